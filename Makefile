@@ -1,0 +1,77 @@
+# `make` lists the targets.  A target that needs the environment builds it first.
+
+PYTEST := .venv/bin/python -m pytest
+
+.DEFAULT_GOAL := help
+.PHONY: help env env-pip dyad test thorough lint format types imports docs bench constraints clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+# ---------------------------------------------------------------------------------- environments
+# One .venv; each stamp says that these extras are in it, as pyproject.toml and constraints.txt ask.
+
+env: .venv/.dev ## everything for development, in .venv
+
+.venv/.runtime: pyproject.toml constraints.txt .ci/env
+	@.ci/env
+	@touch $@
+
+.venv/.dev: pyproject.toml constraints.txt .ci/env
+	@.ci/env dev
+	@touch .venv/.runtime $@
+
+.venv/.bench: pyproject.toml constraints.txt .ci/env
+	@.ci/env bench
+	@touch .venv/.runtime $@
+
+env-pip: ## the same environment with venv and pip alone, where uv cannot be had
+	@POLYCORNER_INSTALLER=pip .ci/env dev
+	@touch .venv/.runtime .venv/.dev
+
+# ------------------------------------------------------------------------------------------- use
+
+dyad: .venv/.runtime ## the nested pair of dumbbells in the drum, certified and drawn, in out/dyad
+	@.venv/bin/polycorner dyad --length 16 --ball 3 --rod 1.5 --drum 125 --out out/dyad
+
+# ----------------------------------------------------------------------------------------- check
+
+# The workers already use every core; threads inside the linear algebra would only compete.
+test thorough: export OPENBLAS_NUM_THREADS = 1
+test thorough: export OMP_NUM_THREADS = 1
+
+test: .venv/.dev ## tests and doctests
+	@$(PYTEST) -n auto
+
+thorough: .venv/.dev ## the same with many more generated inputs
+	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto
+
+lint: .venv/.dev ## ruff: rules and format
+	@.venv/bin/ruff check .
+	@.venv/bin/ruff format --check .
+
+format: .venv/.dev ## let ruff repair what it can
+	@.venv/bin/ruff check --fix .
+	@.venv/bin/ruff format .
+
+types: .venv/.dev ## mypy --strict on the package
+	@.venv/bin/mypy
+
+imports: .venv/.dev ## which folder and which file may import which
+	@.venv/bin/lint-imports
+
+docs: .venv/.dev ## the documentation, in docs/_build/html
+	@.venv/bin/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+
+bench: .venv/.bench ## side-by-side runs against other tools
+	@set -e; for file in benchmarks/bench_*.py; do echo "$$file"; .venv/bin/python "$$file"; done
+
+# ---------------------------------------------------------------------------------------- upkeep
+
+constraints: .venv/.dev ## resolve the exact versions anew
+	@.ci/env --resolve
+
+clean: ## remove what was built, environments included
+	rm -rf .venv .uv build dist out docs/_build docs/generated
+	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

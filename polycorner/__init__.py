@@ -1,0 +1,71 @@
+"""Curvilinear polyhedra: faces, corners, and where an energy comes to rest on them, and why.
+
+The names below are loaded when they are first used, so that importing the package costs NumPy
+and little more.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from polycorner.errors import PolycornerError, SolverError
+    from polycorner.geometry.functions import SmoothFunction
+    from polycorner.geometry.manifold import Manifold
+    from polycorner.minima.certificate import Certificate, certify
+    from polycorner.minima.minimise import minimise, stationary_on
+    from polycorner.minima.verdicts import Entrapment, Verdict
+    from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
+    from polycorner.polyhedra.strata import LocalType, Stratum, stratum_at
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "PolycornerError": "errors",
+    "SolverError": "errors",
+    "SmoothFunction": "geometry.functions",
+    "Manifold": "geometry.manifold",
+    "Certificate": "minima.certificate",
+    "certify": "minima.certificate",
+    "minimise": "minima.minimise",
+    "stationary_on": "minima.minimise",
+    "Entrapment": "minima.verdicts",
+    "Verdict": "minima.verdicts",
+    "AllOf": "polyhedra.polyhedron",
+    "AnyOf": "polyhedra.polyhedron",
+    "Polyhedron": "polyhedra.polyhedron",
+    "LocalType": "polyhedra.strata",
+    "Stratum": "polyhedra.strata",
+    "stratum_at": "polyhedra.strata",
+}
+
+__all__ = [
+    "AllOf",
+    "AnyOf",
+    "Certificate",
+    "Entrapment",
+    "LocalType",
+    "Manifold",
+    "PolycornerError",
+    "Polyhedron",
+    "SmoothFunction",
+    "SolverError",
+    "Stratum",
+    "Verdict",
+    "certify",
+    "minimise",
+    "stationary_on",
+    "stratum_at",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        msg = f"module 'polycorner' has no attribute {name!r}"
+        raise AttributeError(msg)
+    value = getattr(import_module(f"polycorner.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -1,0 +1,1 @@
+"""Smooth functions on products of lines and circles."""

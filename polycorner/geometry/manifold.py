@@ -1,0 +1,230 @@
+"""Products of lines and circles, with a length scale for each coordinate."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    import sympy
+
+Array = NDArray[np.float64]
+
+_IDENTIFIER = re.compile(r"[^\W\d]\w*")
+
+
+@dataclass(frozen=True)
+class Manifold:
+    """The configuration manifold ``X``: a product of lines and circles with one chart.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Coordinate names, distinct identifiers.
+    periods : sequence of float, optional
+        Period of each coordinate: a positive number for a circle, ``inf`` (default) for a line.
+    scales : sequence of float, optional
+        What counts as a unit displacement of each coordinate (default 1), so that millimetres
+        and angles can share a vector.  Every tolerance of the package is measured in it.
+
+    Raises
+    ------
+    ValueError
+        If names repeat or are no identifiers, or a period or scale is not positive.
+
+    Examples
+    --------
+    >>> M = Manifold(("phi", "eta"), periods=(2 * math.pi, math.inf))
+    >>> M.difference([3.0, 1.0], [-3.0, 0.0]).round(3).tolist()
+    [-0.283, 1.0]
+    >>> (M * M).names
+    ('phi1', 'eta1', 'phi2', 'eta2')
+    """
+
+    names: tuple[str, ...]
+    periods: tuple[float, ...] = ()
+    scales: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = _names(self.names)
+        n = len(names)
+        object.__setattr__(self, "names", names)
+        periods = _positive("periods", self.periods or (math.inf,) * n, n, finite=False)
+        scales = _positive("scales", self.scales or (1.0,) * n, n, finite=True)
+        object.__setattr__(self, "periods", periods)
+        object.__setattr__(self, "scales", scales)
+
+    @classmethod
+    def euclidean(cls, names: str | Sequence[str], *, scale: float = 1.0) -> "Manifold":
+        """``R^n`` with coordinates named in one string (``"x y"``) or a sequence.
+
+        >>> Manifold.euclidean("x y").dimension
+        2
+        """
+        parsed = _names(names)
+        return cls(parsed, (math.inf,) * len(parsed), (scale,) * len(parsed))
+
+    @property
+    def dimension(self) -> int:
+        """The number of coordinates."""
+        return len(self.names)
+
+    @cached_property
+    def symbols(self) -> "tuple[sympy.Symbol, ...]":
+        """The coordinates as real SymPy symbols, in order."""
+        import sympy
+
+        return tuple(sympy.Symbol(name, real=True) for name in self.names)
+
+    def __mul__(self, other: object) -> "Manifold":
+        """Return the product ``X x Y``; names that would repeat get the suffixes 1 and 2."""
+        if not isinstance(other, Manifold):
+            return NotImplemented
+        return _product((self, other))
+
+    def __pow__(self, copies: int) -> "Manifold":
+        """Return ``X x ... x X``; names get the suffixes 1 to ``copies``."""
+        if not isinstance(copies, int) or copies < 1:
+            msg = f"copies: expected a positive whole number; got {copies!r}"
+            raise ValueError(msg)
+        return _product((self,) * copies)
+
+    @cached_property
+    def scale_array(self) -> Array:
+        """The scales as an array."""
+        return np.array(self.scales)
+
+    @cached_property
+    def _circles(self) -> tuple[tuple[int, float], ...]:
+        return tuple((i, p) for i, p in enumerate(self.periods) if p < math.inf)
+
+    def points(self, q: ArrayLike, argument: str = "q") -> Array:
+        """Check that ``q`` is one point ``(n,)`` or a batch ``(..., n)`` of finite reals.
+
+        Returns
+        -------
+        (..., n) array of float64
+
+        Raises
+        ------
+        TypeError
+            If ``q`` is not made of real numbers.
+        ValueError
+            If the last axis is not ``n`` long, or an entry is NaN or infinite.
+        """
+        array = reals(q, argument)
+        if array.ndim == 0 or array.shape[-1] != len(self.names):
+            msg = (
+                f"{argument}: expected shape (..., {self.dimension}) for the coordinates "
+                f"{', '.join(self.names)}; got shape {array.shape}"
+            )
+            raise ValueError(msg)
+        return finite(array, argument)
+
+    def point(self, q: ArrayLike | Mapping[str, float], argument: str = "q") -> Array:
+        """Check one point: ``n`` finite reals, or a mapping from coordinate names to them."""
+        if isinstance(q, Mapping):
+            if set(q) != set(self.names):
+                msg = f"{argument}: expected the coordinates {', '.join(self.names)}; got {sorted(q)}"
+                raise ValueError(msg)
+            q = [q[name] for name in self.names]
+        array = self.points(q, argument)
+        if array.ndim != 1:
+            msg = f"{argument}: expected one point of shape ({self.dimension},); got {array.shape}"
+            raise ValueError(msg)
+        return array
+
+    def wrap(self, q: ArrayLike) -> Array:
+        """Bring circle coordinates into ``(-period/2, period/2]``; lines stay as they are."""
+        wrapped = self.points(q).copy()
+        for i, period in self._circles:
+            wrapped[..., i] = _principal(wrapped[..., i], period)
+        return wrapped
+
+    def difference(self, p: ArrayLike, q: ArrayLike) -> Array:
+        """Return the shortest tangent vector that leads from ``q`` to ``p``."""
+        vector = self.points(p, "p") - self.points(q)
+        for i, period in self._circles:
+            vector[..., i] = _principal(vector[..., i], period)
+        return vector
+
+    def shift(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Return the point reached from ``q`` along the tangent vector ``v``."""
+        return self.wrap(self.points(q) + self.points(v, "v"))
+
+
+def reals(values: ArrayLike, argument: str) -> Array:
+    """Turn ``values`` into an array of float64, refusing anything that is not real numbers."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return values
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        msg = f"{argument}: expected a rectangular array of real numbers; got ragged nesting"
+        raise ValueError(msg) from error
+    if array.dtype.kind not in "iuf":
+        msg = f"{argument}: expected real numbers; got dtype {array.dtype}"
+        raise TypeError(msg)
+    return array.astype(np.float64)
+
+
+def finite(array: Array, argument: str) -> Array:
+    """Return ``array`` unchanged, refusing NaN and infinities."""
+    if not np.isfinite(array).all():
+        msg = f"{argument}: expected finite numbers; got {_first_bad(array)}"
+        raise ValueError(msg)
+    return array
+
+
+def _first_bad(array: Array) -> str:
+    position = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+    return f"{array[position]} at index {position[0] if len(position) == 1 else position}"
+
+
+def _principal(values: Array, period: float) -> Array:
+    return values - period * np.ceil(values / period - 0.5)
+
+
+def _names(names: str | Sequence[str]) -> tuple[str, ...]:
+    parsed = tuple(names.replace(",", " ").split()) if isinstance(names, str) else tuple(names)
+    if not parsed:
+        msg = "names: expected at least one coordinate name; got none"
+        raise ValueError(msg)
+    for name in parsed:
+        if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
+            msg = f"names: expected identifiers; got {name!r}"
+            raise ValueError(msg)
+    repeated = [name for name, count in Counter(parsed).items() if count > 1]
+    if repeated:
+        msg = f"names: expected distinct names; got {', '.join(repeated)} more than once"
+        raise ValueError(msg)
+    return parsed
+
+
+def _positive(argument: str, values: Any, n: int, *, finite: bool) -> tuple[float, ...]:
+    if np.ndim(values) != 1 or len(values) != n:
+        msg = f"{argument}: expected {n} numbers, one for each coordinate; got {values!r}"
+        raise ValueError(msg)
+    numbers = tuple(float(value) for value in values)
+    if not all(v > 0 and (v < math.inf or not finite) for v in numbers):
+        kind = "positive finite numbers" if finite else "positive numbers or inf"
+        msg = f"{argument}: expected {kind}; got {numbers}"
+        raise ValueError(msg)
+    return numbers
+
+
+def _product(factors: tuple[Manifold, ...]) -> Manifold:
+    names = [name for factor in factors for name in factor.names]
+    if len(set(names)) < len(names):
+        names = [f"{name}{k}" for k, factor in enumerate(factors, 1) for name in factor.names]
+    return Manifold(
+        tuple(names),
+        tuple(period for factor in factors for period in factor.periods),
+        tuple(scale for factor in factors for scale in factor.scales),
+    )

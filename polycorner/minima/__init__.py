@@ -1,0 +1,1 @@
+"""An energy on a polyhedron: where it rests, and why."""

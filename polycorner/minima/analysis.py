@@ -1,0 +1,273 @@
+"""The analysis behind a certificate: every piece of the polyhedron at a point, put together."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from polycorner.geometry.manifold import Array
+from polycorner.minima.conditions import Curvature, Multipliers, find_curvature, find_multipliers
+from polycorner.minima.problem import Problem
+from polycorner.minima.verdicts import Entrapment, Verdict
+from polycorner.polyhedra.cones import inward_direction, null_space, rank, unit_rows
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.strata import local_pieces
+
+PROBES = (0.003, 0.03)  # how far flat directions are followed, in scale units
+PROBE_NOISE = 1e-12  # change of the energy, relative to its own size, that counts as none
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """First and second order at a point, in scaled coordinates with unit gradients.
+
+    ``active`` lists rows of the system; ``strong_positions`` are positions in ``active`` of an
+    independent set of functions with positive multipliers, ``weak`` rows with zero multipliers.
+    """
+
+    verdict: Verdict
+    active: tuple[int, ...]
+    gradients: Array
+    multipliers: Multipliers
+    independent: bool
+    strong_positions: tuple[int, ...]
+    weak: tuple[int, ...]
+    curvature: Curvature
+    reference: float
+    small_curvature: float
+    flat_verified: bool
+    flat_change: float
+    signature: tuple[int, int, int]
+    entrapment: tuple[tuple[str, Entrapment], ...]
+
+
+@dataclass(frozen=True)
+class _Local:
+    """Derivatives at the point and what counts as small there."""
+
+    problem: Problem
+    point: Array
+    values: Array
+    gradients: Array
+    hessians: Array
+    tolerance: float
+    rank_tolerance: float
+
+    @property
+    def reference(self) -> float:
+        """The energy's own size: its largest first or second derivative in scaled coordinates."""
+        return float(max(abs(self.gradients[-1]).max(), abs(self.hessians[-1]).max())) or 1.0
+
+    @property
+    def small(self) -> float:
+        """A first derivative that counts as zero."""
+        return self.tolerance * self.reference
+
+    @property
+    def equations(self) -> Array:
+        """Gradients of the equations."""
+        return self.gradients[self.problem.inequalities : -1]
+
+
+def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float) -> Analysis:
+    """Analyse every piece of the polyhedron near ``q``; the least favourable verdict counts.
+
+    Where several pieces meet, a point is a minimum of the union exactly when it is a minimum of
+    each, so the analysis returned is that of the piece that decides.
+    """
+    values, gradients, hessians = problem.evaluate(q, 2)
+    local = _Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
+    pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
+    if not pieces or not np.isfinite(values[-1]):
+        return replace(_analyse_piece(local, frozenset()), verdict=Verdict.OUTSIDE)
+    analyses = [_analyse_piece(local, piece) for piece in pieces]
+    order = list(Verdict)
+    return max(analyses, key=lambda a: (not a.verdict.is_minimum, order.index(a.verdict)))
+
+
+def _analyse_piece(local: _Local, piece: Piece) -> Analysis:
+    active = tuple(sorted(piece))
+    inequalities = local.gradients[list(active)]
+    rows = np.vstack([inequalities, local.equations])
+    multipliers = find_multipliers(
+        inequalities, local.equations, local.gradients[-1], local.small, local.rank_tolerance
+    )
+    k = len(active)
+    positive = multipliers.values[:k] > local.small
+    strong = unit_rows(np.vstack([inequalities[positive], local.equations]))
+    weak = [i for i, held in zip(active, positive, strict=True) if not held]
+    hessian = _lagrangian_hessian(local, active, rows, multipliers)
+    size = max(local.reference, float(abs(hessian).max()))
+    small_curvature = local.tolerance * size
+    curvature = find_curvature(hessian, strong, local.gradients[weak], small_curvature)
+    verdict = _verdict(local, inequalities, multipliers, curvature, weak, small_curvature)
+    strong_rows = tuple(i for i, held in zip(active, positive, strict=True) if held)
+    change = _flat_change(local, strong_rows, curvature.flat, piece) if _asks(verdict) else 0.0
+    if verdict is Verdict.UNDECIDED and curvature.decided and change <= PROBE_NOISE:
+        verdict = Verdict.MINIMUM_ALONG_LOCUS
+    positions = _independent_positions(inequalities, positive, local)
+    verified = not curvature.flat.shape[1] or change <= PROBE_NOISE
+    return Analysis(
+        verdict=verdict,
+        active=active,
+        gradients=rows,
+        multipliers=multipliers,
+        independent=rank(rows, local.rank_tolerance) == len(rows),
+        strong_positions=positions,
+        weak=tuple(weak),
+        curvature=curvature,
+        reference=local.reference,
+        small_curvature=small_curvature,
+        flat_verified=verified,
+        flat_change=change,
+        signature=_signature(positions, curvature, small_curvature),
+        entrapment=tuple(
+            _entrapment(local, active, positions, multipliers, weak, curvature, small_curvature)
+        ),
+    )
+
+
+def _asks(verdict: Verdict) -> bool:
+    """Whether flat directions still have to be followed."""
+    return verdict is Verdict.UNDECIDED
+
+
+def _lagrangian_hessian(
+    local: _Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
+) -> Array:
+    sizes = np.linalg.norm(rows, axis=1)
+    m = local.problem.inequalities
+    numbers = [*active, *range(m, m + len(local.equations))]
+    result = local.hessians[-1].copy()
+    for row, value, size in zip(numbers, multipliers.values, sizes, strict=True):
+        if size > 0:
+            result -= value / size * local.hessians[row]
+    return result
+
+
+def _verdict(
+    local: _Local,
+    inequalities: Array,
+    multipliers: Multipliers,
+    curvature: Curvature,
+    weak: list[int],
+    small_curvature: float,
+) -> Verdict:
+    if not multipliers.exist:
+        rows = np.vstack([inequalities, local.equations])
+        regular = rank(rows, local.rank_tolerance) == len(rows)
+        if not regular and len(inequalities):
+            regular = inward_direction(inequalities, local.equations)[1] > local.rank_tolerance
+        return Verdict.NOT_STATIONARY if regular else Verdict.NO_MULTIPLIER
+    if not curvature.decided:
+        return Verdict.UNDECIDED
+    if curvature.least < -small_curvature:
+        # Another choice of multipliers might still show a minimum where they are not unique.
+        return Verdict.SADDLE if multipliers.unique else Verdict.UNDECIDED
+    if curvature.flat.shape[1]:
+        return Verdict.UNDECIDED
+    return Verdict.WEAK_MINIMUM if weak else Verdict.STRICT_MINIMUM
+
+
+def _flat_change(local: _Local, strong: tuple[int, ...], flat: Array, piece: Piece) -> float:
+    """Follow every flat direction along the face; return the largest relative change of energy.
+
+    A step is corrected by Newton's method on the face; steps that leave the polyhedron through
+    a weakly active function are skipped, except that one side at least must be followed.
+    """
+    if not flat.shape[1]:
+        return np.inf
+    problem, scales = local.problem, local.problem.scales
+    start = float(local.values[-1])
+    size = abs(start) + local.reference
+    worst = 0.0
+    directions = [*flat.T, *([flat.sum(axis=1) / flat.shape[1] ** 0.5] if flat.shape[1] > 1 else [])]
+    for direction in directions:
+        followed = 0
+        for step in (sign * probe for sign in (1, -1) for probe in PROBES):
+            guess = local.point + step * direction * scales
+            q, last = problem.on_face(frozenset(strong), guess)
+            moved = abs((q - guess) / scales).max()
+            if not last < 1e-8 or moved > 0.1 * abs(step):
+                return np.inf
+            values, gradients = problem.evaluate(q, 1)
+            if not _inside(local, values, gradients, piece):
+                continue
+            followed += 1
+            worst = max(worst, abs(float(values[-1]) - start) / size)
+        if not followed:
+            return np.inf
+    return worst
+
+
+def _inside(local: _Local, values: Array, gradients: Array, piece: Piece) -> bool:
+    rows = list(piece)
+    sizes = np.linalg.norm(gradients[rows], axis=1)
+    return bool((values[rows] >= -local.tolerance * sizes).all())
+
+
+def _independent_positions(
+    inequalities: Array, positive: Array, local: _Local
+) -> tuple[int, ...]:
+    """Return positions of strongly active functions that are independent, greedily in order."""
+    chosen: list[int] = []
+    for i in np.flatnonzero(positive).tolist():
+        rows = np.vstack([inequalities[[*chosen, i]], local.equations])
+        others = np.vstack([inequalities[chosen], local.equations])
+        if rank(rows, local.rank_tolerance) > rank(others, local.rank_tolerance):
+            chosen.append(i)
+    return tuple(chosen)
+
+
+def _signature(
+    positions: tuple[int, ...], curvature: Curvature, small: float
+) -> tuple[int, int, int]:
+    free = int((abs(curvature.values) <= small).sum())
+    return len(positions), len(curvature.values) - free, free
+
+
+def _entrapment(
+    local: _Local,
+    active: tuple[int, ...],
+    positions: tuple[int, ...],
+    multipliers: Multipliers,
+    weak: list[int],
+    curvature: Curvature,
+    small: float,
+) -> Iterator[tuple[str, Entrapment]]:
+    names = local.problem.polyhedron.names
+    for position in positions:
+        yield names[active[position]], Entrapment.HALF_V
+    for position, row in enumerate(active):
+        if multipliers.values[position] < -local.small:
+            yield names[row], Entrapment.NONE
+    if multipliers.residual > local.small:
+        return  # the energy slopes along the face: its curvature there holds nothing
+    curved = curvature.vectors[:, curvature.values > small]
+    held: list[int] = []
+    for row in weak:
+        slopes = local.gradients[[*held, row]] @ curved
+        if rank(slopes, 1e-6) > len(held):
+            held.append(row)
+            yield names[row], Entrapment.HALF_U
+    inner = curved @ null_space(local.gradients[held] @ curved, 1e-6) if held else curved
+    others = (
+        (inner, Entrapment.U),
+        (curvature.vectors[:, abs(curvature.values) <= small], Entrapment.FREE),
+        (curvature.vectors[:, curvature.values < -small], Entrapment.NONE),
+    )
+    taken: dict[str, int] = {}
+    for vectors, kind in others:
+        for vector in vectors.T:
+            label = _direction_name(vector, local.problem.polyhedron.manifold.names)
+            taken[label] = taken.get(label, 0) + 1
+            yield label if taken[label] == 1 else f"{label} ({taken[label]})", kind
+
+
+def _direction_name(vector: Array, names: tuple[str, ...]) -> str:
+    """Name a direction by the coordinates that change at least half as much as the most."""
+    top = abs(vector).max()
+    large = [i for i in range(len(vector)) if abs(vector[i]) >= 0.5 * top]
+    sign = np.sign(vector[large[0]])
+    words = [("+ " if vector[i] * sign > 0 else "- ") + names[i] for i in large]
+    return " ".join(words).removeprefix("+ ")

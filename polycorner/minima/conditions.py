@@ -1,0 +1,230 @@
+"""First- and second-order conditions at a point of one convex piece of a polyhedron.
+
+With ``g`` the gradient of the energy and ``a_i`` the gradients of active functions, all in scaled
+coordinates, the conditions are those of [NW] ch. 12:
+
+- first order: ``g = sum lam_i a_i + sum mu_j e_j`` with ``lam_i >= 0``;
+- second order: ``d^T (H_E - sum lam_i H_i) d > 0`` for every ``d != 0`` of the critical cone
+  ``{a_i d = 0 where lam_i > 0, a_i d >= 0 where lam_i = 0, e_j d = 0}``.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from polycorner.geometry.manifold import Array
+from polycorner.polyhedra.cones import null_space, rank, unit_rows
+
+MAX_WEAK = 10
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Multipliers of unit gradients, in units of energy per scale unit.
+
+    Attributes
+    ----------
+    values : (k,) array
+        Inequalities first, equations after them.
+    lower, upper : (k,) array
+        The range of each over the set of all multipliers; equal when they are unique.
+    exist : bool
+        Whether the conditions of first order hold with these values.
+    residual : float
+        Largest component of ``g - sum lam_i a_i``.
+    """
+
+    values: Array
+    lower: Array
+    upper: Array
+    exist: bool
+    residual: float
+
+    @property
+    def unique(self) -> bool:
+        """Whether no other multipliers satisfy the same conditions."""
+        return bool((self.upper - self.lower <= 1e-7 * (1 + abs(self.values).max(initial=0))).all())
+
+
+def find_multipliers(
+    inequalities: Array, equations: Array, gradient: Array, small: float, rank_tolerance: float
+) -> Multipliers:
+    """Return multipliers of the unit gradients; the central ones where they are not unique.
+
+    Parameters
+    ----------
+    inequalities, equations : (k, n), (e, n) array
+        Gradients of the active functions and of the equations.
+    gradient : (n,) array
+        Gradient of the energy.
+    small : float
+        A residual, or a negative multiplier, down to this size counts as zero.
+    rank_tolerance : float
+        Relative size below which a singular value counts as zero.
+    """
+    rows = unit_rows(np.vstack([inequalities, equations]))
+    k = len(inequalities)
+    values = np.linalg.lstsq(rows.T, gradient, rcond=rank_tolerance)[0] if len(rows) else np.empty(0)
+    if rank(rows, rank_tolerance) == len(rows):
+        residual = float(abs(gradient - values @ rows).max(initial=0))
+        exist = residual <= small and bool((values[:k] >= -small).all())
+        return Multipliers(values, values, values, exist, residual)
+    return _central_multipliers(rows, k, gradient, values, small, rank_tolerance)
+
+
+def _central_multipliers(
+    rows: Array, k: int, gradient: Array, least: Array, small: float, rank_tolerance: float
+) -> Multipliers:
+    """Dependent gradients: decide existence by non-negative least squares, then find the ranges."""
+    from scipy.optimize import nnls
+
+    signed = np.vstack([rows, -rows[k:]])
+    split, distance = nnls(signed.T, gradient)
+    values = split[: len(rows)].copy()
+    values[k:] -= split[len(rows) :]
+    residual = float(abs(gradient - values @ rows).max())
+    if distance > small:
+        return Multipliers(least, least, least, exist=False, residual=residual)
+    lower, upper, centre = _ranges(rows, k, values, rank_tolerance)
+    return Multipliers(centre, lower, upper, exist=True, residual=residual)
+
+
+def _ranges(
+    rows: Array, k: int, values: Array, rank_tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Return the least, the largest and a central choice, along changes that leave the sum as is."""
+    from scipy.optimize import linprog
+
+    count = len(rows)
+    largest = max(1e-300, float(abs(values).max()))
+    left, singular, _ = np.linalg.svd(rows)
+    free = left[:, int((singular > rank_tolerance * singular[0]).sum()) :]
+    bound = 1e6
+    limits = [(-bound, bound)] * free.shape[1]
+    start = values / largest
+    lower, upper = start.copy(), start.copy()
+    for i in range(count):
+        for side, target in ((1.0, lower), (-1.0, upper)):
+            found = linprog(
+                side * free[i], A_ub=-free[:k], b_ub=np.maximum(start[:k], 0.0), bounds=limits
+            )
+            target[i] = start[i] + free[i] @ found.x
+    best = linprog(
+        np.array([0.0] * free.shape[1] + [-1.0]),
+        A_ub=np.hstack([-free[:k], np.ones((k, 1))]),
+        b_ub=np.maximum(start[:k], 0.0),
+        bounds=[*limits, (None, 1.0)],
+    )
+    centre = start + free @ best.x[:-1]
+    unbounded = abs(upper) >= 0.5 * bound
+    upper = np.where(unbounded, np.sign(upper) * np.inf, upper)
+    return lower * largest, upper * largest, centre * largest
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """The second-order condition on a critical cone.
+
+    Attributes
+    ----------
+    values : (k,) array
+        Eigenvalues of the Lagrangian's Hessian on the tangent space of the strongly active
+        functions and equations, ascending.
+    vectors : (n, k) array
+        Their orthonormal eigenvectors, in scaled coordinates.
+    least : float
+        Least value of the form on unit vectors of the critical cone; ``inf`` when the cone is 0.
+    flat : (n, r) array
+        Directions of the cone in which the form vanishes.
+    decided : bool
+        False when there are too many weakly active functions to enumerate the cone's faces.
+    """
+
+    values: Array
+    vectors: Array
+    least: float
+    flat: Array
+    decided: bool
+
+
+def find_curvature(hessian: Array, strong: Array, weak: Array, small: float) -> Curvature:
+    """Minimise the quadratic form of ``hessian`` on ``{strong d = 0, weak d >= 0, |d| = 1}``.
+
+    Without weak rows the least value is the least eigenvalue on the null space.  With them the
+    minimum lies in the relative interior of some face of the cone and is an eigenvector there,
+    so enumerating faces and eigenvectors is exact.
+    """
+    basis = null_space(strong, 1e-6)
+    values, inner = np.linalg.eigh(basis.T @ hessian @ basis)
+    vectors = basis @ inner
+    if not len(weak) or (len(values) and values[0] > small):
+        flat = vectors[:, abs(values) <= small]
+        least = float(values[0]) if len(values) else np.inf
+        return Curvature(values, vectors, least, flat, decided=True)
+    if len(weak) > MAX_WEAK:
+        return Curvature(values, vectors, np.nan, np.empty((len(hessian), 0)), decided=False)
+    least, flat = _least_on_cone(hessian, basis, unit_rows(weak), small)
+    return Curvature(values, vectors, least, flat, decided=True)
+
+
+def _least_on_cone(hessian: Array, basis: Array, weak: Array, small: float) -> tuple[float, Array]:
+    least = np.inf
+    flat: list[Array] = []
+    for size in range(len(weak) + 1):
+        for chosen in combinations(range(len(weak)), size):
+            face = basis @ null_space(weak[list(chosen)] @ basis, 1e-6)
+            if not face.shape[1]:
+                continue
+            values, inner = np.linalg.eigh(face.T @ hessian @ face)
+            for value, group in _clusters(values, small):
+                direction = _member(face @ inner[:, group], weak)
+                if direction is None:
+                    continue
+                least = min(least, value)
+                if abs(value) <= small:
+                    flat.append(direction)
+    columns = np.array(flat).T if flat else np.empty((len(hessian), 0))
+    return least, _independent(columns)
+
+
+def _clusters(values: Array, small: float) -> list[tuple[float, list[int]]]:
+    """Group nearly equal eigenvalues, whose eigenvectors are not determined one by one."""
+    groups: list[list[int]] = []
+    for i, value in enumerate(values):
+        if groups and value - values[groups[-1][-1]] <= small:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    return [(float(values[group[0]]), group) for group in groups]
+
+
+def _member(vectors: Array, weak: Array) -> Array | None:
+    """Return a vector of the span with ``weak d >= 0``, or None if there is only 0."""
+    edge = 1e-9
+    if vectors.shape[1] == 1:
+        column = vectors[:, 0]
+        for sign in (1.0, -1.0):
+            if (sign * weak @ column >= -edge).all():
+                return np.asarray(sign * column)
+        return None
+    from scipy.optimize import linprog
+
+    k = vectors.shape[1]
+    for i in range(k):
+        for sign in (1.0, -1.0):
+            objective = np.zeros(k)
+            objective[i] = -sign
+            found = linprog(objective, A_ub=-weak @ vectors, b_ub=np.zeros(len(weak)), bounds=[(-1, 1)] * k)
+            if found.success and sign * found.x[i] > 1e-6:
+                direction = vectors @ found.x
+                return np.asarray(direction / np.linalg.norm(direction))
+    return None
+
+
+def _independent(columns: Array) -> Array:
+    """Return an orthonormal basis of the span of the columns."""
+    if not columns.size:
+        return columns
+    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, singular > 1e-6 * singular[0]])

@@ -1,0 +1,136 @@
+"""An energy on a polyhedron, laid out for the compiled core."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.geometry.functions import Bundle, SmoothFunction
+from polycorner.geometry.manifold import Array
+from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+
+if TYPE_CHECKING:
+    import sympy
+
+    Energy = SmoothFunction | sympy.Expr
+
+Flat = tuple[
+    NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Minimise ``energy`` over ``polyhedron``.
+
+    Rows of the system are the inequalities, the equations, and last the energy; derivatives here
+    are in scaled coordinates ``u = q / scales``.
+    """
+
+    polyhedron: Polyhedron
+    energy: SmoothFunction
+
+    @property
+    def dimension(self) -> int:
+        """The number of coordinates ``n``."""
+        return self.polyhedron.dimension
+
+    @property
+    def inequalities(self) -> int:
+        """The number of inequalities ``m``."""
+        return len(self.polyhedron.functions)
+
+    @property
+    def rows(self) -> int:
+        """The number of rows: inequalities, equations, energy."""
+        return self.inequalities + len(self.polyhedron.equations) + 1
+
+    @cached_property
+    def scales(self) -> Array:
+        """The manifold's scales."""
+        return self.polyhedron.manifold.scale_array
+
+    @cached_property
+    def _bundle(self) -> Bundle:
+        d = self.polyhedron
+        return Bundle(d.manifold, (*d.functions, *d.equations, self.energy))
+
+    def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
+        """Return values ``(M,)``, scaled gradients ``(M, n)`` and scaled Hessians ``(M, n, n)``."""
+        results = list(self._bundle.evaluate(q, order))
+        if order >= 1:
+            results[1] = results[1] * self.scales
+        if order >= 2:
+            results[2] = results[2] * np.outer(self.scales, self.scales)
+        return tuple(results)
+
+    @cached_property
+    def flat(self) -> tuple[Flat, int]:
+        """The problem as arrays for :mod:`~polycorner.minima.compiled`, and its scratch size."""
+        table, reads, rows, parameters = [], [], [], []
+        size = 1
+        for call in self._bundle.calls:
+            kernel = call.family.kernel
+            k, m = kernel.variables, kernel.outputs
+            point = kernel.compiled(2).point
+            table.append((point, k, m, len(reads), len(rows), len(parameters)))
+            reads += call.reads
+            where = dict(zip(call.columns, call.rows, strict=True))
+            rows += [where.get(column, -1) for column in range(m)]
+            parameters += call.parameters.tolist()
+            size = max(size, k + m * (1 + k + k * k))
+        arrays = (
+            np.array(table, dtype=np.int64),
+            np.array(reads, dtype=np.int64),
+            np.array(rows, dtype=np.int64),
+            np.array([*parameters, 0.0]),
+            self.scales,
+        )
+        return arrays, size
+
+    def mask(self, piece: Piece) -> NDArray[np.bool_]:
+        """Return which inequalities belong to a piece."""
+        use = np.zeros(self.inequalities, dtype=np.bool_)
+        use[list(piece)] = True
+        return use
+
+    def descend(self, piece: Piece, q: Array, limit: int) -> tuple[int, int, Array, Array]:
+        """Run the compiled descent inside one piece; see :func:`compiled.descend`."""
+        from polycorner.minima import compiled
+
+        flat, size = self.flat
+        status, iterations, u, lam = compiled.descend(
+            flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size, limit
+        )
+        return status, iterations, u * self.scales, lam
+
+    def on_face(self, active: Piece, q: Array) -> tuple[Array, float]:
+        """Return the stationary point Newton's method finds on a face, and its last step."""
+        from polycorner.minima import compiled
+
+        flat, size = self.flat
+        u, _, step = compiled.on_face(
+            flat, self.mask(active), self.inequalities, self.rows, q / self.scales, size
+        )
+        return u * self.scales, step
+
+
+@lru_cache(maxsize=64)
+def pose(polyhedron: Polyhedron, energy: "Energy") -> Problem:
+    """Return the problem of an energy on a polyhedron, checking that they belong together."""
+    if not isinstance(polyhedron, Polyhedron):
+        msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
+        raise TypeError(msg)
+    manifold = polyhedron.manifold
+    function: Any = energy
+    if not isinstance(energy, SmoothFunction):
+        function = SmoothFunction("energy", energy, manifold)
+    if function.manifold != manifold:
+        msg = (
+            f"energy: lives on the coordinates {', '.join(function.manifold.names)}; "
+            f"expected those of the polyhedron, {', '.join(manifold.names)}"
+        )
+        raise ValueError(msg)
+    return Problem(polyhedron, function)

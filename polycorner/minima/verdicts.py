@@ -1,0 +1,41 @@
+"""What a certificate can say: enums whose values are sentences."""
+
+from enum import Enum
+
+
+class Verdict(Enum):
+    """Whether a point is a local minimum of an energy on a polyhedron, as a sentence."""
+
+    STRICT_MINIMUM = "strict local minimum: no other point nearby is as low"
+    MINIMUM_ALONG_LOCUS = "local minimum, attained along a locus on which the energy is constant"
+    WEAK_MINIMUM = "strict local minimum with a weakly active function: its multiplier is zero"
+    NOT_STATIONARY = "not a minimum: the energy falls to first order in an allowed direction"
+    SADDLE = "not a minimum: first order holds, but the energy falls to second order"
+    NO_MULTIPLIER = (
+        "undecided: no multiplier exists and the active gradients leave no inward direction (a cusp)"
+    )
+    UNDECIDED = "undecided: first order holds, but the second order vanishes in a direction"
+    OUTSIDE = "the point does not lie in the polyhedron"
+    INFEASIBLE = "no point of the polyhedron was reached from the start"
+    UNBOUNDED = "the energy keeps falling as far as the search went: unbounded below, or no rest"
+    NOT_CONVERGED = "the search stopped before it reached a stationary point"
+
+    @property
+    def is_minimum(self) -> bool:
+        """Whether the verdict asserts a local minimum."""
+        return self in _MINIMA
+
+
+_MINIMA = frozenset(
+    {Verdict.STRICT_MINIMUM, Verdict.MINIMUM_ALONG_LOCUS, Verdict.WEAK_MINIMUM}
+)
+
+
+class Entrapment(Enum):
+    """How the energy holds a point in one direction ([GMBN] app. C)."""
+
+    HALF_V = "half-V"
+    HALF_U = "half-U"
+    U = "U"
+    FREE = "free"
+    NONE = "none"

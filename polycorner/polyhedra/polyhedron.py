@@ -1,0 +1,322 @@
+"""And/or trees of smooth inequalities, and the closed sets they carve out of a manifold."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polycorner.geometry.functions import Bundle, Family, SmoothFunction
+from polycorner.geometry.manifold import Array, Manifold
+
+if TYPE_CHECKING:
+    import sympy
+
+Part = Union["AllOf", "AnyOf", SmoothFunction, "sympy.Expr"]
+# What a model says about a point.
+Annotation = Callable[[Array], str | None]
+# A piece of the set: the positions of the functions that must all be at least zero.
+Piece = frozenset[int]
+
+MAX_SELECTIONS = 256
+
+
+class _Group:
+    """Parts joined by one word; a frozen value."""
+
+    def __init__(self, *parts: Part) -> None:
+        self.parts = parts
+
+    def __repr__(self) -> str:
+        """Return the group as it would be written."""
+        return f"{type(self).__name__}({', '.join(map(repr, self.parts))})"
+
+
+class AllOf(_Group):
+    """The intersection of its parts: every inequality holds."""
+
+
+class AnyOf(_Group):
+    """The union of its parts: at least one inequality holds (locally concave corners)."""
+
+
+class Polyhedron:
+    """A curvilinear polyhedron ``D = {q : f_i(q) >= 0 joined by and/or, h_j(q) = 0}``.
+
+    Parameters
+    ----------
+    manifold : Manifold
+        Where ``D`` lives.
+    parts : AllOf, AnyOf, SmoothFunction, SymPy expression, sequence or mapping
+        The inequalities ``f >= 0``.  A sequence means all of them; a mapping gives names.
+        Expressions without a name are called ``f1``, ``f2``, ...
+    equations : the same kinds, optional
+        Functions ``h = 0`` (sections), called ``h1``, ``h2``, ... without a name.
+    annotations : mapping from str to callable, optional
+        What a model has to say about a point, such as its chirality; kept in strata.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For parts that are no functions, repeated names, functions on another manifold, symbols
+        that are no coordinates, or nothing at all.
+
+    Examples
+    --------
+    >>> M = Manifold.euclidean("x y")
+    >>> x, y = M.symbols
+    >>> D = Polyhedron(M, {"bowl": y - x**2, "lid": 2 - y})
+    >>> D.values([1.0, 1.5]).tolist(), D.contains([1.0, 1.5]), D.contains([0.0, 3.0])
+    ([0.5, 0.5], True, False)
+    """
+
+    def __init__(
+        self,
+        manifold: Manifold,
+        parts: Part | Sequence[Any] | Mapping[str, Any],
+        equations: Part | Sequence[Any] | Mapping[str, Any] = (),
+        *,
+        annotations: Mapping[str, Annotation] | None = None,
+    ) -> None:
+        if not isinstance(manifold, Manifold):
+            msg = f"manifold: expected a Manifold; got {type(manifold).__name__}"
+            raise TypeError(msg)
+        self.manifold = manifold
+        self.annotations = dict(annotations or {})
+        tree, functions = _collect(manifold, "parts", parts, "f")
+        flat, sections = _collect(manifold, "equations", equations, "h")
+        if any(isinstance(node, AnyOf) for node in _groups(flat)):
+            msg = "equations: expected functions that all vanish; got an AnyOf"
+            raise ValueError(msg)
+        if not functions and not sections:
+            msg = "parts: expected at least one inequality or equation; got none"
+            raise ValueError(msg)
+        self.functions, self.equations = tuple(functions), tuple(sections)
+        self.names = tuple(f.name for f in self.functions)
+        self.equation_names = tuple(h.name for h in self.equations)
+        _check_distinct(self.names + self.equation_names)
+        self.tree = _indexed(tree, {id(f): i for i, f in enumerate(self.functions)})
+        self._bundle = Bundle(manifold, self.functions)
+        self._sections = Bundle(manifold, self.equations)
+
+    def __repr__(self) -> str:
+        """Return the coordinates and the names of the functions."""
+        equations = f", equations {list(self.equation_names)}" if self.equations else ""
+        return f"Polyhedron({list(self.manifold.names)}: {list(self.names)} >= 0{equations})"
+
+    @property
+    def dimension(self) -> int:
+        """The dimension of the manifold around it."""
+        return self.manifold.dimension
+
+    @cached_property
+    def is_union(self) -> bool:
+        """Whether the tree contains an ``AnyOf`` with more than one part."""
+        return _branches(self.tree)
+
+    @cached_property
+    def bundle(self) -> Bundle:
+        """Inequalities first, equations after them, evaluated together."""
+        if not self.equations:
+            return self._bundle
+        return Bundle(self.manifold, self.functions + self.equations)
+
+    def values(self, q: ArrayLike) -> Array:
+        """Return ``f_i(q)``, shape ``(..., m)``."""
+        return self._bundle.evaluate(self.manifold.points(q), 0)[0]
+
+    def gradients(self, q: ArrayLike) -> Array:
+        """Return the partial derivatives of every ``f_i``, shape ``(..., m, n)``."""
+        return self._bundle.evaluate(self.manifold.points(q), 1)[1]
+
+    def hessians(self, q: ArrayLike) -> Array:
+        """Return the second partial derivatives of every ``f_i``, shape ``(..., m, n, n)``."""
+        return self._bundle.evaluate(self.manifold.points(q), 2)[2]
+
+    def evaluate(self, q: ArrayLike, order: int = 1) -> tuple[Array, ...]:
+        """Return values, gradients and Hessians of every ``f_i`` up to ``order`` in one call."""
+        return self._bundle.evaluate(self.manifold.points(q), order)
+
+    def equation_values(self, q: ArrayLike) -> Array:
+        """Return ``h_j(q)``, shape ``(..., k)``."""
+        points = self.manifold.points(q)
+        if not self.equations:
+            return np.empty((*points.shape[:-1], 0))
+        return self._sections.evaluate(points, 0)[0]
+
+    def implicit(self, q: ArrayLike) -> Any:
+        """Return the implicit value: the minimum over ``AllOf``, the maximum over ``AnyOf``."""
+        return self.implicit_of(self.values(q))[()]
+
+    def implicit_of(self, values: Array) -> Array:
+        """Return the minimum over ``AllOf``, maximum over ``AnyOf`` of given values ``(..., m)``."""
+        return _implicit(self.tree, values)
+
+    def contains(self, q: ArrayLike, *, tolerance: float = 0.0) -> Any:
+        """Whether ``q`` lies in ``D``, functions allowed to miss by ``tolerance``."""
+        inside = self.implicit(q) >= -tolerance
+        return (inside & (abs(self.equation_values(q)) <= tolerance).all(axis=-1))[()]
+
+    def signs_to_pieces(self, signs: Sequence[int]) -> list[Piece]:
+        """Return ``D`` near a point as a union of pieces, from the sign of every function there.
+
+        Functions that are positive hold nearby and negative ones fail nearby; only those that
+        vanish (sign 0) can matter.  Each piece is a set of vanishing functions that must all be
+        at least zero; a piece inside another is dropped.  No piece: the point is outside ``D``;
+        the empty piece alone: it is inside.
+        """
+        pieces = _pieces(self.tree, signs)
+        return sorted(
+            (p for p in pieces if not any(other < p for other in pieces)),
+            key=lambda piece: (len(piece), sorted(piece)),
+        )
+
+    def selections(self, values: Sequence[float], tolerance: float = 0.0) -> list[Piece]:
+        """Return whole branches of the tree that hold at a point, the roomiest first.
+
+        A selection takes all parts of every ``AllOf`` and one part of every ``AnyOf``; where no
+        part holds, all of them, the one that fails least first.
+        """
+        limited = [s for s, _ in zip(_select(self.tree, values, tolerance), range(MAX_SELECTIONS))]
+        return list(dict.fromkeys(limited))
+
+
+Tree = Union[int, "_Node"]
+
+
+class _Node:
+    """An indexed group: leaves are positions of functions."""
+
+    def __init__(self, *, union: bool, children: tuple[Tree, ...]) -> None:
+        self.union, self.children = union, children
+
+
+def _branches(tree: Tree) -> bool:
+    if isinstance(tree, int):
+        return False
+    return (tree.union and len(tree.children) > 1) or any(map(_branches, tree.children))
+
+
+def _implicit(tree: Tree, values: Array) -> Array:
+    if isinstance(tree, int):
+        return values[..., tree]
+    parts = [_implicit(child, values) for child in tree.children]
+    if not parts:
+        return np.full(values.shape[:-1], -np.inf if tree.union else np.inf)
+    combine = np.maximum if tree.union else np.minimum
+    return np.asarray(combine.reduce(parts))
+
+
+def _pieces(tree: Tree, signs: Sequence[int]) -> set[Piece]:
+    if isinstance(tree, int):
+        return {frozenset()} if signs[tree] > 0 else {frozenset([tree])} if signs[tree] == 0 else set()
+    parts = [_pieces(child, signs) for child in tree.children]
+    if tree.union:
+        return set().union(*parts)
+    product: set[Piece] = {frozenset()}
+    for part in parts:
+        product = {p | q for p in product for q in part}
+    return product
+
+
+def _select(tree: Tree, values: Sequence[float], tolerance: float) -> Iterator[Piece]:
+    if isinstance(tree, int):
+        yield frozenset([tree])
+        return
+    if tree.union:
+        room = np.asarray(values, dtype=np.float64)
+        ranked = sorted(tree.children, key=lambda child: -float(_implicit(child, room)))
+        holding = [c for c in ranked if float(_implicit(c, room)) >= -tolerance]
+        for child in holding or ranked:
+            yield from _select(child, values, tolerance)
+        return
+    if not tree.children:
+        yield frozenset()
+        return
+    head, *rest = tree.children
+    for first in _select(head, values, tolerance):
+        for others in _select(_Node(union=False, children=tuple(rest)), values, tolerance):
+            yield first | others
+
+
+def _indexed(part: Any, position: dict[int, int]) -> Tree:
+    if isinstance(part, SmoothFunction):
+        return position[id(part)]
+    children = tuple(_indexed(child, position) for child in part.parts)
+    return _Node(union=isinstance(part, AnyOf), children=children)
+
+
+def _groups(part: Any) -> Iterator[Any]:
+    yield part
+    for child in getattr(part, "parts", ()):
+        yield from _groups(child)
+
+
+def _check_distinct(names: Sequence[str]) -> None:
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        msg = f"parts: expected distinct names; got {', '.join(repeated)} more than once"
+        raise ValueError(msg)
+
+
+def _collect(
+    manifold: Manifold, argument: str, parts: Any, letter: str
+) -> tuple[Any, list[SmoothFunction]]:
+    """Return the tree with every expression made a function, and its functions in order."""
+    named = parts.items() if isinstance(parts, Mapping) else None
+    if named is None and not isinstance(parts, Sequence):
+        parts = [parts]
+    items = list(named) if named is not None else [("", part) for part in parts]
+    plain: dict[str, Any] = {}
+    functions: list[SmoothFunction] = []
+    tree = AllOf(*[_named(manifold, argument, name, part, plain, letter) for name, part in items])
+    family = Family.of(plain, manifold.names) if plain else None
+    finished = _finished(tree, family, manifold, functions)
+    return finished, functions
+
+
+class _Plain:
+    """An expression waiting for the family that all plain expressions share."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+
+def _named(
+    manifold: Manifold, argument: str, name: str, part: Any, plain: dict[str, Any], letter: str
+) -> Any:
+    if isinstance(part, AllOf | AnyOf):
+        if isinstance(part, AnyOf) and not part.parts:
+            msg = f"{argument}: an AnyOf of nothing is empty; give it at least one part"
+            raise ValueError(msg)
+        inner = [_named(manifold, argument, "", child, plain, letter) for child in part.parts]
+        return type(part)(*inner)
+    if isinstance(part, SmoothFunction):
+        if part.manifold != manifold:
+            msg = (
+                f"{argument}: {part.name} lives on the coordinates "
+                f"{', '.join(part.manifold.names)}; expected {', '.join(manifold.names)}"
+            )
+            raise ValueError(msg)
+        return part
+    if not isinstance(name, str):
+        msg = f"{argument}: expected names to be strings; got {name!r}"
+        raise TypeError(msg)
+    label = name or f"{letter}{len(plain) + 1}"
+    plain[label] = part
+    return _Plain(label)
+
+
+def _finished(
+    part: Any, family: Family | None, manifold: Manifold, functions: list[SmoothFunction]
+) -> Any:
+    if isinstance(part, AllOf | AnyOf):
+        return type(part)(*[_finished(p, family, manifold, functions) for p in part.parts])
+    if isinstance(part, _Plain):
+        assert family is not None
+        part = SmoothFunction.member(family, part.name, manifold)
+    if all(part is not f for f in functions):
+        functions.append(part)
+    return part

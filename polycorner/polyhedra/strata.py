@@ -1,0 +1,159 @@
+"""Which face of a polyhedron a point lies on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polycorner.geometry.manifold import Array
+from polycorner.polyhedra.cones import inward_direction, rank
+from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+
+TOLERANCE = 1e-8
+RANK_TOLERANCE = 1e-6
+
+
+class LocalType(Enum):
+    """What a polyhedron looks like near a point; the value says it in a sentence."""
+
+    OUTSIDE = "the point does not lie in the polyhedron"
+    INTERIOR = "no active function: the polyhedron is a neighbourhood of the point"
+    QUADRANT = "independent active gradients: locally a quadrant"
+    CONE = "dependent active gradients: locally a convex cone that is not a quadrant"
+    UNION = "several branches meet: locally a union of convex cones"
+    DEGENERATE = "the active gradients leave no inward direction: possibly a cusp, not a corner"
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """The face of a polyhedron that a point lies on.
+
+    Attributes
+    ----------
+    active : tuple of str
+        Functions that vanish at the point and matter for membership near it.
+    pieces : tuple of tuple of str
+        The polyhedron near the point as a union: each piece is where its functions are >= 0.
+    rank : int
+        Rank of the gradients of active functions and equations.
+    dimension : int
+        Dimension of the face, ``n - rank``.
+    local_type : LocalType
+        Interior, quadrant, cone, union, degenerate, or outside.
+    annotations : mapping from str to str or None
+        What the model says about the point, such as ``{"chirality": "R"}``.
+    """
+
+    active: tuple[str, ...]
+    pieces: tuple[tuple[str, ...], ...]
+    rank: int
+    dimension: int
+    local_type: LocalType
+    annotations: Mapping[str, str | None]
+
+    @property
+    def chirality(self) -> str | None:
+        """The model's ``chirality`` annotation, or None."""
+        return self.annotations.get("chirality")
+
+
+def stratum_at(
+    polyhedron: Polyhedron,
+    q: ArrayLike | Mapping[str, float],
+    *,
+    tolerance: float = TOLERANCE,
+    rank_tolerance: float = RANK_TOLERANCE,
+) -> Stratum:
+    """Classify a point: which functions are active, the rank, dimension and type of its face.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        The set.
+    q : (n,) array or mapping from coordinate names
+        The point.
+    tolerance : float, optional
+        A function counts as active within this distance of its zero set, in scale units
+        (``|f| <= tolerance |grad f|`` with the gradient in scaled coordinates).
+    rank_tolerance : float, optional
+        Singular values of the unit gradients below this fraction of the largest count as zero.
+
+    Examples
+    --------
+    >>> from polycorner.geometry.manifold import Manifold
+    >>> M = Manifold.euclidean("x y")
+    >>> x, y = M.symbols
+    >>> stratum_at(Polyhedron(M, {"floor": y, "wall": x}), [0.0, 0.0]).dimension
+    0
+    """
+    check_tolerance("tolerance", tolerance)
+    check_tolerance("rank_tolerance", rank_tolerance)
+    point = polyhedron.manifold.point(q)
+    values, gradients = evaluated(polyhedron, point)
+    pieces = local_pieces(polyhedron, values, gradients, tolerance)
+    active = sorted(set().union(*pieces))
+    m, n = len(polyhedron.functions), polyhedron.dimension
+    jacobian = gradients[[*active, *range(m, len(values))]]
+    r = rank(jacobian, rank_tolerance)
+    return Stratum(
+        active=tuple(polyhedron.names[i] for i in active),
+        pieces=tuple(tuple(polyhedron.names[i] for i in sorted(piece)) for piece in pieces),
+        rank=r,
+        dimension=n - r,
+        local_type=_local_type(pieces, gradients, m, rank_tolerance),
+        annotations={name: label(point) for name, label in polyhedron.annotations.items()},
+    )
+
+
+def evaluated(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array]:
+    """Return values and scaled gradients of all inequalities, then all equations."""
+    values, gradients = polyhedron.bundle.evaluate(q, 1)
+    return values, gradients * polyhedron.manifold.scale_array
+
+
+def distances(values: Array, gradients: Array) -> Array:
+    """Return first-order signed distances ``f / |grad f|``; infinite where the gradient vanishes."""
+    sizes = np.linalg.norm(gradients, axis=1)
+    far = np.where(values == 0, 0.0, np.copysign(np.inf, values))
+    return np.asarray(np.divide(values, sizes, out=far, where=sizes > 0))
+
+
+def local_pieces(
+    polyhedron: Polyhedron, values: Array, gradients: Array, tolerance: float
+) -> list[Piece]:
+    """Return the polyhedron near a point as a union of pieces; none where the point is outside."""
+    away = distances(values, gradients)
+    m = len(polyhedron.functions)
+    if (abs(away[m:]) > tolerance).any() or np.isnan(away).any():
+        return []
+    signs = np.where(away > tolerance, 1, np.where(away < -tolerance, -1, 0))
+    return polyhedron.signs_to_pieces(signs[:m].tolist())
+
+
+def check_tolerance(argument: str, value: float) -> None:
+    """Refuse a tolerance that is not strictly between 0 and 1."""
+    if not 0 < value < 1:
+        msg = f"{argument}: expected a number between 0 and 1; got {value!r}"
+        raise ValueError(msg)
+
+
+def _local_type(
+    pieces: list[Piece], gradients: Array, m: int, rank_tolerance: float
+) -> LocalType:
+    if not pieces:
+        return LocalType.OUTSIDE
+    if len(pieces) > 1:
+        return LocalType.UNION
+    active = sorted(pieces[0])
+    equations = gradients[m:]
+    if not active and not len(equations):
+        return LocalType.INTERIOR
+    jacobian = np.vstack([gradients[active], equations])
+    if rank(jacobian, rank_tolerance) == len(jacobian):
+        return LocalType.QUADRANT if active else LocalType.INTERIOR
+    if not active:
+        return LocalType.DEGENERATE
+    _, rate = inward_direction(gradients[active], equations)
+    return LocalType.CONE if rate > rank_tolerance else LocalType.DEGENERATE

@@ -1,0 +1,27 @@
+"""What every test shares: a silent plotting back end and the amount of generated input.
+
+``HYPOTHESIS_PROFILE=thorough`` asks for more examples than the default profile ``fast``.
+"""
+
+import os
+
+import matplotlib as mpl
+from hypothesis import HealthCheck, settings
+
+mpl.use("Agg")
+
+# The first call of a kernel compiles it, so a deadline would measure the compiler.
+settings.register_profile(
+    "fast",
+    max_examples=25,
+    deadline=None,
+    derandomize=bool(os.environ.get("CI")),
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.register_profile(
+    "thorough",
+    max_examples=1000,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
