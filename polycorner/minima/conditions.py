@@ -84,7 +84,10 @@ def _central_multipliers(
     values = split[: len(rows)].copy()
     values[k:] -= split[len(rows) :]
     residual = float(abs(gradient - values @ rows).max())
-    if distance > small:
+    # Gradients that count as dependent may carry no multiplier so large that it exists only
+    # because they are not quite so: that is what happens beside a cusp.
+    bounded = abs(values).max() * rank_tolerance <= 0.1 * np.linalg.norm(gradient) + small
+    if distance > small or not bounded:
         return Multipliers(least, least, least, exist=False, residual=residual)
     lower, upper, centre = _ranges(rows, k, values, rank_tolerance)
     return Multipliers(centre, lower, upper, exist=True, residual=residual)
@@ -101,24 +104,18 @@ def _ranges(
     left, singular, _ = np.linalg.svd(rows)
     free = left[:, int((singular > rank_tolerance * singular[0]).sum()) :]
     bound = 1e6
-    limits = [(-bound, bound)] * free.shape[1]
     start = values / largest
-    lower, upper = start.copy(), start.copy()
+    room, limits = np.maximum(start[:k], 0.0), [(-bound, bound)] * free.shape[1]
+    lower, upper, vertices = start.copy(), start.copy(), []
     for i in range(count):
         for side, target in ((1.0, lower), (-1.0, upper)):
-            found = linprog(
-                side * free[i], A_ub=-free[:k], b_ub=np.maximum(start[:k], 0.0), bounds=limits
-            )
+            found = linprog(side * free[i], A_ub=-free[:k], b_ub=room, bounds=limits)
             target[i] = start[i] + free[i] @ found.x
-    best = linprog(
-        np.array([0.0] * free.shape[1] + [-1.0]),
-        A_ub=np.hstack([-free[:k], np.ones((k, 1))]),
-        b_ub=np.maximum(start[:k], 0.0),
-        bounds=[*limits, (None, 1.0)],
-    )
-    centre = start + free @ best.x[:-1]
-    unbounded = abs(upper) >= 0.5 * bound
-    upper = np.where(unbounded, np.sign(upper) * np.inf, upper)
+            if abs(found.x).max() < 0.5 * bound:
+                vertices.append(start + free @ found.x)
+            elif abs(target[i]) >= 0.1 * bound:
+                target[i] = -side * np.inf
+    centre = np.mean(vertices, axis=0) if vertices else start
     return lower * largest, upper * largest, centre * largest
 
 
