@@ -234,6 +234,23 @@ class _Call:
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
+    @cached_property
+    def address(self) -> int:
+        """Address of the parameters, which this value keeps alive."""
+        return self.parameters.ctypes.data
+
+    @cached_property
+    def places(self) -> tuple[Any, Any, Any]:
+        """Where values, gradients and Hessians of one point go in the bundle's arrays."""
+        rows, reads = list(self.rows), list(self.reads)
+        return (rows, np.ix_(rows, reads), np.ix_(rows, reads, reads))
+
+    @cached_property
+    def picked(self) -> Any:
+        """Which of the kernel's outputs are wanted, in order."""
+        count = len(self.family.names)
+        return np.s_[:] if self.columns == tuple(range(count)) else list(self.columns)
+
 
 class Bundle:
     """Several functions on one manifold, evaluated together with as few kernel calls as possible."""
@@ -264,26 +281,36 @@ class Bundle:
         """
         direct = self._direct
         if direct is not None and q.ndim == 1:
-            return direct.family.kernel.at(q, direct.parameters, order)
+            return direct.family.kernel.at(q, direct.address, order)
+        if q.ndim == 1:
+            return self._assembled_point(q, order)
         flat = q.reshape(-1, q.shape[-1])
         if direct is not None:
-            results = direct.family.kernel.over(flat, direct.parameters, order)
+            results = direct.family.kernel.over(flat, direct.address, order)
         else:
             results = self._assembled(flat, order)
         batch = q.shape[:-1]
         return tuple([result.reshape(batch + result.shape[1:]) for result in results])
 
-    def _assembled(self, flat: Array, order: int) -> tuple[Array, ...]:
-        points, m, n = len(flat), len(self.functions), self.manifold.dimension
-        shapes = ((points, m), (points, m, n), (points, m, n, n))[: order + 1]
-        results = tuple(np.zeros(shape) for shape in shapes)
+    def _shapes(self, order: int) -> tuple[tuple[int, ...], ...]:
+        m, n = len(self.functions), self.manifold.dimension
+        return ((m,), (m, n), (m, n, n))[: order + 1]
+
+    def _assembled_point(self, q: Array, order: int) -> tuple[Array, ...]:
+        results = tuple([np.zeros(shape) for shape in self._shapes(order)])
         for call in self.calls:
-            rows, columns, reads = list(call.rows), list(call.columns), list(call.reads)
-            parts = call.family.kernel.over(flat[:, reads], call.parameters, order)
-            places = (np.s_[:, rows], np.ix_(range(points), rows, reads))
-            places += (np.ix_(range(points), rows, reads, reads),)
-            for result, part, place in zip(results, parts, places, strict=False):
-                result[place] = part[:, columns]
+            parts = call.family.kernel.at(q[list(call.reads)], call.address, order)
+            for result, part, place in zip(results, parts, call.places, strict=False):
+                result[place] = part[call.picked]
+        return results
+
+    def _assembled(self, flat: Array, order: int) -> tuple[Array, ...]:
+        results = tuple([np.zeros((len(flat), *shape)) for shape in self._shapes(order)])
+        for call in self.calls:
+            parts = call.family.kernel.over(flat[:, list(call.reads)], call.address, order)
+            for result, part, place in zip(results, parts, call.places, strict=False):
+                inner = place if isinstance(place, tuple) else (place,)
+                result[(slice(None), *inner)] = part[:, call.picked]
         return results
 
 

@@ -66,11 +66,14 @@ class Kernel:
             self._compiled[order] = CompiledKernel(self, order)
         return self._compiled[order]
 
-    def at(self, q: Array, parameters: Array, order: int) -> tuple[Array, ...]:
-        """Return values ``(m,)``, gradients ``(m, k)`` and Hessians ``(m, k, k)`` at one point."""
+    def at(self, q: Array, parameters: int, order: int) -> tuple[Array, ...]:
+        """Return values ``(m,)``, gradients ``(m, k)`` and Hessians ``(m, k, k)`` at one point.
+
+        ``parameters`` is the address of the parameters (:func:`address`); nothing is checked.
+        """
         return self.compiled(order).at(q, parameters)
 
-    def over(self, q: Array, parameters: Array, order: int) -> tuple[Array, ...]:
+    def over(self, q: Array, parameters: int, order: int) -> tuple[Array, ...]:
         """Return values, gradients and Hessians at every row of ``q`` ``(N, k)``."""
         return self.compiled(order).over(q, parameters)
 
@@ -96,9 +99,9 @@ class CompiledKernel:
             _write(path, code)
         self._engine, addresses = _load(code, name)
         self.point, packed, batch = addresses
-        address = ctypes.c_void_p
-        self._packed = ctypes.PYFUNCTYPE(None, address, address)(packed)
-        self._batch = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[address] * 5)(batch)
+        pointer = ctypes.c_void_p
+        self._packed = ctypes.PYFUNCTYPE(None, pointer, pointer)(packed)
+        self._batch = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[pointer] * 5)(batch)
         k, m = kernel.variables, kernel.outputs
         self._shapes = ((m,), (m, k), (m, k, k))[: order + 1]
         ends = np.cumsum([k, *(int(np.prod(shape)) for shape in self._shapes)]).tolist()
@@ -107,20 +110,28 @@ class CompiledKernel:
             (slice(a, b), shape) for a, b, shape in zip(ends, ends[1:], self._shapes, strict=False)
         ]
 
-    def at(self, q: Array, parameters: Array) -> tuple[Array, ...]:
+    def at(self, q: Array, parameters: int) -> tuple[Array, ...]:
         """Evaluate at one point; see :meth:`Kernel.at`."""
         block = np.empty(self._size)
         block[: self._k] = q
-        self._packed(block.ctypes.data, parameters.ctypes.data)
+        self._packed(address(block), parameters)
         return tuple([block[part].reshape(shape) for part, shape in self._views])
 
-    def over(self, q: Array, parameters: Array) -> tuple[Array, ...]:
+    def over(self, q: Array, parameters: int) -> tuple[Array, ...]:
         """Evaluate at every row; see :meth:`Kernel.over`."""
-        q = np.ascontiguousarray(q)
-        outputs = tuple(np.empty((len(q), *shape)) for shape in self._shapes)
-        addresses = [output.ctypes.data for output in outputs] + [None, None]
-        self._batch(len(q), q.ctypes.data, parameters.ctypes.data, *addresses[:3])
+        outputs = tuple([np.empty((len(q), *shape)) for shape in self._shapes])
+        self.fill(np.ascontiguousarray(q), parameters, outputs)
         return outputs
+
+    def fill(self, q: Array, parameters: int, outputs: tuple[Array, ...]) -> None:
+        """Evaluate at every row of ``q``, a C-contiguous ``(N, k)``, into given C-contiguous arrays."""
+        addresses = [*(output.ctypes.data for output in outputs), None, None]
+        self._batch(len(q), q.ctypes.data, parameters, *addresses[:3])
+
+
+def address(array: Array) -> int:
+    """Return the address of a writable, not empty array, three times faster than ``ctypes.data``."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array))
 
 
 def cache_directory() -> Path:

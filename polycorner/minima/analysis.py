@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,34 @@ from polycorner.polyhedra.strata import local_pieces
 
 PROBES = (0.003, 0.03)  # how far flat directions are followed, in scale units
 PROBE_NOISE = 1e-12  # change of the energy, relative to its own size, that counts as none
+
+
+@dataclass(frozen=True)
+class Local:
+    """Derivatives at the point and what counts as small there."""
+
+    problem: Problem
+    point: Array
+    values: Array
+    gradients: Array
+    hessians: Array
+    tolerance: float
+    rank_tolerance: float
+
+    @cached_property
+    def reference(self) -> float:
+        """The energy's own size: its largest first or second derivative in scaled coordinates."""
+        return float(max(abs(self.gradients[-1]).max(), abs(self.hessians[-1]).max())) or 1.0
+
+    @property
+    def small(self) -> float:
+        """A first derivative that counts as zero."""
+        return self.tolerance * self.reference
+
+    @property
+    def equations(self) -> Array:
+        """Gradients of the equations."""
+        return self.gradients[self.problem.inequalities : -1]
 
 
 @dataclass(frozen=True)
@@ -37,36 +66,19 @@ class Analysis:
     small_curvature: float
     flat_verified: bool
     flat_change: float
-    signature: tuple[int, int, int]
-    entrapment: tuple[tuple[str, Entrapment], ...]
-
-
-@dataclass(frozen=True)
-class _Local:
-    """Derivatives at the point and what counts as small there."""
-
-    problem: Problem
-    point: Array
-    values: Array
-    gradients: Array
-    hessians: Array
-    tolerance: float
-    rank_tolerance: float
+    local: Local
 
     @property
-    def reference(self) -> float:
-        """The energy's own size: its largest first or second derivative in scaled coordinates."""
-        return float(max(abs(self.gradients[-1]).max(), abs(self.hessians[-1]).max())) or 1.0
+    def signature(self) -> tuple[int, int, int]:
+        """The lemma's ``(p, q, r)``."""
+        values = self.curvature.values
+        free = int((abs(values) <= self.small_curvature).sum())
+        return len(self.strong_positions), len(values) - free, free
 
-    @property
-    def small(self) -> float:
-        """A first derivative that counts as zero."""
-        return self.tolerance * self.reference
-
-    @property
-    def equations(self) -> Array:
-        """Gradients of the equations."""
-        return self.gradients[self.problem.inequalities : -1]
+    @cached_property
+    def entrapment(self) -> dict[str, Entrapment]:
+        """The kind of entrapment in every direction."""
+        return dict(_entrapment(self))
 
 
 def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float) -> Analysis:
@@ -76,7 +88,7 @@ def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float)
     each, so the analysis returned is that of the piece that decides.
     """
     values, gradients, hessians = problem.evaluate(q, 2)
-    local = _Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
+    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
     pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
     if not pieces or not np.isfinite(values[-1]):
         return replace(_analyse_piece(local, frozenset()), verdict=Verdict.OUTSIDE)
@@ -85,7 +97,7 @@ def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float)
     return max(analyses, key=lambda a: (not a.verdict.is_minimum, order.index(a.verdict)))
 
 
-def _analyse_piece(local: _Local, piece: Piece) -> Analysis:
+def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     active = tuple(sorted(piece))
     inequalities = local.gradients[list(active)]
     rows = np.vstack([inequalities, local.equations])
@@ -102,8 +114,9 @@ def _analyse_piece(local: _Local, piece: Piece) -> Analysis:
     curvature = find_curvature(hessian, strong, local.gradients[weak], small_curvature)
     verdict = _verdict(local, inequalities, multipliers, curvature, weak, small_curvature)
     strong_rows = tuple(i for i, held in zip(active, positive, strict=True) if held)
-    change = _flat_change(local, strong_rows, curvature.flat, piece) if _asks(verdict) else 0.0
-    if verdict is Verdict.UNDECIDED and curvature.decided and change <= PROBE_NOISE:
+    asks = verdict is Verdict.UNDECIDED and curvature.decided
+    change = _flat_change(local, strong_rows, curvature.flat, piece) if asks else 0.0
+    if asks and change <= PROBE_NOISE:
         verdict = Verdict.MINIMUM_ALONG_LOCUS
     positions = _independent_positions(inequalities, positive, local)
     verified = not curvature.flat.shape[1] or change <= PROBE_NOISE
@@ -120,20 +133,12 @@ def _analyse_piece(local: _Local, piece: Piece) -> Analysis:
         small_curvature=small_curvature,
         flat_verified=verified,
         flat_change=change,
-        signature=_signature(positions, curvature, small_curvature),
-        entrapment=tuple(
-            _entrapment(local, active, positions, multipliers, weak, curvature, small_curvature)
-        ),
+        local=local,
     )
 
 
-def _asks(verdict: Verdict) -> bool:
-    """Whether flat directions still have to be followed."""
-    return verdict is Verdict.UNDECIDED
-
-
 def _lagrangian_hessian(
-    local: _Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
+    local: Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
 ) -> Array:
     sizes = np.linalg.norm(rows, axis=1)
     m = local.problem.inequalities
@@ -146,7 +151,7 @@ def _lagrangian_hessian(
 
 
 def _verdict(
-    local: _Local,
+    local: Local,
     inequalities: Array,
     multipliers: Multipliers,
     curvature: Curvature,
@@ -169,7 +174,7 @@ def _verdict(
     return Verdict.WEAK_MINIMUM if weak else Verdict.STRICT_MINIMUM
 
 
-def _flat_change(local: _Local, strong: tuple[int, ...], flat: Array, piece: Piece) -> float:
+def _flat_change(local: Local, strong: tuple[int, ...], flat: Array, piece: Piece) -> float:
     """Follow every flat direction along the face; return the largest relative change of energy.
 
     A step is corrected by Newton's method on the face; steps that leave the polyhedron through
@@ -200,17 +205,20 @@ def _flat_change(local: _Local, strong: tuple[int, ...], flat: Array, piece: Pie
     return worst
 
 
-def _inside(local: _Local, values: Array, gradients: Array, piece: Piece) -> bool:
+def _inside(local: Local, values: Array, gradients: Array, piece: Piece) -> bool:
     rows = list(piece)
     sizes = np.linalg.norm(gradients[rows], axis=1)
     return bool((values[rows] >= -local.tolerance * sizes).all())
 
 
 def _independent_positions(
-    inequalities: Array, positive: Array, local: _Local
+    inequalities: Array, positive: Array, local: Local
 ) -> tuple[int, ...]:
     """Return positions of strongly active functions that are independent, greedily in order."""
     chosen: list[int] = []
+    everything = np.vstack([inequalities[positive], local.equations])
+    if rank(everything, local.rank_tolerance) == len(everything):
+        return tuple(np.flatnonzero(positive).tolist())
     for i in np.flatnonzero(positive).tolist():
         rows = np.vstack([inequalities[[*chosen, i]], local.equations])
         others = np.vstack([inequalities[chosen], local.equations])
@@ -219,33 +227,19 @@ def _independent_positions(
     return tuple(chosen)
 
 
-def _signature(
-    positions: tuple[int, ...], curvature: Curvature, small: float
-) -> tuple[int, int, int]:
-    free = int((abs(curvature.values) <= small).sum())
-    return len(positions), len(curvature.values) - free, free
-
-
-def _entrapment(
-    local: _Local,
-    active: tuple[int, ...],
-    positions: tuple[int, ...],
-    multipliers: Multipliers,
-    weak: list[int],
-    curvature: Curvature,
-    small: float,
-) -> Iterator[tuple[str, Entrapment]]:
+def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
+    local, multipliers, curvature, small = a.local, a.multipliers, a.curvature, a.small_curvature
     names = local.problem.polyhedron.names
-    for position in positions:
-        yield names[active[position]], Entrapment.HALF_V
-    for position, row in enumerate(active):
+    for position in a.strong_positions:
+        yield names[a.active[position]], Entrapment.HALF_V
+    for position, row in enumerate(a.active):
         if multipliers.values[position] < -local.small:
             yield names[row], Entrapment.NONE
     if multipliers.residual > local.small:
         return  # the energy slopes along the face: its curvature there holds nothing
     curved = curvature.vectors[:, curvature.values > small]
     held: list[int] = []
-    for row in weak:
+    for row in a.weak:
         slopes = local.gradients[[*held, row]] @ curved
         if rank(slopes, 1e-6) > len(held):
             held.append(row)
