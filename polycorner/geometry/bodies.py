@@ -48,9 +48,7 @@ def foot(p: "Point", start: "Point", end: "Point") -> "sympy.Expr":
     return dot(minus(p, start), u) / dot(u, u)
 
 
-def point_line_distance(
-    p: "Point", start: "Point", end: "Point", at: "sympy.Expr"
-) -> "sympy.Expr":
+def point_line_distance(p: "Point", start: "Point", end: "Point", at: "sympy.Expr") -> "sympy.Expr":
     """Return the distance of ``p`` from a line on which its foot is at ``at``."""
     w, u = minus(p, start), minus(end, start)
     return norm((w[0] - at * u[0], w[1] - at * u[1], w[2] - at * u[2]))

@@ -56,7 +56,9 @@ class Emitter:
         while stack:
             top = stack[-1]
             op, args = self.graph.nodes[top]
-            children = [] if op in {"const", "var", "par"} else [a for a in args if isinstance(a, int)]
+            children = (
+                [] if op in {"const", "var", "par"} else [a for a in args if isinstance(a, int)]
+            )
             waiting = [a for a in children if a not in self._done]
             if waiting:
                 stack += waiting

@@ -163,7 +163,7 @@ class SmoothFunction:
         """Return a function of a family, bound to coordinates and parameter values."""
         function = cls.__new__(cls)
         reads = tuple(reads or family.variables)
-        function._bind(family, name, manifold, reads, tuple(parameters), label)
+        cls._bind(function, family, name, manifold, reads, tuple(parameters), label)
         return function
 
     def _bind(
@@ -193,7 +193,9 @@ class SmoothFunction:
 
     def __repr__(self) -> str:
         """Return the name and what the function reads."""
-        return f"SmoothFunction({self.name!r}, reads {[self.manifold.names[i] for i in self.reads]})"
+        return (
+            f"SmoothFunction({self.name!r}, reads {[self.manifold.names[i] for i in self.reads]})"
+        )
 
     @property
     def expression(self) -> "sympy.Expr":
@@ -205,7 +207,9 @@ class SmoothFunction:
             name: sympy.Symbol(self.manifold.names[i], real=True)
             for name, i in zip(self.family.variables, self.reads, strict=True)
         }
-        return formal.xreplace({s: renamed[s.name] for s in formal.free_symbols if s.name in renamed})
+        return formal.xreplace(
+            {s: renamed[s.name] for s in formal.free_symbols if s.name in renamed}
+        )
 
     @cached_property
     def _bundle(self) -> "Bundle":
@@ -253,7 +257,7 @@ class _Call:
 
 
 class Bundle:
-    """Several functions on one manifold, evaluated together with as few kernel calls as possible."""
+    """Several functions on one manifold, evaluated together in as few calls as possible."""
 
     def __init__(self, manifold: Manifold, functions: Sequence[SmoothFunction]) -> None:
         self.manifold, self.functions = manifold, tuple(functions)

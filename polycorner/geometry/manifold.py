@@ -131,7 +131,9 @@ class Manifold:
         """Check one point: ``n`` finite reals, or a mapping from coordinate names to them."""
         if isinstance(q, Mapping):
             if set(q) != set(self.names):
-                msg = f"{argument}: expected the coordinates {', '.join(self.names)}; got {sorted(q)}"
+                msg = (
+                    f"{argument}: expected the coordinates {', '.join(self.names)}; got {sorted(q)}"
+                )
                 raise ValueError(msg)
             q = [q[name] for name in self.names]
         array = self.points(q, argument)

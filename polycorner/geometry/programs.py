@@ -373,7 +373,8 @@ class _Translator:
 
     def _mul(self, e: "sympy.Basic") -> int:
         g = self.graph
-        above, below = [], []
+        above: list[sympy.Basic] = []
+        below: list[sympy.Basic] = []
         for factor in e.args:
             negative = type(factor).__name__ == "Pow" and factor.args[1].is_negative
             (below if negative else above).append(1 / factor if negative else factor)
@@ -418,4 +419,4 @@ class _Translator:
 def _exact(number: "sympy.Basic") -> Fraction:
     if getattr(number, "is_Float", False):
         return Fraction(float(number))
-    return Fraction(int(number.p), int(number.q))  # type: ignore[attr-defined]  # a Rational
+    return Fraction(int(number.p), int(number.q))

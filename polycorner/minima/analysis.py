@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.geometry.manifold import Array
 from polycorner.minima.conditions import Curvature, Multipliers, find_curvature, find_multipliers
@@ -106,14 +107,15 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     )
     k = len(active)
     positive = multipliers.values[:k] > local.small
-    strong = unit_rows(np.vstack([inequalities[positive], local.equations]))
-    weak = [i for i, held in zip(active, positive, strict=True) if not held]
+    weighted = abs(multipliers.values[:k]) > local.small
+    strong = unit_rows(np.vstack([inequalities[weighted], local.equations]))
+    weak = [i for i, held in zip(active, weighted, strict=True) if not held]
     hessian = _lagrangian_hessian(local, active, rows, multipliers)
     size = max(local.reference, float(abs(hessian).max()))
     small_curvature = local.tolerance * size
     curvature = find_curvature(hessian, strong, local.gradients[weak], small_curvature)
     verdict = _verdict(local, inequalities, multipliers, curvature, weak, small_curvature)
-    strong_rows = tuple(i for i, held in zip(active, positive, strict=True) if held)
+    strong_rows = tuple(i for i, held in zip(active, weighted, strict=True) if held)
     asks = verdict is Verdict.UNDECIDED and curvature.decided
     change = _flat_change(local, strong_rows, curvature.flat, piece) if asks else 0.0
     if asks and change <= PROBE_NOISE:
@@ -143,7 +145,7 @@ def _lagrangian_hessian(
     sizes = np.linalg.norm(rows, axis=1)
     m = local.problem.inequalities
     numbers = [*active, *range(m, m + len(local.equations))]
-    result = local.hessians[-1].copy()
+    result: Array = local.hessians[-1].copy()
     for row, value, size in zip(numbers, multipliers.values, sizes, strict=True):
         if size > 0:
             result -= value / size * local.hessians[row]
@@ -186,7 +188,10 @@ def _flat_change(local: Local, strong: tuple[int, ...], flat: Array, piece: Piec
     start = float(local.values[-1])
     size = abs(start) + local.reference
     worst = 0.0
-    directions = [*flat.T, *([flat.sum(axis=1) / flat.shape[1] ** 0.5] if flat.shape[1] > 1 else [])]
+    directions = [
+        *flat.T,
+        *([flat.sum(axis=1) / flat.shape[1] ** 0.5] if flat.shape[1] > 1 else []),
+    ]
     for direction in directions:
         followed = 0
         for step in (sign * probe for sign in (1, -1) for probe in PROBES):
@@ -212,7 +217,7 @@ def _inside(local: Local, values: Array, gradients: Array, piece: Piece) -> bool
 
 
 def _independent_positions(
-    inequalities: Array, positive: Array, local: Local
+    inequalities: Array, positive: NDArray[np.bool_], local: Local
 ) -> tuple[int, ...]:
     """Return positions of strongly active functions that are independent, greedily in order."""
     chosen: list[int] = []
@@ -263,5 +268,5 @@ def _direction_name(vector: Array, names: tuple[str, ...]) -> str:
     top = abs(vector).max()
     large = [i for i in range(len(vector)) if abs(vector[i]) >= 0.5 * top]
     sign = np.sign(vector[large[0]])
-    words = [("+ " if vector[i] * sign > 0 else "- ") + names[i] for i in large]
-    return " ".join(words).removeprefix("+ ")
+    words = [("+" if vector[i] * sign > 0 else "-") + names[i] for i in large]
+    return "".join(words).removeprefix("+")

@@ -173,7 +173,8 @@ class Certificate:
     @property
     def strictly_complementary(self) -> bool:
         """Whether every active function has a strictly positive multiplier."""
-        return not self.analysis.weak
+        values = self.analysis.multipliers.values[: len(self.active)]
+        return bool((values > self.analysis.local.small).all())
 
     @property
     def curvatures(self) -> Array:
@@ -243,8 +244,6 @@ class Certificate:
 
     def residuals(self) -> Residuals:
         """Recompute the residuals from the functions and the stored multipliers."""
-        if self.verdict in (Verdict.INFEASIBLE, Verdict.OUTSIDE):
-            return Residuals(self._miss(), float("inf"), float("inf"))
         values, gradients, hessians = self.problem.evaluate(self.point, 2)
         names = [*self.problem.polyhedron.names, *self.problem.polyhedron.equation_names]
         multipliers = self.multipliers

@@ -73,9 +73,7 @@ def evaluate(problem, u, F, J, H, size):
             work[i] = u[c] * scales[c]
         j0 = k + m
         h0 = j0 + m * k
-        call_kernel(
-            address, start, base + 8 * p0, start + 8 * k, start + 8 * j0, start + 8 * h0
-        )
+        call_kernel(address, start, base + 8 * p0, start + 8 * k, start + 8 * j0, start + 8 * h0)
         for o in range(m):
             row = rows[w0 + o]
             if row < 0:
@@ -92,7 +90,7 @@ def evaluate(problem, u, F, J, H, size):
 
 @njit(cache=True)
 def add_multiple(y, a, x):
-    """Add ``a x`` to ``y`` in place.  Loops, not array expressions: they compile ten times faster."""
+    """Add ``a x`` to ``y`` in place.  Loops compile ten times faster than array expressions."""
     stay_whole()
     for i in range(y.size):
         y[i] += a * x[i]
@@ -562,7 +560,7 @@ def polish(problem, on, m, u, F, J, H, size):
     n, total = u.size, F.size - 1
     lam = np.zeros(total)
     last = np.inf
-    for iteration in range(60):
+    for _ in range(60):
         evaluate(problem, u, F, J, H, size)
         A, b, keep, sizes = system(F, J, on, m)
         g = J[total]
@@ -595,7 +593,7 @@ def polish(problem, on, m, u, F, J, H, size):
 
 @njit(cache=True)
 def finished(problem, use, on, m, u, F, J, H, size, energy):
-    """Polish a copy of ``u``: 2 a feasible stationary point no higher, 1 only feasible, 0 neither."""
+    """Polish a copy of ``u``; say 2 if it is stationary and no higher, 1 if only no higher, else 0."""
     stay_whole()
     v, rows = u.copy(), on.copy()
     for _ in range(4):
@@ -640,7 +638,9 @@ def descend(problem, use, m, rows, u, size, limit):
     lam, on, before = np.zeros(rows - 1), np.zeros(m, np.bool_), np.zeros(m, np.bool_)
     u = u.copy()
     origin = u.copy()
-    if not project(problem, use, m, u, F, J, H, size, np.int64(100)) or not np.isfinite(F[rows - 1]):
+    if not project(problem, use, m, u, F, J, H, size, np.int64(100)) or not np.isfinite(
+        F[rows - 1]
+    ):
         return INFEASIBLE, 0, u, lam
     cap = FIRST_CAP
     for iteration in range(1, limit + 1):
@@ -701,7 +701,7 @@ def descend(problem, use, m, rows, u, size, limit):
 
 @njit(cache=True)
 def on_face(problem, on, m, rows, u, size):
-    """Polish ``u`` on the face where the rows ``on`` vanish; return the point, rows' multipliers."""
+    """Polish a copy of ``u`` on the face where the rows ``on`` vanish; see :func:`polish`."""
     n = u.size
     F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
     v = u.copy()

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from polycorner.geometry.manifold import Array
-from polycorner.polyhedra.cones import null_space, rank, unit_rows
+from polycorner.polyhedra.cones import linear_programme, null_space, rank, unit_rows
 
 MAX_WEAK = 10
 
@@ -65,7 +65,9 @@ def find_multipliers(
     """
     rows = unit_rows(np.vstack([inequalities, equations]))
     k = len(inequalities)
-    values = np.linalg.lstsq(rows.T, gradient, rcond=rank_tolerance)[0] if len(rows) else np.empty(0)
+    values = np.zeros(len(rows))
+    if len(rows):
+        values = np.asarray(np.linalg.lstsq(rows.T, gradient, rcond=rank_tolerance)[0])
     if rank(rows, rank_tolerance) == len(rows):
         residual = float(abs(gradient - values @ rows).max(initial=0))
         exist = residual <= small and bool((values[:k] >= -small).all())
@@ -76,7 +78,7 @@ def find_multipliers(
 def _central_multipliers(
     rows: Array, k: int, gradient: Array, least: Array, small: float, rank_tolerance: float
 ) -> Multipliers:
-    """Dependent gradients: decide existence by non-negative least squares, then find the ranges."""
+    """Decide existence for dependent gradients by non-negative least squares; find the ranges."""
     from scipy.optimize import nnls
 
     signed = np.vstack([rows, -rows[k:]])
@@ -96,23 +98,21 @@ def _central_multipliers(
 def _ranges(
     rows: Array, k: int, values: Array, rank_tolerance: float
 ) -> tuple[Array, Array, Array]:
-    """Return the least, the largest and a central choice, along changes that leave the sum as is."""
-    from scipy.optimize import linprog
-
+    """Return the least, the largest and a central choice that all give the same sum."""
     count = len(rows)
     largest = max(1e-300, float(abs(values).max()))
     left, singular, _ = np.linalg.svd(rows)
     free = left[:, int((singular > rank_tolerance * singular[0]).sum()) :]
     bound = 1e6
     start = values / largest
-    room, limits = np.maximum(start[:k], 0.0), [(-bound, bound)] * free.shape[1]
+    room = np.maximum(start[:k], 0.0)
     lower, upper, vertices = start.copy(), start.copy(), []
     for i in range(count):
         for side, target in ((1.0, lower), (-1.0, upper)):
-            found = linprog(side * free[i], A_ub=-free[:k], b_ub=room, bounds=limits)
-            target[i] = start[i] + free[i] @ found.x
-            if abs(found.x).max() < 0.5 * bound:
-                vertices.append(start + free @ found.x)
+            change = linear_programme(side * free[i], -free[:k], room, bound=bound)
+            target[i] = start[i] + free[i] @ change
+            if abs(change).max() < 0.5 * bound:
+                vertices.append(start + free @ change)
             elif abs(target[i]) >= 0.1 * bound:
                 target[i] = -side * np.inf
     centre = np.mean(vertices, axis=0) if vertices else start
@@ -205,16 +205,13 @@ def _member(vectors: Array, weak: Array) -> Array | None:
             if (sign * weak @ column >= -edge).all():
                 return np.asarray(sign * column)
         return None
-    from scipy.optimize import linprog
-
-    k = vectors.shape[1]
-    for i in range(k):
+    for i in range(vectors.shape[1]):
         for sign in (1.0, -1.0):
-            objective = np.zeros(k)
-            objective[i] = -sign
-            found = linprog(objective, A_ub=-weak @ vectors, b_ub=np.zeros(len(weak)), bounds=[(-1, 1)] * k)
-            if found.success and sign * found.x[i] > 1e-6:
-                direction = vectors @ found.x
+            cost = np.zeros(vectors.shape[1])
+            cost[i] = -sign
+            found = linear_programme(cost, -weak @ vectors, np.zeros(len(weak)), bound=1.0)
+            if sign * found[i] > 1e-6:
+                direction = vectors @ found
                 return np.asarray(direction / np.linalg.norm(direction))
     return None
 

@@ -43,7 +43,10 @@ class Model:
         gradient, root, radius = cp.Parameter(n), cp.Parameter((n, n)), cp.Parameter(nonneg=True)
         a, b = cp.Parameter((max(inequalities, 1), n)), cp.Parameter(max(inequalities, 1))
         c, h = cp.Parameter((max(equations, 1), n)), cp.Parameter(max(equations, 1))
-        slack, excess = cp.Variable(max(inequalities, 1), nonneg=True), cp.Variable(max(equations, 1))
+        slack, excess = (
+            cp.Variable(max(inequalities, 1), nonneg=True),
+            cp.Variable(max(equations, 1)),
+        )
         cost = gradient @ step + cp.sum_squares(root @ step) / 2
         rules = [cp.norm_inf(step) <= radius]
         contacts = None
@@ -65,7 +68,8 @@ class Model:
             msg = "Clarabel stopped while solving a step of the sequential convex programme"
             raise SolverError(msg) from error
         if self.step.value is None:
-            msg = f"Clarabel found no step of the sequential convex programme: {self.programme.status}"
+            status = self.programme.status
+            msg = f"Clarabel found no step of the sequential convex programme: {status}"
             raise SolverError(msg)
         duals = np.zeros(0) if self.contacts is None else np.asarray(self.contacts.dual_value)
         return np.asarray(self.step.value), duals

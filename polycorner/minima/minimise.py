@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,7 +90,11 @@ def minimise(
     if search is None:
         msg = f"method: expected one of {', '.join(map(repr, _SEARCHES))}; got {method!r}"
         raise ValueError(msg)
-    if isinstance(max_iterations, bool) or not isinstance(max_iterations, int) or max_iterations < 1:
+    if (
+        isinstance(max_iterations, bool)
+        or not isinstance(max_iterations, int)
+        or max_iterations < 1
+    ):
         msg = f"max_iterations: expected a positive whole number; got {max_iterations!r}"
         raise ValueError(msg)
     check_tolerance("tolerance", tolerance)
@@ -124,7 +128,9 @@ def stationary_on(
     problem = pose(polyhedron, energy)
     unknown = [name for name in active if name not in polyhedron.names]
     if unknown:
-        msg = f"active: expected names among {', '.join(polyhedron.names)}; got {', '.join(unknown)}"
+        msg = (
+            f"active: expected names among {', '.join(polyhedron.names)}; got {', '.join(unknown)}"
+        )
         raise ValueError(msg)
     q = polyhedron.manifold.point(start, "start")
     face = frozenset(polyhedron.names.index(name) for name in active)
@@ -138,7 +144,11 @@ def stationary_on(
 def _descend_union(problem: Problem, q: Array, search: "Search", limit: int) -> Rest:
     """Descend in one branch of the tree after another until none leads lower."""
     d = problem.polyhedron
-    first, *others = d.selections(d.values(q).tolist()) if d.is_union else [frozenset(range(problem.inequalities))]
+    first, *others = (
+        d.selections(d.values(q).tolist())
+        if d.is_union
+        else [frozenset(range(problem.inequalities))]
+    )
     rest = search(problem, first, q, limit)
     for piece in others:
         if rest.failure is not Verdict.INFEASIBLE:
@@ -198,8 +208,9 @@ def _slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
     rows = sorted(piece)
     sections = list(range(m, problem.rows - 1))
     floor = float(values[-1])
+    options: Any = {"ftol": 1e-15, "maxiter": limit}
 
-    def constraint(kind: str, kept: list[int]) -> dict[str, object]:
+    def constraint(kind: str, kept: list[int]) -> Any:
         return {
             "type": kind,
             "fun": lambda u: problem.evaluate(u * scales, 0)[0][kept],
@@ -212,9 +223,11 @@ def _slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
         jac=lambda u: problem.evaluate(u * scales, 1)[1][-1] / size,
         method="SLSQP",
         constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
-        options={"ftol": 1e-15, "maxiter": limit},
+        options=options,
     )
-    return _finished(problem, piece, found.x * scales, int(found.nit), stopped=found.status in (0, 8))
+    return _finished(
+        problem, piece, found.x * scales, int(found.nit), stopped=found.status in (0, 8)
+    )
 
 
 def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:

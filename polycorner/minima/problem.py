@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,14 @@ from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 if TYPE_CHECKING:
     import sympy
 
-    Energy = SmoothFunction | sympy.Expr
+    Energy: TypeAlias = SmoothFunction | sympy.Expr
 
 Flat = tuple[
-    NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
 ]
 
 
@@ -69,7 +73,10 @@ class Problem:
     @cached_property
     def flat(self) -> tuple[Flat, int]:
         """The problem as arrays for :mod:`~polycorner.minima.compiled`, and its scratch size."""
-        table, reads, rows, parameters = [], [], [], []
+        table: list[tuple[int, ...]] = []
+        reads: list[int] = []
+        rows: list[int] = []
+        parameters: list[float] = []
         size = 1
         for call in self._bundle.calls:
             kernel = call.family.kernel

@@ -21,9 +21,11 @@ def certificate_text(c: "Certificate") -> str:
         ("entrapment", ", ".join(f"{d}: {e.value}" for d, e in c.entrapment().items()) or "none"),
         (
             "residuals",
-            f"infeasibility {residuals.infeasibility:.1e}, "
-            f"stationarity {residuals.stationarity:.1e}, "
-            f"complementarity {residuals.complementarity:.1e}",
+            (
+                f"infeasibility {residuals.infeasibility:.1e}, "
+                f"stationarity {residuals.stationarity:.1e}, "
+                f"complementarity {residuals.complementarity:.1e}"
+            ),
         ),
     ]
     return "\n".join(f"{label:<12} {text}" for label, text in lines)

@@ -11,9 +11,7 @@ class Verdict(Enum):
     WEAK_MINIMUM = "strict local minimum with a weakly active function: its multiplier is zero"
     NOT_STATIONARY = "not a minimum: the energy falls to first order in an allowed direction"
     SADDLE = "not a minimum: first order holds, but the energy falls to second order"
-    NO_MULTIPLIER = (
-        "undecided: no multiplier exists and the active gradients leave no inward direction (a cusp)"
-    )
+    NO_MULTIPLIER = "undecided: no multiplier exists, and no direction leads inward (a cusp)"
     UNDECIDED = "undecided: first order holds, but the second order vanishes in a direction"
     OUTSIDE = "the point does not lie in the polyhedron"
     INFEASIBLE = "no point of the polyhedron was reached from the start"
@@ -26,9 +24,7 @@ class Verdict(Enum):
         return self in _MINIMA
 
 
-_MINIMA = frozenset(
-    {Verdict.STRICT_MINIMUM, Verdict.MINIMUM_ALONG_LOCUS, Verdict.WEAK_MINIMUM}
-)
+_MINIMA = frozenset({Verdict.STRICT_MINIMUM, Verdict.MINIMUM_ALONG_LOCUS, Verdict.WEAK_MINIMUM})
 
 
 class Entrapment(Enum):

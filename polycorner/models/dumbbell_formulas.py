@@ -6,6 +6,7 @@ meridian towards growing azimuth.  In the drum the centres lie on a cylinder of 
 ``rho = R - r`` and the rod is the chord between them ([GMBN] sec. 5).
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -62,7 +63,7 @@ def _family(
     names: tuple[str, ...],
     coordinates: tuple[str, ...],
     parameters: tuple[str, ...],
-    formulas: "functions.Callable[[], Formulas]",
+    formulas: "Callable[[], Formulas]",
 ) -> functions.Family:
     key = repr((kernels.source_key(bodies.__name__, __name__), names, coordinates, parameters))
     return functions.Family(names, variables(coordinates), parameters, formulas, key)
@@ -132,8 +133,9 @@ def _gaps(centres: "Expressions") -> "Formulas":
         segment = (balls[rod[0]], balls[rod[1]])
         at = define(f"foot{contact}", bodies.foot(balls[ball], *segment))
         to_line = define(f"line{contact}", bodies.point_line_distance(balls[ball], *segment, at))
-        to_ends = [apart[(ball, end) if owner == 1 else (end, ball)] for end in rod]
-        distance = define(f"d{contact}", bodies.point_segment_distance(at, *to_ends, to_line))
+        to_start, to_end = (apart[(ball, end) if owner == 1 else (end, ball)] for end in rod)
+        to_rod = bodies.point_segment_distance(at, to_start, to_end, to_line)
+        distance = define(f"d{contact}", to_rod)
         ends.append(distance)
         expressions[contact] = distance - r - t
     crossing, distance = bodies.segment_segment_distance(

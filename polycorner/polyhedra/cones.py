@@ -5,17 +5,18 @@ Rows are gradients in scaled coordinates; the linearised cone is ``{d : A d >= 0
 
 import numpy as np
 
+from polycorner.errors import SolverError
 from polycorner.geometry.manifold import Array
 
 
 def unit_rows(matrix: Array) -> Array:
     """Return the rows divided by their lengths; zero rows stay zero."""
     sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
-    return np.divide(matrix, sizes, out=np.zeros_like(matrix), where=sizes > 0)
+    return np.asarray(np.divide(matrix, sizes, out=np.zeros_like(matrix), where=sizes > 0))
 
 
 def rank(matrix: Array, tolerance: float) -> int:
-    """Return the number of singular values of the unit rows above ``tolerance`` times the largest."""
+    """Return how many singular values of the unit rows exceed ``tolerance`` times the largest."""
     if not matrix.size:
         return 0
     singular = np.linalg.svd(unit_rows(matrix), compute_uv=False)
@@ -39,17 +40,42 @@ def inward_direction(inequalities: Array, equations: Array) -> tuple[Array, floa
     the constraint qualification of Mangasarian and Fromovitz holds for the inequalities
     ([NW] sec. 12.6).
     """
-    from scipy.optimize import linprog
-
     a, e = unit_rows(inequalities), unit_rows(equations)
     n = a.shape[1]
-    result = linprog(
+    found = linear_programme(
         np.array([0.0] * n + [-1.0]),
-        A_ub=np.hstack([-a, np.ones((len(a), 1))]),
-        b_ub=np.zeros(len(a)),
-        A_eq=np.hstack([e, np.zeros((len(e), 1))]) if len(e) else None,
-        b_eq=np.zeros(len(e)) if len(e) else None,
-        bounds=[(-1.0, 1.0)] * (n + 1),
-        method="highs",
+        np.hstack([-a, np.ones((len(a), 1))]),
+        np.zeros(len(a)),
+        bound=1.0,
+        equations=np.hstack([e, np.zeros((len(e), 1))]),
     )
-    return result.x[:n], float(-result.fun)
+    return found[:n], float(found[n])
+
+
+def linear_programme(
+    cost: Array, rows: Array, limits: Array, *, bound: float, equations: Array | None = None
+) -> Array:
+    """Minimise ``cost.x`` subject to ``rows x <= limits``, ``equations x = 0``, ``|x_i| <= bound``.
+
+    The caller makes sure that the programme is feasible; it is bounded by construction.
+
+    Raises
+    ------
+    SolverError
+        If HiGHS stops without a solution.
+    """
+    from scipy.optimize import linprog
+
+    some = equations is not None and len(equations) > 0
+    result = linprog(
+        cost,
+        A_ub=rows,
+        b_ub=limits,
+        A_eq=equations if some else None,
+        b_eq=np.zeros(len(equations)) if some and equations is not None else None,
+        bounds=[(-bound, bound)] * len(cost),
+    )
+    if result.x is None:
+        msg = f"HiGHS found no solution of a small linear programme: {result.message}"
+        raise SolverError(msg)
+    return np.asarray(result.x)

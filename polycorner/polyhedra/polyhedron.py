@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
@@ -151,7 +152,7 @@ class Polyhedron:
         return self.implicit_of(self.values(q))[()]
 
     def implicit_of(self, values: Array) -> Array:
-        """Return the minimum over ``AllOf``, maximum over ``AnyOf`` of given values ``(..., m)``."""
+        """Return the implicit value of given values ``(..., m)``; see :meth:`implicit`."""
         return _implicit(self.tree, values)
 
     def contains(self, q: ArrayLike, *, tolerance: float = 0.0) -> Any:
@@ -179,7 +180,7 @@ class Polyhedron:
         A selection takes all parts of every ``AllOf`` and one part of every ``AnyOf``; where no
         part holds, all of them, the one that fails least first.
         """
-        limited = [s for s, _ in zip(_select(self.tree, values, tolerance), range(MAX_SELECTIONS))]
+        limited = islice(_select(self.tree, values, tolerance), MAX_SELECTIONS)
         return list(dict.fromkeys(limited))
 
 
@@ -211,7 +212,9 @@ def _implicit(tree: Tree, values: Array) -> Array:
 
 def _pieces(tree: Tree, signs: Sequence[int]) -> set[Piece]:
     if isinstance(tree, int):
-        return {frozenset()} if signs[tree] > 0 else {frozenset([tree])} if signs[tree] == 0 else set()
+        return (
+            {frozenset()} if signs[tree] > 0 else {frozenset([tree])} if signs[tree] == 0 else set()
+        )
     parts = [_pieces(child, signs) for child in tree.children]
     if tree.union:
         return set().union(*parts)

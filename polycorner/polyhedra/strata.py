@@ -114,7 +114,7 @@ def evaluated(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array]:
 
 
 def distances(values: Array, gradients: Array) -> Array:
-    """Return first-order signed distances ``f / |grad f|``; infinite where the gradient vanishes."""
+    """Return signed distances ``f / |grad f|``, infinite where the gradient alone vanishes."""
     sizes = np.linalg.norm(gradients, axis=1)
     far = np.where(values == 0, 0.0, np.copysign(np.inf, values))
     return np.asarray(np.divide(values, sizes, out=far, where=sizes > 0))
@@ -139,9 +139,7 @@ def check_tolerance(argument: str, value: float) -> None:
         raise ValueError(msg)
 
 
-def _local_type(
-    pieces: list[Piece], gradients: Array, m: int, rank_tolerance: float
-) -> LocalType:
+def _local_type(pieces: list[Piece], gradients: Array, m: int, rank_tolerance: float) -> LocalType:
     if not pieces:
         return LocalType.OUTSIDE
     if len(pieces) > 1:

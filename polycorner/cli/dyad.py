@@ -1,0 +1,259 @@
+"""``polycorner dyad``: the minima of a pair of dumbbells, certified."""
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from polycorner.models import DumbbellPair
+    from polycorner.studies import DyadMinimum
+
+# option, the model's parameter, default (the paper's dyads)
+PARAMETERS = (
+    ("length", "length", 16.0),
+    ("ball", "ball_radius", 3.0),
+    ("rod", "rod_radius", 1.5),
+    ("drum", "drum_radius", 125.0),
+    ("rod_weight", "rod_weight", 0.0),
+)
+EPILOG = """\b
+Examples:
+  polycorner dyad --length 16 --ball 3 --rod 1.5 --drum 125
+  polycorner dyad --drum inf --json
+  polycorner dyad --config examples/dyads.toml --rod 1 --out out
+"""
+
+
+@click.command(epilog=EPILOG)
+@click.option("--length", type=float, help="Distance of a dumbbell's ball centres, mm. [16]")
+@click.option("--ball", type=float, help="Radius of the balls, mm. [3]")
+@click.option("--rod", type=float, help="Radius of the rods, mm. [1.5]")
+@click.option("--drum", type=float, help="Radius of the drum, mm; inf is the plane. [125]")
+@click.option("--rod-weight", type=float, help="Weight of a rod, in weights of a ball. [0]")
+@click.option(
+    "--config",
+    type=click.Path(path_type=Path),
+    help="TOML file with these names as keys; options override it.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the figures and the JSON file.",
+)
+def dyad(config: Path | None, as_json: bool, out: Path | None, **options: float | None) -> None:
+    """Find delta_R, delta_L and G of two dumbbells in a drum, and certify them."""
+    pair = _pair(_merged(config, options))
+    from polycorner.studies import dyad_minima
+
+    entries = dyad_minima(pair)
+    answer = _answer(pair, entries)
+    written = _write(pair, entries, answer, out) if out is not None else []
+    if as_json:
+        click.echo(_json(answer))
+        return
+    _print_tables(pair, entries, answer)
+    for path in written:
+        click.echo(f"wrote {path}")
+
+
+def _fail(message: str) -> NoReturn:
+    """End the command with one line and exit code 2."""
+    raise click.UsageError(message)
+
+
+def _merged(config: Path | None, options: dict[str, float | None]) -> dict[str, Any]:
+    values: dict[str, Any] = {name: default for name, _, default in PARAMETERS}
+    values |= _read(config) if config is not None else {}
+    return values | {name: value for name, value in options.items() if value is not None}
+
+
+def _read(config: Path) -> dict[str, Any]:
+    try:
+        with config.open("rb") as file:
+            table = tomllib.load(file)
+    except OSError as error:
+        reason = error.strerror or error
+        _fail(f"--config: {config} cannot be read ({reason})")
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        _fail(f"--config: {config} is no TOML file: {error}")
+    known = {name for name, _, _ in PARAMETERS}
+    renamed = {key.replace("-", "_"): value for key, value in table.items()}
+    unknown = sorted(set(renamed) - known)
+    if unknown:
+        expected = ", ".join(name for name, _, _ in PARAMETERS)
+        _fail(f"--config: {config}: expected {expected}; got {', '.join(unknown)}")
+    for name, value in renamed.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            _fail(f"--config: {config}: {name}: expected a number; got {value!r}")
+    return renamed
+
+
+def _pair(values: dict[str, Any]) -> "DumbbellPair":
+    from polycorner.models import DumbbellPair
+
+    try:
+        return DumbbellPair(**{field: values[name] for name, field, _ in PARAMETERS})
+    except (ValueError, TypeError) as error:
+        message = str(error)
+        for name, field, _ in PARAMETERS:
+            if message.startswith(f"{field}:"):
+                message = f"--{name.replace('_', '-')}" + message.removeprefix(field)
+                break
+        _fail(message)
+
+
+def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[str, Any]:
+    import math
+
+    from polycorner.studies import paper_heading
+
+    parameters: dict[str, Any] = {name: getattr(pair, field) for name, field, _ in PARAMETERS}
+    parameters["drum"] = "inf" if pair.is_plane else pair.drum_radius
+    return {
+        "parameters": parameters,
+        "minima": [_entry(entry) for entry in entries],
+        "paper_heading_deg": paper_heading(pair),
+        "plane_heading_deg": math.degrees(pair.plane_corner()[0]),
+    }
+
+
+def _entry(entry: "DyadMinimum") -> dict[str, Any]:
+    certificate = entry.certificate
+    residuals = certificate.residuals()
+    return {
+        "name": entry.name,
+        "heading_deg": list(entry.headings),
+        "azimuth_deg": list(entry.azimuths),
+        "lateral": list(entry.lateral),
+        "axial_gap": entry.axial_gap,
+        "height": entry.height,
+        "active": list(certificate.active),
+        "multipliers": entry.multipliers,
+        "signature": list(certificate.signature()),
+        "entrapment": certificate.entrapment_counts(),
+        "entrapment_by_direction": {
+            direction: kind.value for direction, kind in certificate.entrapment().items()
+        },
+        "chirality": certificate.stratum.chirality,
+        "is_minimum": certificate.is_minimum,
+        "verdict": certificate.verdict.value,
+        "residuals": {
+            "infeasibility": residuals.infeasibility,
+            "stationarity": residuals.stationarity,
+            "complementarity": residuals.complementarity,
+        },
+    }
+
+
+def _json(answer: dict[str, Any]) -> str:
+    import json
+
+    return json.dumps(_finite(answer), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    """Return the same value with ``null`` in place of numbers JSON does not have."""
+    import math
+
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write(
+    pair: "DumbbellPair",
+    entries: "tuple[DyadMinimum, ...]",
+    answer: dict[str, Any],
+    out: Path,
+) -> list[Path]:
+    import numpy as np
+
+    from polycorner.pictures import plots
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        file = out / "dyad.json"
+        file.write_text(_json(answer) + "\n", encoding="utf-8")
+    except OSError as error:
+        _fail(f"--out: {out} cannot be written ({error.strerror})")
+    written = [file]
+    written += [plots.save(plots.draw_pair(e), out / f"{e.name}.png") for e in entries]
+    longest = 2 * (pair.drum_radius - pair.ball_radius)
+    lengths = np.linspace(2 * pair.ball_radius, min(10 * pair.ball_radius, longest), 49)
+    rods = sorted({0.25 * pair.ball_radius, pair.rod_radius, 0.8 * pair.ball_radius})
+    figure = plots.draw_heading(pair, lengths.tolist(), rods)
+    return [*written, plots.save(figure, out / "heading.png")]
+
+
+def _print_tables(
+    pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]", answer: dict[str, Any]
+) -> None:
+    from rich.console import Console
+
+    console = Console(width=None if _is_terminal() else 120, highlight=False)
+    where = "the developed plane" if pair.is_plane else f"a drum of radius {pair.drum_radius:g} mm"
+    console.print(
+        f"Two dumbbells (l = {pair.length:g}, r = {pair.ball_radius:g}, "
+        f"t = {pair.rod_radius:g} mm) in {where}"
+    )
+    console.print(_table(entries))
+    for entry in entries:
+        console.print(f"{entry.name}: {entry.certificate.verdict.value}")
+    computed = abs(entries[0].headings[0])
+    console.print(
+        f"heading: computed {computed:.6f} deg, plane {answer['plane_heading_deg']:.6f} deg, "
+        f"paper's arctan(r/l) {answer['paper_heading_deg']:.6f} deg"
+    )
+
+
+def _is_terminal() -> bool:
+    import sys
+
+    return sys.stdout.isatty()
+
+
+def _table(entries: "tuple[DyadMinimum, ...]") -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("")
+    for entry in entries:
+        table.add_column(entry.name)
+    for label, cells in _rows(entries):
+        table.add_row(label, *cells)
+    return table
+
+
+def _rows(entries: "tuple[DyadMinimum, ...]") -> list[tuple[str, list[str]]]:
+    certificates = [entry.certificate for entry in entries]
+    unit = "mm" if entries[0].pair.is_plane else "-"
+    residuals = [certificate.residuals() for certificate in certificates]
+    return [
+        ("heading (deg)", ["{:.6f}  {:.6f}".format(*e.headings) for e in entries]),
+        ("azimuth (deg)", ["{:.6f}  {:.6f}".format(*e.azimuths) for e in entries]),
+        ("axial gap (mm)", [f"{e.axial_gap:.6f}" for e in entries]),
+        ("height (mm)", [f"{e.height:.9f}" for e in entries]),
+        ("minimum", ["yes" if c.is_minimum else "no" for c in certificates]),
+        (f"multipliers ({unit})", [_lines(e.multipliers, "{:.9f}") for e in entries]),
+        ("(p, q, r)", ["({}, {}, {})".format(*c.signature()) for c in certificates]),
+        (
+            "entrapment",
+            [_lines({d: k.value for d, k in c.entrapment().items()}, "{}") for c in certificates],
+        ),
+        ("infeasibility", [f"{r.infeasibility:.1e}" for r in residuals]),
+        ("stationarity", [f"{r.stationarity:.1e}" for r in residuals]),
+        ("complementarity", [f"{r.complementarity:.1e}" for r in residuals]),
+    ]
+
+
+def _lines(values: dict[str, Any], form: str) -> str:
+    width = max((len(name) for name in values), default=0)
+    return "\n".join(f"{name:<{width}}  {form.format(v)}" for name, v in values.items()) or "none"

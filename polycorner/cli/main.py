@@ -1,0 +1,49 @@
+"""The command ``polycorner``: subcommands, errors in one line, exit codes.
+
+=====  ==================================================
+0      an answer, whatever it says
+2      bad input: one line on standard error says which
+130    interrupted
+=====  ==================================================
+"""
+
+import sys
+
+import click
+
+from polycorner import __version__
+from polycorner.cli.dyad import dyad
+
+EXAMPLES = """\b
+Examples:
+  polycorner dyad
+  polycorner dyad --rod 1 --drum inf --json
+"""
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"]}, epilog=EXAMPLES, no_args_is_help=True
+)
+@click.version_option(__version__, message="polycorner %(version)s")
+def cli() -> None:
+    """Find and certify where energies come to rest on curvilinear polyhedra."""
+
+
+cli.add_command(dyad)
+
+
+def main() -> None:
+    """Run the command line and end the process with its exit code."""
+    try:
+        code = cli.main(prog_name="polycorner", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        code = 0
+    except click.ClickException as error:
+        message = " ".join(error.format_message().split())
+        click.echo(f"polycorner: {message}", err=True)
+        code = 2
+    except click.exceptions.Abort:
+        click.echo("polycorner: interrupted", err=True)
+        code = 130
+    sys.exit(code if isinstance(code, int) else 0)

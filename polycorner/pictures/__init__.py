@@ -1,0 +1,1 @@
+"""Everything one looks at; never imported by the core."""
