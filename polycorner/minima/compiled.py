@@ -593,7 +593,7 @@ def polish(problem, on, m, u, F, J, H, size):
 
 @njit(cache=True)
 def finished(problem, use, on, m, u, F, J, H, size, energy):
-    """Polish a copy of ``u``; say 2 if it is stationary and no higher, 1 if only no higher, else 0."""
+    """Polish a copy of ``u``; 2 if that is stationary and no higher, 1 if only the latter, or 0."""
     stay_whole()
     v, rows = u.copy(), on.copy()
     for _ in range(4):

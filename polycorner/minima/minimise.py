@@ -217,10 +217,16 @@ def _slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
             "jac": lambda u: problem.evaluate(u * scales, 1)[1][kept],
         }
 
+    def energy(u: Array) -> float:
+        return float(problem.evaluate(u * scales, 0)[0][-1] - floor) / size
+
+    def slope(u: Array) -> Array:
+        return np.asarray(problem.evaluate(u * scales, 1)[1][-1] / size)
+
     found = minimize(
-        lambda u: (problem.evaluate(u * scales, 0)[0][-1] - floor) / size,
+        energy,
         q / scales,
-        jac=lambda u: problem.evaluate(u * scales, 1)[1][-1] / size,
+        jac=slope,
         method="SLSQP",
         constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
         options=options,
