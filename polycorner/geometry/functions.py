@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.geometry.manifold import Array, Manifold, finite, reals
+from polycorner.geometry.manifold import Array, Manifold, finite, reals, scalar
 from polycorner.geometry.programs import Program, compile_expressions
 
 if TYPE_CHECKING:
@@ -217,7 +217,7 @@ class SmoothFunction:
 
     def value(self, q: ArrayLike) -> Any:
         """Return ``f(q)``, shape ``(...)`` for points ``(..., n)``."""
-        return self._bundle.evaluate(self.manifold.points(q), 0)[0][..., 0][()]
+        return scalar(self._bundle.evaluate(self.manifold.points(q), 0)[0][..., 0])
 
     def gradient(self, q: ArrayLike) -> Array:
         """Return the partial derivatives ``(..., n)``."""

@@ -176,6 +176,11 @@ def reals(values: ArrayLike, argument: str) -> Array:
     return array.astype(np.float64)
 
 
+def scalar(values: Any) -> Any:
+    """Return a plain Python number for an array of no dimension, any other array as it is."""
+    return values.item() if values.ndim == 0 else values
+
+
 def finite(array: Array, argument: str) -> Array:
     """Return ``array`` unchanged, refusing NaN and infinities."""
     flat = array.ravel()

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,7 @@ from polycorner.studies.dyad import DyadMinimum, heading_curve
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito).
 BODIES = ("#0072B2", "#D55E00")
-ACCENT = "#009E73"
-SHADES = ("#56B4E9", "#0072B2", "#CC79A7", "#D55E00")
+SHADES = ("#56B4E9", "#0072B2", "#CC79A7", "#D55E00", "#E69F00", "#009E73")
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -55,7 +55,7 @@ def draw_heading(pair: DumbbellPair, lengths: Sequence[float], rods: Sequence[fl
     figure = Figure(figsize=(7, 6), layout="constrained")
     axes = figure.add_subplot()
     lengths_array = np.asarray(lengths, dtype=np.float64)
-    for colour, rod in zip(SHADES, rods, strict=False):
+    for colour, rod in zip(cycle(SHADES), rods, strict=False):
         for chirality in ("R", "L"):
             model = replace(pair, rod_radius=float(rod))
             headings, rests = heading_curve(model, lengths, chirality)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.geometry.functions import Bundle, Family, SmoothFunction
-from polycorner.geometry.manifold import Array, Manifold
+from polycorner.geometry.manifold import Array, Manifold, scalar
 
 if TYPE_CHECKING:
     import sympy
@@ -149,7 +149,7 @@ class Polyhedron:
 
     def implicit(self, q: ArrayLike) -> Any:
         """Return the implicit value: the minimum over ``AllOf``, the maximum over ``AnyOf``."""
-        return self.implicit_of(self.values(q))[()]
+        return scalar(self.implicit_of(self.values(q)))
 
     def implicit_of(self, values: Array) -> Array:
         """Return the implicit value of given values ``(..., m)``; see :meth:`implicit`."""
@@ -157,8 +157,8 @@ class Polyhedron:
 
     def contains(self, q: ArrayLike, *, tolerance: float = 0.0) -> Any:
         """Whether ``q`` lies in ``D``, functions allowed to miss by ``tolerance``."""
-        inside = self.implicit(q) >= -tolerance
-        return (inside & (abs(self.equation_values(q)) <= tolerance).all(axis=-1))[()]
+        inside = self.implicit_of(self.values(q)) >= -tolerance
+        return scalar(inside & (abs(self.equation_values(q)) <= tolerance).all(axis=-1))
 
     def signs_to_pieces(self, signs: Sequence[int]) -> list[Piece]:
         """Return ``D`` near a point as a union of pieces, from the sign of every function there.
