@@ -153,13 +153,19 @@ def source_key(*modules: str) -> str:
 
 
 @lru_cache(maxsize=1)
-def _target() -> Any:
+def _prepare() -> None:
+    """Set up code generation for this machine, and say where the C mathematics library is."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "msvcrt")
     for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY):
         function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
         llvm.add_symbol(name, function.value)
+
+
+def _target_machine() -> Any:
+    """Return a new target machine; an execution engine takes over the one it is made with."""
+    _prepare()
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(),
         features=llvm.get_host_cpu_features().flatten(),
@@ -207,9 +213,7 @@ def _write(path: Path, code: bytes) -> None:
 
 
 def _load(code: bytes, name: str) -> tuple[Any, list[int]]:
-    target = _target()
-    empty = llvm.parse_assembly("")
-    engine = llvm.create_mcjit_compiler(empty, target)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     entries = (f"{name}_point", f"{name}_packed", f"{name}_batch")
@@ -222,7 +226,7 @@ def _machine_code(program: Program, order: int, name: str) -> bytes:
     _emit_functions(module, program, order, name)
     parsed = llvm.parse_assembly(str(module))
     parsed.verify()
-    target = _target()
+    target = _target_machine()
     options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION)
     builder = llvm.create_pass_builder(target, options)
     builder.getModulePassManager().run(parsed, builder)
