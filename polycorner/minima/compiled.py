@@ -6,8 +6,8 @@ the file a function stands in and of no other.
 All vectors are in scaled coordinates ``u = q / scales``.  A problem is a tuple of flat arrays
 
 =========  ==============================================================================
-table      (G, 6) int64: address of a kernel's point routine, its variables, its outputs,
-           where its reads, rows and parameters start
+table      (G, 7) int64: addresses of a kernel's point routines with and without Hessians, its
+           variables, its outputs, where its reads, rows and parameters start
 reads      coordinate read by each variable of each call
 rows       row of the system each output goes to, or -1
 parameters numbers, call after call
@@ -28,8 +28,9 @@ CONVERGED, INFEASIBLE, UNBOUNDED, STALLED = 0, 1, 2, 3
 
 FEASIBLE = 1e-10  # scaled distance by which a constraint may be missed during the descent
 EXACT = 1e-13  # and after the last Newton iterations
-FIRST_CAP = 0.25  # longest first step, in scale units
+FIRST_CAP = 0.5  # longest first step, in scale units
 FAR = 1e8  # a descent that goes farther is called unbounded
+CURVED = 1e-8  # relative curvature below which a stationary point is a saddle
 RANK = 1e-8  # singular values below this fraction of the largest count as zero
 
 
@@ -60,14 +61,15 @@ def stay_whole(_: Any) -> Any:
 
 
 @njit(cache=True)
-def evaluate(problem, u, F, J, H, size):
-    """Fill values (M,), scaled gradients (M, n) and scaled Hessians (M, n, n)."""
+def evaluate(problem, u, F, J, H, size, second):
+    """Fill values (M,), scaled gradients (M, n) and, if asked, scaled Hessians (M, n, n)."""
     stay_whole()
     table, reads, rows, parameters, scales = problem
     work = np.empty(size)
     start, base = work.ctypes.data, parameters.ctypes.data
     for call in range(table.shape[0]):
-        address, k, m, r0, w0, p0 = table[call]
+        curved, straight, k, m, r0, w0, p0 = table[call]
+        address = curved if second else straight
         for i in range(k):
             c = reads[r0 + i]
             work[i] = u[c] * scales[c]
@@ -82,9 +84,10 @@ def evaluate(problem, u, F, J, H, size):
             for i in range(k):
                 a = reads[r0 + i]
                 J[row, a] = work[j0 + o * k + i] * scales[a]
-                for j in range(k):
-                    b = reads[r0 + j]
-                    H[row, a, b] = work[h0 + (o * k + i) * k + j] * scales[a] * scales[b]
+                if second:
+                    for j in range(k):
+                        b = reads[r0 + j]
+                        H[row, a, b] = work[h0 + (o * k + i) * k + j] * scales[a] * scales[b]
     work[0] = 0.0
 
 
@@ -448,7 +451,7 @@ def project(problem, use, m, u, F, J, H, size, limit):
     stay_whole()
     n, equations = u.size, F.size - 1 - m
     eye, zero = identity(n), np.zeros(n)
-    evaluate(problem, u, F, J, H, size)
+    evaluate(problem, u, F, J, H, size, False)
     worst = violation(F, J, use, m)
     for _ in range(limit):
         if worst <= FEASIBLE:
@@ -465,7 +468,7 @@ def project(problem, use, m, u, F, J, H, size, limit):
         improved = False
         for _ in range(12):
             trial = plus(u, factor, d)
-            evaluate(problem, trial, F, J, H, size)
+            evaluate(problem, trial, F, J, H, size, False)
             after = violation(F, J, use, m)
             if after < worst * (1.0 - 0.1 * factor) or after <= FEASIBLE:
                 for k in range(n):
@@ -485,7 +488,7 @@ def crosses_wall(problem, use, m, u, d, F, J, H, size):
     stay_whole()
     samples = min(64, int(np.ceil(2.0 * largest(d))))
     for k in range(1, samples):
-        evaluate(problem, plus(u, k / samples, d), F, J, H, size)
+        evaluate(problem, plus(u, k / samples, d), F, J, H, size, False)
         if not violation(F, J, use, m) <= 0.5:
             return True
     return False
@@ -561,7 +564,7 @@ def polish(problem, on, m, u, F, J, H, size):
     lam = np.zeros(total)
     last = np.inf
     for _ in range(60):
-        evaluate(problem, u, F, J, H, size)
+        evaluate(problem, u, F, J, H, size, True)
         A, b, keep, sizes = system(F, J, on, m)
         g = J[total]
         for i in range(total):
@@ -587,19 +590,61 @@ def polish(problem, on, m, u, F, J, H, size):
             break
         add_multiple(u, 1.0, d)
         last = step
-    evaluate(problem, u, F, J, H, size)
+    evaluate(problem, u, F, J, H, size, True)
     return lam, step
 
 
 @njit(cache=True)
-def finished(problem, use, on, m, u, F, J, H, size, energy):
-    """Polish a copy of ``u``; 2 if that is stationary and no higher, 1 if only the latter, or 0."""
+def steepest_curve(H, J, lam, on, m, direction):
+    """Return the least curvature of the Lagrangian along the face, relative, and its direction."""
     stay_whole()
-    v, rows = u.copy(), on.copy()
+    n, total = H.shape[1], lam.size
+    A, b, _, _ = system(lam, J, on, m)
+    V, s = identity(n), np.zeros(n)
+    cut = 0.0
+    if b.size:
+        _, s, V = svd(A)
+        cut = RANK * largest(s)
+    L = lagrangian_hessian(H, lam)
+    # The null space, completed by a large multiple of the gradients' own span.
+    reference = max(largest_entry(L), largest_entry(H[total])) + 1e-300
+    M = np.zeros((n, n))
+    for a in range(n):
+        for c in range(n):
+            if s[a] <= cut and s[c] <= cut:
+                for i in range(n):
+                    for k in range(n):
+                        M[a, c] += V[i, a] * L[i, k] * V[k, c]
+        if s[a] > cut:
+            M[a, a] = reference
+    _, _, W = svd(M)
+    least, chosen = np.inf, 0
+    for j in range(n):
+        value = 0.0
+        for a in range(n):
+            for c in range(n):
+                value += W[a, j] * M[a, c] * W[c, j]
+        if value < least:
+            least, chosen = value, j
+    for i in range(n):
+        direction[i] = 0.0
+        for a in range(n):
+            direction[i] += V[i, a] * W[a, chosen]
+    return least / reference
+
+
+@njit(cache=True)
+def finished(problem, use, on, m, u, F, J, H, size, energy):
+    """Polish a copy of ``u``: 3 a rest, 2 a saddle, 1 not stationary, 0 higher or outside.
+
+    Returns that number, the point, the multipliers and the direction of least curvature.
+    """
+    stay_whole()
+    v, rows, direction = u.copy(), on.copy(), np.zeros(u.size)
     for _ in range(4):
         lam, step = polish(problem, rows, m, v, F, J, H, size)
         if not step < 1e-8 or largest(plus(v, -1.0, u)) > 0.5:
-            return 0, v, lam
+            return 0, v, lam, direction
         added = False
         for i in range(m):
             if use[i] and not rows[i] and F[i] < -EXACT * length(J[i]):
@@ -616,8 +661,54 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
             stationary = False
     higher = F[last] > energy + 1e-9 * (abs(energy) + reference)
     if higher or violation(F, J, use, m) > FEASIBLE:
-        return 0, v, lam
-    return 1 + (stationary and largest(pull) <= 1e-9 * reference), v, lam
+        return 0, v, lam, direction
+    if not (stationary and largest(pull) <= 1e-9 * reference):
+        return 1, v, lam, direction
+    saddle = steepest_curve(H, J, lam, rows, m, direction) < -CURVED
+    return (2 if saddle else 3), v, lam, direction
+
+
+@njit(cache=True)
+def leave(problem, use, m, v, direction, F, J, H, size):
+    """Move ``v`` off a saddle, to a feasible lower point along its direction; return success."""
+    stay_whole()
+    evaluate(problem, v, F, J, H, size, False)
+    energy = F[F.size - 1]
+    for k in range(24):
+        step = 0.1 * 0.5 ** (k // 2) * (1.0 - 2.0 * (k % 2))
+        trial = plus(v, step, direction)
+        if project(problem, use, m, trial, F, J, H, size, np.int64(6)) and F[F.size - 1] < energy:
+            for i in range(v.size):
+                v[i] = trial[i]
+            return True
+    return False
+
+
+@njit(cache=True)
+def probe(problem, on, use, m, rows, u, directions, steps, size):
+    """Follow directions along a face; return the largest change of the energy, or infinity.
+
+    Each step is corrected by Newton's method on the face.  Steps that leave the set of the used
+    rows are skipped; a direction that cannot be followed at all counts as infinite.
+    """
+    n = u.size
+    F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
+    evaluate(problem, u, F, J, H, size, False)
+    energy, worst = F[rows - 1], 0.0
+    for j in range(directions.shape[0]):
+        followed = False
+        for step in steps:
+            guess = plus(u, step, directions[j])
+            q = guess.copy()
+            _, last = polish(problem, on, m, q, F, J, H, size)
+            if not last < 1e-8 or largest(plus(q, -1.0, guess)) > 0.1 * abs(step):
+                return np.inf
+            if violation(F, J, use, m) <= FEASIBLE:
+                followed = True
+                worst = max(worst, abs(F[rows - 1] - energy))
+        if not followed:
+            return np.inf
+    return worst
 
 
 @njit(cache=True)
@@ -644,7 +735,7 @@ def descend(problem, use, m, rows, u, size, limit):
         return INFEASIBLE, 0, u, lam
     cap = FIRST_CAP
     for iteration in range(1, limit + 1):
-        evaluate(problem, u, F, J, H, size)
+        evaluate(problem, u, F, J, H, size, True)
         energy, g = F[rows - 1], J[rows - 1].copy()
         convexified(lagrangian_hessian(H, lam), g, L)
         A, b, keep, sizes = system(F, J, use, m)
@@ -665,9 +756,13 @@ def descend(problem, use, m, rows, u, size, limit):
         for i in range(m):
             settled = settled and on[i] == before[i]
         if reach < 1e-9 or (reach < 0.05 and settled):
-            good, v, exact = finished(problem, use, on, m, u, F, J, H, size, energy)
-            if good == 2:
+            good, v, exact, way = finished(problem, use, on, m, u, F, J, H, size, energy)
+            if good == 3:
                 return CONVERGED, iteration, v, exact
+            if good == 2 and leave(problem, use, m, v, way, F, J, H, size):
+                for k in range(n):
+                    u[k] = v[k]
+                continue
             if reach < 1e-9:
                 return STALLED, iteration, v if good else u, lam
         slope = 0.0
@@ -687,8 +782,8 @@ def descend(problem, use, m, rows, u, size, limit):
                     break
             factor *= 0.5
         if not accepted:
-            good, v, exact = finished(problem, use, on, m, u, F, J, H, size, energy)
-            return (CONVERGED if good == 2 else STALLED), iteration, v if good else u, exact
+            good, v, exact, _ = finished(problem, use, on, m, u, F, J, H, size, energy)
+            return (CONVERGED if good >= 2 else STALLED), iteration, v if good else u, exact
         if factor * reach >= 0.99 * cap:
             cap *= 2.0
         else:

@@ -81,8 +81,8 @@ class Problem:
         for call in self._bundle.calls:
             kernel = call.family.kernel
             k, m = kernel.variables, kernel.outputs
-            point = kernel.compiled(2).point
-            table.append((point, k, m, len(reads), len(rows), len(parameters)))
+            curved, straight = kernel.compiled(2).point, kernel.compiled(1).point
+            table.append((curved, straight, k, m, len(reads), len(rows), len(parameters)))
             reads += call.reads
             where = dict(zip(call.columns, call.rows, strict=True))
             rows += [where.get(column, -1) for column in range(m)]
@@ -122,6 +122,20 @@ class Problem:
             flat, self.mask(active), self.inequalities, self.rows, q / self.scales, size
         )
         return u * self.scales, step
+
+    def probe(
+        self, strong: Piece, piece: Piece, q: Array, directions: Array, steps: Array
+    ) -> float:
+        """Return how much the energy changes along scaled directions; see :func:`compiled.probe`."""
+        from polycorner.minima import compiled
+
+        flat, size = self.flat
+        masks = self.mask(strong), self.mask(piece)
+        rows = np.ascontiguousarray(directions)
+        change: float = compiled.probe(
+            flat, *masks, self.inequalities, self.rows, q / self.scales, rows, steps, size
+        )
+        return change
 
 
 @lru_cache(maxsize=64)
