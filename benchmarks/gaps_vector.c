@@ -167,42 +167,55 @@ INLINE void eight(const real *q, const double *p, real *f, real *J) {
     for (int k = 0; k < 6; k++) J[6 * ab + k] = choose(crossing, row[k], J[6 * ab + k]);
 }
 
-/* Exchange rows and columns of an 8 x 8 square and store it with the given stride. */
-INLINE void store_square(const real *a, double *to, int64_t stride) {
-    real b[8], c[8], d[8];
+/* Exchange rows and columns of an 8 x 8 square. */
+INLINE void transpose(real *a) {
+    real b[8], c[8];
 #pragma GCC unroll 4
     for (int k = 0; k < 8; k += 2) {
         b[k] = __builtin_shufflevector(a[k], a[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
         b[k + 1] = __builtin_shufflevector(a[k], a[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
     }
 #pragma GCC unroll 4
-    for (int k = 0; k < 8; k++) {
-        if (k & 2) continue;
+    for (int n = 0; n < 4; n++) {
+        int k = n + (n & 2); /* 0, 1, 4, 5 */
         c[k] = __builtin_shufflevector(b[k], b[k + 2], 0, 1, 8, 9, 4, 5, 12, 13);
         c[k + 2] = __builtin_shufflevector(b[k], b[k + 2], 2, 3, 10, 11, 6, 7, 14, 15);
     }
 #pragma GCC unroll 4
     for (int k = 0; k < 4; k++) {
-        d[k] = __builtin_shufflevector(c[k], c[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        d[k + 4] = __builtin_shufflevector(c[k], c[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+        a[k] = __builtin_shufflevector(c[k], c[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+        a[k + 4] = __builtin_shufflevector(c[k], c[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
     }
+}
+
+INLINE void load(const double *q, real *in) {
+    real square[LANES] = {0};
 #pragma GCC unroll 8
-    for (int k = 0; k < 8; k++) memcpy(to + stride * k, &d[k], sizeof(real));
+    for (int lane = 0; lane < LANES; lane++) memcpy(&square[lane], q + 6 * lane, 6 * sizeof(double));
+    transpose(square);
+#pragma GCC unroll 6
+    for (int k = 0; k < 6; k++) in[k] = square[k];
 }
 
 INLINE void store(const real *a, int rows, double *to) {
-    int k = 0;
-    for (; k + 8 <= rows; k += 8) store_square(a + k, to + k, rows);
-    for (; k < rows; k++)
-        for (int lane = 0; lane < LANES; lane++) to[rows * lane + k] = a[k][lane];
+#pragma GCC unroll 8
+    for (int k = 0; k < rows; k += LANES) {
+        const int width = rows - k < LANES ? rows - k : LANES;
+        real square[LANES] = {0};
+#pragma GCC unroll 8
+        for (int n = 0; n < width; n++) square[n] = a[k + n];
+        transpose(square);
+#pragma GCC unroll 8
+        for (int lane = 0; lane < LANES; lane++)
+            memcpy(to + rows * lane + k, &square[lane], width * sizeof(double));
+    }
 }
 
 /* As in gaps.c; count must be a multiple of eight. */
 void gaps(int64_t count, const double *q, const double *p, double *f, double *J) {
     for (int64_t i = 0; i < count; i += LANES) {
         real in[6], F[CONTACTS], D[ROWS];
-        for (int k = 0; k < 6; k++)
-            for (int lane = 0; lane < LANES; lane++) in[k][lane] = q[6 * (i + lane) + k];
+        load(q + 6 * i, in);
         eight(in, p, F, D);
         store(F, CONTACTS, f + CONTACTS * i);
         store(D, ROWS, J + ROWS * i);

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import mpmath
+import numpy as np
 import sympy as sp
 
 from polycorner import Manifold, Polyhedron
@@ -71,16 +72,35 @@ class Posed:
         return list(u[:n]), dict(zip(names, u[n:], strict=True))
 
     def _first_multipliers(self, point):
-        equations, unknowns, names = self.kkt
-        n, k = len(point), len(names)
-        if not k:
+        """Return least-squares multipliers, as good as the guess is."""
+        held = [self.inequalities[name] for name in self.active] + list(self.equations.values())
+        if not held:
             return []
-        at = dict(zip(self.coordinates, point, strict=True))
-        pull = sp.Matrix(equations[:n]).subs(at)
-        slope = pull.jacobian(unknowns[n:])
-        rest = pull.subs(dict.fromkeys(unknowns[n:], 0))
-        found = mpmath.qr_solve(mpmath.matrix(slope.tolist()), -mpmath.matrix(list(rest)))[0]
-        return list(found)
+        at = dict(zip(self.coordinates, map(float, point), strict=True))
+        rows = np.array(
+            [
+                [float(sp.diff(f, x).subs(at)) for x in self.coordinates]
+                for f in [self.energy, *held]
+            ]
+        )
+        return list(map(mpmath.mpf, np.linalg.lstsq(rows[1:].T, rows[0], rcond=None)[0].tolist()))
+
+    @cached_property
+    def face_curvatures(self):
+        """Eigenvalues of the Lagrangian's Hessian on the optimum's face, ascending."""
+        point, multipliers = self.solution
+        at = dict(zip(self.coordinates, map(float, point), strict=True))
+        functions = self.inequalities | self.equations
+        lagrangian = self.energy - sum(lam * functions[f] for f, lam in multipliers.items())
+        numbers = np.array(sp.hessian(lagrangian, self.coordinates).subs(at), dtype=float)
+        rows = [
+            [float(sp.diff(functions[f], x).subs(at)) for x in self.coordinates]
+            for f in multipliers
+        ]
+        if not rows:
+            return np.linalg.eigvalsh(numbers)
+        left = np.linalg.svd(np.array(rows))[2][len(rows) :].T
+        return np.linalg.eigvalsh(left.T @ numbers @ left)
 
 
 def _coordinates(n):
@@ -197,7 +217,9 @@ def hs71():
     equations = {"sphere": x1**2 + x2**2 + x3**2 + x4**2 - 40}
     energy = x1 * x4 * (x1 + x2 + x3) + x3
     guess, active = (1, 4.743, 3.8211, 1.3794), ("volume", "x1_low")
-    return Posed("HS71", s, energy, inequalities, equations, (1, 5, 5, 1), active, guess, exact=False)
+    return Posed(
+        "HS71", s, energy, inequalities, equations, (1, 5, 5, 1), active, guess, exact=False
+    )
 
 
 def hs76():
@@ -248,6 +270,19 @@ def hs26():
 REGULAR = tuple(
     make()
     for make in (
-        hs6, hs7, hs21, hs22, hs23, hs24, hs28, hs35, hs43, hs48, hs65, hs71, hs76, hs100,
+        hs6,
+        hs7,
+        hs21,
+        hs22,
+        hs23,
+        hs24,
+        hs28,
+        hs35,
+        hs43,
+        hs48,
+        hs65,
+        hs71,
+        hs76,
+        hs100,
     )
 )

@@ -1,0 +1,99 @@
+"""Timing tasks side by side: interleaved rounds, medians, ratios; a table and a JSON file.
+
+Another process that takes the machine for a while slows the tasks of one round alike, so the ratio
+of two tasks is taken round by round, and the median of those ratios is what a reader should keep.
+"""
+
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results"
+
+Times = dict[str, list[float]]
+
+
+def seconds(task: Callable[[], object]) -> float:
+    """Return how long one call takes, in seconds."""
+    start = perf_counter()
+    task()
+    return perf_counter() - start
+
+
+def interleave(tasks: Mapping[str, Callable[[], object]], rounds: int) -> Times:
+    """Return the times of every task in each of several rounds, after one round to warm up.
+
+    Every round begins with another task, so that no task always follows the same one.
+    """
+    times: Times = {name: [] for name in tasks}
+    order = list(tasks)
+    for task in tasks.values():
+        task()
+    for _ in range(rounds):
+        for name in order:
+            times[name].append(seconds(tasks[name]))
+        order.append(order.pop(0))
+    return times
+
+
+def ratio(times: Sequence[float], reference: Sequence[float]) -> float:
+    """Return the median over rounds of ``times / reference``."""
+    return statistics.median(a / b for a, b in zip(times, reference, strict=True))
+
+
+def difference(times: Sequence[float], reference: Sequence[float]) -> float:
+    """Return the median over rounds of ``times - reference``."""
+    return statistics.median(a - b for a, b in zip(times, reference, strict=True))
+
+
+def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Print rows under their columns, the first aligned left and the others right."""
+    cells = [[str(cell) for cell in row] for row in (columns, *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    print(f"\n{title}")
+    for row in cells:
+        head, *others = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        tail = (cell.strip().rjust(w) for cell, w in zip(others, widths[1:], strict=True))
+        print("  " + "   ".join([head, *tail]))
+
+
+def write(name: str, figures: Mapping[str, Any]) -> None:
+    """Write figures, and what they were measured on, to ``benchmarks/results/<name>.json``."""
+    RESULTS.mkdir(exist_ok=True)
+    content = {"measured on": machine(), **figures}
+    (RESULTS / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+
+
+def machine() -> dict[str, str]:
+    """Return what a reader needs to place the figures."""
+    from llvmlite import binding
+
+    return {
+        "processor": binding.get_host_cpu_name(),
+        "cores": str(os.cpu_count()),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def fresh(*arguments: str, folder: Path) -> None:
+    """Run a fresh interpreter of this environment in a folder, with this checkout importable."""
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.DEVNULL,
+        check=True,
+    )
