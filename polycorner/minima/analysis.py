@@ -11,7 +11,7 @@ from polycorner.geometry.manifold import Array
 from polycorner.minima.conditions import Curvature, Multipliers, find_curvature, find_multipliers
 from polycorner.minima.problem import Problem
 from polycorner.minima.verdicts import Entrapment, Verdict
-from polycorner.polyhedra.cones import inward_direction, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import Rows, inward_direction, null_space, rank
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import local_pieces
 
@@ -44,9 +44,9 @@ class Local:
         return self.tolerance * self.reference
 
     @property
-    def equations(self) -> Array:
-        """Gradients of the equations."""
-        return self.gradients[self.problem.inequalities : -1]
+    def sections(self) -> range:
+        """Rows of the equations."""
+        return range(self.problem.inequalities, len(self.values) - 1)
 
 
 @dataclass(frozen=True)
@@ -102,40 +102,39 @@ def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float)
 
 def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     active = tuple(sorted(piece))
-    inequalities = local.gradients[list(active)]
-    rows = np.vstack([inequalities, local.equations])
-    multipliers = find_multipliers(
-        inequalities, local.equations, local.gradients[-1], local.small, local.rank_tolerance
-    )
-    k = len(active)
-    positive = multipliers.values[:k] > local.small
-    weighted = abs(multipliers.values[:k]) > local.small
-    strong = unit_rows(np.vstack([inequalities[weighted], local.equations]))
-    weak = [i for i, held in zip(active, weighted, strict=True) if not held]
-    hessian = _lagrangian_hessian(local, active, rows, multipliers)
-    size = max(local.reference, float(abs(hessian).max()))
-    small_curvature = local.tolerance * size
-    curvature = find_curvature(hessian, strong, local.gradients[weak], small_curvature)
-    verdict = _verdict(local, inequalities, multipliers, curvature, weak, small_curvature)
-    strong_rows = tuple(i for i, held in zip(active, weighted, strict=True) if held)
-    asks = verdict is Verdict.UNDECIDED and curvature.decided
-    change = _flat_change(local, strong_rows, curvature.flat, piece) if asks else 0.0
-    if asks and change <= PROBE_NOISE:
-        verdict = Verdict.MINIMUM_ALONG_LOCUS
-    positions = _independent_positions(inequalities, positive, local)
-    verified = not curvature.flat.shape[1] or change <= PROBE_NOISE
+    k, small = len(active), local.small
+    gradients = local.gradients[[*active, *local.sections]]
+    rows = Rows(gradients, local.rank_tolerance)
+    slope = local.gradients[-1]
+    most = 0.1 * float(np.linalg.norm(slope)) / local.rank_tolerance + small
+    multipliers = find_multipliers(rows, k, slope, small, most)
+    values = multipliers.values[:k]
+    strong = [*np.flatnonzero(abs(values) > small).tolist(), *range(k, len(gradients))]
+    weak = [active[i] for i in np.flatnonzero(abs(values) <= small)]
+    face = rows if len(strong) == len(gradients) else Rows(gradients[strong], local.rank_tolerance)
+    hessian = _lagrangian_hessian(local, active, gradients, multipliers)
+    small_curvature = local.tolerance * max(local.reference, float(abs(hessian).max()))
+    curvature = find_curvature(hessian, face.null_space, local.gradients[weak], small_curvature)
+    verdict = _verdict(local, rows, k, multipliers, curvature, small_curvature)
+    change = 0.0
+    if verdict is Verdict.UNDECIDED and abs(curvature.least) <= small_curvature:
+        held = frozenset(active[i] for i in strong if i < k)
+        change = _flat_change(local, held, curvature.flat, piece)
+        verdict = Verdict.MINIMUM_ALONG_LOCUS if change <= PROBE_NOISE else verdict
+    elif verdict is Verdict.STRICT_MINIMUM and weak:
+        verdict = Verdict.WEAK_MINIMUM
     return Analysis(
         verdict=verdict,
         active=active,
-        gradients=rows,
+        gradients=gradients,
         multipliers=multipliers,
-        independent=rank(rows, local.rank_tolerance) == len(rows),
-        strong_positions=positions,
+        independent=rows.independent,
+        strong_positions=_independent_positions(rows, np.flatnonzero(values > small), k, local),
         weak=tuple(weak),
         curvature=curvature,
         reference=local.reference,
         small_curvature=small_curvature,
-        flat_verified=verified,
+        flat_verified=not curvature.flat.shape[1] or change <= PROBE_NOISE,
         flat_change=change,
         local=local,
     )
@@ -144,9 +143,8 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
 def _lagrangian_hessian(
     local: Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
 ) -> Array:
-    sizes = np.linalg.norm(rows, axis=1)
-    m = local.problem.inequalities
-    numbers = [*active, *range(m, m + len(local.equations))]
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    numbers = [*active, *local.sections]
     result: Array = local.hessians[-1].copy()
     for row, value, size in zip(numbers, multipliers.values, sizes, strict=True):
         if size > 0:
@@ -156,51 +154,51 @@ def _lagrangian_hessian(
 
 def _verdict(
     local: Local,
-    inequalities: Array,
+    rows: Rows,
+    k: int,
     multipliers: Multipliers,
     curvature: Curvature,
-    weak: list[int],
     small_curvature: float,
 ) -> Verdict:
+    """Return the verdict before flat directions are followed and weak functions looked at."""
     if not multipliers.exist:
-        rows = np.vstack([inequalities, local.equations])
-        regular = rank(rows, local.rank_tolerance) == len(rows)
-        if not regular and len(inequalities):
-            regular = inward_direction(inequalities, local.equations)[1] > local.rank_tolerance
+        regular = rows.independent
+        if not regular and k:
+            _, rate = inward_direction(rows.units[:k], rows.units[k:])
+            regular = rate > local.rank_tolerance
         return Verdict.NOT_STATIONARY if regular else Verdict.NO_MULTIPLIER
-    if not curvature.decided:
-        return Verdict.UNDECIDED
-    if curvature.least < -small_curvature:
+    if curvature.decided and curvature.least < -small_curvature:
         # Another choice of multipliers might still show a minimum where they are not unique.
         return Verdict.SADDLE if multipliers.unique else Verdict.UNDECIDED
-    if curvature.flat.shape[1]:
+    if not curvature.decided or curvature.flat.shape[1]:
         return Verdict.UNDECIDED
-    return Verdict.WEAK_MINIMUM if weak else Verdict.STRICT_MINIMUM
+    return Verdict.STRICT_MINIMUM
 
 
-def _flat_change(local: Local, strong: tuple[int, ...], flat: Array, piece: Piece) -> float:
+def _flat_change(local: Local, held: Piece, flat: Array, piece: Piece) -> float:
     """Follow every flat direction, and their mean, both ways; return the relative change."""
     if not flat.shape[1]:
         return np.inf
     mean = flat.sum(axis=1) / flat.shape[1] ** 0.5
     directions = np.vstack([flat.T, mean]) if flat.shape[1] > 1 else flat.T
-    change = local.problem.probe(frozenset(strong), piece, local.point, directions, PROBES)
+    change = local.problem.probe(held, piece, local.point, directions, PROBES)
     return change / (abs(float(local.values[-1])) + local.reference)
 
 
 def _independent_positions(
-    inequalities: Array, positive: NDArray[np.bool_], local: Local
+    rows: Rows, positive: NDArray[np.int64], k: int, local: Local
 ) -> tuple[int, ...]:
     """Return positions of strongly active functions that are independent, greedily in order."""
+    candidates = positive.tolist()
+    if rows.independent:
+        return tuple(candidates)
     chosen: list[int] = []
-    everything = np.vstack([inequalities[positive], local.equations])
-    if rank(everything, local.rank_tolerance) == len(everything):
-        return tuple(np.flatnonzero(positive).tolist())
-    for i in np.flatnonzero(positive).tolist():
-        rows = np.vstack([inequalities[[*chosen, i]], local.equations])
-        others = np.vstack([inequalities[chosen], local.equations])
-        if rank(rows, local.rank_tolerance) > rank(others, local.rank_tolerance):
+    sections = list(range(k, len(rows.units)))
+    reached = rank(rows.units[sections], local.rank_tolerance)
+    for i in candidates:
+        if rank(rows.units[[*chosen, i, *sections]], local.rank_tolerance) > reached:
             chosen.append(i)
+            reached += 1
     return tuple(chosen)
 
 

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from polycorner.geometry.manifold import Array
-from polycorner.polyhedra.cones import linear_programme, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import Rows, linear_programme, null_space, unit_rows
 
 MAX_WEAK = 10
 
@@ -47,62 +47,52 @@ class Multipliers:
         return bool((self.upper - self.lower <= 1e-7 * (1 + abs(self.values).max(initial=0))).all())
 
 
-def find_multipliers(
-    inequalities: Array, equations: Array, gradient: Array, small: float, rank_tolerance: float
-) -> Multipliers:
-    """Return multipliers of the unit gradients; the central ones where they are not unique.
+def find_multipliers(rows: Rows, k: int, gradient: Array, small: float, most: float) -> Multipliers:
+    """Return multipliers of unit gradients; the central ones where they are not unique.
 
     Parameters
     ----------
-    inequalities, equations : (k, n), (e, n) array
-        Gradients of the active functions and of the equations.
+    rows : Rows
+        Gradients of the active functions, then of the equations.
+    k : int
+        How many belong to inequalities.
     gradient : (n,) array
         Gradient of the energy.
     small : float
         A residual, or a negative multiplier, down to this size counts as zero.
-    rank_tolerance : float
-        Relative size below which a singular value counts as zero.
+    most : float
+        Multipliers of dependent gradients beyond this size do not count: beside a cusp they
+        exist only because the gradients are not quite dependent.
     """
-    rows = unit_rows(np.vstack([inequalities, equations]))
-    k = len(inequalities)
-    values = np.zeros(len(rows))
-    if len(rows):
-        values = np.asarray(np.linalg.lstsq(rows.T, gradient, rcond=rank_tolerance)[0])
-    if rank(rows, rank_tolerance) == len(rows):
-        residual = float(abs(gradient - values @ rows).max(initial=0))
+    values = rows.weights(gradient) if len(rows.units) else np.empty(0)
+    if rows.independent:
+        residual = float(abs(gradient - values @ rows.units).max(initial=0))
         exist = residual <= small and bool((values[:k] >= -small).all())
         return Multipliers(values, values, values, exist, residual)
-    return _central_multipliers(rows, k, gradient, values, small, rank_tolerance)
+    return _central_multipliers(rows, k, gradient, values, small, most)
 
 
 def _central_multipliers(
-    rows: Array, k: int, gradient: Array, least: Array, small: float, rank_tolerance: float
+    rows: Rows, k: int, gradient: Array, least: Array, small: float, most: float
 ) -> Multipliers:
     """Decide existence for dependent gradients by non-negative least squares; find the ranges."""
     from scipy.optimize import nnls
 
-    signed = np.vstack([rows, -rows[k:]])
-    split, distance = nnls(signed.T, gradient)
-    values = split[: len(rows)].copy()
-    values[k:] -= split[len(rows) :]
-    residual = float(abs(gradient - values @ rows).max())
-    # Gradients that count as dependent may carry no multiplier so large that it exists only
-    # because they are not quite so: that is what happens beside a cusp.
-    bounded = abs(values).max() * rank_tolerance <= 0.1 * np.linalg.norm(gradient) + small
-    if distance > small or not bounded:
+    units = rows.units
+    split, distance = nnls(np.vstack([units, -units[k:]]).T, gradient)
+    values = split[: len(units)].copy()
+    values[k:] -= split[len(units) :]
+    residual = float(abs(gradient - values @ units).max())
+    if distance > small or abs(values).max() > most:
         return Multipliers(least, least, least, exist=False, residual=residual)
-    lower, upper, centre = _ranges(rows, k, values, rank_tolerance)
+    lower, upper, centre = _ranges(rows.relations, k, values)
     return Multipliers(centre, lower, upper, exist=True, residual=residual)
 
 
-def _ranges(
-    rows: Array, k: int, values: Array, rank_tolerance: float
-) -> tuple[Array, Array, Array]:
-    """Return the least, the largest and a central choice that all give the same sum."""
-    count = len(rows)
+def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
+    """Return the least, the largest and a central choice, changed along the columns of ``free``."""
+    count = len(values)
     largest = max(1e-300, float(abs(values).max()))
-    left, singular, _ = np.linalg.svd(rows)
-    free = left[:, int((singular > rank_tolerance * singular[0]).sum()) :]
     bound = 1e6
     start = values / largest
     room = np.maximum(start[:k], 0.0)
@@ -145,14 +135,13 @@ class Curvature:
     decided: bool
 
 
-def find_curvature(hessian: Array, strong: Array, weak: Array, small: float) -> Curvature:
-    """Minimise the quadratic form of ``hessian`` on ``{strong d = 0, weak d >= 0, |d| = 1}``.
+def find_curvature(hessian: Array, basis: Array, weak: Array, small: float) -> Curvature:
+    """Minimise the form of ``hessian`` on ``{d in span(basis), weak d >= 0, |d| = 1}``.
 
     Without weak rows the least value is the least eigenvalue on the null space.  With them the
     minimum lies in the relative interior of some face of the cone and is an eigenvector there,
     so enumerating faces and eigenvectors is exact.
     """
-    basis = null_space(strong, 1e-6)
     values, inner = np.linalg.eigh(basis.T @ hessian @ basis)
     vectors = basis @ inner
     if not len(weak) or (len(values) and values[0] > small):

@@ -126,7 +126,7 @@ class Problem:
     def probe(
         self, strong: Piece, piece: Piece, q: Array, directions: Array, steps: Array
     ) -> float:
-        """Return how much the energy changes along scaled directions; see :func:`compiled.probe`."""
+        """Return how much the energy changes along directions; see :func:`compiled.probe`."""
         from polycorner.minima import compiled
 
         flat, size = self.flat

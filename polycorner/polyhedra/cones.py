@@ -11,26 +11,59 @@ from polycorner.geometry.manifold import Array
 
 def unit_rows(matrix: Array) -> Array:
     """Return the rows divided by their lengths; zero rows stay zero."""
-    sizes = np.linalg.norm(matrix, axis=1, keepdims=True)
-    return np.asarray(np.divide(matrix, sizes, out=np.zeros_like(matrix), where=sizes > 0))
+    sizes = np.sqrt(np.einsum("ij,ij->i", matrix, matrix))[:, None]
+    return matrix / np.where(sizes > 0, sizes, 1.0)
+
+
+class Rows:
+    """Unit rows of a matrix ``(k, n)`` with their singular value decomposition.
+
+    Singular values up to ``tolerance`` times the largest count as zero.
+
+    Attributes
+    ----------
+    units : (k, n) array
+        The rows divided by their lengths.
+    rank : int
+        How many singular values count.
+    """
+
+    def __init__(self, matrix: Array, tolerance: float) -> None:
+        self.units = unit_rows(matrix)
+        self._left, self._singular, self._right = np.linalg.svd(self.units)
+        top = float(self._singular[0]) if self._singular.size else 0.0
+        self.rank = int((self._singular > tolerance * top).sum()) if top > 0 else 0
+
+    @property
+    def independent(self) -> bool:
+        """Whether the rows are linearly independent."""
+        return self.rank == len(self.units)
+
+    @property
+    def null_space(self) -> Array:
+        """Orthonormal basis, as columns ``(n, n - rank)``, of what the rows annihilate."""
+        return np.asarray(self._right[self.rank :].T)
+
+    @property
+    def relations(self) -> Array:
+        """Orthonormal basis, as columns ``(k, k - rank)``, of the weights that sum to nothing."""
+        return np.asarray(self._left[:, self.rank :])
+
+    def weights(self, vector: Array) -> Array:
+        """Return the shortest least-squares weights of the unit rows that sum to ``vector``."""
+        r = self.rank
+        parts = (self._right[:r] @ vector) / self._singular[:r]
+        return np.asarray(self._left[:, :r] @ parts)
 
 
 def rank(matrix: Array, tolerance: float) -> int:
-    """Return how many singular values of the unit rows exceed ``tolerance`` times the largest."""
-    if not matrix.size:
-        return 0
-    singular = np.linalg.svd(unit_rows(matrix), compute_uv=False)
-    return int((singular > tolerance * max(singular[0], 1e-300)).sum()) if singular[0] > 0 else 0
+    """Return the rank of the unit rows; see :class:`Rows`."""
+    return Rows(matrix, tolerance).rank if matrix.size else 0
 
 
 def null_space(matrix: Array, tolerance: float) -> Array:
-    """Return an orthonormal basis, as columns ``(n, k)``, of what the rows annihilate."""
-    n = matrix.shape[1]
-    if not matrix.size:
-        return np.eye(n)
-    _, singular, rows = np.linalg.svd(unit_rows(matrix))
-    kept = int((singular > tolerance * max(singular[0], 1e-300)).sum()) if singular[0] > 0 else 0
-    return rows[kept:].T
+    """Return an orthonormal basis of what the rows annihilate; see :class:`Rows`."""
+    return Rows(matrix, tolerance).null_space if matrix.size else np.eye(matrix.shape[1])
 
 
 def inward_direction(inequalities: Array, equations: Array) -> tuple[Array, float]:

@@ -115,7 +115,7 @@ def evaluated(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array]:
 
 def distances(values: Array, gradients: Array) -> Array:
     """Return signed distances ``f / |grad f|``, infinite where the gradient alone vanishes."""
-    sizes = np.linalg.norm(gradients, axis=1)
+    sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
     far = np.where(values == 0, 0.0, np.copysign(np.inf, values))
     return np.asarray(np.divide(values, sizes, out=far, where=sizes > 0))
 
