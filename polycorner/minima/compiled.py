@@ -120,18 +120,6 @@ def identity(n):
 
 
 @njit(cache=True)
-def transposed(A):
-    """Return the transpose as an array of its own."""
-    stay_whole()
-    m, n = A.shape
-    B = np.empty((n, m))
-    for i in range(m):
-        for j in range(n):
-            B[j, i] = A[i, j]
-    return B
-
-
-@njit(cache=True)
 def length(v):
     """Return the Euclidean length."""
     total = 0.0
@@ -572,13 +560,19 @@ def polish(problem, on, m, u, F, J, H, size):
         V, s = identity(n), np.zeros(n)
         d = np.zeros(n)
         if b.size:
-            _, s, V = svd(A)
+            U, s, V = svd(A)
             cut = RANK * largest(s)
-            y = solve_truncated(transposed(A), g, cut)
-            for j in range(b.size):
-                lam[keep[j]] = y[j] / sizes[j]
-                b[j] = -b[j]
-            d = solve_truncated(A, b, cut)
+            for c in range(n):
+                if s[c] > cut:
+                    slope = miss = 0.0
+                    for k in range(n):
+                        slope += V[k, c] * g[k] / s[c]
+                    for j in range(b.size):
+                        miss += U[j, c] * b[j] / s[c]
+                    for j in range(b.size):
+                        lam[keep[j]] += U[j, c] * slope / sizes[j]
+                    for k in range(n):
+                        d[k] -= V[k, c] * miss
         else:
             cut = 0.0
         L = lagrangian_hessian(H, lam)
@@ -755,7 +749,7 @@ def descend(problem, use, m, rows, u, size, limit):
         settled = True
         for i in range(m):
             settled = settled and on[i] == before[i]
-        if reach < 1e-9 or (reach < 0.05 and settled):
+        if reach < 1e-9 or (reach < 0.5 and settled):
             good, v, exact, way = finished(problem, use, on, m, u, F, J, H, size, energy)
             if good == 3:
                 return CONVERGED, iteration, v, exact
