@@ -69,7 +69,9 @@ class Family:
         """Return the straight-line program of the values."""
         definitions, expressions = self.formulas()
         ordered = [expressions[name] for name in self.names]
-        return compile_expressions(ordered, self.variables, self.parameters, definitions)
+        return compile_expressions(
+            ordered, self.variables, self.parameters, definitions, self.names
+        )
 
     @cached_property
     def kernel(self) -> "Kernel":
@@ -329,6 +331,9 @@ def _sympified(name: str, expression: object) -> "sympy.Expr":
     except sympy.SympifyError as error:
         msg = f"{name}: expected a SymPy expression; got {expression!r}"
         raise TypeError(msg) from error
+    if isinstance(result, sympy.core.relational.Relational):
+        msg = f"{name}: expected f, meaning f >= 0, instead of an inequality; got {result}"
+        raise TypeError(msg)
     if not isinstance(result, sympy.Expr):
         msg = f"{name}: expected a SymPy expression; got {type(expression).__name__}"
         raise TypeError(msg)

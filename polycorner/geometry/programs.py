@@ -280,6 +280,7 @@ def compile_expressions(
     variables: Sequence[str],
     parameters: Sequence[str] = (),
     definitions: "Mapping[str, sympy.Expr] | None" = None,
+    names: Sequence[str] = (),
 ) -> Program:
     """Translate SymPy expressions into one program.
 
@@ -291,6 +292,8 @@ def compile_expressions(
         Names of the symbols it reads, in order.
     definitions : mapping from str to sympy.Expr, optional
         Intermediate quantities by name, in an order in which each uses only earlier ones.
+    names : sequence of str, optional
+        What the expressions are called in error messages.
 
     Raises
     ------
@@ -300,9 +303,13 @@ def compile_expressions(
     """
     translator = _Translator(variables, parameters)
     for name, expression in (definitions or {}).items():
+        translator.subject = name
         translator.names[name] = translator.translate(expression)
-    outputs = tuple(translator.translate(expression) for expression in expressions)
-    return Program(translator.graph, outputs, len(variables), len(parameters))
+    outputs = []
+    for position, expression in enumerate(expressions):
+        translator.subject = names[position] if names else f"expression {position + 1}"
+        outputs.append(translator.translate(expression))
+    return Program(translator.graph, tuple(outputs), len(variables), len(parameters))
 
 
 class _Translator:
@@ -312,6 +319,7 @@ class _Translator:
         self.graph = Graph()
         self.names = {name: self.graph.node("var", i) for i, name in enumerate(variables)}
         self.names |= {name: self.graph.node("par", i) for i, name in enumerate(parameters)}
+        self.subject = ""
         self._seen: dict[sympy.Basic, int] = {}
 
     def translate(self, expression: "sympy.Basic") -> int:
@@ -327,14 +335,14 @@ class _Translator:
             return self.graph.const(_exact(e))
         rule = self._rules().get(kind)
         if rule is None:
-            msg = f"expression: the function {kind} has no compiled form; got {e}"
+            msg = f"{self.subject}: the function {kind} has no compiled form; got {e}"
             raise ValueError(msg)
         return rule(e)
 
     def _symbol(self, name: str) -> int:
         if name not in self.names:
             msg = (
-                f"expression: the symbol {name} is no coordinate and no parameter; "
+                f"{self.subject}: the symbol {name} is no coordinate and no parameter; "
                 f"known are {', '.join(self.names)}"
             )
             raise ValueError(msg)
@@ -408,7 +416,9 @@ class _Translator:
     def _piecewise(self, e: "sympy.Basic") -> int:
         *cases, (last, otherwise) = e.args
         if otherwise != True:  # noqa: E712  SymPy's own truth value, not Python's
-            msg = f"expression: expected the last case of a Piecewise to be True; got {otherwise}"
+            msg = (
+                f"{self.subject}: expected the last case of a Piecewise to be True; got {otherwise}"
+            )
             raise ValueError(msg)
         result = self.translate(last)
         for value, condition in reversed(cases):

@@ -126,6 +126,9 @@ def stationary_on(
     The verdict is ``NOT_CONVERGED`` when Newton's method finds no such point.
     """
     problem = pose(polyhedron, energy)
+    if isinstance(active, str):
+        msg = f"active: expected a list of names; got the string {active!r}"
+        raise TypeError(msg)
     unknown = [name for name in active if name not in polyhedron.names]
     if unknown:
         msg = (
@@ -258,7 +261,7 @@ def _finished(problem: Problem, piece: Piece, q: Array, iterations: int, *, stop
         point, last = problem.on_face(face, q)
     near = abs((point - q) / problem.scales).max() < 0.1
     if last < 1e-8 and near and not _missed(problem, piece, point):
-        return Rest(point, iterations, None)
+        return Rest(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
     if _missed(problem, piece, q, 1e-6):
         return Rest(q, iterations, Verdict.INFEASIBLE)
     return Rest(q, iterations, Verdict.NOT_CONVERGED if not stopped or not near else None)

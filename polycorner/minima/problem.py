@@ -1,5 +1,6 @@
 """An energy on a polyhedron, laid out for the compiled core."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -138,12 +139,20 @@ class Problem:
         return change
 
 
-@lru_cache(maxsize=64)
 def pose(polyhedron: Polyhedron, energy: "Energy") -> Problem:
     """Return the problem of an energy on a polyhedron, checking that they belong together."""
     if not isinstance(polyhedron, Polyhedron):
         msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
         raise TypeError(msg)
+    if not isinstance(energy, Hashable):
+        msg = f"energy: expected a SmoothFunction or a SymPy expression; got {energy!r}"
+        raise TypeError(msg)
+    return _posed(polyhedron, energy)
+
+
+@lru_cache(maxsize=64)
+def _posed(polyhedron: Polyhedron, energy: Any) -> Problem:
+    """Keep the latest problems, so that one posed again is not compiled again."""
     manifold = polyhedron.manifold
     function: Any = energy
     if not isinstance(energy, SmoothFunction):
