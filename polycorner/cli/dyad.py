@@ -1,6 +1,8 @@
 """``polycorner dyad``: the minima of a pair of dumbbells, certified."""
 
+import sys
 import tomllib
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -48,17 +50,28 @@ Examples:
 def dyad(config: Path | None, as_json: bool, out: Path | None, **options: float | None) -> None:
     """Find delta_R, delta_L and G of two dumbbells in a drum, and certify them."""
     pair = _pair(_merged(config, options))
-    from polycorner.studies import dyad_minima
+    with _patience():
+        from polycorner.studies import dyad_minima
 
-    entries = dyad_minima(pair)
-    answer = _answer(pair, entries)
-    written = _write(pair, entries, answer, out) if out is not None else []
+        entries = dyad_minima(pair)
+        answer = _answer(pair, entries)
+        written = _write(pair, entries, answer, out) if out is not None else []
     if as_json:
         click.echo(_json(answer))
         return
     _print_tables(pair, entries, answer)
     for path in written:
         click.echo(f"wrote {path}")
+
+
+def _patience() -> AbstractContextManager[object]:
+    """Show on a terminal that something is going on: the first run compiles for a while."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+
+    words = "finding and certifying (the first run on a machine compiles for about 20 seconds)"
+    return Console(stderr=True).status(words)
 
 
 def _fail(message: str) -> NoReturn:
@@ -197,7 +210,7 @@ def _print_tables(
 ) -> None:
     from rich.console import Console
 
-    console = Console(width=None if _is_terminal() else 120, highlight=False)
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
     where = "the developed plane" if pair.is_plane else f"a drum of radius {pair.drum_radius:g} mm"
     console.print(
         f"Two dumbbells (l = {pair.length:g}, r = {pair.ball_radius:g}, "
@@ -211,12 +224,6 @@ def _print_tables(
         f"heading: computed {computed:.6f} deg, plane {answer['plane_heading_deg']:.6f} deg, "
         f"paper's arctan(r/l) {answer['paper_heading_deg']:.6f} deg"
     )
-
-
-def _is_terminal() -> bool:
-    import sys
-
-    return sys.stdout.isatty()
 
 
 def _table(entries: "tuple[DyadMinimum, ...]") -> "Table":
@@ -234,7 +241,7 @@ def _table(entries: "tuple[DyadMinimum, ...]") -> "Table":
 
 def _rows(entries: "tuple[DyadMinimum, ...]") -> list[tuple[str, list[str]]]:
     certificates = [entry.certificate for entry in entries]
-    unit = "mm" if entries[0].pair.is_plane else "-"
+    unit = "mm" if entries[0].pair.is_plane else "dE/dgap"
     residuals = [certificate.residuals() for certificate in certificates]
     return [
         ("heading (deg)", ["{:.6f}  {:.6f}".format(*e.headings) for e in entries]),

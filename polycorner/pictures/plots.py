@@ -65,6 +65,7 @@ def draw_heading(pair: DumbbellPair, lengths: Sequence[float], rods: Sequence[fl
     paper = np.degrees(np.arctan2(pair.ball_radius, lengths_array))
     axes.plot(lengths_array, paper, "k--", label="paper, ±arctan(r/l)")
     axes.plot(lengths_array, -paper, "k--")
+    axes.plot([], [], ":", color="0.4", label="corner is no minimum")
     axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
     axes.text(lengths_array[-1], 1.0, "right-handed", ha="right", color="0.4")
     axes.text(lengths_array[-1], -1.0, "left-handed", ha="right", va="top", color="0.4")
