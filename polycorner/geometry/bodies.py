@@ -76,17 +76,13 @@ def segment_segment_distance(
     import sympy
 
     u, v, w = minus(first[1], first[0]), minus(second[1], second[0]), minus(first[0], second[0])
-    names = "uu uv vv uw vw den"
-    uu, uv, vv, uw, vw, den = sympy.symbols(names, real=True)
-    definitions = {
-        "uu": dot(u, u),
-        "uv": dot(u, v),
-        "vv": dot(v, v),
-        "uw": dot(u, w),
-        "vw": dot(v, w),
-        "den": uu * vv - uv * uv,
-    }
-    s, t = uv * vw - vv * uw, uu * vw - uv * uw
-    crossing = sympy.And(den > PARALLEL**2 * uu * vv, 0 < s, s < den, 0 < t, t < den)
-    apart = sympy.Abs(dot(w, cross(u, v))) / sympy.sqrt(den)
+    names = ("nx", "ny", "nz", "nn")
+    nx, ny, nz, nn = sympy.symbols(names, real=True)
+    normal = (nx, ny, nz)
+    # Everything from the common normal n = u x v: |u|^2 |v|^2 - (u.v)^2 would lose all digits for
+    # nearly parallel segments.  The foot on the first is at s/nn, on the second at t/nn.
+    definitions = dict(zip(names, (*cross(u, v), dot(normal, normal)), strict=True))
+    s, t = -dot(cross(w, v), normal), -dot(cross(w, u), normal)
+    crossing = sympy.And(nn > PARALLEL**2 * dot(u, u) * dot(v, v), 0 < s, s < nn, 0 < t, t < nn)
+    apart = sympy.Abs(dot(w, normal)) / sympy.sqrt(nn)
     return definitions, sympy.Piecewise((apart, crossing), (sympy.Min(*ends), True))

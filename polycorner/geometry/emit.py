@@ -158,8 +158,12 @@ def sine_cosine(module: ir.Module, lanes: int) -> ir.Function:
     b.position_at_end(near)
     _return_pair(b, pair, _reduced(b, x, lanes))
     b.position_at_end(far)
-    calls = [by_lane(b, library(module, name), [x], lanes) for name in ("sin", "cos")]
-    _return_pair(b, pair, calls)
+    # Lanes with small arguments keep the values they would have had alone.
+    mixed = [
+        b.select(outside, by_lane(b, library(module, name), [x], lanes), close)
+        for name, close in zip(("sin", "cos"), _reduced(b, x, lanes), strict=True)
+    ]
+    _return_pair(b, pair, mixed)
     return routine
 
 

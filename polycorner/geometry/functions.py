@@ -178,9 +178,9 @@ class SmoothFunction:
         label: str | None = None,
     ) -> None:
         unknown = [coordinate for coordinate in reads if coordinate not in manifold.names]
-        if unknown or len(reads) != len(family.variables):
+        if unknown or len(set(reads)) != len(reads) or len(reads) != len(family.variables):
             msg = (
-                f"reads: expected {len(family.variables)} of the coordinates "
+                f"reads: expected {len(family.variables)} different ones of the coordinates "
                 f"{', '.join(manifold.names)}; got {', '.join(reads)}"
             )
             raise ValueError(msg)

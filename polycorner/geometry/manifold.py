@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FEW = 24
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 
 
@@ -55,8 +56,8 @@ class Manifold:
         names = _names(self.names)
         n = len(names)
         object.__setattr__(self, "names", names)
-        periods = _positive("periods", self.periods or (math.inf,) * n, n, finite=False)
-        scales = _positive("scales", self.scales or (1.0,) * n, n, finite=True)
+        periods = _positive("periods", _given(self.periods, math.inf, n), n, finite=False)
+        scales = _positive("scales", _given(self.scales, 1.0, n), n, finite=True)
         object.__setattr__(self, "periods", periods)
         object.__setattr__(self, "scales", scales)
 
@@ -183,9 +184,9 @@ def scalar(values: Any) -> Any:
 
 def finite(array: Array, argument: str) -> Array:
     """Return ``array`` unchanged, refusing NaN and infinities."""
-    flat = array.ravel()
-    # One product is a quick certificate; only where it overflows is every entry looked at.
-    if not math.isfinite(flat.dot(flat)) and not np.isfinite(array).all():
+    # For a single point Python's own loop is quicker than two passes of NumPy.
+    few = array.size <= FEW
+    if not (all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()):
         msg = f"{argument}: expected finite numbers; got {_first_bad(array)}"
         raise ValueError(msg)
     return array
@@ -201,6 +202,9 @@ def _principal(values: Array, period: float) -> Array:
 
 
 def _names(names: str | Sequence[str]) -> tuple[str, ...]:
+    if not isinstance(names, Iterable):
+        msg = f"names: expected a string or a sequence of strings; got {names!r}"
+        raise TypeError(msg)
     parsed = tuple(names.replace(",", " ").split()) if isinstance(names, str) else tuple(names)
     if not parsed:
         msg = "names: expected at least one coordinate name; got none"
@@ -216,11 +220,16 @@ def _names(names: str | Sequence[str]) -> tuple[str, ...]:
     return parsed
 
 
+def _given(values: Any, default: float, n: int) -> Any:
+    return (default,) * n if isinstance(values, tuple) and not values else values
+
+
 def _positive(argument: str, values: Any, n: int, *, finite: bool) -> tuple[float, ...]:
-    if np.ndim(values) != 1 or len(values) != n:
+    array = reals(values, argument)
+    if array.shape != (n,):
         msg = f"{argument}: expected {n} numbers, one for each coordinate; got {values!r}"
         raise ValueError(msg)
-    numbers = tuple(float(value) for value in values)
+    numbers = tuple(array.tolist())
     if not all(v > 0 and (v < math.inf or not finite) for v in numbers):
         kind = "positive finite numbers" if finite else "positive numbers or inf"
         msg = f"{argument}: expected {kind}; got {numbers}"

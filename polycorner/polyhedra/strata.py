@@ -134,7 +134,8 @@ def local_pieces(
 
 def check_tolerance(argument: str, value: float) -> None:
     """Refuse a tolerance that is not strictly between 0 and 1."""
-    if not 0 < value < 1:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not 0 < value < 1:
         msg = f"{argument}: expected a number between 0 and 1; got {value!r}"
         raise ValueError(msg)
 
