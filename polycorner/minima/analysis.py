@@ -13,7 +13,7 @@ from polycorner.minima.problem import Problem
 from polycorner.minima.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.cones import Rows, inward_direction, null_space, rank
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.polyhedra.strata import local_pieces
+from polycorner.polyhedra.strata import distances, local_pieces
 
 PROBES = np.array(
     [0.003, 0.03, -0.003, -0.03]
@@ -115,7 +115,8 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     hessian = _lagrangian_hessian(local, active, gradients, multipliers)
     small_curvature = local.tolerance * max(local.reference, float(abs(hessian).max()))
     curvature = find_curvature(hessian, face.null_space, local.gradients[weak], small_curvature)
-    verdict = _verdict(local, rows, k, multipliers, curvature, small_curvature)
+    away = distances(local.values[list(active)], gradients[:k])
+    verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
     change = 0.0
     if verdict is Verdict.UNDECIDED and abs(curvature.least) <= small_curvature:
         held = frozenset(active[i] for i in strong if i < k)
@@ -155,13 +156,16 @@ def _lagrangian_hessian(
 def _verdict(
     local: Local,
     rows: Rows,
-    k: int,
+    away: Array,
     multipliers: Multipliers,
     curvature: Curvature,
     small_curvature: float,
 ) -> Verdict:
     """Return the verdict before flat directions are followed and weak functions looked at."""
+    if not multipliers.complementary(away, 10 * local.small):
+        return Verdict.NOT_STATIONARY  # so large a multiplier needs a contact that is truly closed
     if not multipliers.exist:
+        k = len(away)
         regular = rows.independent
         if not regular and k:
             _, rate = inward_direction(rows.units[:k], rows.units[k:])
@@ -225,7 +229,7 @@ def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
         (curvature.vectors[:, abs(curvature.values) <= small], Entrapment.FREE),
         (curvature.vectors[:, curvature.values < -small], Entrapment.NONE),
     )
-    taken: dict[str, int] = {}
+    taken = dict.fromkeys((names[row] for row in a.active), 1)
     for vectors, kind in others:
         for vector in vectors.T:
             label = _direction_name(vector, local.problem.polyhedron.manifold.names)

@@ -187,7 +187,7 @@ class Certificate:
         if self.search in (Verdict.INFEASIBLE, Verdict.UNBOUNDED):
             return self.search
         found = self.analysis.verdict
-        if self.search is not None and found is Verdict.NOT_STATIONARY:
+        if self.search is not None and found in (Verdict.NOT_STATIONARY, Verdict.OUTSIDE):
             return self.search
         return found
 
@@ -310,4 +310,6 @@ def certify(
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
-    return Certificate(problem, polyhedron.manifold.point(q), tolerance, rank_tolerance)
+    point = polyhedron.manifold.point(q)
+    problem.check_energy(point, "q")
+    return Certificate(problem, point, tolerance, rank_tolerance)

@@ -294,11 +294,10 @@ def slack(A, b, x, i):
 
 
 @njit(cache=True)
-def most_violated(A, b, x, is_active, start, stop):
-    """Return the inactive row that fails most, or -1; rows at the end count as equations."""
+def most_violated(A, b, x, is_active, start, stop, equations):
+    """Return the inactive row that fails most, as inequality or equation, or -1."""
     stay_whole()
     chosen, worst = -1, 0.0
-    equations = stop == A.shape[0] and start > 0
     for i in range(start, stop):
         if is_active[i]:
             continue
@@ -334,9 +333,9 @@ def quadratic(L, g, A, b, equations):
     Q, R = np.zeros((n, n)), np.zeros((n, n))
     count, failed = np.int64(0), False
     for _ in range(20 * (rows + n) + 20):
-        p = most_violated(A, b, x, is_active, rows - equations, rows)
+        p = most_violated(A, b, x, is_active, rows - equations, rows, True)
         if p < 0:
-            p = most_violated(A, b, x, is_active, np.int64(0), rows - equations)
+            p = most_violated(A, b, x, is_active, np.int64(0), rows - equations, False)
         if p < 0:
             break
         sign[p] = -1.0 if slack(A, b, x, p) > 0 else 1.0
@@ -786,6 +785,15 @@ def descend(problem, use, m, rows, u, size, limit):
         if largest(plus(u, -1.0, origin)) > FAR:
             return UNBOUNDED, iteration, u, lam
     return STALLED, limit, u, lam
+
+
+@njit(cache=True)
+def restore(problem, use, m, rows, u, size):
+    """Bring a copy of ``u`` to the set; return whether that succeeded, and the point."""
+    n = u.size
+    F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
+    v = u.copy()
+    return project(problem, use, m, v, F, J, H, size, np.int64(100)), v
 
 
 @njit(cache=True)

@@ -46,6 +46,12 @@ class Multipliers:
         """Whether no other multipliers satisfy the same conditions."""
         return bool((self.upper - self.lower <= 1e-7 * (1 + abs(self.values).max(initial=0))).all())
 
+    def complementary(self, away: Array, small: float) -> bool:
+        """Whether every product of a multiplier and the distance to its contact is small."""
+        if not self.exist:
+            return True
+        return bool((abs(self.values[: len(away)] * away) <= small).all())
+
 
 def find_multipliers(rows: Rows, k: int, gradient: Array, small: float, most: float) -> Multipliers:
     """Return multipliers of unit gradients; the central ones where they are not unique.

@@ -101,10 +101,8 @@ def minimise(
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
     q = polyhedron.manifold.point(start, "start")
+    problem.check_energy(q, "start")
     rest = _descend_union(problem, q, search, max_iterations)
-    if rest.failure is Verdict.INFEASIBLE and not np.isfinite(problem.energy.value(q)):
-        msg = f"start: expected a point where the energy is finite; got {q.tolist()}"
-        raise ValueError(msg)
     return Certificate(
         problem, rest.point, tolerance, rank_tolerance, method, rest.iterations, rest.failure
     )
@@ -136,6 +134,7 @@ def stationary_on(
         )
         raise ValueError(msg)
     q = polyhedron.manifold.point(start, "start")
+    problem.check_energy(q, "start")
     face = frozenset(polyhedron.names.index(name) for name in active)
     point, last = problem.on_face(face, q)
     failure = None if last < 1e-8 else Verdict.NOT_CONVERGED
@@ -262,9 +261,10 @@ def _finished(problem: Problem, piece: Piece, q: Array, iterations: int, *, stop
     near = abs((point - q) / problem.scales).max() < 0.1
     if last < 1e-8 and near and not _missed(problem, piece, point):
         return Rest(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
-    if _missed(problem, piece, q, 1e-6):
+    reached, point = problem.restore(piece, q)
+    if not reached:
         return Rest(q, iterations, Verdict.INFEASIBLE)
-    return Rest(q, iterations, Verdict.NOT_CONVERGED if not stopped or not near else None)
+    return Rest(point, iterations, Verdict.NOT_CONVERGED)
 
 
 def _holding(problem: Problem, piece: Piece, values: Array, gradients: Array) -> Piece:

@@ -71,6 +71,13 @@ class Problem:
             results[2] = results[2] * np.outer(self.scales, self.scales)
         return tuple(results)
 
+    def check_energy(self, q: Array, argument: str) -> None:
+        """Refuse a point where the energy is not finite."""
+        value = self.energy.value(q)
+        if not np.isfinite(value):
+            msg = f"{argument}: expected a point where the energy is finite; it is {value} there"
+            raise ValueError(msg)
+
     @cached_property
     def flat(self) -> tuple[Flat, int]:
         """The problem as arrays for :mod:`~polycorner.minima.compiled`, and its scratch size."""
@@ -113,6 +120,16 @@ class Problem:
             flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size, limit
         )
         return status, iterations, u * self.scales, lam
+
+    def restore(self, piece: Piece, q: Array) -> tuple[bool, Array]:
+        """Return whether repeated linearisation finds a point of a piece near ``q``, and it."""
+        from polycorner.minima import compiled
+
+        flat, size = self.flat
+        reached, u = compiled.restore(
+            flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size
+        )
+        return reached, u * self.scales
 
     def on_face(self, active: Piece, q: Array) -> tuple[Array, float]:
         """Return the stationary point Newton's method finds on a face, and its last step."""
