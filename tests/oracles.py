@@ -74,8 +74,16 @@ def differences(f, q, digits=60):
         return np.array([float(x) for x in here]), gradient, hessian
 
 
+def agree(computed, exact, tolerance=1e-12):
+    """Assert that levels agree relative to the larger of 1 and the largest entry of a function."""
+    for f, g in zip(computed, exact, strict=True):
+        size = np.maximum(1.0, abs(g).reshape(len(g), -1).max(axis=1))
+        worst = (abs(f - g).reshape(len(g), -1).max(axis=1) / size).max()
+        assert worst <= tolerance, f"level {g.ndim - 1} differs by {worst:.2g}"
+
+
 def ulps(computed, exact):
-    """Return the distance of a float from a number in long arithmetic, in units in the last place."""
+    """Return the error of a float in units in the last place of the exact number."""
     return float(
         abs(mpmath.mpf(float(computed)) - exact) / mpmath.mpf(np.spacing(abs(float(exact))))
     )
@@ -130,7 +138,7 @@ def truth_table(signs):
     yield from itertools.product(*options)
 
 
-# ------------------------------------------------------------------------------------ linear algebra
+# --------------------------------------------------------------------------------- linear algebra
 
 
 def exact_rank(rows):
@@ -149,11 +157,13 @@ def exact_rank(rows):
     return found
 
 
-def fastest_rate(a):
-    """Return ``max min_i a_i d`` over ``|d_j| <= 1`` by trying every vertex of the linear program."""
+def fastest_rate(a, e):
+    """Return ``max min_i a_i d`` over ``|d_j| <= 1``, ``e d = 0``, by trying every vertex."""
     m, n = a.shape
-    sides = np.vstack([np.hstack([a, -np.ones((m, 1))]), np.eye(n, n + 1), -np.eye(n, n + 1)])
-    bounds = np.concatenate([np.zeros(m), -np.ones(2 * n)])
+    both = np.hstack([np.vstack([e, -e]), np.zeros((2 * len(e), 1))])
+    moving = np.hstack([a, -np.ones((m, 1))])
+    sides = np.vstack([moving, both, np.eye(n, n + 1), -np.eye(n, n + 1)])
+    bounds = np.concatenate([np.zeros(m + len(both)), -np.ones(2 * n)])
     best = -math.inf
     for chosen in itertools.combinations(range(len(sides)), n + 1):
         square = sides[list(chosen)]

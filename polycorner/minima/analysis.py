@@ -18,6 +18,16 @@ from polycorner.polyhedra.strata import distances, local_pieces
 PROBES = np.array(
     [0.003, 0.03, -0.003, -0.03]
 )  # how far flat directions are followed, in scale units
+# Where several pieces meet, the first of these that one of them shows decides.
+DECISIVE = (
+    Verdict.NOT_STATIONARY,
+    Verdict.SADDLE,
+    Verdict.NO_MULTIPLIER,
+    Verdict.UNDECIDED,
+    Verdict.MINIMUM_ALONG_LOCUS,
+    Verdict.WEAK_MINIMUM,
+    Verdict.STRICT_MINIMUM,
+)
 PROBE_NOISE = 1e-12  # change of the energy, relative to its own size, that counts as none
 
 
@@ -96,8 +106,7 @@ def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float)
     if not pieces or not np.isfinite(values[-1]):
         return replace(_analyse_piece(local, frozenset()), verdict=Verdict.OUTSIDE)
     analyses = [_analyse_piece(local, piece) for piece in pieces]
-    order = list(Verdict)
-    return max(analyses, key=lambda a: (not a.verdict.is_minimum, order.index(a.verdict)))
+    return min(analyses, key=lambda a: DECISIVE.index(a.verdict))
 
 
 def _analyse_piece(local: Local, piece: Piece) -> Analysis:
@@ -118,7 +127,7 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     away = distances(local.values[list(active)], gradients[:k])
     verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
     change = 0.0
-    if verdict is Verdict.UNDECIDED and abs(curvature.least) <= small_curvature:
+    if verdict is Verdict.UNDECIDED and curvature.least >= -small_curvature:
         held = frozenset(active[i] for i in strong if i < k)
         change = _flat_change(local, held, curvature.flat, piece)
         verdict = Verdict.MINIMUM_ALONG_LOCUS if change <= PROBE_NOISE else verdict
@@ -179,13 +188,19 @@ def _verdict(
     return Verdict.STRICT_MINIMUM
 
 
-def _flat_change(local: Local, held: Piece, flat: Array, piece: Piece) -> float:
-    """Follow every flat direction, and their mean, both ways; return the relative change."""
+def _flat_change(local: Local, face: Piece, flat: Array, piece: Piece) -> float:
+    """Follow flat directions and generic mixtures of them both ways; return the relative change."""
     if not flat.shape[1]:
         return np.inf
-    mean = flat.sum(axis=1) / flat.shape[1] ** 0.5
-    directions = np.vstack([flat.T, mean]) if flat.shape[1] > 1 else flat.T
-    change = local.problem.probe(held, piece, local.point, directions, PROBES)
+    left, singular, _ = np.linalg.svd(flat, full_matrices=False)
+    held = left[:, singular > 1e-6 * singular[0]].T
+    directions = flat.T
+    if flat.shape[1] > 1:
+        # Weights without rational relations: no polynomial of low degree vanishes on them all.
+        powers = np.sqrt([[2.0], [3.0], [5.0]]) ** np.arange(flat.shape[1])
+        mixed = powers @ flat.T
+        directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
+    change = local.problem.probe(face, piece, local.point, directions, held, PROBES)
     return change / (abs(float(local.values[-1])) + local.reference)
 
 

@@ -497,18 +497,28 @@ def lagrangian_hessian(H, lam):
 
 
 @njit(cache=True)
-def convexified(B, g, L):
-    """Add the least of a geometric sequence of multiples of the identity that makes B definite."""
+def convexified(B, g, A, L):
+    """Factor ``B``, made definite: curved up across the rows of ``A``, then along the identity.
+
+    What is added across active gradients does not change a step along the face; multiples of the
+    identity, in a geometric sequence, are added only if that is not enough.
+    """
     stay_whole()
     n = B.shape[0]
-    shift = 1e-6 * max(largest_entry(B), largest(g)) + 1e-300
+    across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g)) + 1e-300
     while True:
         C = B.copy()
         for i in range(n):
             C[i, i] += shift
+            for k in range(n):
+                for j in range(A.shape[0]):
+                    C[i, k] += across * A[j, i] * A[j, k]
         if cholesky(C, L):
             return
-        shift *= 8.0
+        if across == 0.0 and A.shape[0] > 0:
+            across = 10.0 * n * largest_entry(B)
+        else:
+            shift *= 8.0
 
 
 @njit(cache=True)
@@ -540,8 +550,10 @@ def add_tangential_step(d, L, g, V, s, cut, reference):
 
 
 @njit(cache=True)
-def polish(problem, on, m, u, F, J, H, size):
+def polish(problem, on, m, held, u, F, J, H, size):
     """Newton's method on the KKT equations of the face where the rows ``on`` and equations vanish.
+
+    The components of ``u`` along the rows of ``held`` stay as they are.
 
     Dependent gradients and flat directions are met by pseudo-inverses: the shortest step.
     Returns the multipliers by row and the last step's length.
@@ -552,13 +564,20 @@ def polish(problem, on, m, u, F, J, H, size):
     last = np.inf
     for _ in range(60):
         evaluate(problem, u, F, J, H, size, True)
-        A, b, keep, sizes = system(F, J, on, m)
+        rows, b, keep, sizes = system(F, J, on, m)
+        kept = rows.shape[0]
+        A = np.zeros((kept + held.shape[0], n))
+        for k in range(n):
+            for j in range(kept):
+                A[j, k] = rows[j, k]
+            for j in range(held.shape[0]):
+                A[kept + j, k] = held[j, k]
         g = J[total]
         for i in range(total):
             lam[i] = 0.0
         V, s = identity(n), np.zeros(n)
         d = np.zeros(n)
-        if b.size:
+        if A.shape[0]:
             U, s, V = svd(A)
             cut = RANK * largest(s)
             for c in range(n):
@@ -588,18 +607,17 @@ def polish(problem, on, m, u, F, J, H, size):
 
 
 @njit(cache=True)
-def steepest_curve(H, J, lam, on, m, direction):
+def steepest_curve(F, J, H, lam, on, m, direction):
     """Return the least curvature of the Lagrangian along the face, relative, and its direction."""
     stay_whole()
     n, total = H.shape[1], lam.size
-    A, b, _, _ = system(lam, J, on, m)
+    A, b, _, _ = system(F, J, on, m)
     V, s = identity(n), np.zeros(n)
     cut = 0.0
     if b.size:
         _, s, V = svd(A)
         cut = RANK * largest(s)
     L = lagrangian_hessian(H, lam)
-    # The null space, completed by a large multiple of the gradients' own span.
     reference = max(largest_entry(L), largest_entry(H[total])) + 1e-300
     M = np.zeros((n, n))
     for a in range(n):
@@ -608,8 +626,10 @@ def steepest_curve(H, J, lam, on, m, direction):
                 for i in range(n):
                     for k in range(n):
                         M[a, c] += V[i, a] * L[i, k] * V[k, c]
+        # Shifted to be definite, so that singular vectors are eigenvectors; off the face, large.
+        M[a, a] += 2.0 * n * reference
         if s[a] > cut:
-            M[a, a] = reference
+            M[a, a] += 2.0 * n * reference
     _, _, W = svd(M)
     least, chosen = np.inf, 0
     for j in range(n):
@@ -617,6 +637,7 @@ def steepest_curve(H, J, lam, on, m, direction):
         for a in range(n):
             for c in range(n):
                 value += W[a, j] * M[a, c] * W[c, j]
+        value -= 2.0 * n * reference
         if value < least:
             least, chosen = value, j
     for i in range(n):
@@ -635,8 +656,8 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
     stay_whole()
     v, rows, direction = u.copy(), on.copy(), np.zeros(u.size)
     for _ in range(4):
-        lam, step = polish(problem, rows, m, v, F, J, H, size)
-        if not step < 1e-8 or largest(plus(v, -1.0, u)) > 0.5:
+        lam, step = polish(problem, rows, m, np.zeros((0, u.size)), v, F, J, H, size)
+        if not step < 1e-8:
             return 0, v, lam, direction
         added = False
         for i in range(m):
@@ -644,6 +665,11 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
                 rows[i] = added = True
         if not added:
             break
+    way = plus(v, -1.0, u)
+    if largest(way) > 0.5:
+        if crosses_wall(problem, use, m, u, way, F, J, H, size):
+            return 0, v, lam, direction
+        evaluate(problem, v, F, J, H, size, True)
     last = F.size - 1
     reference = max(largest(J[last]), largest_entry(H[last]))
     pull = J[last].copy()
@@ -657,7 +683,7 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
         return 0, v, lam, direction
     if not (stationary and largest(pull) <= 1e-9 * reference):
         return 1, v, lam, direction
-    saddle = steepest_curve(H, J, lam, rows, m, direction) < -CURVED
+    saddle = steepest_curve(F, J, H, lam, rows, m, direction) < -CURVED
     return (2 if saddle else 3), v, lam, direction
 
 
@@ -678,11 +704,13 @@ def leave(problem, use, m, v, direction, F, J, H, size):
 
 
 @njit(cache=True)
-def probe(problem, on, use, m, rows, u, directions, steps, size):
-    """Follow directions along a face; return the largest change of the energy, or infinity.
+def probe(problem, on, use, m, rows, u, directions, held, steps, size):
+    """Follow directions along a face; return the largest change, or infinity.
 
-    Each step is corrected by Newton's method on the face.  Steps that leave the set of the used
-    rows are skipped; a direction that cannot be followed at all counts as infinite.
+    The change is that of the energy, or its slope along the span of ``held`` (orthonormal rows,
+    which span the directions) on the face.  Each step is corrected by Newton's method on the
+    face with the components along ``held`` fixed.  Steps that leave the set of the used rows are
+    skipped; a direction that cannot be followed at all counts as infinite.
     """
     n = u.size
     F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
@@ -693,12 +721,20 @@ def probe(problem, on, use, m, rows, u, directions, steps, size):
         for step in steps:
             guess = plus(u, step, directions[j])
             q = guess.copy()
-            _, last = polish(problem, on, m, q, F, J, H, size)
+            lam, last = polish(problem, on, m, held, q, F, J, H, size)
             if not last < 1e-8 or largest(plus(q, -1.0, guess)) > 0.1 * abs(step):
                 return np.inf
             if violation(F, J, use, m) <= FEASIBLE:
                 followed = True
                 worst = max(worst, abs(F[rows - 1] - energy))
+                for r in range(held.shape[0]):
+                    slope = 0.0
+                    for k in range(n):
+                        pull = J[rows - 1, k]
+                        for i in range(rows - 1):
+                            pull -= lam[i] * J[i, k]
+                        slope += held[r, k] * pull
+                    worst = max(worst, abs(slope))
         if not followed:
             return np.inf
     return worst
@@ -730,7 +766,8 @@ def descend(problem, use, m, rows, u, size, limit):
     for iteration in range(1, limit + 1):
         evaluate(problem, u, F, J, H, size, True)
         energy, g = F[rows - 1], J[rows - 1].copy()
-        convexified(lagrangian_hessian(H, lam), g, L)
+        face, _, _, _ = system(F, J, on, m)
+        convexified(lagrangian_hessian(H, lam), g, face, L)
         A, b, keep, sizes = system(F, J, use, m)
         for j in range(b.size):
             if abs(b[j]) < FEASIBLE:
@@ -802,5 +839,5 @@ def on_face(problem, on, m, rows, u, size):
     n = u.size
     F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
     v = u.copy()
-    lam, step = polish(problem, on, m, v, F, J, H, size)
+    lam, step = polish(problem, on, m, np.zeros((0, n)), v, F, J, H, size)
     return v, lam, step

@@ -17,6 +17,9 @@ from polycorner.geometry.manifold import Array
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space, unit_rows
 
 MAX_WEAK = 10
+# A curvature up to this many times what counts as zero is not trusted: beside an inflection it is
+# positive, too.  The direction is then followed as if the form vanished in it.
+NEARLY_FLAT = 30.0
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ class Curvature:
     least : float
         Least value of the form on unit vectors of the critical cone; ``inf`` when the cone is 0.
     flat : (n, r) array
-        Directions of the cone in which the form vanishes.
+        Unit directions of the cone in which the form vanishes, or very nearly.
     decided : bool
         False when there are too many weakly active functions to enumerate the cone's faces.
     """
@@ -150,8 +153,8 @@ def find_curvature(hessian: Array, basis: Array, weak: Array, small: float) -> C
     """
     values, inner = np.linalg.eigh(basis.T @ hessian @ basis)
     vectors = basis @ inner
-    if not len(weak) or (len(values) and values[0] > small):
-        flat = vectors[:, abs(values) <= small]
+    if not len(weak) or (len(values) and values[0] > NEARLY_FLAT * small):
+        flat = vectors[:, (values >= -small) & (values <= NEARLY_FLAT * small)]
         least = float(values[0]) if len(values) else np.inf
         return Curvature(values, vectors, least, flat, decided=True)
     if len(weak) > MAX_WEAK:
@@ -174,10 +177,9 @@ def _least_on_cone(hessian: Array, basis: Array, weak: Array, small: float) -> t
                 if direction is None:
                     continue
                 least = min(least, value)
-                if abs(value) <= small:
+                if -small <= value <= NEARLY_FLAT * small:
                     flat.append(direction)
-    columns = np.array(flat).T if flat else np.empty((len(hessian), 0))
-    return least, _independent(columns)
+    return least, np.array(flat).T if flat else np.empty((len(hessian), 0))
 
 
 def _clusters(values: Array, small: float) -> list[tuple[float, list[int]]]:
@@ -209,11 +211,3 @@ def _member(vectors: Array, weak: Array) -> Array | None:
                 direction = vectors @ found
                 return np.asarray(direction / np.linalg.norm(direction))
     return None
-
-
-def _independent(columns: Array) -> Array:
-    """Return an orthonormal basis of the span of the columns."""
-    if not columns.size:
-        return columns
-    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, singular > 1e-6 * singular[0]])

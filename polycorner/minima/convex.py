@@ -33,6 +33,7 @@ class Model:
     gradient: cp.Parameter
     root: cp.Parameter
     radius: cp.Parameter
+    penalty: cp.Parameter
     programme: cp.Problem
     contacts: cp.Constraint | None
 
@@ -41,6 +42,7 @@ class Model:
         """State the programme for ``n`` coordinates."""
         step = cp.Variable(n)
         gradient, root, radius = cp.Parameter(n), cp.Parameter((n, n)), cp.Parameter(nonneg=True)
+        penalty = cp.Parameter(nonneg=True)
         a, b = cp.Parameter((max(inequalities, 1), n)), cp.Parameter(max(inequalities, 1))
         c, h = cp.Parameter((max(equations, 1), n)), cp.Parameter(max(equations, 1))
         slack, excess = (
@@ -53,24 +55,22 @@ class Model:
         if inequalities:
             contacts = a @ step + b + slack >= 0
             rules.append(contacts)
-            cost += PENALTY * cp.sum(slack)
+            cost += penalty * cp.sum(slack)
         if equations:
             rules.append(c @ step + h == excess)
-            cost += PENALTY * cp.norm1(excess)
+            cost += penalty * cp.norm1(excess)
         programme = cp.Problem(cp.Minimize(cost), rules)
-        return cls(step, (a, b), (c, h), gradient, root, radius, programme, contacts)
+        return cls(step, (a, b), (c, h), gradient, root, radius, penalty, programme, contacts)
 
-    def solve(self) -> tuple[Array, Array]:
-        """Return the step and the multipliers of the inequalities."""
+    def solve(self) -> tuple[Array, Array] | None:
+        """Return the step and the multipliers of the inequalities, or None if there is no step."""
         try:
             self.programme.solve(solver=cp.CLARABEL)
         except cp.error.SolverError as error:
             msg = "Clarabel stopped while solving a step of the sequential convex programme"
             raise SolverError(msg) from error
         if self.step.value is None:
-            status = self.programme.status
-            msg = f"Clarabel found no step of the sequential convex programme: {status}"
-            raise SolverError(msg)
+            return None
         duals = np.zeros(0) if self.contacts is None else np.asarray(self.contacts.dual_value)
         return np.asarray(self.step.value), duals
 
@@ -80,8 +80,9 @@ def sequential_convex(
 ) -> tuple[Array, int, bool]:
     """Return the last point, the number of programmes solved, and whether the steps died out.
 
-    Rows are scaled to unit gradients and the energy to its own size, so that one penalty serves;
-    a step is accepted when energy plus penalty falls, else the trust region shrinks.
+    Rows are scaled to unit gradients and the energy to its own size.  A step is accepted when
+    energy plus penalty falls, else the trust region shrinks; the penalty grows when the
+    multipliers come near it.
     """
     kept = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     count, scales = len(piece), problem.scales
@@ -89,25 +90,31 @@ def sequential_convex(
     values, gradients, hessians = problem.evaluate(q, 2)
     size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
     duals = np.zeros(count)
-    merit = _merit(values, gradients, kept, count, size)
-    radius, idle = FIRST_RADIUS, 0
+    penalty, radius, idle = PENALTY, FIRST_RADIUS, 0
     for iteration in range(1, limit + 1):
         lengths = np.linalg.norm(gradients[kept], axis=1)
         lengths[lengths == 0] = 1.0
+        rows = gradients[kept] / lengths[:, None]
+        weights = _weights(rows, gradients[-1] / size, duals)
+        penalty = max(penalty, 3 * float(abs(weights).max(initial=0.0)))
+        merit = _merit(values, gradients, kept, count, size, penalty)
         _load(model, values, gradients, kept, lengths, size, count, radius)
         curvature = hessians[-1] / size
-        for row, length, dual in zip(kept, lengths, duals, strict=False):
-            curvature = curvature - dual / length * hessians[row]
-        model.root.value = _square_root(curvature)
-        step, duals = model.solve()
+        for row, length, weight in zip(kept, lengths, weights, strict=True):
+            curvature = curvature - weight / length * hessians[row]
+        model.root.value, model.penalty.value = _square_root(curvature), penalty
+        solved = model.solve() if np.isfinite(curvature).all() else None
+        if solved is None:
+            return q, iteration, False
+        step, duals = solved
         trial = q + step * scales
         after = problem.evaluate(trial, 2)
-        new_merit = _merit(after[0], after[1], kept, count, size)
+        new_merit = _merit(after[0], after[1], kept, count, size, penalty)
         reach = float(abs(step).max())
         gained = merit - new_merit
         idle = idle + 1 if abs(gained) <= 1e-13 * (1 + abs(merit)) else 0
         if np.isfinite(new_merit) and gained >= -1e-14 * (1 + abs(merit)):
-            q, (values, gradients, hessians), merit = trial, after, new_merit
+            q, (values, gradients, hessians) = trial, after
             radius = min(2 * radius, 1.0) if reach > 0.9 * radius else radius
             if reach < 1e-7 or idle > 1:
                 return q, iteration, True
@@ -116,6 +123,17 @@ def sequential_convex(
         if radius < LEAST_RADIUS:
             return q, iteration, True
     return q, limit, False
+
+
+def _weights(rows: Array, slope: Array, duals: Array) -> Array:
+    """Return multipliers of all rows: least squares over equations and contacts that push."""
+    count = len(duals)
+    chosen = [*np.flatnonzero(duals > 1e-6).tolist(), *range(count, len(rows))]
+    weights = np.zeros(len(rows))
+    if chosen:
+        weights[chosen] = np.linalg.lstsq(rows[chosen].T, slope, rcond=1e-8)[0]
+    weights[:count] = np.maximum(weights[:count], 0.0)
+    return weights
 
 
 def _load(
@@ -136,10 +154,12 @@ def _load(
     model.gradient.value, model.radius.value = gradients[-1] / size, radius
 
 
-def _merit(values: Array, gradients: Array, kept: list[int], count: int, size: float) -> float:
+def _merit(
+    values: Array, gradients: Array, kept: list[int], count: int, size: float, penalty: float
+) -> float:
     away = distances(values[kept], gradients[kept])
     short = np.maximum(-away[:count], 0.0).sum() + abs(away[count:]).sum()
-    return float(values[-1] / size + PENALTY * short)
+    return float(values[-1] / size + penalty * short)
 
 
 def _square_root(matrix: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from polycorner.geometry.manifold import Array
 from polycorner.minima.certificate import Certificate
 from polycorner.minima.problem import Problem, pose
 from polycorner.minima.verdicts import Verdict
-from polycorner.polyhedra.cones import unit_rows
+from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
 
@@ -86,15 +87,12 @@ def minimise(
     >>> c.point.round(6).tolist(), c.active, c.verdict.name
     ([-0.5, 0.25], ('bowl',), 'STRICT_MINIMUM')
     """
-    search = _SEARCHES.get(method)
+    search = _SEARCHES.get(method) if isinstance(method, str) else None
     if search is None:
         msg = f"method: expected one of {', '.join(map(repr, _SEARCHES))}; got {method!r}"
         raise ValueError(msg)
-    if (
-        isinstance(max_iterations, bool)
-        or not isinstance(max_iterations, int)
-        or max_iterations < 1
-    ):
+    whole = isinstance(max_iterations, Integral) and not isinstance(max_iterations, bool)
+    if not whole or max_iterations < 1:
         msg = f"max_iterations: expected a positive whole number; got {max_iterations!r}"
         raise ValueError(msg)
     check_tolerance("tolerance", tolerance)
@@ -123,15 +121,16 @@ def stationary_on(
     ``{f_i = 0 for i active, h = 0}`` is stationary, and the certificate says what it is on ``D``.
     The verdict is ``NOT_CONVERGED`` when Newton's method finds no such point.
     """
+    check_tolerance("tolerance", tolerance)
+    check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
-    if isinstance(active, str):
-        msg = f"active: expected a list of names; got the string {active!r}"
+    names = polyhedron.names
+    if not isinstance(active, list | tuple) or not all(isinstance(name, str) for name in active):
+        msg = f"active: expected a list of names among {', '.join(names)}; got {active!r}"
         raise TypeError(msg)
-    unknown = [name for name in active if name not in polyhedron.names]
+    unknown = [name for name in active if name not in names]
     if unknown:
-        msg = (
-            f"active: expected names among {', '.join(polyhedron.names)}; got {', '.join(unknown)}"
-        )
+        msg = f"active: expected names among {', '.join(names)}; got {', '.join(unknown)}"
         raise ValueError(msg)
     q = polyhedron.manifold.point(start, "start")
     problem.check_energy(q, "start")
@@ -233,38 +232,66 @@ def _slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
         constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
         options=options,
     )
-    return _finished(
-        problem, piece, found.x * scales, int(found.nit), stopped=found.status in (0, 8)
-    )
+    stopped = found.status in (0, 8)
+    return _finished(problem, piece, q, found.x * scales, int(found.nit), stopped=stopped)
 
 
 def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
     from polycorner.minima.convex import sequential_convex
 
     point, iterations, settled = sequential_convex(problem, piece, q, limit)
-    return _finished(problem, piece, point, iterations, stopped=settled)
+    return _finished(problem, piece, q, point, iterations, stopped=settled)
 
 
-def _finished(problem: Problem, piece: Piece, q: Array, iterations: int, *, stopped: bool) -> Rest:
+def _finished(
+    problem: Problem, piece: Piece, start: Array, q: Array, iterations: int, *, stopped: bool
+) -> Rest:
     """Polish an approximate minimum on the face of the functions that hold it."""
     if not np.isfinite(q).all() or abs(q / problem.scales).max() > 1e8:
-        return Rest(np.nan_to_num(q), iterations, Verdict.UNBOUNDED)
+        return Rest(start, iterations, Verdict.UNBOUNDED)
     values, gradients = problem.evaluate(q, 1)
-    face = _holding(problem, piece, values, gradients)
-    point, last = problem.on_face(face, q)
-    for _ in range(4):
-        miss = _missed(problem, piece, point)
-        if not miss or not last < 1e-8:
-            break
-        face |= miss
+    if np.isfinite(values).all() and np.isfinite(gradients).all():
+        point = _polished(problem, piece, q, _holding(problem, piece, values, gradients))
+        if point is not None:
+            return Rest(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
+    for origin in (q, start):
+        reached, point = problem.restore(piece, origin)
+        if reached and np.isfinite(problem.energy.value(point)):
+            return Rest(point, iterations, Verdict.NOT_CONVERGED)
+    return Rest(q, iterations, Verdict.INFEASIBLE)
+
+
+def _polished(problem: Problem, piece: Piece, q: Array, face: Piece) -> Array | None:
+    """Return the stationary point of a face near ``q``, the face corrected as it turns out.
+
+    Functions that are missed join the face; functions with negative multipliers leave it.
+    """
+    seen: set[Piece] = set()
+    while face not in seen:
+        seen.add(face)
         point, last = problem.on_face(face, q)
-    near = abs((point - q) / problem.scales).max() < 0.1
-    if last < 1e-8 and near and not _missed(problem, piece, point):
-        return Rest(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
-    reached, point = problem.restore(piece, q)
-    if not reached:
-        return Rest(q, iterations, Verdict.INFEASIBLE)
-    return Rest(point, iterations, Verdict.NOT_CONVERGED)
+        if not last < 1e-8 or abs((point - q) / problem.scales).max() > 0.1:
+            return None
+        missed = _missed(problem, piece, point)
+        if missed is None:
+            return None
+        pulling = _pulling(problem, face, point)
+        if not missed and not pulling:
+            return point
+        face = (face | missed) if missed else face - pulling
+    return None
+
+
+def _pulling(problem: Problem, face: Piece, point: Array) -> Piece:
+    """Return the functions of an independent face with negative multipliers."""
+    _, gradients = problem.evaluate(point, 1)
+    chosen = sorted(face)
+    rows = Rows(gradients[[*chosen, *range(problem.inequalities, problem.rows - 1)]], 1e-8)
+    if not chosen or not rows.independent:
+        return frozenset()
+    weights = rows.weights(gradients[-1])[: len(chosen)]
+    small = 1e-9 * float(abs(gradients[-1]).max())
+    return frozenset(i for i, weight in zip(chosen, weights, strict=True) if weight < -small)
 
 
 def _holding(problem: Problem, piece: Piece, values: Array, gradients: Array) -> Piece:
@@ -274,21 +301,23 @@ def _holding(problem: Problem, piece: Piece, values: Array, gradients: Array) ->
     m = problem.inequalities
     away = distances(values[:-1], gradients[:-1])
     near = [i for i in sorted(piece) if away[i] <= NEAR]
-    sections = unit_rows(gradients[m:-1])
-    columns = np.vstack([unit_rows(gradients[near]), sections, -sections])
     if not near:
         return frozenset()
+    sections = unit_rows(gradients[m:-1])
+    columns = np.vstack([unit_rows(gradients[near]), sections, -sections])
     shares, _ = nnls(columns.T, gradients[-1])
     size = abs(gradients[-1]).max()
     return frozenset(i for i, share in zip(near, shares, strict=False) if share > 1e-6 * size)
 
 
-def _missed(problem: Problem, piece: Piece, q: Array, tolerance: float = 1e-10) -> Piece:
+def _missed(problem: Problem, piece: Piece, q: Array) -> Piece | None:
+    """Return the inequalities of a piece that fail at ``q``, or None where an equation does."""
     values, gradients = problem.evaluate(q, 1)
     away = distances(values[:-1], gradients[:-1])
     m = problem.inequalities
-    late = {m + j for j in range(len(away) - m) if abs(away[m + j]) > tolerance}
-    return frozenset(i for i in piece if not away[i] >= -tolerance) | late
+    if not (abs(away[m:]) <= 1e-10).all():
+        return None
+    return frozenset(i for i in piece if not away[i] >= -1e-10)
 
 
 Search = Callable[[Problem, Piece, Array, int], Rest]

@@ -90,11 +90,11 @@ class Problem:
             kernel = call.family.kernel
             k, m = kernel.variables, kernel.outputs
             curved, straight = kernel.compiled(2).point, kernel.compiled(1).point
-            table.append((curved, straight, k, m, len(reads), len(rows), len(parameters)))
-            reads += call.reads
-            where = dict(zip(call.columns, call.rows, strict=True))
-            rows += [where.get(column, -1) for column in range(m)]
-            parameters += call.parameters.tolist()
+            for where in _layers(call.columns, call.rows):
+                table.append((curved, straight, k, m, len(reads), len(rows), len(parameters)))
+                reads += call.reads
+                rows += [where.get(column, -1) for column in range(m)]
+                parameters += call.parameters.tolist()
             size = max(size, k + m * (1 + k + k * k))
         arrays = (
             np.array(table, dtype=np.int64),
@@ -142,18 +142,30 @@ class Problem:
         return u * self.scales, step
 
     def probe(
-        self, strong: Piece, piece: Piece, q: Array, directions: Array, steps: Array
+        self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
     ) -> float:
         """Return how much the energy changes along directions; see :func:`compiled.probe`."""
         from polycorner.minima import compiled
 
         flat, size = self.flat
         masks = self.mask(strong), self.mask(piece)
-        rows = np.ascontiguousarray(directions)
+        ways = np.ascontiguousarray(directions), np.ascontiguousarray(held)
         change: float = compiled.probe(
-            flat, *masks, self.inequalities, self.rows, q / self.scales, rows, steps, size
+            flat, *masks, self.inequalities, self.rows, q / self.scales, *ways, steps, size
         )
         return change
+
+
+def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:
+    """Split (output, row) pairs so that no output occurs twice in a part: it has one place."""
+    layers: list[dict[int, int]] = []
+    for column, row in zip(columns, rows, strict=True):
+        free = next((layer for layer in layers if column not in layer), None)
+        if free is None:
+            layers.append({column: row})
+        else:
+            free[column] = row
+    return layers
 
 
 def pose(polyhedron: Polyhedron, energy: "Energy") -> Problem:

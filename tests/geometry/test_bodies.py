@@ -87,7 +87,7 @@ def test_parallel_segments_are_as_far_apart_as_their_ends(
     np.testing.assert_allclose(between_segments.value(batch), exact, atol=1e-6)
 
 
-@pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("angle", [1e-2, 5e-4, 1e-4, 2e-6, 1e-7, 1e-8, 1e-9, 1e-11])
 @pytest.mark.parametrize("apart", [0.5, 3.0])
 def test_slightly_crossed_segments_are_as_far_apart_as_at_their_crossing(
     between_segments, angle, apart
@@ -97,8 +97,8 @@ def test_slightly_crossed_segments_are_as_far_apart_as_at_their_crossing(
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     u, v, w = turn[0], np.cos(angle) * turn[0] + np.sin(angle) * turn[1], apart * turn[2]
     middle = rng.uniform(-100, 100, (100, 1, 3))
-    q = middle + np.stack([-8 * u, 8 * u, w - 8 * v, w + 8 * v])
-    np.testing.assert_allclose(between_segments.value(q.reshape(-1, 12)), apart, atol=1e-9)
+    q = middle + np.stack([-2 * u, 14 * u, w - 9 * v, w + 7 * v])
+    np.testing.assert_allclose(between_segments.value(q.reshape(-1, 12)), apart, atol=1e-7)
 
 
 @given(segments())
@@ -111,9 +111,9 @@ def test_distance_does_not_depend_on_the_order_of_anything(between_segments, q):
         )
 
 
-@given(segments(), vectors(3))
-def test_the_gradient_pushes_apart_as_fast_as_the_bodies_move(between_segments, q, shift):
-    """Moving all four corners alike changes nothing; moving one segment at most by its motion."""
+@given(segments())
+def test_the_gradient_pushes_apart_as_fast_as_the_bodies_move(between_segments, q):
+    """Moving all four corners alike changes nothing, moving one segment changes the distance."""
     assume(oracles.between_segments(*parts(q)) > 1e-3)
     gradient = between_segments.gradient(q).reshape(4, 3)
     np.testing.assert_allclose(gradient.sum(axis=0), 0, atol=1e-6)

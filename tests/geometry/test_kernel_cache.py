@@ -1,4 +1,4 @@
-"""Machine code on disk: compiled once, loaded later, remade when spoilt, done without if need be."""
+"""Machine code on disk: compiled once, then loaded; remade when spoilt; not a necessity."""
 
 import gc
 import os
@@ -114,7 +114,7 @@ def test_without_a_choice_it_is_the_users_cache(monkeypatch):
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda code: b"",
+        lambda _: b"",
         lambda code: code[:20],
         lambda code: code[:-1],
         lambda code: code + b"\0",

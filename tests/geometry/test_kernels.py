@@ -63,7 +63,7 @@ POINTS = [(0.3, 0.7), (0.8, 0.45), (0.55, 0.62), (0.21, 0.13), (0.9, 0.85), (0.4
 
 
 @pytest.fixture(scope="module")
-def every(kernels_elsewhere):
+def every():
     return together(ALL, "x y")
 
 
@@ -73,18 +73,10 @@ def long(expressions):
     return lambda q: written(*q)
 
 
-def agrees(computed, exact, tolerance=1e-12):
-    """Whether all entries agree relative to the larger of 1 and the largest entry of a function."""
-    for f, g in zip(computed, exact, strict=True):
-        size = np.maximum(1.0, abs(g).reshape(len(g), -1).max(axis=1))
-        size = size.reshape(-1, *[1] * (g.ndim - 1))
-        assert (abs(f - g) <= tolerance * size).all()
-
-
 @pytest.mark.parametrize("q", POINTS)
 def test_kernels_agree_with_long_arithmetic(every, q):
     exact = oracles.differences(long(ALL.values()), q)
-    agrees(every.evaluate(np.array(q), 2), exact)
+    oracles.agree(every.evaluate(np.array(q), 2), exact)
 
 
 @pytest.mark.parametrize("q", POINTS[:3])
@@ -126,7 +118,7 @@ def test_the_orders_are_attained():
 @given(smooth_expressions((x, y)), st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
 def test_generated_expressions_agree_with_long_arithmetic(expression, q):
     compiled = together({"f": expression}, "x y").evaluate(np.array(q), 2)
-    agrees(compiled, oracles.differences(long([expression]), q), tolerance=1e-10)
+    oracles.agree(compiled, oracles.differences(long([expression]), q), tolerance=1e-10)
 
 
 @pytest.mark.parametrize("q", POINTS)
@@ -143,8 +135,8 @@ def test_a_batch_is_its_points_to_the_bit(every, order, count):
     for results, shape in zip(batch, ((), (2,), (2, 2)), strict=False):
         assert results.shape == (count, len(ALL), *shape)
     for i in range(count):
-        for together, alone in zip(batch, every.evaluate(q[i], order), strict=True):
-            assert together[i].tobytes() == alone.tobytes()
+        for rows, alone in zip(batch, every.evaluate(q[i], order), strict=True):
+            assert rows[i].tobytes() == alone.tobytes()
 
 
 @pytest.mark.parametrize("order", [0, 1])
@@ -153,6 +145,18 @@ def test_lower_orders_are_parts_of_higher_ones(every, order):
     full = every.evaluate(q, 2)
     for less, more in zip(every.evaluate(q, order), full, strict=False):
         np.testing.assert_allclose(less, more, rtol=1e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize("outputs", [*range(1, 10), 15, 16, 17, 23])
+def test_any_number_of_functions_is_stored_in_its_place(outputs):
+    powers = together({f"f{i}": x * y**i + i for i in range(outputs)}, "x y")
+    q = np.random.default_rng(outputs).uniform(0.5, 1.5, (19, 2))
+    values, gradients = powers.evaluate(q, 1)
+    a, b = q.T
+    for i in range(outputs):
+        np.testing.assert_allclose(values[:, i], a * b**i + i, rtol=1e-14)
+        np.testing.assert_allclose(gradients[:, i, 0], b**i, rtol=1e-14)
+        np.testing.assert_allclose(gradients[:, i, 1], i * a * b ** (i - 1.0), rtol=1e-14)
 
 
 def test_a_transposed_batch_is_read_row_by_row(every):
@@ -172,6 +176,16 @@ def test_the_angle_of_a_vector_is_right_in_every_quadrant(quadrant):
     mixed = (b * b - a * a) / square**2
     expected = np.array([[2 * a * b / square**2, mixed], [mixed, -2 * a * b / square**2]])
     np.testing.assert_allclose(hessian[0], expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_a_boundary_belongs_to_the_weak_inequality(count):
+    """At ``x = y`` the relations ``<=`` and ``>=`` hold, ``<`` and ``>`` do not."""
+    relations = {"<": x < y, "<=": x <= y, ">": x > y, ">=": x >= y}
+    relations["not"] = sp.Not(sp.And(x <= y, x < 9), evaluate=False)
+    cases = {name: sp.Piecewise((1, holds), (0, True)) for name, holds in relations.items()}
+    found = together(cases, "x y").evaluate(np.full((count, 2), 0.5), 0)[0]
+    assert found.tolist() == [[0.0, 1.0, 0.0, 1.0, 0.0]] * count
 
 
 @pytest.mark.parametrize("value", [0.0, 0.25, 1e-9, -3.0, 1e100, 5e-324])

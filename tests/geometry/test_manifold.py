@@ -93,6 +93,11 @@ class TestDifferenceAndShift:
         M, q, v = drawn
         np.testing.assert_allclose(M.difference(M.shift(q, v), q), v, atol=1e-12)
 
+    @given(manifold_and_points(2))
+    def test_a_shift_lands_in_the_half_open_period(self, drawn):
+        M, q, v = drawn
+        assert np.array_equal(M.shift(q, v), M.wrap(q + v))
+
     @given(manifold_and_points(3))
     def test_shifts_add_up(self, drawn):
         M, q, v, w = drawn
@@ -236,7 +241,7 @@ class TestConstruction:
             Manifold.euclidean(names)
 
     def test_a_repeated_name_is_quoted(self):
-        with pytest.raises(ValueError, match="names: .*phi more than once"):
+        with pytest.raises(ValueError, match=r"names: .*phi more than once"):
             Manifold(("phi", "eta", "phi"))
 
     @pytest.mark.parametrize("names", [None, 5])

@@ -26,7 +26,10 @@ def family(n):
     lam = sp.symbols(f"lam1:{n + 1}", real=True)
     e, beta = sp.symbols("e beta", real=True)
     away = [sp.Symbol(f"away{i}", real=True) for i in range(n)]
-    definitions = {f"away{i}": w * (x[i] - c) for i, (c, w) in enumerate(zip(names["c"], names["w"]))}
+    definitions = {
+        f"away{i}": w * (x[i] - c)
+        for i, (c, w) in enumerate(zip(names["c"], names["w"], strict=True))
+    }
     z = sp.symbols(f"z1:{n + 1}", real=True)
     for i in range(n):
         bend = names["s"][i] * (away[(i + 1) % n] ** 2 + sp.sin(away[i]) * away[(i + 1) % n])
@@ -83,11 +86,15 @@ class Corner:
         )  # fmt: skip
 
         def member(name):
-            return SmoothFunction.member(family(self.n), name, manifold, parameters=numbers.tolist())
+            return SmoothFunction.member(
+                family(self.n), name, manifold, parameters=numbers.tolist()
+            )
 
         faces = AllOf(*[member(f"f{i + 1}") for i in range(self.contacts)])
         if not self.contacts:
-            faces = AllOf(SmoothFunction("far", manifold.symbols[0] + 1000 * self.scales[0], manifold))
+            faces = AllOf(
+                SmoothFunction("far", manifold.symbols[0] + 1000 * self.scales[0], manifold)
+            )
         return Polyhedron(manifold, faces), member("energy")
 
     def certify(self, **options):

@@ -7,7 +7,7 @@ import sympy as sp
 
 
 def quadratic_programme(B, g, A, b, equations):
-    """Minimise ``g.d + d.B.d / 2`` with ``A d + b >= 0``, the last rows ``= 0``, by trying every face.
+    """Minimise ``g.d + d.B.d / 2`` with ``A d + b >= 0``, the last rows ``= 0``, face by face.
 
     Returns the minimiser, or None where no point satisfies the rows.
     """

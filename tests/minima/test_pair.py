@@ -20,14 +20,13 @@ chiralities = st.sampled_from("RL")
 
 
 @st.composite
-def pairs(draw, *, ratio=st.floats(0.3, 0.7), rod_weight=0.0):
+def pairs(draw):
     """Pairs of the experiments' proportions: 3 mm balls, rods of 30 to 70 % of their radius."""
     return DumbbellPair(
         length=draw(st.floats(12, 20)),
         ball_radius=3,
-        rod_radius=3 * draw(ratio),
+        rod_radius=3 * draw(st.floats(0.3, 0.7)),
         drum_radius=draw(st.floats(60, 300)),
-        rod_weight=rod_weight,
     )
 
 
@@ -90,7 +89,7 @@ def test_the_corner_is_symmetric(pair, chirality):
     assert judge(pair, pair.mirror(c.point)).multipliers == pytest.approx(c.multipliers, rel=1e-9)
     swapped = judge(pair, pair.swap(c.point))
     assert swapped.verdict is c.verdict
-    assert swapped.active == ("A1B2", "A1b", "aB2") or swapped.active == ("A1B2", "aB2", "A1b")
+    assert set(swapped.active) == {"A1B2", "A1b", "aB2"}
     turned = judge(pair, pair.half_turn(c.point, "A"))
     assert set(turned.active) == {"A1B1", "A1b", "aB1"}
     assert turned.signature() == c.signature()
@@ -129,7 +128,7 @@ def test_the_weight_of_the_rods_does_not_move_the_corner(pair, weight):
 
 @given(st.floats(12, 20), st.floats(0.3, 0.7), chiralities)
 def test_multipliers_are_the_energys_sensitivities(length, ratio, chirality):
-    """A thicker rod closes the ball-rod gaps; a larger ball closes all three, twice the ball-ball's.
+    """A thicker rod closes the ball-rod gaps; a larger ball closes all, the ball-ball gap twice.
 
     In the plane the energy does not know the radii, so ``dE/dt`` and ``dE/dr`` at the corner are
     the multipliers' sums (the envelope theorem).
@@ -178,10 +177,8 @@ def test_no_feasible_point_near_the_corner_is_lower(pair, chirality, seed):
 # ------------------------------------------------------------------------- where one may start
 
 
-@settings(max_examples=1, derandomize=True)
-@given(st.just(standard()))
-def test_two_hundred_dyads_reach_their_corner(pair):
-    rng = np.random.default_rng(200)
+def test_two_hundred_dyads_reach_their_corner():
+    pair, rng = standard(), np.random.default_rng(200)
     expected = {chirality: rest(pair, pair.nested(chirality)) for chirality in "RL"}
     for k in range(200):
         chirality = "RL"[k % 2]

@@ -1,0 +1,72 @@
+"""Importing the package is cheap, and every public name is there."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import polycorner
+
+ROOT = Path(polycorner.__file__).parents[1]
+HEAVY = ("sympy", "numba", "llvmlite", "scipy", "cvxpy", "clarabel", "matplotlib", "rich", "click")
+LOADED = """
+import sys
+before = set(sys.modules)
+{statement}
+names = {{name.partition(".")[0] for name in set(sys.modules) - before}}
+print(*sorted(names - set(sys.stdlib_module_names)))
+"""
+
+
+def loaded_by(statement):
+    """Return the packages outside the standard library that a statement loads."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", LOADED.format(statement=statement)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return {name for name in done.stdout.split() if not name.startswith("_")}
+
+
+def test_importing_the_package_loads_numpy_at_most():
+    assert loaded_by("import polycorner") <= {"polycorner", "numpy"}
+
+
+def test_the_first_name_costs_numpy_and_nothing_more():
+    assert loaded_by("from polycorner import Manifold") == {"polycorner", "numpy"}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from polycorner import AllOf, AnyOf, Polyhedron, SmoothFunction, Stratum, stratum_at",
+        "from polycorner import Verdict, Entrapment, LocalType, PolycornerError, SolverError",
+        "import polycorner; dir(polycorner); polycorner.__version__",
+    ],
+)
+def test_names_for_writing_a_problem_load_nothing_heavy(statement):
+    assert not loaded_by(statement) & set(HEAVY)
+
+
+@pytest.mark.parametrize("name", polycorner.__all__)
+def test_every_public_name_resolves(name):
+    value = getattr(polycorner, name)
+    assert value.__name__ == name
+    assert value.__module__.startswith("polycorner.")
+    assert value.__doc__
+
+
+def test_public_names_are_sorted_and_listed():
+    assert list(polycorner.__all__) == sorted(polycorner.__all__)
+    assert set(polycorner.__all__) <= set(dir(polycorner))
+    assert polycorner.__version__.count(".") == 2
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'Dumbbell'"):
+        _ = polycorner.Dumbbell
