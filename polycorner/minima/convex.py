@@ -12,6 +12,7 @@ import numpy as np
 from polycorner.errors import SolverError
 from polycorner.geometry.manifold import Array
 from polycorner.minima.problem import Problem
+from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 
@@ -107,7 +108,7 @@ def sequential_convex(
         if solved is None:
             return q, iteration, False
         step, duals = solved
-        trial = q + step * scales
+        trial = _corrected(problem, q + step * scales, kept, count)
         after = problem.evaluate(trial, 2)
         new_merit = _merit(after[0], after[1], kept, count, size, penalty)
         reach = float(abs(step).max())
@@ -123,6 +124,22 @@ def sequential_convex(
         if radius < LEAST_RADIUS:
             return q, iteration, True
     return q, limit, False
+
+
+def _corrected(problem: Problem, trial: Array, kept: list[int], count: int) -> Array:
+    """Return a trial point moved, to first order, onto the functions it fails.
+
+    Without this second-order correction the curvature of the constraints makes every long step
+    along them look bad ([NW] sec. 15.5, the Maratos effect).
+    """
+    values, gradients = problem.evaluate(trial, 1)
+    away = distances(values[kept], gradients[kept])
+    failed = np.flatnonzero(np.concatenate([away[:count] < 0, away[count:] != 0]))
+    if not failed.size or not np.isfinite(away[failed]).all():
+        return trial
+    rows = unit_rows(gradients[kept][failed])
+    correction = np.linalg.lstsq(rows, -away[failed], rcond=1e-8)[0]
+    return np.asarray(trial + correction * problem.scales)
 
 
 def _weights(rows: Array, slope: Array, duals: Array) -> Array:

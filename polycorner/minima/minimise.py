@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Method = Literal["newton", "slsqp", "scp"]
 
 MAX_SWITCHES = 50
+FAR = 1e8  # a search that ends farther away, in scale units, found no rest
 NEAR = 1e-3  # scaled distance within which a function may be active at an unpolished minimum
 
 
@@ -247,9 +248,11 @@ def _finished(
     problem: Problem, piece: Piece, start: Array, q: Array, iterations: int, *, stopped: bool
 ) -> Rest:
     """Polish an approximate minimum on the face of the functions that hold it."""
-    if not np.isfinite(q).all() or abs(q / problem.scales).max() > 1e8:
-        return Rest(start, iterations, Verdict.UNBOUNDED)
+    if not np.isfinite(q).all():
+        q = start
     values, gradients = problem.evaluate(q, 1)
+    if abs(q / problem.scales).max() > FAR and _missed(problem, piece, q, 1e-6) == frozenset():
+        return Rest(start, iterations, Verdict.UNBOUNDED)
     if np.isfinite(values).all() and np.isfinite(gradients).all():
         point = _polished(problem, piece, q, _holding(problem, piece, values, gradients))
         if point is not None:
@@ -310,14 +313,14 @@ def _holding(problem: Problem, piece: Piece, values: Array, gradients: Array) ->
     return frozenset(i for i, share in zip(near, shares, strict=False) if share > 1e-6 * size)
 
 
-def _missed(problem: Problem, piece: Piece, q: Array) -> Piece | None:
+def _missed(problem: Problem, piece: Piece, q: Array, tolerance: float = 1e-10) -> Piece | None:
     """Return the inequalities of a piece that fail at ``q``, or None where an equation does."""
     values, gradients = problem.evaluate(q, 1)
     away = distances(values[:-1], gradients[:-1])
     m = problem.inequalities
-    if not (abs(away[m:]) <= 1e-10).all():
+    if not (abs(away[m:]) <= tolerance).all():
         return None
-    return frozenset(i for i in piece if not away[i] >= -1e-10)
+    return frozenset(i for i in piece if not away[i] >= -tolerance)
 
 
 Search = Callable[[Problem, Piece, Array, int], Rest]
