@@ -4,6 +4,7 @@ This is the readable form of a descent step: minimise a convex model of the ener
 linearised polyhedron inside a trust region ([BV] ch. 4, [NW] ch. 18).
 """
 
+import warnings
 from dataclasses import dataclass
 
 import cvxpy as cp
@@ -65,11 +66,16 @@ class Model:
 
     def solve(self) -> tuple[Array, Array] | None:
         """Return the step and the multipliers of the inequalities, or None if there is no step."""
-        try:
-            self.programme.solve(solver=cp.CLARABEL)
-        except cp.error.SolverError as error:
-            msg = "Clarabel stopped while solving a step of the sequential convex programme"
-            raise SolverError(msg) from error
+        if cp.CLARABEL not in cp.installed_solvers():
+            msg = "cvxpy does not find the solver Clarabel; install the package clarabel"
+            raise SolverError(msg)
+        with warnings.catch_warnings():
+            # An inaccurate step is as good as any: it is taken only if the merit falls.
+            warnings.simplefilter("ignore", UserWarning)
+            try:
+                self.programme.solve(solver=cp.CLARABEL)
+            except cp.error.SolverError:
+                return None  # numerical failure on this step's data
         if self.step.value is None:
             return None
         duals = np.zeros(0) if self.contacts is None else np.asarray(self.contacts.dual_value)
