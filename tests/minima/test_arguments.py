@@ -96,7 +96,7 @@ def test_a_point_of_the_wrong_shape(verb, name, shape):
         [None, 1],
         [[1, 2], [3]],
         [True, False],
-        object(),
+        pytest.param(object(), id="object"),
         {"x": "a", "y": 1},
         np.array(["2020", "2021"], dtype="M8[Y]"),
     ],
