@@ -137,7 +137,7 @@ def by_lane(
 
 
 def sine_cosine(module: ir.Module, lanes: int) -> ir.Function:
-    """Return the routine ``x -> (sin x, cos x)``, within one unit in the last place.
+    """Return the routine ``x -> (sin x, cos x)``, within two units in the last place.
 
     The argument is reduced to ``|r| <= pi/4``, where the Taylor sums up to ``r**15`` and
     ``r**16`` are truncated below ``5e-17``.  Beyond ``REDUCTION_LIMIT`` the C library takes over.
@@ -194,9 +194,12 @@ def _reduced(b: ir.IRBuilder, x: ir.Value, lanes: int) -> list[ir.Value]:
     shifted = b.fadd(b.fmul(x, constant(2 / 3.141592653589793)), constant(ROUNDER))
     quadrant = b.bitcast(shifted, integers)
     count = b.fsub(shifted, constant(ROUNDER))
-    r = x
-    for part in HALF_PI:
-        r = b.fsub(r, b.fmul(count, constant(part)))
+    first, second, third = (b.fmul(count, constant(part)) for part in HALF_PI)
+    # Only the last step rounds: the digits that the second one loses are carried over to it.
+    exact = b.fsub(x, first)
+    head = b.fsub(exact, second)
+    lost = b.fsub(b.fsub(exact, head), second)
+    r = b.fadd(head, b.fsub(lost, third))
     sine, cosine = _sine_sum(b, r, constant), _cosine_sum(b, r, constant)
     odd, upper = bit(quadrant, 1), bit(quadrant, 2)
     new_sine = b.select(odd, cosine, sine)

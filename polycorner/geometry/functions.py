@@ -54,6 +54,9 @@ class Family:
         definitions: "Mapping[str, Any] | None" = None,
     ) -> "Family":
         """Return the family of given expressions, checking every symbol at once."""
+        variables, parameters = tuple(variables), tuple(parameters)
+        _check_new("parameters", parameters, variables)
+        _check_new("definitions", tuple(definitions or ()), variables + parameters)
         given = {name: _sympified(name, e) for name, e in expressions.items()}
         known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
         family = cls(tuple(given), tuple(variables), tuple(parameters), lambda: (known, given))
@@ -146,6 +149,9 @@ class SmoothFunction:
         reads: Sequence[str] | None = None,
         definitions: "Expressions | None" = None,
     ) -> None:
+        if not isinstance(manifold, Manifold):
+            msg = f"manifold: expected a Manifold; got {type(manifold).__name__}"
+            raise TypeError(msg)
         values = {str(symbol): value for symbol, value in (parameters or {}).items()}
         formal = tuple(variables or manifold.names)
         family = Family.of({name: expression}, formal, values, definitions)
@@ -192,6 +198,18 @@ class SmoothFunction:
         self.name = label or name
         self.reads = tuple(manifold.names.index(coordinate) for coordinate in reads)
         self.parameters = tuple(numbers.tolist())
+
+    def renamed(self, name: str) -> "SmoothFunction":
+        """Return the same function under another name."""
+        reads = [self.manifold.names[i] for i in self.reads]
+        return SmoothFunction.member(
+            self.family,
+            self.member_name,
+            self.manifold,
+            parameters=self.parameters,
+            reads=reads,
+            label=name,
+        )
 
     def __repr__(self) -> str:
         """Return the name and what the function reads."""
@@ -318,6 +336,13 @@ class Bundle:
                 inner = place if isinstance(place, tuple) else (place,)
                 result[(slice(None), *inner)] = part[:, call.picked]
         return results
+
+
+def _check_new(argument: str, names: Sequence[str], taken: Sequence[str]) -> None:
+    hidden = [name for name in names if name in taken]
+    if hidden:
+        msg = f"{argument}: expected names other than {', '.join(taken)}; got {', '.join(hidden)}"
+        raise ValueError(msg)
 
 
 def _sympified(name: str, expression: object) -> "sympy.Expr":

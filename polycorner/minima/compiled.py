@@ -29,6 +29,7 @@ CONVERGED, INFEASIBLE, UNBOUNDED, STALLED = 0, 1, 2, 3
 FEASIBLE = 1e-10  # scaled distance by which a constraint may be missed during the descent
 EXACT = 1e-13  # and after the last Newton iterations
 FIRST_CAP = 0.5  # longest first step, in scale units
+PATIENCE = 20  # steps after which active functions, too, are curved up across
 FAR = 1e8  # a descent that goes farther is called unbounded
 CURVED = 1e-8  # relative curvature below which a stationary point is a saddle
 RANK = 1e-8  # singular values below this fraction of the largest count as zero
@@ -500,8 +501,8 @@ def lagrangian_hessian(H, lam):
 def convexified(B, g, A, L):
     """Factor ``B``, made definite: curved up across the rows of ``A``, then along the identity.
 
-    What is added across active gradients does not change a step along the face; multiples of the
-    identity, in a geometric sequence, are added only if that is not enough.
+    What is added across the gradients of equations does not change a step along their section;
+    multiples of the identity, in a geometric sequence, are added only if that is not enough.
     """
     stay_whole()
     n = B.shape[0]
@@ -657,7 +658,7 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
     v, rows, direction = u.copy(), on.copy(), np.zeros(u.size)
     for _ in range(4):
         lam, step = polish(problem, rows, m, np.zeros((0, u.size)), v, F, J, H, size)
-        if not step < 1e-8:
+        if not step < 1e-8 or largest(plus(v, -1.0, u)) > 0.5:
             return 0, v, lam, direction
         added = False
         for i in range(m):
@@ -665,11 +666,6 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
                 rows[i] = added = True
         if not added:
             break
-    way = plus(v, -1.0, u)
-    if largest(way) > 0.5:
-        if crosses_wall(problem, use, m, u, way, F, J, H, size):
-            return 0, v, lam, direction
-        evaluate(problem, v, F, J, H, size, True)
     last = F.size - 1
     reference = max(largest(J[last]), largest_entry(H[last]))
     pull = J[last].copy()
@@ -762,12 +758,14 @@ def descend(problem, use, m, rows, u, size, limit):
         F[rows - 1]
     ):
         return INFEASIBLE, 0, u, lam
+    nothing, section = np.zeros(m, np.bool_), np.zeros((0, n))
     cap = FIRST_CAP
     for iteration in range(1, limit + 1):
         evaluate(problem, u, F, J, H, size, True)
         energy, g = F[rows - 1], J[rows - 1].copy()
-        face, _, _, _ = system(F, J, on, m)
-        convexified(lagrangian_hessian(H, lam), g, face, L)
+        if rows - 1 > m or iteration > PATIENCE:
+            section, _, _, _ = system(F, J, on if iteration > PATIENCE else nothing, m)
+        convexified(lagrangian_hessian(H, lam), g, section, L)
         A, b, keep, sizes = system(F, J, use, m)
         for j in range(b.size):
             if abs(b[j]) < FEASIBLE:

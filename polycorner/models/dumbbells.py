@@ -191,6 +191,7 @@ class DumbbellPair:
             Common heading in radians; default that of the corner in the plane.
         clearance : float, optional
             Distance, in mm, left at each of the three contacts; default a tenth of the ball radius.
+            Exact in the plane; in the drum, right to the order of ``1/R^2``.
         """
         sign = {"R": 1, "L": -1}.get(chirality)
         if sign is None:
@@ -271,6 +272,12 @@ def _check(pair: DumbbellPair) -> None:
         ("drum_radius", pair.drum_radius, pair.drum_radius > 0, "a positive length in mm or inf"),
         ("rod_weight", pair.rod_weight, pair.rod_weight >= 0, "a number not below 0"),
         ("rod_radius", t, t < r, f"less than the ball radius {r:g} mm"),
+        (
+            "drum_radius",
+            pair.drum_radius,
+            pair.drum_radius > r,
+            f"more than the ball radius {r:g} mm",
+        ),
         ("length", length, length >= 2 * r, f"at least two ball radii, {2 * r:g} mm"),
         (
             "length",

@@ -52,7 +52,7 @@ class Polyhedron:
         Where ``D`` lives.
     parts : AllOf, AnyOf, SmoothFunction, SymPy expression, sequence or mapping
         The inequalities ``f >= 0``.  A sequence means all of them; a mapping gives names.
-        Expressions without a name are called ``f1``, ``f2``, ...
+        Expressions without a name are called ``f1``, ``f2``, ..., or after the group's name.
     equations : the same kinds, optional
         Functions ``h = 0`` (sections), called ``h1``, ``h2``, ... without a name.
     annotations : mapping from str to callable, optional
@@ -294,7 +294,7 @@ def _named(
         if isinstance(part, AnyOf) and not part.parts:
             msg = f"{argument}: an AnyOf of nothing is empty; give it at least one part"
             raise ValueError(msg)
-        inner = [_named(manifold, argument, "", child, plain, letter) for child in part.parts]
+        inner = [_named(manifold, argument, "", p, plain, name or letter) for p in part.parts]
         return type(part)(*inner)
     if isinstance(part, SmoothFunction):
         if part.manifold != manifold:
@@ -303,7 +303,7 @@ def _named(
                 f"{', '.join(part.manifold.names)}; expected {', '.join(manifold.names)}"
             )
             raise ValueError(msg)
-        return part
+        return part.renamed(name) if name else part
     if not isinstance(name, str):
         msg = f"{argument}: expected names to be strings; got {name!r}"
         raise TypeError(msg)

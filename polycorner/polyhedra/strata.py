@@ -21,7 +21,7 @@ class LocalType(Enum):
     OUTSIDE = "the point does not lie in the polyhedron"
     INTERIOR = "no active function: the polyhedron is a neighbourhood of the point"
     QUADRANT = "independent active gradients: locally a quadrant"
-    CONE = "dependent active gradients: locally a convex cone that is not a quadrant"
+    CONE = "dependent active gradients: locally a convex cone, not a quadrant as it is written"
     UNION = "several branches meet: locally a union of convex cones"
     DEGENERATE = "the active gradients leave no inward direction: possibly a cusp, not a corner"
 

@@ -221,6 +221,23 @@ class TestRefusals:
         with pytest.raises((TypeError, ValueError), match=r"^parameters: "):
             SmoothFunction("f", k * x, SPACE, parameters={"k": number})
 
+    def test_a_parameter_cannot_hide_a_coordinate(self):
+        """Else a slope would silently vanish."""
+        with pytest.raises(ValueError, match=r"^parameters: .*x"):
+            SmoothFunction("f", x * y, SPACE, parameters={"x": 3.0})
+
+    @pytest.mark.parametrize("name", ["x", "k"])
+    def test_a_definition_cannot_hide_a_coordinate_or_a_parameter(self, name):
+        with pytest.raises(ValueError, match=f"^definitions: .*{name}"):
+            SmoothFunction(
+                "f", k * x, SPACE, parameters={"k": 3.0}, definitions={name: sp.Integer(2)}
+            )
+
+    @pytest.mark.parametrize("manifold", [None, "x y", ("x", "y", "z")])
+    def test_the_manifold_is_a_manifold(self, manifold):
+        with pytest.raises(TypeError, match=r"^manifold: expected a Manifold"):
+            SmoothFunction("f", x, manifold)
+
     @pytest.mark.parametrize("numbers", [(), (1.0, 2.0)])
     def test_a_member_has_one_number_for_each_parameter(self, numbers):
         family = Family.of({"f": k * x}, ("x",), ("k",))

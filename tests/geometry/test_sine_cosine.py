@@ -14,6 +14,16 @@ from strategies import together
 from polycorner.geometry import emit
 
 ALLOWED = 2.0
+# Where millions of random angles met the largest errors of the reduced argument.
+HARDEST = [
+    0.8171697376933368,
+    7.602939097641823,
+    60.756930975646,
+    987.9996385999224,
+    6592.616558159278,
+    75694.97906173604,
+    711785.6832893274,
+]
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +81,12 @@ def test_both_stay_exact_near_multiples_of_a_quarter_turn(circular, counts):
     angles = near_multiples(counts)
     for evaluate in circular:
         assert worst(evaluate(angles), angles) <= ALLOWED
+
+
+@pytest.mark.parametrize("angle", HARDEST)
+def test_both_are_that_close_for_the_hardest_angles_too(circular, angle):
+    for evaluate in circular:
+        assert worst(evaluate([angle, -angle]), [angle, -angle]) <= ALLOWED
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=False))

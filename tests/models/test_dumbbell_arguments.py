@@ -53,6 +53,12 @@ def test_sizes_fit_together(changes, says):
         DumbbellPair(**GOOD | changes)
 
 
+@pytest.mark.parametrize("radius", [1.0, 3.0])
+def test_a_drum_that_is_smaller_than_a_ball_is_what_is_blamed(radius):
+    with pytest.raises(ValueError, match=r"^drum_radius: "):
+        DumbbellPair(**GOOD | {"drum_radius": radius})
+
+
 def test_the_sentence_is_one_line():
     for changes in ({"length": math.nan}, {"rod_radius": 4.0}, {"drum_radius": "wide"}):
         with pytest.raises((ValueError, TypeError)) as caught:
