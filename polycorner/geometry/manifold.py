@@ -102,8 +102,10 @@ class Manifold:
         return np.array(self.scales)
 
     @cached_property
-    def _circles(self) -> tuple[tuple[int, float], ...]:
-        return tuple((i, p) for i, p in enumerate(self.periods) if p < math.inf)
+    def _circles(self) -> tuple[list[int], Array]:
+        """Positions and periods of the coordinates that are circles."""
+        positions = [i for i, period in enumerate(self.periods) if period < math.inf]
+        return positions, np.array([self.periods[i] for i in positions])
 
     def points(self, q: ArrayLike, argument: str = "q") -> Array:
         """Check that ``q`` is one point ``(n,)`` or a batch ``(..., n)`` of finite reals.
@@ -145,17 +147,18 @@ class Manifold:
 
     def wrap(self, q: ArrayLike) -> Array:
         """Bring circle coordinates into ``(-period/2, period/2]``; lines stay as they are."""
-        wrapped = self.points(q).copy()
-        for i, period in self._circles:
-            wrapped[..., i] = _principal(wrapped[..., i], period)
-        return wrapped
+        return self._principal(self.points(q).copy())
 
     def difference(self, p: ArrayLike, q: ArrayLike) -> Array:
         """Return the shortest tangent vector that leads from ``q`` to ``p``."""
-        vector = self.points(p, "p") - self.points(q)
-        for i, period in self._circles:
-            vector[..., i] = _principal(vector[..., i], period)
-        return vector
+        return self._principal(self.points(p, "p") - self.points(q))
+
+    def _principal(self, array: Array) -> Array:
+        circles, periods = self._circles
+        if circles:
+            values = array[..., circles]
+            array[..., circles] = values - periods * np.ceil(values / periods - 0.5)
+        return array
 
     def shift(self, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the point reached from ``q`` along the tangent vector ``v``."""
@@ -195,10 +198,6 @@ def finite(array: Array, argument: str) -> Array:
 def _first_bad(array: Array) -> str:
     position = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
     return f"{array[position]} at index {position[0] if len(position) == 1 else position}"
-
-
-def _principal(values: Array, period: float) -> Array:
-    return values - period * np.ceil(values / period - 0.5)
 
 
 def _names(names: str | Sequence[str]) -> tuple[str, ...]:

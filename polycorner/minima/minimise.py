@@ -100,8 +100,11 @@ def minimise(
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
     q = polyhedron.manifold.point(start, "start")
-    problem.check_energy(q, "start")
+    if search is not _newton:
+        problem.check_energy(q, "start")
     rest = _descend_union(problem, q, search, max_iterations)
+    if rest.failure is Verdict.INFEASIBLE:
+        problem.check_energy(q, "start")
     return Certificate(
         problem, rest.point, tolerance, rank_tolerance, method, rest.iterations, rest.failure
     )

@@ -105,8 +105,14 @@ class Problem:
         )
         return arrays, size
 
+    @cached_property
+    def _everything(self) -> NDArray[np.bool_]:
+        return np.ones(self.inequalities, dtype=np.bool_)
+
     def mask(self, piece: Piece) -> NDArray[np.bool_]:
         """Return which inequalities belong to a piece."""
+        if len(piece) == self.inequalities:
+            return self._everything
         use = np.zeros(self.inequalities, dtype=np.bool_)
         use[list(piece)] = True
         return use

@@ -70,7 +70,8 @@ def inward_direction(inequalities: Array, equations: Array) -> tuple[Array, floa
     """Return the direction ``d``, ``|d_i| <= 1``, that enters the cone fastest, and its rate.
 
     The rate is ``max min_i a_i d``, at most 1, over unit rows subject to ``E d = 0``: positive
-    exactly where the constraint qualification of Mangasarian and Fromovitz holds for the inequalities
+    exactly where the constraint qualification of Mangasarian and Fromovitz holds for the
+    inequalities
     ([NW] sec. 12.6).
     """
     a, e = unit_rows(inequalities), unit_rows(equations)
