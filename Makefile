@@ -64,7 +64,7 @@ docs: .venv/.dev ## the documentation, in docs/_build/html
 	@.venv/bin/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 bench: .venv/.bench ## side-by-side runs against other tools
-	@set -e; for file in $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py)); do \
+	@set -e; for file in $(wildcard benchmarks/bench_*.py); do \
 	    echo "$$file"; .venv/bin/python "$$file"; done
 
 # ---------------------------------------------------------------------------------------- upkeep

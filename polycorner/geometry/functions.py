@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.geometry.manifold import Array, Manifold, finite, reals, scalar
-from polycorner.geometry.programs import Program, compile_expressions
+from polycorner.geometry.programs import Program
+from polycorner.geometry.translate import compile_expressions
 
 if TYPE_CHECKING:
     import sympy

@@ -21,7 +21,7 @@ import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir
 
-from polycorner.geometry import emit, programs
+from polycorner.geometry import emit, programs, translate
 from polycorner.geometry.manifold import Array
 from polycorner.geometry.programs import Program
 
@@ -179,7 +179,7 @@ def _target_machine() -> Any:
 @lru_cache(maxsize=1)
 def _generator_key() -> str:
     machine = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
-    code = source_key(programs.__name__, emit.__name__, __name__)
+    code = source_key(programs.__name__, translate.__name__, emit.__name__, __name__)
     return repr((code, llvmlite.__version__, machine))
 
 

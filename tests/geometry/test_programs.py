@@ -8,7 +8,8 @@ import sympy as sp
 from hypothesis import assume, given
 from strategies import rational_terms
 
-from polycorner.geometry.programs import Graph, compile_expressions
+from polycorner.geometry.programs import Graph
+from polycorner.geometry.translate import compile_expressions
 
 x, y, k = sp.symbols("x y k", real=True)
 POINT = (Fraction(2, 3), Fraction(-5, 7), Fraction(11, 13))
