@@ -168,3 +168,28 @@ def _plane_heights() -> "Formulas":
         x, theta = _symbols(f"x{k} theta{k}")
         total += (2 + weight) * (x**2 + (length * sympy.sin(theta) / 2) ** 2) / 2
     return {}, {"trough": total}
+
+
+def plane_heading_formula() -> "sympy.Expr":
+    """Return ``theta_s(r, t, l)`` of the three-contact corner in the plane, derived symbolically.
+
+    The two dumbbells are parallel, their axes ``p = r + t`` apart and shifted by
+    ``D = l - sqrt(4 r^2 - p^2)``, so that each inner ball touches the other rod and both touch.
+    The trough energy of the four balls, balanced about the lowest line, has a derivative of the
+    form ``A sin 2 theta - B cos 2 theta``; its coefficients are read off and checked.
+    """
+    import sympy
+
+    length, r, t, theta = sympy.symbols("l r t theta", positive=True)
+    p = r + t
+    along = length - sympy.sqrt(4 * r**2 - p**2)
+    offset = along * sympy.sin(theta) - p * sympy.cos(theta)
+    signs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    lateral = [(a * offset + b * length * sympy.sin(theta)) / 2 for a, b in signs]
+    slope = sympy.diff(sum(x**2 for x in lateral) / 2, theta)
+    a, b = slope.subs(theta, sympy.pi / 4), -slope.subs(theta, 0)
+    form = a * sympy.sin(2 * theta) - b * sympy.cos(2 * theta)
+    if sympy.simplify(slope - form) != 0:
+        msg = "the slope of the trough energy is not of the form that the derivation needs"
+        raise AssertionError(msg)
+    return sympy.atan(sympy.simplify(b / a)) / 2

@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 from polycorner import minimise
-from polycorner.models import DumbbellPair
+from polycorner.models import DumbbellPair, plane_heading_formula
 from polycorner.studies import dyad_minima, heading_curve, paper_heading
 
+FORMULA = plane_heading_formula()
+FORMULA_SYMBOLS = sympy.symbols("l r t", positive=True)
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 lengths, shares = st.floats(12, 30), st.floats(0.1, 0.8)
 
@@ -92,6 +94,14 @@ def test_the_papers_heading_is_exact_when_only_outer_balls_weigh_and_rods_are_th
     across, along = 2 * r, length  # t = r
     outer = sympy.atan(across / (along + length))
     assert sympy.simplify(outer - sympy.atan(r / length)) == 0
+
+
+@given(lengths, shares)
+def test_derived_formula_is_the_number_the_model_uses(length, share):
+    pair = DumbbellPair(length, 3.0, 3.0 * share)
+    sizes = (length, pair.ball_radius, pair.rod_radius)
+    number = FORMULA.subs(dict(zip(FORMULA_SYMBOLS, sizes, strict=True))).evalf()
+    assert math.isclose(float(number), pair.plane_corner()[0], rel_tol=1e-12)
 
 
 def test_curve_keeps_what_is_no_minimum_apart():
