@@ -52,7 +52,7 @@ def call_kernel(_: Any, address: Any, q: Any, p: Any, f: Any, J: Any, H: Any) ->
 
 @intrinsic
 def stay_whole(_: Any) -> Any:
-    """Keep the calling function from being copied into its callers, which took half a minute."""
+    """Keep the calling function from being copied into its callers, which slows compilation."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         builder.function.attributes.add("noinline")
