@@ -506,7 +506,9 @@ def convexified(B, g, A, L):
     """
     stay_whole()
     n = B.shape[0]
-    across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g)) + 1e-300
+    across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g))
+    if shift < 1e-300:
+        shift = 1e-300 if shift > 0.0 else 1.0
     while True:
         C = B.copy()
         for i in range(n):
@@ -679,8 +681,10 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
         return 0, v, lam, direction
     if not (stationary and largest(pull) <= 1e-9 * reference):
         return 1, v, lam, direction
-    saddle = steepest_curve(F, J, H, lam, rows, m, direction) < -CURVED
-    return (2 if saddle else 3), v, lam, direction
+    if steepest_curve(F, J, H, lam, rows, m, direction) >= -CURVED:
+        return 3, v, lam, direction
+    # A saddle that was left must not draw the descent back, not even by a rounding error.
+    return (2 if F[last] <= energy else 0), v, lam, direction
 
 
 @njit(cache=True)
