@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from functools import reduce
+from functools import cached_property, partial, reduce
 from typing import TYPE_CHECKING
 
 from polycorner.geometry.programs import Graph, Program
@@ -71,7 +71,7 @@ class _Translator:
             return self._symbol(str(e))
         if getattr(e, "is_Rational", False) or getattr(e, "is_Float", False):
             return self.graph.const(_exact(e))
-        rule = self._rules().get(kind)
+        rule = self._rules.get(kind)
         if rule is None:
             msg = f"{self.subject}: the function {kind} has no compiled form; got {e}"
             raise ValueError(msg)
@@ -86,6 +86,7 @@ class _Translator:
             raise ValueError(msg)
         return self.names[name]
 
+    @cached_property
     def _rules(self) -> "dict[str, Callable[[sympy.Basic], int]]":
         g, t = self.graph, self.translate
         rules: dict[str, Callable[[sympy.Basic], int]] = {
@@ -107,9 +108,10 @@ class _Translator:
             "And": lambda e: self._fold("and", e.args),
             "Or": lambda e: self._fold("or", e.args),
         }
-        for op in UNARY:
-            rules[op] = lambda e, op=op: g.unary(op, t(e.args[0]))  # type: ignore[misc]  # the default binds op
-        return rules
+        return rules | {op: partial(self._unary, op) for op in UNARY}
+
+    def _unary(self, op: str, e: "sympy.Basic") -> int:
+        return self.graph.unary(op, self.translate(e.args[0]))
 
     def _fold(self, op: str, args: "Iterable[sympy.Basic]") -> int:
         return reduce(lambda a, b: self.graph.node(op, a, b), map(self.translate, args))
@@ -153,7 +155,7 @@ class _Translator:
 
     def _piecewise(self, e: "sympy.Basic") -> int:
         *cases, (last, otherwise) = e.args
-        if otherwise != True:  # noqa: E712  SymPy's own truth value, not Python's
+        if type(otherwise).__name__ != "BooleanTrue":
             msg = (
                 f"{self.subject}: expected the last case of a Piecewise to be True; got {otherwise}"
             )
