@@ -14,8 +14,12 @@ if TYPE_CHECKING:
     from polycorner.minima.certificate import Certificate, certify
     from polycorner.minima.minimise import minimise, stationary_on
     from polycorner.minima.verdicts import Entrapment, Verdict
+    from polycorner.polyhedra.atlas import Completeness, Corner, Edge, Face, Skeleton
     from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
+    from polycorner.polyhedra.skeleton import skeleton
     from polycorner.polyhedra.strata import LocalType, Stratum, stratum_at
+    from polycorner.polyhedra.symmetry import Element, Symmetry
+    from polycorner.polyhedra.walks import End
 
 __version__ = "0.1.0"
 
@@ -30,29 +34,47 @@ _HOMES = {
     "stationary_on": "minima.minimise",
     "Entrapment": "minima.verdicts",
     "Verdict": "minima.verdicts",
+    "Completeness": "polyhedra.atlas",
+    "Corner": "polyhedra.atlas",
+    "Edge": "polyhedra.atlas",
+    "Face": "polyhedra.atlas",
+    "Skeleton": "polyhedra.atlas",
+    "End": "polyhedra.walks",
     "AllOf": "polyhedra.polyhedron",
     "AnyOf": "polyhedra.polyhedron",
     "Polyhedron": "polyhedra.polyhedron",
+    "skeleton": "polyhedra.skeleton",
     "LocalType": "polyhedra.strata",
     "Stratum": "polyhedra.strata",
     "stratum_at": "polyhedra.strata",
+    "Element": "polyhedra.symmetry",
+    "Symmetry": "polyhedra.symmetry",
 }
 
 __all__ = [
     "AllOf",
     "AnyOf",
     "Certificate",
+    "Completeness",
+    "Corner",
+    "Edge",
+    "Element",
+    "End",
     "Entrapment",
+    "Face",
     "LocalType",
     "Manifold",
     "PolycornerError",
     "Polyhedron",
+    "Skeleton",
     "SmoothFunction",
     "SolverError",
     "Stratum",
+    "Symmetry",
     "Verdict",
     "certify",
     "minimise",
+    "skeleton",
     "stationary_on",
     "stratum_at",
 ]

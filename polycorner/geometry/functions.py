@@ -250,7 +250,7 @@ class SmoothFunction:
 
 
 @dataclass(frozen=True, eq=False)
-class _Call:
+class Call:
     """One call of a family's kernel: which coordinates go in, which rows come out."""
 
     family: Family
@@ -259,26 +259,53 @@ class _Call:
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
-    @cached_property
-    def address(self) -> int:
-        """Address of the parameters, which this value keeps alive."""
-        return self.parameters.ctypes.data
 
-    @cached_property
-    def places(self) -> tuple[Any, Any, Any]:
-        """Where values, gradients and Hessians of one point go in the bundle's arrays."""
-        rows, reads = list(self.rows), list(self.reads)
-        return (rows, np.ix_(rows, reads), np.ix_(rows, reads, reads))
+class _Batch:
+    """Calls of one kernel that differ only in what they read: one call over all of them."""
 
-    @cached_property
-    def picked(self) -> Any:
-        """Which of the kernel's outputs are wanted, in order."""
-        count = len(self.family.names)
-        return np.s_[:] if self.columns == tuple(range(count)) else list(self.columns)
+    def __init__(self, calls: Sequence[Call]) -> None:
+        first = calls[0]
+        self.kernel, self.parameters = first.family.kernel, first.parameters
+        self.address = self.parameters.ctypes.data  # of an array that this value keeps alive
+        self.reads = np.array([call.reads for call in calls])
+        everything = first.columns == tuple(range(len(first.family.names)))
+        self.columns: Any = np.s_[:] if everything else list(first.columns)
+        rows, reads = np.array([call.rows for call in calls]), self.reads
+        self.places: tuple[tuple[Any, ...], ...] = (
+            (rows,),
+            (rows[:, :, None], reads[:, None, :]),
+            (rows[:, :, None, None], reads[:, None, :, None], reads[:, None, None, :]),
+        )
+
+    def scatter(self, q: Array, results: tuple[Array, ...]) -> None:
+        """Evaluate at every row of ``q`` ``(N, n)`` and put what comes out in its place."""
+        count, order = len(self.reads), len(results) - 1
+        inputs = q[:, self.reads].reshape(len(q) * count, self.reads.shape[1])
+        parts = self.kernel.over(inputs, self.address, order)
+        for result, part, place in zip(results, parts, self.places, strict=False):
+            shaped = part.reshape(len(q), count, *part.shape[1:])
+            result[(slice(None), *place)] = shaped[:, :, self.columns]
+
+    def scatter_point(self, q: Array, results: tuple[Array, ...]) -> None:
+        """Evaluate at the point ``q`` ``(n,)`` and put what comes out in its place."""
+        order = len(results) - 1
+        if len(self.reads) == 1:
+            single = self.kernel.at(q[self.reads[0]], self.address, order)
+            parts = tuple([part[None] for part in single])
+        else:
+            parts = self.kernel.over(q[self.reads], self.address, order)
+        for result, part, place in zip(results, parts, self.places, strict=False):
+            result[place] = part[:, self.columns]
 
 
 class Bundle:
-    """Several functions on one manifold, evaluated together in as few calls as possible."""
+    """Several functions on one manifold, evaluated together in as few calls as possible.
+
+    Attributes
+    ----------
+    calls : list of Call
+        One call for each family, choice of coordinates and choice of parameters.
+    """
 
     def __init__(self, manifold: Manifold, functions: Sequence[SmoothFunction]) -> None:
         self.manifold, self.functions = manifold, tuple(functions)
@@ -289,54 +316,54 @@ class Bundle:
         only = self.calls[0] if len(self.calls) == 1 else None
         self._direct = only if only is not None and self._is_direct(only) else None
 
-    def _call(self, rows: list[int]) -> _Call:
+    def _call(self, rows: list[int]) -> Call:
         first = self.functions[rows[0]]
         columns = [first.family.names.index(self.functions[row].member_name) for row in rows]
         numbers = np.array(first.parameters, dtype=np.float64)
-        return _Call(first.family, first.reads, numbers, tuple(rows), tuple(columns))
+        return Call(first.family, first.reads, numbers, tuple(rows), tuple(columns))
 
-    def _is_direct(self, call: _Call) -> bool:
+    def _is_direct(self, call: Call) -> bool:
         n, m = self.manifold.dimension, len(call.family.names)
         return call.reads == tuple(range(n)) and call.columns == tuple(range(m))
+
+    @cached_property
+    def _batches(self) -> list[_Batch]:
+        grouped: dict[tuple[int, bytes, tuple[int, ...]], list[Call]] = {}
+        for call in self.calls:
+            key = (id(call.family), call.parameters.tobytes(), call.columns)
+            grouped.setdefault(key, []).append(call)
+        return [_Batch(calls) for calls in grouped.values()]
 
     def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
         """Return values ``(..., m)``, gradients ``(..., m, n)``, Hessians ``(..., m, n, n)``.
 
         ``q`` must be a float64 array ``(..., n)``; nothing is checked here.
         """
-        direct = self._direct
-        if direct is not None and q.ndim == 1:
-            return direct.family.kernel.at(q, direct.address, order)
         if q.ndim == 1:
-            return self._assembled_point(q, order)
+            return self._at(q, order)
         flat = q.reshape(-1, q.shape[-1])
-        if direct is not None:
-            results = direct.family.kernel.over(flat, direct.address, order)
+        if self._direct is not None:
+            call = self._direct
+            results = call.family.kernel.over(flat, call.parameters.ctypes.data, order)
         else:
-            results = self._assembled(flat, order)
-        batch = q.shape[:-1]
-        return tuple([result.reshape(batch + result.shape[1:]) for result in results])
+            results = tuple([np.zeros((len(flat), *shape)) for shape in self._shapes(order)])
+            for batch in self._batches:
+                batch.scatter(flat, results)
+        outer = q.shape[:-1]
+        return tuple([result.reshape(outer + result.shape[1:]) for result in results])
+
+    def _at(self, q: Array, order: int) -> tuple[Array, ...]:
+        if self._direct is not None:
+            batch = self._batches[0]
+            return batch.kernel.at(q, batch.address, order)
+        results = tuple([np.zeros(shape) for shape in self._shapes(order)])
+        for batch in self._batches:
+            batch.scatter_point(q, results)
+        return results
 
     def _shapes(self, order: int) -> tuple[tuple[int, ...], ...]:
         m, n = len(self.functions), self.manifold.dimension
         return ((m,), (m, n), (m, n, n))[: order + 1]
-
-    def _assembled_point(self, q: Array, order: int) -> tuple[Array, ...]:
-        results = tuple([np.zeros(shape) for shape in self._shapes(order)])
-        for call in self.calls:
-            parts = call.family.kernel.at(q[list(call.reads)], call.address, order)
-            for result, part, place in zip(results, parts, call.places, strict=False):
-                result[place] = part[call.picked]
-        return results
-
-    def _assembled(self, flat: Array, order: int) -> tuple[Array, ...]:
-        results = tuple([np.zeros((len(flat), *shape)) for shape in self._shapes(order)])
-        for call in self.calls:
-            parts = call.family.kernel.over(flat[:, list(call.reads)], call.address, order)
-            for result, part, place in zip(results, parts, call.places, strict=False):
-                inner = place if isinstance(place, tuple) else (place,)
-                result[(slice(None), *inner)] = part[:, call.picked]
-        return results
 
 
 def _check_new(argument: str, names: Sequence[str], taken: Sequence[str]) -> None:

@@ -113,3 +113,62 @@ def linear_programme(
         msg = f"HiGHS found no solution of a small linear programme: {result.message}"
         raise SolverError(msg)
     return np.asarray(result.x)
+
+
+def independent_rows(matrix: Array, tolerance: float) -> list[int]:
+    """Return positions of independent rows that span all rows, the best conditioned first.
+
+    Gram-Schmidt with pivoting: what is left of a row must be longer than ``tolerance``.
+    """
+    left = matrix
+    chosen: list[int] = []
+    while len(chosen) < min(matrix.shape):
+        sizes = np.sqrt(np.einsum("ij,ij->i", left, left))
+        best = int(np.argmax(sizes))
+        if sizes[best] <= tolerance:
+            break
+        chosen.append(best)
+        axis = left[best] / sizes[best]
+        left = left - np.outer(left @ axis, axis)
+    return chosen
+
+
+def extreme_rays(rows: Array, tolerance: float) -> list[tuple[Array, frozenset[int]]]:
+    """Return the extreme rays of the pointed cone ``{d : a_i d >= 0}`` and what is tight on each.
+
+    The double description method: the rays of a simplicial cone made of independent rows are the
+    columns of an inverse; every further half-space keeps the rays inside it and adds one ray for
+    every pair of adjacent rays that it separates.  Two rays are adjacent when the rows tight
+    on both have rank ``n - 2`` ([FP] sec. 2).
+
+    Parameters
+    ----------
+    rows : (m, n) array
+        Normals, of rank ``n``.
+    tolerance : float
+        Slopes of unit rows along unit rays up to this count as zero.
+
+    Returns
+    -------
+    list of (unit direction (n,), positions of the tight rows)
+    """
+    units = unit_rows(rows)
+    n = units.shape[1]
+    base = independent_rows(units, tolerance)
+    rays = list(unit_rows(np.asarray(np.linalg.inv(units[base]).T)))
+    seen = list(base)
+    for i in (i for i in range(len(units)) if i not in base):
+        slopes = [float(units[i] @ d) for d in rays]
+        kept = [d for d, slope in zip(rays, slopes, strict=True) if slope >= -tolerance]
+        up = [k for k, slope in enumerate(slopes) if slope > tolerance]
+        down = [k for k, slope in enumerate(slopes) if slope < -tolerance]
+        tight = [frozenset(j for j in seen if abs(units[j] @ d) <= tolerance) for d in rays]
+        for p in up:
+            for q in down:
+                shared = sorted(tight[p] & tight[q])
+                if len(shared) >= n - 2 and rank(units[shared], tolerance) == n - 2:
+                    d = slopes[p] * rays[q] - slopes[q] * rays[p]
+                    kept.append(d / np.linalg.norm(d))
+        rays = kept
+        seen.append(i)
+    return [(d, frozenset(np.flatnonzero(abs(units @ d) <= tolerance).tolist())) for d in rays]

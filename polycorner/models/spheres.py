@@ -1,0 +1,196 @@
+"""Clusters of hard spheres that stick together: rigid ones are corners, hinges are edges.
+
+``n`` spheres of unit diameter do not overlap: ``|x_i - x_j|^2 >= 1`` for every pair.  Modulo
+congruence a rigid cluster is a corner of this polyhedron; breaking one contact opens a one-
+dimensional motion, an edge, that ends where a new contact closes ([HC] sec. 2).  Clusters are
+counted up to relabelling and mirror images.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polycorner.geometry import kernels
+from polycorner.geometry.functions import Family, SmoothFunction
+from polycorner.geometry.manifold import Array, Manifold
+from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.polyhedra.symmetry import Relabelling, Symmetry
+
+if TYPE_CHECKING:
+    import sympy
+
+VARIABLES = ("x1", "y1", "z1", "x2", "y2", "z2")
+
+
+@lru_cache(maxsize=1)
+def _gap() -> Family:
+    """Return the gap of two spheres of unit diameter, ``|x_2 - x_1|^2 - 1``."""
+    return Family(("gap",), VARIABLES, (), _formulas, kernels.source_key(__name__))
+
+
+def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+    import sympy
+
+    x1, y1, z1, x2, y2, z2 = (sympy.Symbol(name, real=True) for name in VARIABLES)
+    return {}, {"gap": (x2 - x1) ** 2 + (y2 - y1) ** 2 + (z2 - z1) ** 2 - 1}
+
+
+@dataclass(frozen=True)
+class SphereCluster:
+    """``n`` hard spheres of unit diameter in space.
+
+    Coordinates are ``x1 y1 z1 ... xn yn zn``, in diameters.  The contact of spheres ``i < j`` is
+    called ``i-j``.
+
+    Parameters
+    ----------
+    count : int
+        Number of spheres, at least 2.
+
+    Raises
+    ------
+    ValueError
+        If ``count`` is no whole number above 1.
+    """
+
+    count: int
+
+    def __post_init__(self) -> None:
+        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 2:
+            msg = f"count: expected a whole number of spheres, at least 2; got {self.count!r}"
+            raise ValueError(msg)
+
+    @cached_property
+    def manifold(self) -> Manifold:
+        """Space, once for every sphere."""
+        return Manifold.euclidean("x y z") ** self.count
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of spheres, counted from 0, in the order of the functions."""
+        return tuple(combinations(range(self.count), 2))
+
+    @cached_property
+    def polyhedron(self) -> Polyhedron:
+        """``|x_i - x_j|^2 - 1 >= 0`` for every pair."""
+        gaps = []
+        for i, j in self.pairs:
+            reads = [self.manifold.names[3 * k + axis] for k in (i, j) for axis in range(3)]
+            name = f"{i + 1}-{j + 1}"
+            gaps.append(
+                SmoothFunction.member(_gap(), "gap", self.manifold, reads=reads, label=name)
+            )
+        return Polyhedron(self.manifold, AllOf(*gaps))
+
+    @cached_property
+    def symmetry(self) -> Symmetry:
+        """Congruences, mirror images and relabellings."""
+        return Symmetry(
+            tangents=self._motions,
+            invariants=self.distances,
+            key=lambda q: np.sort(self.distances(q)),
+            relabel=self._relabellings,
+        )
+
+    def distances(self, q: ArrayLike) -> Array:
+        """Return the distances of all pairs of centres, ``(..., n (n - 1) / 2)``."""
+        points = self.manifold.points(q)
+        centres = points.reshape(*points.shape[:-1], self.count, 3)
+        first, second = (list(side) for side in zip(*self.pairs, strict=True))
+        return np.asarray(np.linalg.norm(centres[..., first, :] - centres[..., second, :], axis=-1))
+
+    def contacts(self, q: ArrayLike, *, tolerance: float = 1e-6) -> NDArray[np.bool_]:
+        """Return the adjacency matrix ``(n, n)`` of touching spheres, as booleans."""
+        touching = np.zeros((self.count, self.count), dtype=np.bool_)
+        for (i, j), distance in zip(
+            self.pairs, self.distances(self.manifold.point(q)), strict=True
+        ):
+            touching[i, j] = touching[j, i] = abs(distance - 1) <= tolerance
+        return touching
+
+    def stacked(self) -> Array:
+        """Return a rigid cluster: a tetrahedron, and every further sphere in a hollow of three.
+
+        For fewer than four spheres a triangle or a pair.
+        """
+        centres = [np.zeros(3), np.array([1.0, 0, 0]), np.array([0.5, math.sqrt(0.75), 0])]
+        while len(centres) < self.count:
+            centres.append(_hollow(centres))
+        return np.concatenate(centres[: self.count])
+
+    def starts(self) -> Array:
+        """Return points to fall from, ``(1, 3 n)``."""
+        return self.stacked()[None]
+
+    def _motions(self, q: Array) -> Array:
+        """Return the velocities of three translations and three rotations about the centroid."""
+        centres = q.reshape(self.count, 3)
+        away = centres - centres.mean(axis=0)
+        motions = np.zeros((6, self.count, 3))
+        for axis in range(3):
+            motions[axis, :, axis] = 1.0
+            after, before = (axis + 1) % 3, (axis + 2) % 3
+            motions[3 + axis, :, before] = away[:, after]
+            motions[3 + axis, :, after] = -away[:, before]
+        return motions.reshape(6, -1)
+
+    def _matrix(self, q: Array) -> Array:
+        matrix = np.zeros((self.count, self.count))
+        first, second = (list(side) for side in zip(*self.pairs, strict=True))
+        matrix[first, second] = matrix[second, first] = self.distances(q)
+        return matrix
+
+    def _relabellings(self, p: Array, q: Array, tolerance: float) -> list[Relabelling]:
+        """Return all relabellings that carry the distances of ``p`` to those of ``q``."""
+        labels = [f"{i + 1}-{j + 1}" for i, j in self.pairs]
+        found: list[Relabelling] = []
+        for image in _isometries(self._matrix(p), self._matrix(q), tolerance):
+            targets = (sorted((image[i], image[j])) for i, j in self.pairs)
+            names = (f"{i + 1}-{j + 1}" for i, j in targets)
+            found.append(dict(zip(labels, names, strict=True)))
+        return found
+
+
+def _hollow(centres: list[Array]) -> Array:
+    """Return the first free place that touches three spheres."""
+    for a, b, c in combinations(centres, 3):
+        u, v = b - a, c - a
+        normal = np.cross(u, v)
+        if np.linalg.norm(normal) < 1e-9:
+            continue
+        # The point x = a + s u + t v + h n at distance 1 from a, b and c.
+        gram = np.array([[u @ u, u @ v], [u @ v, v @ v]])
+        s, t = np.linalg.solve(gram, [u @ u / 2, v @ v / 2])
+        foot = s * u + t * v
+        if foot @ foot > 1:
+            continue
+        rise = math.sqrt(1 - foot @ foot) / np.linalg.norm(normal)
+        for sign in (1, -1):
+            place = a + foot + sign * rise * normal
+            if min(np.linalg.norm(place - other) for other in centres) > 1 - 1e-9:
+                return np.asarray(place)
+    msg = "a cluster of spheres always has a free hollow"
+    raise AssertionError(msg)
+
+
+def _isometries(p: Array, q: Array, tolerance: float) -> list[tuple[int, ...]]:
+    """Return all permutations ``s`` with ``|p_ij - q_s(i)s(j)| <= tolerance``, by backtracking."""
+    n = len(p)
+    rows_p, rows_q = np.sort(p, axis=1), np.sort(q, axis=1)
+    alike = abs(rows_p[:, None] - rows_q[None]).max(axis=2) <= tolerance
+    partial: list[tuple[int, ...]] = [()]
+    for i in range(n):
+        longer = []
+        for image in partial:
+            fits = alike[i].copy()
+            fits[list(image)] = False
+            if image:
+                fits &= (abs(q[list(image)] - p[:i, i][:, None]) <= tolerance).all(axis=0)
+            longer += [(*image, int(k)) for k in np.flatnonzero(fits)]
+        partial = longer
+    return partial

@@ -1,0 +1,323 @@
+"""An atlas that grows: falling into corners, walking edges, shooting across faces.
+
+The end of an edge at a corner is named by two positions, those of the corner and of the ray.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from polycorner.geometry.manifold import Array
+from polycorner.polyhedra.atlas import Completeness
+from polycorner.polyhedra.cones import null_space
+from polycorner.polyhedra.curves import Frame, Ground, Spot, settle
+from polycorner.polyhedra.faces import Flag, Passage, inward
+from polycorner.polyhedra.places import Place, Places
+from polycorner.polyhedra.rays import Ray
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.polyhedra.symmetry import Relabelling
+from polycorner.polyhedra.walks import End, Walk, follow
+
+FALLS = 6
+
+Half = tuple[int, int]
+Progress = Callable[[int, int, int], None]
+
+
+@dataclass
+class Curve:
+    """An edge while the atlas grows.
+
+    ``relabelled`` carries the names along the walk to the names at the corner ``stop``.
+    """
+
+    points: Array
+    active: frozenset[int]
+    kinds: tuple[End, End]
+    start: Half | None
+    stop: Half | None
+    relabelled: Relabelling
+    length: float
+    branches: int
+
+    @property
+    def middle(self) -> Array:
+        """A point well inside."""
+        return np.asarray(self.points[len(self.points) // 2])
+
+
+class Explorer:
+    """What was found and what is left to do."""
+
+    def __init__(self, ground: Ground, seeds: Iterable[Array], rng: np.random.Generator) -> None:
+        self.ground, self.rng = ground, rng
+        self.polyhedron, self.symmetry = ground.polyhedron, ground.symmetry
+        self.manifold = self.polyhedron.manifold
+        self.scales = self.manifold.scale_array
+        self.register = Places(ground)
+        self.curves: list[Curve] = []
+        self.passages: list[Passage] = []
+        self.seeds: deque[tuple[int, Array]] = deque(enumerate(seeds))
+        self.pending: deque[Half] = deque()
+        self.shot: set[tuple[int, frozenset[int]]] = set()
+
+    # --------------------------------------------------------------------------- order of the work
+
+    def run(self, budget: int, progress: Progress | None) -> Completeness:
+        """Work until nothing is left, the budget is used up, or someone interrupts."""
+        limit = len(self.curves) + budget
+        try:
+            for task in self._tasks():
+                if len(self.curves) >= limit:
+                    return Completeness.BUDGET
+                task()
+                if progress is not None:
+                    progress(len(self.places), len(self.curves), len(self.pending))
+        except KeyboardInterrupt:
+            return Completeness.INTERRUPTED
+        return Completeness.EXHAUSTED if self.curves or self.places else Completeness.SEEDS
+
+    def _tasks(self) -> Iterator[Callable[[], None]]:
+        """Yield what to do next; a task leaves the lists only once it is done."""
+        while True:
+            if self.pending:
+                half = self.pending[0]
+                yield partial(self._walk, half)
+                self.pending.popleft()
+            elif self.seeds:
+                number, seed = self.seeds[0]
+                yield partial(self._fall, number, seed)
+                self.seeds.popleft()
+            else:
+                crossing = next(self._crossings(), None)
+                if crossing is None:
+                    return
+                yield partial(self._shoot, *crossing)
+                self.shot.add(crossing)
+
+    def corner(self, spot: Spot) -> tuple[int, list[Relabelling]] | None:
+        """Return the corner at a point, as :meth:`Places.find`; what leaves a new one waits."""
+        known = len(self.places)
+        found = self.register.find(spot)
+        if found is not None and found[0] == known:
+            orbit = self.places[known].orbit
+            self.pending.extend((known, i) for i, twin in enumerate(orbit) if twin == i)
+        return found
+
+    @property
+    def places(self) -> list[Place]:
+        """The corners."""
+        return self.register.places
+
+    @property
+    def notes(self) -> list[str]:
+        """Everything a user should know."""
+        return list(self.register.notes)
+
+    # ---------------------------------------------------------------------------------------- edges
+
+    def _walk(self, half: Half) -> None:
+        k, i = half
+        place = self.places[k]
+        if i in place.edges:
+            return
+        ray = place.star.rays[i]
+        walk = follow(ray.frame, ray.direction, passive=ray.active)
+        points = np.vstack([place.spot.q, walk.points])
+        stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
+        curve = Curve(
+            points, ray.active, (End.CORNER, walk.end), half, stop, carried,
+            walk.length + ray.distance, walk.branches,
+        )  # fmt: skip
+        place.edges[i] = len(self.curves)
+        if stop is not None:
+            there = self.places[stop[0]]
+            there.edges[there.orbit[stop[1]]] = len(self.curves)
+        self.curves.append(curve)
+        self._remark(curve)
+
+    def _remark(self, curve: Curve) -> None:
+        label = self.register.written(curve.active)
+        for kind in curve.kinds:
+            if kind not in (End.CORNER, End.CLOSED):
+                self.register.note(f"the edge {label} {kind.value}")
+        if curve.branches:
+            self.register.note(
+                f"the edge {label} meets other curves on the same functions: not followed"
+            )
+
+    def _arrive(self, walk: Walk, ray: Ray) -> tuple[Half | None, Relabelling]:
+        """Return the end of the edge at the corner a walk came to."""
+        found = self.corner(walk.frame)
+        if found is None:
+            return None, {}
+        k, carried = found
+        place = self.places[k]
+        rays = place.star.rays
+        distance = rays[0].distance if rays else 1e-3
+        back = settle(
+            self.ground,
+            walk.frame.q - distance * self.scales * walk.tangent,
+            walk.frame.kept,
+            distance,
+        )
+        sample = None if back is None else back.q
+        match = self.register.match(place, sample, ray, carried, range(len(rays)))
+        if match is None:
+            self.register.note(
+                f"the edge {self.register.written(ray.active)} arrives at a corner "
+                f"that no edge of this kind leaves"
+            )
+            return None, {}
+        return (k, match[0]), match[1]
+
+    def _edge_at(self, frame: Frame, active: frozenset[int]) -> tuple[str, Half | int] | None:
+        """Return the edge through a point: its end at a corner, or its position."""
+        kept = frame.basis(active)
+        here = Frame(self.ground, frame.q, kept)
+        t = self._along(here)
+        walks = []
+        for way in (t, -t):
+            walk = follow(here, way, passive=active, home=True)
+            if walk.end is End.CORNER:
+                stop, _ = self._arrive(walk, Ray(way, active, here, 0.0))
+                return None if stop is None else ("half", stop)
+            walks.append(walk)
+            if walk.end is End.CLOSED:
+                break
+        return "curve", self._free_edge(walks, here, active)
+
+    def _free_edge(self, walks: list[Walk], here: Frame, active: frozenset[int]) -> int:
+        """Return the position of an edge without corners, new or known."""
+        for k, curve in enumerate(self.curves):
+            if curve.start is None and curve.active == active and self._lies_on(here.q, curve):
+                return k
+        forth = walks[0]
+        points = forth.points
+        kinds = (forth.end, forth.end)
+        if len(walks) == 2:
+            points = np.vstack([walks[1].points[::-1], points[1:]])
+            kinds = (walks[1].end, forth.end)
+        curve = Curve(
+            points, active, kinds, None, None, {},
+            sum(w.length for w in walks), sum(w.branches for w in walks),
+        )  # fmt: skip
+        self.curves.append(curve)
+        self._remark(curve)
+        return len(self.curves) - 1
+
+    def _lies_on(self, q: Array, curve: Curve) -> bool:
+        """Whether a point lies on a curve, up to the sagitta of its chords."""
+        apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
+        nearest = int(np.argmin(apart))
+        chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
+        around = chords[max(nearest - 1, 0) : nearest + 1]
+        return bool(apart[nearest] <= 0.6 * around.max())
+
+    # ---------------------------------------------------------------------------------------- falls
+
+    def _fall(self, number: int, seed: Array) -> None:
+        """Go straight ahead in random directions, from face to smaller face, into a corner."""
+        spot = self.ground.spot(seed)
+        active = spot.active() if np.isfinite(spot.values).all() else None
+        if active is None:
+            self.register.note(f"start {number} lies outside the polyhedron: left out")
+            return
+        for _ in range(len(seed)):
+            free = self._free(spot, active)
+            if free == 0 or (free == 1 and not self._continues(spot, active)):
+                self.corner(spot)
+                return
+            if free == 1:
+                self._edge_at(Frame(self.ground, spot.q, []), active)
+                return
+            landed = self._straight(spot, active)
+            if landed is None:
+                self.register.note(
+                    f"start {number}: straight walks in {FALLS} directions, forth and back, met "
+                    f"nothing within {self.ground.extent:g} scale units"
+                )
+                return
+            spot, active = landed
+
+    def _free(self, spot: Spot, active: frozenset[int]) -> int:
+        fixed = null_space(spot.matrix([]), RANK_TOLERANCE)
+        return int(fixed.shape[1]) - len(spot.basis(active))
+
+    def _continues(self, spot: Spot, active: frozenset[int]) -> bool:
+        """Whether functions that depend on each other vanish together on a curve."""
+        kept = spot.basis(active)
+        if len(kept) == len(active):
+            return True
+        t = self._along(Frame(self.ground, spot.q, kept))
+        ahead = settle(self.ground, spot.q + 1e-3 * self.scales * t, kept, 1e-3)
+        return ahead is not None and ahead.active() == active
+
+    @staticmethod
+    def _along(frame: Frame) -> Array:
+        """Return the direction of the curve on which the held functions vanish."""
+        return null_space(frame.matrix(frame.kept), RANK_TOLERANCE)[:, 0]
+
+    def _straight(self, spot: Spot, active: frozenset[int]) -> tuple[Spot, frozenset[int]] | None:
+        frame = Frame(self.ground, spot.q, spot.basis(active))
+        for _ in range(FALLS):
+            v = frame.tangent(self.rng.standard_normal(len(spot.q)))
+            for way in (v, -v):
+                walk = follow(frame, way, passive=active)
+                there = walk.frame.active() if walk.end is End.CORNER else None
+                if there is not None:
+                    return walk.frame, there
+        return None
+
+    # ---------------------------------------------------------------------------------------- faces
+
+    def _crossings(self) -> Iterator[tuple[int, frozenset[int]]]:
+        """Yield edges and faces beside them that were not crossed yet."""
+        if self.symmetry.is_discrete:
+            return
+        for k, curve in enumerate(self.curves):
+            for face in self.faces_beside(curve):
+                if (k, face) not in self.shot:
+                    yield k, face
+
+    def faces_beside(self, curve: Curve) -> list[frozenset[int]]:
+        """Return the active sets of the two-dimensional faces that meet an edge."""
+        if curve.start is not None:
+            k, i = curve.start
+            return list({s.active for s in self.places[k].star.sectors if i in s.rays})
+        found = []
+        for dropped in sorted(curve.active):
+            face = curve.active - {dropped}
+            if inward(self.ground, curve.middle, curve.active, face) is not None:
+                found.append(face)
+        return found
+
+    def _shoot(self, k: int, face: frozenset[int]) -> None:
+        """Go straight across a face from the middle of an edge and record where it ends."""
+        curve = self.curves[k]
+        start = inward(self.ground, curve.middle, curve.active, face)
+        if start is None:
+            return
+        frame, way = start
+        walk = follow(frame, way, passive=face)
+        active = walk.frame.active() if walk.end is End.CORNER else None
+        if active is None or not active > face:
+            return
+        if self._free(walk.frame, active) != 1 or not self._continues(walk.frame, active):
+            return
+        edge = self._edge_at(walk.frame, active)
+        if edge is not None:
+            inner = walk.points[len(walk.points) // 2]
+            self.passages.append(Passage(self.flag(k, face), self._flag_of(edge, face), inner))
+
+    def flag(self, k: int, face: frozenset[int]) -> Flag:
+        """Return the flag of an edge and a face beside it."""
+        start = self.curves[k].start
+        names = self.register.names(face)
+        return ("half", start, names) if start is not None else ("curve", k, names)
+
+    def _flag_of(self, edge: tuple[str, Half | int], face: frozenset[int]) -> Flag:
+        return (edge[0], edge[1], self.register.names(face))
