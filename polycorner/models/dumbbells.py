@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 from polycorner.geometry.functions import SmoothFunction
 from polycorner.geometry.manifold import Array, Manifold
 from polycorner.models import dumbbell_formulas as formulas
+from polycorner.models import dumbbell_motions as motions
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
 
 Chirality = Literal["L", "R"]
 
@@ -92,6 +94,42 @@ class DumbbellPair:
             for name in formulas.CONTACTS
         ]
         return Polyhedron(self.manifold, AllOf(*gaps), annotations={"chirality": self.chirality})
+
+    @cached_property
+    def symmetry(self) -> Symmetry:
+        """Motions of the pair as a whole.
+
+        All of them in the plane; in the drum rolling, shifting and the half-turn about a vertical
+        axis.
+        """
+        half, unit = self.length / 2, self.ball_radius
+        if self.is_plane:
+            return Symmetry(
+                motions.plane_tangents, lambda q: motions.plane_invariants(q, half, unit)
+            )
+        return Symmetry(
+            motions.drum_tangents,
+            lambda q: motions.drum_invariants(q, half, unit, self.centre_radius),
+            elements=(motions.half_turn_in_place(),),
+        )
+
+    def section(self, heading: float = 0.0) -> Polyhedron:
+        """Return ``D`` cut down to pairs with a given mean heading, in radians.
+
+        The equation is ``sin((theta_1 + theta_2)/2 - heading) = 0``: the mean of two directions
+        is given modulo half a turn.  Modulo the symmetry, relative placements in three dimensions
+        remain, each of them once.
+        """
+        import sympy
+
+        angle = sympy.Float(_number("heading", heading))
+        mean = (sympy.Symbol("theta1", real=True) + sympy.Symbol("theta2", real=True)) / 2
+        return Polyhedron(
+            self.manifold,
+            AllOf(*self.polyhedron.functions),
+            {"heading": sympy.sin(mean - angle)},
+            annotations=self.polyhedron.annotations,
+        )
 
     @cached_property
     def energy(self) -> SmoothFunction:
@@ -205,6 +243,46 @@ class DumbbellPair:
         axis = np.array([math.sin(theta), math.cos(theta)])
         normal = sign * np.array([-math.cos(theta), math.sin(theta)])
         return self._pair(along * axis + across * normal, theta)
+
+    def relative(self, q: Array) -> Array:
+        """Return where B is as seen from A, in the developed plane and in ball radii, ``(4,)``.
+
+        Its place across and along the axis of A, then cosine and sine of the angle between the
+        axes times half a length.
+        """
+        flat = q.copy()
+        if not self.is_plane:
+            apart = math.remainder(q[3] - q[0], math.tau)
+            flat[[0, 3]] = 0.0, self.centre_radius * apart
+        return motions.plane_invariants(flat, self.length / 2, self.ball_radius)
+
+    def placements(
+        self, rng: np.random.Generator, count: int, *, heading: float | None = None
+    ) -> Array:
+        """Return random placements without overlap, near enough to touch, ``(count, 6)``.
+
+        Parameters
+        ----------
+        rng : Generator
+            Source of the random numbers.
+        count : int
+            How many.
+        heading : float, optional
+            Mean heading in radians; default random.
+        """
+        reach = self.length + 4 * self.ball_radius
+        found = np.empty((0, 6))
+        while len(found) < count:
+            offset = rng.uniform(-reach, reach, (4 * count, 2)) / 2
+            turn = rng.uniform(-math.pi, math.pi, 4 * count)
+            mean = rng.uniform(-math.pi, math.pi, 4 * count) if heading is None else heading
+            across = offset[:, 0] if self.is_plane else offset[:, 0] / self.centre_radius
+            half = np.stack([across, offset[:, 1], turn], axis=-1) / 2
+            middle = np.zeros((4 * count, 3))
+            middle[:, 2] = mean
+            q = np.concatenate([middle - half, middle + half], axis=-1)
+            found = np.concatenate([found, q[np.asarray(self.polyhedron.contains(q))]])
+        return self.manifold.wrap(found[:count])
 
     def side_by_side(self, *, clearance: float = 0.0) -> Array:
         """Return two dumbbells on parallel meridians, ball beside ball, ``clearance`` mm apart."""

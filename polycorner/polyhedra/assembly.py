@@ -154,7 +154,7 @@ def _components(
     counts = {fixed: len(explorer.places), fixed + 1: len(explorer.curves)}
     if free >= 2:
         counts[fixed + 2] = faces
-    if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.is_discrete:
+    if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
         inside = Forest()
         for flag in flags:
             inside.join(("edge", _edge_of(explorer, flag)), surface.find(flag))

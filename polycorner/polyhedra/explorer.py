@@ -18,7 +18,7 @@ from polycorner.polyhedra.faces import Flag, Passage, inward
 from polycorner.polyhedra.places import Place, Places
 from polycorner.polyhedra.rays import Ray
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.polyhedra.symmetry import Relabelling
+from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.polyhedra.walks import End, Walk, follow
 
 FALLS = 6
@@ -193,7 +193,7 @@ class Explorer:
     def _free_edge(self, walks: list[Walk], here: Frame, active: frozenset[int]) -> int:
         """Return the position of an edge without corners, new or known."""
         for k, curve in enumerate(self.curves):
-            if curve.start is None and curve.active == active and self._lies_on(here.q, curve):
+            if curve.start is None and self._is_image(here.q, active, curve):
                 return k
         forth = walks[0]
         points = forth.points
@@ -209,7 +209,15 @@ class Explorer:
         self._remark(curve)
         return len(self.curves) - 1
 
-    def _lies_on(self, q: Array, curve: Curve) -> bool:
+    def _is_image(self, q: Array, active: frozenset[int], curve: Curve) -> bool:
+        """Whether a symmetry carries a point with given active functions to a curve."""
+        names, there = self.register.names(active), self.register.names(curve.active)
+        return any(
+            renamed(names, g.names) == there and self.lies_on(g.apply(q), curve)
+            for g in self.symmetry.group
+        )
+
+    def lies_on(self, q: Array, curve: Curve) -> bool:
         """Whether a point lies on a curve, up to the sagitta of its chords."""
         apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
         nearest = int(np.argmin(apart))
@@ -276,7 +284,7 @@ class Explorer:
 
     def _crossings(self) -> Iterator[tuple[int, frozenset[int]]]:
         """Yield edges and faces beside them that were not crossed yet."""
-        if self.symmetry.is_discrete:
+        if self.symmetry.relabels:
             return
         for k, curve in enumerate(self.curves):
             for face in self.faces_beside(curve):

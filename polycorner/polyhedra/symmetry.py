@@ -61,9 +61,16 @@ class Symmetry:
     relabel: Callable[[Array, Array, float], Sequence[Relabelling]] | None = None
 
     @property
-    def is_discrete(self) -> bool:
-        """Whether points may be relabelled."""
-        return bool(self.elements) or self.relabel is not None
+    def relabels(self) -> bool:
+        """Whether functions may change their names."""
+        return self.relabel is not None or any(
+            name != image for g in self.elements for name, image in g.names.items()
+        )
+
+    @property
+    def group(self) -> list[Element]:
+        """The finite group with the identity first."""
+        return [Element(lambda q: q, {}), *self.elements]
 
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
@@ -87,10 +94,9 @@ class Symmetry:
             return []
         if self.relabel is not None:
             return list(self.relabel(p, q, tolerance))
-        group = [Element(lambda point: point, {}), *self.elements]
         return [
             element.names
-            for element in group
+            for element in self.group
             if self.separation(manifold, element.apply(p), q) <= tolerance
         ]
 

@@ -16,7 +16,7 @@ import numpy as np
 from polycorner.geometry.manifold import Array
 from polycorner.polyhedra.curves import Frame, settle
 
-FIRST_STEP = 0.05
+FIRST_STEP = 0.2
 LONGEST_STEP = 0.5
 SHORTEST_STEP = 1e-7
 TURN = 0.25
