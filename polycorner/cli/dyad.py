@@ -1,12 +1,20 @@
 """``polycorner dyad``: the minima of a pair of dumbbells, certified."""
 
 import sys
-import tomllib
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from polycorner.cli.common import (
+    chosen_pair,
+    fail,
+    json_text,
+    output_options,
+    pair_options,
+    parameters,
+    patience,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,14 +22,7 @@ if TYPE_CHECKING:
     from polycorner.models import DumbbellPair
     from polycorner.studies import DyadMinimum
 
-# option, the model's parameter, default (the paper's dyads)
-PARAMETERS = (
-    ("length", "length", 16.0),
-    ("ball", "ball_radius", 3.0),
-    ("rod", "rod_radius", 1.5),
-    ("drum", "drum_radius", 125.0),
-    ("rod_weight", "rod_weight", 0.0),
-)
+WORDS = "finding and certifying (the first run on a machine compiles for about 20 seconds)"
 EPILOG = """\b
 Examples:
   polycorner dyad --length 16 --ball 3 --rod 1.5 --drum 125
@@ -31,93 +32,23 @@ Examples:
 
 
 @click.command(epilog=EPILOG)
-@click.option("--length", type=float, help="Distance of a dumbbell's ball centres, mm. [16]")
-@click.option("--ball", type=float, help="Radius of the balls, mm. [3]")
-@click.option("--rod", type=float, help="Radius of the rods, mm. [1.5]")
-@click.option("--drum", type=float, help="Radius of the drum, mm; inf is the plane. [125]")
-@click.option("--rod-weight", type=float, help="Weight of a rod, in weights of a ball. [0]")
-@click.option(
-    "--config",
-    type=click.Path(path_type=Path),
-    help="TOML file with these names as keys; options override it.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the figures and the JSON file.",
-)
+@pair_options
+@output_options
 def dyad(config: Path | None, as_json: bool, out: Path | None, **options: float | None) -> None:
     """Find delta_R, delta_L and G of two dumbbells in a drum, and certify them."""
-    pair = _pair(_merged(config, options))
-    with _patience():
+    pair = chosen_pair(config, options)
+    with patience(WORDS):
         from polycorner.studies import dyad_minima
 
         entries = dyad_minima(pair)
         answer = _answer(pair, entries)
         written = _write(pair, entries, answer, out) if out is not None else []
     if as_json:
-        click.echo(_json(answer))
+        click.echo(json_text(answer))
         return
     _print_tables(pair, entries, answer)
     for path in written:
         click.echo(f"wrote {path}")
-
-
-def _patience() -> AbstractContextManager[object]:
-    """Show on a terminal that something is going on: the first run compiles for a while."""
-    if not sys.stderr.isatty():
-        return nullcontext()
-    from rich.console import Console
-
-    words = "finding and certifying (the first run on a machine compiles for about 20 seconds)"
-    return Console(stderr=True).status(words)
-
-
-def _fail(message: str) -> NoReturn:
-    """End the command with one line and exit code 2."""
-    raise click.UsageError(message)
-
-
-def _merged(config: Path | None, options: dict[str, float | None]) -> dict[str, Any]:
-    values: dict[str, Any] = {name: default for name, _, default in PARAMETERS}
-    values |= _read(config) if config is not None else {}
-    return values | {name: value for name, value in options.items() if value is not None}
-
-
-def _read(config: Path) -> dict[str, Any]:
-    try:
-        with config.open("rb") as file:
-            table = tomllib.load(file)
-    except OSError as error:
-        reason = error.strerror or error
-        _fail(f"--config: {config} cannot be read ({reason})")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        _fail(f"--config: {config} is no TOML file: {error}")
-    known = {name for name, _, _ in PARAMETERS}
-    renamed = {key.replace("-", "_"): value for key, value in table.items()}
-    unknown = sorted(set(renamed) - known)
-    if unknown:
-        expected = ", ".join(name for name, _, _ in PARAMETERS)
-        _fail(f"--config: {config}: expected {expected}; got {', '.join(unknown)}")
-    for name, value in renamed.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            _fail(f"--config: {config}: {name}: expected a number; got {value!r}")
-    return renamed
-
-
-def _pair(values: dict[str, Any]) -> "DumbbellPair":
-    from polycorner.models import DumbbellPair
-
-    try:
-        return DumbbellPair(**{field: values[name] for name, field, _ in PARAMETERS})
-    except (ValueError, TypeError) as error:
-        message = str(error)
-        for name, field, _ in PARAMETERS:
-            if message.startswith(f"{field}:"):
-                message = f"--{name.replace('_', '-')}" + message.removeprefix(field)
-                break
-        _fail(message)
 
 
 def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[str, Any]:
@@ -125,10 +56,8 @@ def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[st
 
     from polycorner.studies import paper_heading
 
-    parameters: dict[str, Any] = {name: getattr(pair, field) for name, field, _ in PARAMETERS}
-    parameters["drum"] = "inf" if pair.is_plane else pair.drum_radius
     return {
-        "parameters": parameters,
+        "parameters": parameters(pair),
         "minima": [_entry(entry) for entry in entries],
         "paper_heading_deg": paper_heading(pair),
         "plane_heading_deg": math.degrees(pair.plane_corner()[0]),
@@ -163,23 +92,6 @@ def _entry(entry: "DyadMinimum") -> dict[str, Any]:
     }
 
 
-def _json(answer: dict[str, Any]) -> str:
-    import json
-
-    return json.dumps(_finite(answer), indent=2, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    """Return the same value with ``null`` in place of numbers JSON does not have."""
-    import math
-
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 def _write(
     pair: "DumbbellPair",
     entries: "tuple[DyadMinimum, ...]",
@@ -193,9 +105,9 @@ def _write(
     try:
         out.mkdir(parents=True, exist_ok=True)
         file = out / "dyad.json"
-        file.write_text(_json(answer) + "\n", encoding="utf-8")
+        file.write_text(json_text(answer) + "\n", encoding="utf-8")
     except OSError as error:
-        _fail(f"--out: {out} cannot be written ({error.strerror})")
+        fail(f"--out: {out} cannot be written ({error.strerror})")
     written = [file]
     written += [plots.save(plots.draw_pair(e), out / f"{e.name}.png") for e in entries]
     longest = 2 * (pair.drum_radius - pair.ball_radius)

@@ -12,12 +12,14 @@ import sys
 import click
 
 from polycorner import __version__
+from polycorner.cli.atlas import atlas
 from polycorner.cli.dyad import dyad
 
 EXAMPLES = """\b
 Examples:
   polycorner dyad
   polycorner dyad --rod 1 --drum inf --json
+  polycorner atlas spheres --count 7
 """
 
 
@@ -26,10 +28,11 @@ Examples:
 )
 @click.version_option(__version__, message="polycorner %(version)s")
 def cli() -> None:
-    """Find and certify where energies come to rest on curvilinear polyhedra."""
+    """Faces of curvilinear polyhedra, and where energies come to rest on them."""
 
 
 cli.add_command(dyad)
+cli.add_command(atlas)
 
 
 def main() -> None:

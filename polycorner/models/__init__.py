@@ -2,5 +2,8 @@
 
 from polycorner.models.dumbbell_formulas import plane_heading_formula
 from polycorner.models.dumbbells import DumbbellPair
+from polycorner.models.pinball import Pinball
+from polycorner.models.spheres import SphereCluster
+from polycorner.models.tutorial import Tutorial
 
-__all__ = ["DumbbellPair", "plane_heading_formula"]
+__all__ = ["DumbbellPair", "Pinball", "SphereCluster", "Tutorial", "plane_heading_formula"]

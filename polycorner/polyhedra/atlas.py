@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Completeness(Enum):
     """How complete an atlas is; the value says it in a sentence."""
 
-    EXHAUSTED = "everything that hangs together with the starts was walked"
+    EXHAUSTED = "everything that was met has been walked; what nothing led to stays unseen"
     BUDGET = "the budget was used up: edges are left to walk"
     INTERRUPTED = "interrupted: edges are left to walk"
     SEEDS = "no start leads to an edge or a corner: nothing to walk"

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -174,10 +175,9 @@ class Explorer:
             return None, {}
         return (k, match[0]), match[1]
 
-    def _edge_at(self, frame: Frame, active: frozenset[int]) -> tuple[str, Half | int] | None:
+    def _edge_at(self, spot: Spot, active: frozenset[int]) -> tuple[str, Half | int] | None:
         """Return the edge through a point: its end at a corner, or its position."""
-        kept = frame.basis(active)
-        here = Frame(self.ground, frame.q, kept)
+        here = Frame(self.ground, spot.q, spot.basis(active))
         t = self._along(here)
         walks = []
         for way in (t, -t):
@@ -228,28 +228,43 @@ class Explorer:
     # ---------------------------------------------------------------------------------------- falls
 
     def _fall(self, number: int, seed: Array) -> None:
-        """Go straight ahead in random directions, from face to smaller face, into a corner."""
+        """Go straight ahead, forth and back, from face to smaller face, into corners."""
         spot = self.ground.spot(seed)
         active = spot.active() if np.isfinite(spot.values).all() else None
         if active is None:
             self.register.note(f"start {number} lies outside the polyhedron: left out")
-            return
-        for _ in range(len(seed)):
-            free = self._free(spot, active)
-            if free == 0 or (free == 1 and not self._continues(spot, active)):
-                self.corner(spot)
-                return
-            if free == 1:
-                self._edge_at(Frame(self.ground, spot.q, []), active)
-                return
-            landed = self._straight(spot, active)
-            if landed is None:
-                self.register.note(
-                    f"start {number}: straight walks in {FALLS} directions, forth and back, met "
-                    f"nothing within {self.ground.extent:g} scale units"
-                )
-                return
-            spot, active = landed
+        elif not self._land(spot, active, both=True):
+            self.register.note(
+                f"start {number}: straight walks in {FALLS} directions, forth and back, met "
+                f"nothing within {self.ground.extent:g} scale units"
+            )
+
+    def _land(self, spot: Spot, active: frozenset[int], *, both: bool) -> bool:
+        """Go on from a point of a face; return whether that led anywhere."""
+        free = self._free(spot, active)
+        if free == 0 or (free == 1 and not self._continues(spot, active)):
+            self.corner(spot)
+            return True
+        if free == 1:
+            self._edge_at(spot, active)
+            return True
+        met = False
+        for there, found in islice(self._straight(spot, active), 2 if both else 1):
+            met |= self._land(there, found, both=False)
+        return met
+
+    def _straight(
+        self, spot: Spot, active: frozenset[int]
+    ) -> Iterator[tuple[Spot, frozenset[int]]]:
+        """Yield where straight walks in random directions, forth and back, meet something."""
+        frame = Frame(self.ground, spot.q, spot.basis(active))
+        for _ in range(FALLS):
+            v = frame.tangent(self.rng.standard_normal(len(spot.q)))
+            for way in (v, -v):
+                walk = follow(frame, way, passive=active)
+                there = walk.frame.active() if walk.end is End.CORNER else None
+                if there is not None:
+                    yield walk.frame, there
 
     def _free(self, spot: Spot, active: frozenset[int]) -> int:
         fixed = null_space(spot.matrix([]), RANK_TOLERANCE)
@@ -268,17 +283,6 @@ class Explorer:
     def _along(frame: Frame) -> Array:
         """Return the direction of the curve on which the held functions vanish."""
         return null_space(frame.matrix(frame.kept), RANK_TOLERANCE)[:, 0]
-
-    def _straight(self, spot: Spot, active: frozenset[int]) -> tuple[Spot, frozenset[int]] | None:
-        frame = Frame(self.ground, spot.q, spot.basis(active))
-        for _ in range(FALLS):
-            v = frame.tangent(self.rng.standard_normal(len(spot.q)))
-            for way in (v, -v):
-                walk = follow(frame, way, passive=active)
-                there = walk.frame.active() if walk.end is End.CORNER else None
-                if there is not None:
-                    return walk.frame, there
-        return None
 
     # ---------------------------------------------------------------------------------------- faces
 

@@ -110,6 +110,11 @@ class Places:
         key = self.symmetry.key
         return np.zeros(1) if key is None else np.asarray(key(q))
 
+    def restore(self, q: Array) -> None:
+        """Add a corner at a point that was one before."""
+        spot = self.ground.spot(q)
+        self._add(spot, spot.active() or frozenset(), self._key(q))
+
     def _add(self, spot: Spot, active: frozenset[int], key: Array) -> tuple[int, list[Relabelling]]:
         star = star_at(spot, active)
         for sentence in star.notes:

@@ -1,6 +1,5 @@
 """Finding the atlas of a polyhedron: the entrance, and the order of the work."""
 
-import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -105,7 +104,7 @@ def resume(atlas: Skeleton, *, budget: int = BUDGET, progress: Progress | None =
     Parameters
     ----------
     atlas : Skeleton
-        What was found so far; it stays as it is.
+        What was found so far; its corners, edges and faces stay as they are.
     budget, progress
         As for :func:`skeleton`.
     """
@@ -113,8 +112,7 @@ def resume(atlas: Skeleton, *, budget: int = BUDGET, progress: Progress | None =
         msg = f"atlas: expected a Skeleton that skeleton() returned; got {type(atlas).__name__}"
         raise TypeError(msg)
     _check_budget(budget)
-    explorer = copy.deepcopy(atlas.state, {id(atlas.state.ground): atlas.state.ground})
-    return assembled(explorer, explorer.run(budget, progress))
+    return assembled(atlas.state, atlas.state.run(budget, progress))
 
 
 def _check_budget(budget: int) -> None:

@@ -100,7 +100,7 @@ def pair_atlas(
     generator = np.random.default_rng(0 if rng is None else rng)
     found = skeleton(
         pair.polyhedron if pair.is_plane else pair.section(heading),
-        _starts(pair, generator, heading),
+        pair_starts(pair, generator, heading),
         symmetry=pair.symmetry,
         budget=budget,
         progress=progress,
@@ -109,7 +109,8 @@ def pair_atlas(
     return PairAtlas(pair, found, None if pair.is_plane else heading)
 
 
-def _starts(pair: DumbbellPair, rng: np.random.Generator, heading: float) -> Array:
+def pair_starts(pair: DumbbellPair, rng: np.random.Generator, heading: float = 0.0) -> Array:
+    """Return where the atlas starts: nested pairs of both chiralities, random placements."""
     nested = [pair.nested(chirality, heading=heading) for chirality in ("R", "L")]
     fitting = [q for q in nested if pair.polyhedron.contains(q)]
     return np.array([*fitting, *pair.placements(rng, PLACEMENTS, heading=heading)])

@@ -240,12 +240,12 @@ def test_any_numbers_give_an_answer_or_one_line(length, ball, rod, drum):
     """Whatever the numbers, the model is built or refused with one sentence naming an option."""
     from click.exceptions import UsageError
 
-    from polycorner.cli.dyad import _pair
+    from polycorner.cli.common import chosen_pair
 
     values = {"length": length, "ball": ball, "rod": rod, "drum": drum, "rod_weight": 0.0}
     message, pair = "", None
     try:
-        pair = _pair(values)
+        pair = chosen_pair(None, values)
     except UsageError as error:
         message = error.message
     if pair is None:

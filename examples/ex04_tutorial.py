@@ -1,0 +1,80 @@
+"""A region that is locally convex but not convex: its corners and sides, and two places of rest.
+
+Seven segments and arcs bound the region; three of the arcs bulge into it.  Walking along them
+finds seven corners, seven edges and one face.  At each corner two functions vanish with
+independent gradients, so that in the coordinates they give the region is a quadrant: that is
+local convexity.  Yet a segment between two points of an inward arc leaves the region, however
+near they are, and the height ``y`` is a local minimum at A as well as at B: on a convex region
+a linear energy has no local minimum above the least.
+
+Run it to draw the figure: ``python examples/ex04_tutorial.py [FILE.png]``.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from polycorner import Certificate, Corner, Skeleton, certify, skeleton
+from polycorner.models import Tutorial
+
+REGION = Tutorial()
+
+
+@dataclass(frozen=True)
+class Result:
+    """The atlas, corners by their letters, the middle of a chord, and ``y`` at every corner."""
+
+    atlas: Skeleton
+    corners: dict[str, Corner]
+    middle: np.ndarray
+    heights: dict[str, Certificate]
+
+
+def main() -> Result:
+    atlas = skeleton(REGION.polyhedron, REGION.starts(np.random.default_rng(0), 3))
+    corners = dict(sorted((letter(corner), corner) for corner in atlas.corners))
+    _, y = REGION.manifold.symbols
+    return Result(
+        atlas=atlas,
+        corners=corners,
+        middle=REGION.sides()["AB"][[30, 34]].mean(axis=0),
+        heights={name: certify(REGION.polyhedron, y, c.point) for name, c in corners.items()},
+    )
+
+
+def letter(corner: Corner) -> str:
+    """Return the letter that the names of a corner's two sides share."""
+    (name,) = set.intersection(*map(set, corner.active))
+    return name
+
+
+def draw(result: Result, path: Path) -> None:
+    """Draw the region with the names of its corners and sides."""
+    from polycorner.pictures.plots import save
+    from polycorner.pictures.regions import draw_region
+
+    figure = draw_region(
+        REGION.polyhedron,
+        (-3.9, 4.1, -3.2, 3.5),
+        corners=[(name, corner.point) for name, corner in result.corners.items()],
+        edges=list(REGION.sides().items()),
+    )
+    save(figure, path)
+
+
+if __name__ == "__main__":
+    result = main()
+    print(result.atlas)
+    for name, corner in result.corners.items():
+        (x, y), rest = corner.point, result.heights[name]
+        sides = " and ".join(corner.active)
+        print(f"{name}  ({x:+.6f}, {y:+.6f})  {sides}: {corner.local_type.value}")
+        if rest.is_minimum:
+            print(f"   the height rests here: {rest.verdict.value}")
+    depth = REGION.polyhedron.implicit(result.middle)
+    print(f"the middle of a short chord of AB is outside the region: f = {depth:.1e}")
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex04_tutorial.png")
+    draw(result, target)
+    print(f"wrote {target}")

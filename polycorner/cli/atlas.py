@@ -1,0 +1,208 @@
+"""``polycorner atlas``: corners, edges and faces of a model, and how they hang together."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import click
+
+from polycorner.cli.common import (
+    Command,
+    chosen_pair,
+    fail,
+    output_options,
+    pair_options,
+    parameters,
+)
+from polycorner.cli.report import keys
+from polycorner.cli.search import Search
+
+# Random points that a search in the plane falls from.
+STARTS = 60
+# Corners above which a picture is clearer without their numbers.
+CROWDED = 12
+EPILOG = """\b
+Examples:
+  polycorner atlas dyad --plane --json
+  polycorner atlas spheres --count 8
+  polycorner atlas tutorial --out out
+Ctrl-C ends a search, keeps it and reports what was found (exit code 130);
+the same command with --resume goes on from there.
+"""
+
+
+@click.group(epilog=EPILOG, no_args_is_help=True)
+def atlas() -> None:
+    """Walk from corner to corner of a model and report how its faces hang together."""
+
+
+def search_options(command: Command) -> Command:
+    """Add ``--seed``, ``--budget`` and ``--resume``, and what every answer is written with."""
+    for option in (
+        click.option("--resume", is_flag=True, help="Go on with the search that was interrupted."),
+        click.option("--budget", type=int, default=100_000, help="Edges to walk at most. [100000]"),
+        click.option("--seed", type=int, default=0, help="Seed of the random directions. [0]"),
+    ):
+        command = option(command)
+    return output_options(command)
+
+
+@atlas.command()
+@pair_options
+@click.option("--plane", is_flag=True, help="The developed plane: the same as --drum inf.")
+@click.option("--heading", type=float, default=0.0, help="Mean heading in the drum, degrees. [0]")
+@search_options
+def dyad(
+    config: Path | None, plane: bool, heading: float, as_json: bool, out: Path | None,
+    seed: int, budget: int, resume: bool, **options: float | None,
+) -> None:  # fmt: skip
+    """Walk through the placements of two dumbbells: corners, and the motions that join them."""
+    if plane:
+        options["drum"] = math.inf
+    pair = chosen_pair(config, options)
+    if not math.isfinite(heading):
+        fail(f"--heading: expected an angle in degrees; got {heading}")
+    from polycorner.studies.pair_atlas import PairAtlas, pair_starts
+
+    angle = math.radians(heading)
+    polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
+    search = Search("dyad", parameters(pair) | {"heading": heading}, out, seed, budget)
+    found = search.run(
+        polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
+    )
+    whole = PairAtlas(pair, found, None if pair.is_plane else angle)
+    extra: dict[str, Any] = {"components": keys(whole.components)}
+    if search.finished:
+        extra["components_unordered"] = keys(whole.components_unordered)
+    answer = search.answer(found, extra, names=[whole.kind(c) for c in found.corners])
+    for corner in answer["corners"]:
+        corner["dimension"] += 0 if pair.is_plane else 1
+        corner["rank"] -= 0 if pair.is_plane else 1
+
+    def draw(folder: Path) -> list[Path]:
+        from polycorner.pictures import pair_atlas, plots
+
+        return [plots.save(pair_atlas.draw_atlas(whole), folder / "atlas.png")]
+
+    search.finish(answer, as_json=as_json, draw=draw if search.finished else None)
+
+
+@atlas.command()
+@click.option("--count", type=int, default=6, help="Number of spheres. [6]")
+@search_options
+def spheres(
+    count: int, as_json: bool, out: Path | None, seed: int, budget: int, resume: bool
+) -> None:
+    """List rigid clusters of sticky unit spheres up to congruence and relabelling."""
+    from polycorner.models.spheres import SphereCluster
+
+    try:
+        model = SphereCluster(count)
+    except ValueError as error:
+        fail(f"--{error}")
+    search = Search("spheres", {"count": count}, out, seed, budget)
+    found = search.run(model.polyhedron, lambda _: model.starts(), model.symmetry, resume=resume)
+    singular = sum(corner.singular for corner in found.corners)
+    extra = {
+        "corners_count": len(found.corners),
+        "edges_count": len(found.edges),
+        "faces_count": len(found.faces),
+        "singular_count": singular,
+    }
+    answer = search.answer(found, extra)
+
+    def draw(folder: Path) -> list[Path]:
+        from polycorner.pictures import clusters, plots
+
+        figure = clusters.draw_clusters(model, [c.point for c in found.corners])
+        return [plots.save(figure, folder / "clusters.png")]
+
+    search.finish(answer, as_json=as_json, draw=draw)
+
+
+@atlas.command()
+@search_options
+def tutorial(as_json: bool, out: Path | None, seed: int, budget: int, resume: bool) -> None:
+    """Walk around a planar region with seven corners, locally convex but not convex."""
+    from polycorner.models.tutorial import Tutorial
+
+    _planar("tutorial", Tutorial(), as_json, out, seed, budget, resume)
+
+
+@atlas.command()
+@search_options
+def pinball(as_json: bool, out: Path | None, seed: int, budget: int, resume: bool) -> None:
+    """Walk around a board with pins and wedges: corners that trap and corners that split."""
+    from polycorner.models.pinball import Pinball
+
+    _planar("pinball", Pinball(), as_json, out, seed, budget, resume)
+
+
+@atlas.command()
+@click.option("--count", type=int, default=3, help="Number of disks. [3]")
+@click.option(
+    "--torus", type=click.Choice(["square", "hexagonal"]), default="square", help="[square]"
+)
+@click.option("--seed", type=int, default=0, help="Seed of the random starts. [0]")
+@output_options
+def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) -> None:
+    """List the critical largest common radii of hard disks on a flat torus."""
+    import numpy as np
+
+    from polycorner.models.disks import TorusDisks
+
+    try:
+        model = TorusDisks(count, torus)
+    except (TypeError, ValueError) as error:
+        fail(f"--{error}")
+    search = Search("disks", {"count": count, "torus": torus}, out, seed, 1)
+    with search.patience() as progress:
+        found = model.critical(np.random.default_rng(seed), progress=progress)
+    rows = [
+        {
+            "radius": c.radius,
+            "index": c.index,
+            "nullity": c.nullity,
+            "contacts": len(c.contacts),
+            "hits": c.hits,
+        }
+        for c in found
+    ]
+    answer = {"model": "disks", "parameters": search.parameters, "critical": rows}
+
+    def draw(folder: Path) -> list[Path]:
+        from polycorner.pictures import plots, torus
+
+        return [plots.save(torus.draw_critical(model, found), folder / "critical.png")]
+
+    search.finish(answer, as_json=as_json, draw=draw)
+
+
+def _planar(
+    name: str, model: Any, as_json: bool, out: Path | None, seed: int, budget: int, resume: bool
+) -> None:
+    search = Search(name, {}, out, seed, budget)
+    found = search.run(model.polyhedron, lambda rng: model.starts(rng, STARTS), None, resume=resume)
+    answer = search.answer(found, {})
+
+    def draw(folder: Path) -> list[Path]:
+        import numpy as np
+
+        from polycorner.pictures import plots, regions
+        from polycorner.polyhedra.tracing import traced
+
+        curves = [traced(found, edge) for edge in found.edges]
+        low, high = np.vstack(curves).min(axis=0), np.vstack(curves).max(axis=0)
+        crowded = len(found.corners) > CROWDED
+        room = 0.06 * (high - low).max()
+        figure = regions.draw_region(
+            model.polyhedron,
+            (low[0] - room, high[0] + room, low[1] - room, high[1] + room),
+            corners=[
+                ("" if crowded else str(k), corner.point) for k, corner in enumerate(found.corners)
+            ],
+            edges=curves,
+        )
+        return [plots.save(figure, folder / f"{name}.png")]
+
+    search.finish(answer, as_json=as_json, draw=draw)

@@ -1,0 +1,76 @@
+"""An atlas as a table in the terminal."""
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+
+def keys(counts: dict[int, int]) -> dict[str, int]:
+    """Return counts by dimension as JSON has them."""
+    return {str(dimension): count for dimension, count in sorted(counts.items())}
+
+
+def print_answer(answer: dict[str, Any]) -> None:
+    """Print an answer as a table for people."""
+    from rich.console import Console
+
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    if "critical" in answer:
+        console.print(_critical(answer))
+    else:
+        _print_atlas(console, answer)
+
+
+def _critical(answer: dict[str, Any]) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in answer["critical"][0]:
+        table.add_column(title, justify="right")
+    for row in answer["critical"]:
+        table.add_row(f"{row['radius']:.9f}", *(str(row[k]) for k in list(row)[1:]))
+    return table
+
+
+def _print_atlas(console: "Console", answer: dict[str, Any]) -> None:
+    counts = ", ".join(f"{n} of dimension {d}" for d, n in answer["components"].items())
+    console.print(f"components of the strata: {counts}")
+    if "components_unordered" in answer:
+        counts = ", ".join(
+            f"{n} of dimension {d}" for d, n in answer["components_unordered"].items()
+        )
+        console.print(f"up to relabelling: {counts}")
+    if "singular_count" in answer:
+        console.print(
+            f"{answer['corners_count']} rigid clusters ({answer['singular_count']} singular), "
+            f"{answer['edges_count']} one-dimensional motions"
+        )
+    if answer["corners"]:
+        console.print(_corners(answer))
+    console.print(f"Euler characteristic: {answer['euler_characteristic']}")
+    console.print(f"complete: {answer['complete']}")
+    for note in answer["notes"]:
+        console.print(f"note: {note}")
+
+
+def _corners(answer: dict[str, Any]) -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in ("corner", "active", "rank", "type", "edges to"):
+        table.add_column(title)
+    edges = answer["edges"]
+    for k, corner in enumerate(answer["corners"]):
+        ends = [e["ends"] for e in edges if k in e["ends"]]
+        others = [b if a == k else a for a, b in ends]
+        reached = ", ".join("-" if other is None else str(other) for other in others)
+        active = " ".join(corner["active"])
+        shown = active if len(active) < 60 else f"{len(corner['active'])} contacts"
+        kind = corner["local_type"] + (", singular" if corner["singular"] else "")
+        table.add_row(f"{k} {corner['name']}", shown, str(corner["rank"]), kind, reached)
+    return table

@@ -1,0 +1,210 @@
+"""One search for an atlas: progress, saving, going on, and the answer."""
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from polycorner.cli.common import fail, json_text
+from polycorner.cli.report import keys, print_answer
+
+if TYPE_CHECKING:
+    from polycorner.polyhedra.atlas import Skeleton
+    from polycorner.polyhedra.polyhedron import Polyhedron
+    from polycorner.polyhedra.symmetry import Symmetry
+
+    Progress = Callable[[int, int, int], None]
+
+# Edges walked between two savings of a long search.
+CHUNK = 100
+
+
+class Search:
+    """One search with its progress bar, its savings and its report."""
+
+    def __init__(
+        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int
+    ) -> None:
+        if seed < 0:
+            fail(f"--seed: expected a whole number not below 0; got {seed}")
+        if budget < 1:
+            fail(f"--budget: expected a positive number of edges; got {budget}")
+        self.model, self.parameters, self.out = model, chosen, out
+        self.seed, self.budget = seed, budget
+        self.finished, self.interrupted = True, False
+
+    @property
+    def state(self) -> Path:
+        """Where an unfinished search is kept."""
+        if self.out is not None:
+            return self.out / "atlas-state.json"
+        from polycorner.geometry.kernels import cache_directory
+
+        told = repr((self.model, sorted(self.parameters.items()), self.seed))
+        return cache_directory() / f"atlas-{hashlib.sha256(told.encode()).hexdigest()[:16]}.json"
+
+    def run(
+        self,
+        polyhedron: "Polyhedron",
+        starts: Callable[[Any], Any],
+        symmetry: "Symmetry | None",
+        *,
+        resume: bool,
+    ) -> "Skeleton":
+        """Search, or go on, saving every so often; also what an interrupted search found."""
+        import numpy as np
+
+        from polycorner.polyhedra.atlas import Completeness
+        from polycorner.polyhedra.skeleton import resume as go_on
+        from polycorner.polyhedra.skeleton import skeleton
+        from polycorner.studies.files import save_atlas
+
+        left = self.budget
+        with self.patience() as progress:
+            if resume:
+                found = self._load(polyhedron, symmetry)
+            else:
+                rng = np.random.default_rng(self.seed)
+                first = starts(rng)
+                budget = min(CHUNK, left)
+                found = skeleton(
+                    polyhedron, first, symmetry=symmetry, budget=budget, progress=progress, rng=rng
+                )
+                left -= budget
+            while left > 0 and (resume or found.complete is Completeness.BUDGET):
+                resume = False
+                save_atlas(found, self.state)
+                found = go_on(found, budget=min(CHUNK, left), progress=progress)
+                left -= CHUNK
+        self.finished = found.complete in (Completeness.EXHAUSTED, Completeness.SEEDS)
+        if self.finished:
+            self.state.unlink(missing_ok=True)
+        else:
+            save_atlas(found, self.state)
+        self.interrupted = found.complete is Completeness.INTERRUPTED
+        return found
+
+    def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
+        from polycorner.studies.files import load_atlas
+
+        if not self.state.exists():
+            fail("--resume: expected an unfinished search with the same options; got none")
+        try:
+            return load_atlas(self.state, polyhedron, symmetry=symmetry)
+        except ValueError as error:
+            fail(f"--resume: {error}")
+
+    @contextmanager
+    def patience(self) -> "Iterator[Progress | None]":
+        """Show a bar with rate and estimate on a terminal, nothing in a pipe."""
+        if not sys.stderr.isatty():
+            yield None
+            return
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        with Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        ) as bar:
+            task = bar.add_task(self.model, total=None, rate="")
+
+            def progress(corners: int, edges: int, pending: int) -> None:
+                speed = bar.tasks[0].finished_speed or bar.tasks[0].speed
+                bar.update(
+                    task,
+                    completed=edges,
+                    total=edges + pending,
+                    description=f"{self.model}: {corners} corners, edges",
+                    rate=f"{speed:.0f}/s" if speed else "",
+                )
+
+            yield progress
+
+    def answer(
+        self, found: "Skeleton", extra: dict[str, Any], names: list[str] | None = None
+    ) -> dict[str, Any]:
+        """Return what is printed as JSON."""
+        labels = names or [f"C{k}" for k in range(len(found.corners))]
+        return {
+            "model": self.model,
+            "parameters": self.parameters,
+            "components": keys(dict(found.components)),
+            **extra,
+            "corners": [
+                {
+                    "name": label,
+                    "active": list(corner.active),
+                    "rank": corner.rank,
+                    "dimension": corner.stratum.dimension,
+                    "local_type": corner.local_type.name.lower(),
+                    "chirality": corner.chirality,
+                    "singular": corner.singular,
+                    "point": corner.point.tolist(),
+                }
+                for label, corner in zip(labels, found.corners, strict=True)
+            ],
+            "edges": [
+                {
+                    "ends": list(edge.ends),
+                    "active": list(edge.active),
+                    "length": edge.length,
+                    "kinds": [kind.name.lower() for kind in edge.kinds],
+                }
+                for edge in found.edges
+            ],
+            "faces": [
+                {
+                    "active": list(face.active),
+                    "boundary": [list(curve) for curve in face.boundary],
+                    "closed": face.closed,
+                }
+                for face in found.faces
+            ],
+            "euler_characteristic": found.euler_characteristic,
+            "complete": found.complete.name.lower(),
+            "notes": list(found.notes),
+        }
+
+    def finish(
+        self,
+        answer: dict[str, Any],
+        *,
+        as_json: bool,
+        draw: Callable[[Path], list[Path]] | None = None,
+    ) -> None:
+        """Print the answer, write the files, and end the process if it was interrupted."""
+        written = []
+        if self.out is not None:
+            file = self.out / "atlas.json"
+            try:
+                self.out.mkdir(parents=True, exist_ok=True)
+                file.write_text(json_text(answer) + "\n", encoding="utf-8")
+            except OSError as error:
+                fail(f"--out: {self.out} cannot be written ({error.strerror})")
+            written = [file, *(draw(self.out) if draw is not None else [])]
+        if as_json:
+            click.echo(json_text(answer))
+        else:
+            print_answer(answer)
+            for path in written:
+                click.echo(f"wrote {path}")
+        if not self.finished:
+            click.echo(f"polycorner: unfinished, kept in {self.state}; --resume goes on", err=True)
+        if self.interrupted:
+            raise click.exceptions.Exit(130)

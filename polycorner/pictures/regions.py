@@ -1,0 +1,240 @@
+"""Planar polyhedra: the region, its sides and corners, and where an energy rests on it."""
+
+import math
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from numpy.typing import ArrayLike
+
+from polycorner.geometry.manifold import Array, finite, reals
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import LocalType, stratum_at
+
+Labelled = Sequence[tuple[str, ArrayLike]]
+Edges = Sequence[ArrayLike | tuple[str, ArrayLike]]
+
+SHADE, SIDE = "0.88", "#0072B2"
+RESTS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+CORNERS = (("locally convex corner", "black"), ("locally concave corner", "white"))
+LENGTH = 7.0  # inches of the longer side of the axes
+ON_CORNER = 1e-6  # tolerance within which a drawn corner is looked up
+OFF = 9.0  # points between a mark and its label
+NEAR = 0.01  # distance, relative to the drawn part, at which the region around a mark is felt
+AROUND = 2 * np.pi * np.arange(72) / 72
+
+
+def draw_region(
+    polyhedron: Polyhedron,
+    bounds: tuple[float, float, float, float],
+    *,
+    corners: Labelled = (),
+    edges: Edges = (),
+    rests: Labelled = (),
+    title: str = "",
+    resolution: int = 800,
+) -> Figure:
+    """Draw a polyhedron in the plane: where its implicit value is at least zero.
+
+    Corners at which the region is locally convex are drawn full, corners at which it is a union
+    of several pieces are drawn hollow; which they are is asked of the polyhedron.  Labels of
+    corners and edges stand off the boundary, outside the region.  Labels of rests are explained
+    in a legend below, one colour for each, and so are the corners where there are both kinds.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        With two coordinates and no equations.
+    bounds : (left, right, bottom, top)
+        The part of the plane that is drawn.
+    corners : sequence of (label, point), optional
+        Points ``(2,)`` and what is written beside them; an empty label leaves the mark alone.
+    edges : sequence of polylines ``(k, 2)`` or of (label, polyline), optional
+        The boundary; default the zero contour of the implicit value.
+    rests : sequence of (label, point), optional
+        Points ``(2,)``; those that share a label share a colour.
+    title : str, optional
+        Above the figure.
+    resolution : int, optional
+        Points along the longer side at which the implicit value is taken.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a polyhedron that is not planar, or bounds, points, polylines or a resolution that
+        are not what is said here.
+    """
+    _check_planar(polyhedron)
+    left, right, bottom, top = _bounds(bounds)
+    if isinstance(resolution, bool) or not isinstance(resolution, int) or resolution < 2:
+        msg = f"resolution: expected a whole number of at least 2; got {resolution!r}"
+        raise ValueError(msg)
+    marked, resting = _points("corners", corners), _points("rests", rests)
+    lines = _polylines(edges)
+    unit = max(right - left, top - bottom)
+    size = (LENGTH * (right - left) / unit, LENGTH * (top - bottom) / unit)
+    figure = Figure(figsize=(size[0] + 0.6, size[1] + 0.8), layout="constrained")
+    axes = figure.add_subplot()
+    _shade(axes, polyhedron, (left, right, bottom, top), resolution, outline=not lines)
+    for label, line in lines:
+        axes.plot(line[:, 0], line[:, 1], color=SIDE, linewidth=2, solid_capstyle="round")
+        middle = _middle(line)
+        _label(axes, label, middle, -_inwards(polyhedron, middle, unit), SIDE)
+    _draw_corners(axes, polyhedron, marked, unit)
+    _draw_rests(axes, resting)
+    _, names = axes.get_legend_handles_labels()
+    if names:
+        figure.legend(loc="outside lower center", ncols=2, frameon=False)
+    x, y = polyhedron.manifold.names
+    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel=x, ylabel=y, title=title)
+    axes.set_aspect("equal")
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _shade(
+    axes: Axes,
+    polyhedron: Polyhedron,
+    bounds: tuple[float, float, float, float],
+    resolution: int,
+    *,
+    outline: bool,
+) -> None:
+    left, right, bottom, top = bounds
+    step = max(right - left, top - bottom) / resolution
+    columns, rows = math.ceil((right - left) / step) + 1, math.ceil((top - bottom) / step) + 1
+    x, y = np.meshgrid(np.linspace(left, right, columns), np.linspace(bottom, top, rows))
+    implicit = polyhedron.implicit(np.stack([x, y], axis=-1))
+    if (implicit > 0).any():
+        axes.contourf(x, y, implicit, levels=[0, implicit.max()], colors=[SHADE])
+    if outline and (implicit > 0).any() and (implicit < 0).any():
+        axes.contour(x, y, implicit, levels=[0], colors=[SIDE], linewidths=1.6)
+
+
+def _draw_corners(
+    axes: Axes, polyhedron: Polyhedron, corners: list[tuple[str, Array]], unit: float
+) -> None:
+    unions = [_is_union(polyhedron, point) for _, point in corners]
+    for union, (kind, face) in enumerate(CORNERS):
+        chosen = [
+            point for point, is_union in zip(corners, unions, strict=True) if is_union == union
+        ]
+        if chosen:
+            x, y = np.array([point for _, point in chosen]).T
+            name = kind if len(set(unions)) == 2 else None
+            order = 6 if union else 4  # a rest may hide the full corner it is at, not a hollow one
+            axes.plot(x, y, "o", color=face, mec="black", ms=6, zorder=order, ls="", label=name)
+    for label, point in corners:
+        _label(axes, label, point, -_inwards(polyhedron, point, unit), "black")
+
+
+def _draw_rests(axes: Axes, rests: list[tuple[str, Array]]) -> None:
+    for colour, label in zip(cycle(RESTS), dict.fromkeys(name for name, _ in rests), strict=False):
+        x, y = np.array([point for name, point in rests if name == label]).T
+        axes.plot(
+            x,
+            y,
+            "o",
+            color=colour,
+            mec="white",
+            mew=0.5,
+            ms=7,
+            zorder=5,
+            ls="",
+            label=label or None,
+        )
+
+
+def _label(axes: Axes, label: str, point: Array, direction: Array, colour: str) -> None:
+    """Write a label off a point, aligned so that it grows away from it."""
+    if not label:
+        return
+    across = {-1: "right", 0: "center", 1: "left"}[round(direction[0])]
+    upright = {-1: "top", 0: "center", 1: "bottom"}[round(direction[1])]
+    axes.annotate(
+        label,
+        (point[0], point[1]),
+        xytext=(OFF * direction[0], OFF * direction[1]),
+        textcoords="offset points",
+        ha=across,
+        va=upright,
+        color=colour,
+        zorder=5,
+        path_effects=[withStroke(linewidth=3, foreground="white")],
+    )
+
+
+def _inwards(polyhedron: Polyhedron, point: Array, unit: float) -> Array:
+    """Return the unit vector from a point to where most of the region is around it."""
+    ring = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=-1)
+    mean = ring[polyhedron.contains(point + NEAR * unit * ring)].sum(axis=0)
+    size = math.hypot(*mean)
+    return mean / size if size > 1e-6 else np.array([0.0, 1.0])
+
+
+def _is_union(polyhedron: Polyhedron, point: Array) -> bool:
+    stratum = stratum_at(polyhedron, point, tolerance=ON_CORNER)
+    return stratum.local_type is LocalType.UNION
+
+
+def _middle(line: Array) -> Array:
+    """Return the point halfway along a polyline."""
+    lengths = np.hypot(*np.diff(line, axis=0).T)
+    travelled = np.concatenate([[0.0], np.cumsum(lengths)])
+    half = travelled[-1] / 2
+    return np.array([np.interp(half, travelled, line[:, k]) for k in (0, 1)])
+
+
+def _check_planar(polyhedron: Polyhedron) -> None:
+    if not isinstance(polyhedron, Polyhedron):
+        msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
+        raise TypeError(msg)
+    if polyhedron.dimension != 2 or polyhedron.equations:
+        msg = (
+            "polyhedron: expected two coordinates and no equations; got "
+            f"{', '.join(polyhedron.manifold.names)} and {len(polyhedron.equations)} equations"
+        )
+        raise ValueError(msg)
+
+
+def _bounds(bounds: Any) -> tuple[float, float, float, float]:
+    array = finite(reals(bounds, "bounds"), "bounds")
+    if array.shape != (4,) or not (array[0] < array[1] and array[2] < array[3]):
+        msg = f"bounds: expected left < right and bottom < top; got {bounds!r}"
+        raise ValueError(msg)
+    left, right, bottom, top = array.tolist()
+    return left, right, bottom, top
+
+
+def _points(argument: str, given: Labelled) -> list[tuple[str, Array]]:
+    marked = []
+    for entry in given:
+        label, point = _pair(argument, entry)
+        if point.shape != (2,):
+            msg = f"{argument}: expected points of shape (2,); got shape {point.shape}"
+            raise ValueError(msg)
+        marked.append((label, point))
+    return marked
+
+
+def _polylines(edges: Edges) -> list[tuple[str, Array]]:
+    lines = []
+    for entry in edges:
+        named = isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[0], str)
+        label, line = _pair("edges", entry if named else ("", entry))
+        if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2:
+            msg = f"edges: expected polylines of shape (k, 2) with k >= 2; got shape {line.shape}"
+            raise ValueError(msg)
+        lines.append((label, line))
+    return lines
+
+
+def _pair(argument: str, entry: Any) -> tuple[str, Array]:
+    if not isinstance(entry, tuple) or len(entry) != 2 or not isinstance(entry[0], str):
+        msg = f"{argument}: expected pairs of a label and numbers; got {entry!r}"
+        raise TypeError(msg)
+    return entry[0], finite(reals(entry[1], argument), argument)

@@ -1,0 +1,172 @@
+"""Pictures of planar polyhedra show the region, its corners and its rests where they are."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron
+from polycorner.models.tutorial import Tutorial
+from polycorner.pictures.plots import save
+from polycorner.pictures.regions import RESTS, SHADE, draw_region
+
+PLANE = Manifold.euclidean("x y")
+X, Y = PLANE.symbols
+# A square from which a quadrant is cut out: six corners, one of them concave.
+ELL = Polyhedron(PLANE, AllOf(X, Y, 2 - X, 2 - Y, AnyOf(1 - X, 1 - Y)))
+CONVEX = [(0, 0), (2, 0), (2, 1), (1, 2), (0, 2)]
+CONCAVE = (1, 1)
+BOUNDS = (-0.5, 2.5, -0.4, 2.4)
+REGION = Tutorial()
+
+
+def rendered(figure):
+    """Return the canvas and its pixels, row 0 at the bottom, between 0 and 1."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return canvas, np.asarray(canvas.buffer_rgba())[::-1, :, :3] / 255
+
+
+def pixel(figure, pixels, point):
+    column, row = figure.axes[0].transData.transform(point)
+    return pixels[int(row), int(column)]
+
+
+def colour_counts(pixels, colour):
+    return int((abs(pixels - to_rgb(colour)).max(axis=-1) < 0.02).sum())
+
+
+@pytest.mark.parametrize(
+    ("polyhedron", "bounds"), [(ELL, BOUNDS), (REGION.polyhedron, (-4, 4, -3, 3.4))]
+)
+def test_the_region_is_shaded_and_nothing_else(polyhedron, bounds):
+    figure = draw_region(polyhedron, bounds, resolution=300)
+    _, pixels = rendered(figure)
+    left, right, bottom, top = bounds
+    span = max(right - left, top - bottom)
+    low, high = (left + span / 50, bottom + span / 50), (right - span / 50, top - span / 50)
+    points = np.random.default_rng(0).uniform(low, high, (2000, 2))
+    ring = span / 200 * np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 6.28, 40)])
+    for point in points:
+        inside = polyhedron.contains(point + ring)
+        if inside.all() or not inside.any():
+            shade = to_rgb(SHADE) if inside.all() else (1, 1, 1)
+            np.testing.assert_allclose(pixel(figure, pixels, point), shade, atol=0.01)
+
+
+def test_the_boundary_is_the_zero_contour_unless_edges_are_given():
+    plain = draw_region(ELL, BOUNDS, resolution=100).axes[0]
+    assert len(plain.collections) == 2
+    assert not plain.lines
+    line = np.array([[0, 0], [2, 0]])
+    drawn = draw_region(ELL, BOUNDS, edges=[line, ("bottom", line)], resolution=100).axes[0]
+    assert len(drawn.collections) == 1
+    for curve in drawn.lines:
+        np.testing.assert_array_equal(curve.get_xydata(), line)
+    assert [text.get_text() for text in drawn.texts] == ["bottom"]
+
+
+def test_corners_are_full_where_convex_and_hollow_where_concave():
+    points = [*CONVEX, CONCAVE]
+    figure = draw_region(ELL, BOUNDS, corners=[("", p) for p in points], resolution=100)
+    full, hollow = figure.axes[0].lines
+    assert (full.get_markerfacecolor(), hollow.get_markerfacecolor()) == ("black", "white")
+    np.testing.assert_array_equal(full.get_xydata(), CONVEX)
+    np.testing.assert_array_equal(hollow.get_xydata(), [CONCAVE])
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "locally convex corner",
+        "locally concave corner",
+    ]
+
+
+def test_one_kind_of_corner_needs_no_legend():
+    figure = draw_region(ELL, BOUNDS, corners=[("", p) for p in CONVEX], resolution=100)
+    assert not figure.legends
+    assert len(figure.axes[0].lines) == 1
+
+
+def test_labels_are_outside_and_keep_off_each_other():
+    """Every letter of the tutorial is wholly outside the region and overlaps no other label."""
+    corners, sides = REGION.corners(), REGION.sides()
+    figure = draw_region(
+        REGION.polyhedron,
+        (-3.9, 4.1, -3.2, 3.5),
+        corners=list(corners.items()),
+        edges=list(sides.items()),
+    )
+    canvas, _ = rendered(figure)
+    axes = figure.axes[0]
+    assert [text.get_text() for text in axes.texts] == [*sides, *corners]
+    boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+    for box in boxes:
+        u, v = np.meshgrid(np.linspace(box.x0, box.x1, 9), np.linspace(box.y0, box.y1, 9))
+        inside = axes.transData.inverted().transform(np.stack([u.ravel(), v.ravel()], axis=-1))
+        assert not REGION.polyhedron.contains(inside).any()
+        assert sum(box.overlaps(other) for other in boxes) == 1
+    outline = axes.transData.transform(np.vstack([*sides.values()]))
+    for box in boxes:
+        assert not box.count_contains(outline)
+        centre = np.array([(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2])
+        assert np.linalg.norm(outline - centre, axis=1).min() < 60
+
+
+def test_rests_are_coloured_by_label_and_explained_below():
+    rests = [("low", (0, 0)), ("", (2, 1)), ("low", (2, 0)), ("high", (0, 2))]
+    figure = draw_region(ELL, BOUNDS, rests=rests, resolution=100)
+    drawn = {line.get_label(): line for line in figure.axes[0].lines}
+    np.testing.assert_array_equal(drawn["low"].get_xydata(), [(0, 0), (2, 0)])
+    np.testing.assert_array_equal(drawn["high"].get_xydata(), [(0, 2)])
+    assert len({line.get_color() for line in drawn.values()}) == 3
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["low", "high"]
+    _, pixels = rendered(figure)
+    assert colour_counts(pixels, RESTS[0]) > 20
+
+
+def test_axes_are_named_after_coordinates_and_true_to_scale():
+    figure = draw_region(ELL, BOUNDS, title="an L", resolution=100)
+    axes = figure.axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("x", "y", "an L")
+    assert (*axes.get_xlim(), *axes.get_ylim()) == BOUNDS
+    rendered(figure)
+    one, two = axes.transData.transform([(0, 0), (1, 1)])
+    np.testing.assert_allclose(*(two - one), rtol=1e-9)
+
+
+def test_a_view_without_boundary_is_drawn_too(tmp_path):
+    for bounds in ((0.2, 0.4, 0.2, 0.4), (5, 6, 5, 6)):
+        path = save(draw_region(ELL, bounds, resolution=20), tmp_path / "part.png")
+        assert path.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("error", "changes", "says"),
+    [
+        (TypeError, {"polyhedron": "L"}, "polyhedron: expected a Polyhedron; got str"),
+        (
+            ValueError,
+            {"polyhedron": Polyhedron(Manifold.euclidean("x y z"), [X])},
+            "polyhedron: expected two coordinates and no equations; got x, y, z and 0 equations",
+        ),
+        (
+            ValueError,
+            {"polyhedron": Polyhedron(PLANE, [X], [Y])},
+            "polyhedron: expected two coordinates and no equations; got x, y and 1 equations",
+        ),
+        (ValueError, {"bounds": (0, 1, 1, 0)}, "bounds: expected left < right and bottom < top"),
+        (ValueError, {"bounds": (0, 1)}, "bounds: expected left < right and bottom < top"),
+        (ValueError, {"bounds": (0, np.inf, 0, 1)}, "bounds: expected finite numbers; got inf"),
+        (ValueError, {"resolution": 1}, "resolution: expected a whole number of at least 2; got 1"),
+        (ValueError, {"resolution": 9.5}, "resolution: expected a whole number"),
+        (ValueError, {"corners": [("A", (0, 0, 0))]}, r"corners: expected points of shape \(2,\)"),
+        (TypeError, {"corners": [(0, 0)]}, "corners: expected pairs of a label and numbers; got"),
+        (TypeError, {"rests": [("A", "B")]}, "rests: expected real numbers; got dtype"),
+        (ValueError, {"rests": [("A", (0, np.nan))]}, "rests: expected finite numbers; got nan"),
+        (ValueError, {"edges": [[0, 1]]}, r"edges: expected polylines of shape \(k, 2\)"),
+        (ValueError, {"edges": [("a", [[0, 1]])]}, r"edges: expected polylines of shape \(k, 2\)"),
+    ],
+)
+def test_arguments_are_refused_in_a_sentence(error, changes, says):
+    arguments = {"polyhedron": ELL, "bounds": BOUNDS} | changes
+    with pytest.raises(error, match=f"^{says}"):
+        draw_region(arguments.pop("polyhedron"), arguments.pop("bounds"), **arguments)
