@@ -80,9 +80,13 @@ def dyad(
         corner["rank"] -= 0 if pair.is_plane else 1
 
     def draw(folder: Path) -> list[Path]:
-        from polycorner.pictures import pair_atlas, plots
+        from polycorner.pictures import pair_atlas, pair_solid, plots
 
-        return [plots.save(pair_atlas.draw_atlas(whole), folder / "atlas.png")]
+        return [
+            plots.save(pair_atlas.draw_atlas(whole), folder / "atlas.png"),
+            plots.save(pair_atlas.draw_motions(whole), folder / "motions.png"),
+            *pair_solid.write_solid(whole, folder),
+        ]
 
     search.finish(answer, as_json=as_json, draw=draw if search.finished else None)
 

@@ -1,0 +1,62 @@
+"""The atlas drawn over the solid: its curves lie on the solid's surface, and both agree."""
+
+import math
+
+import numpy as np
+import pytest
+
+from polycorner.models import DumbbellPair
+from polycorner.pictures.pair_solid import relative_corners, relative_curves, write_solid
+from polycorner.pictures.solids import (
+    forbidden_solid,
+    relative_coordinates,
+    relative_gap,
+    relative_placements,
+)
+from polycorner.studies.pair_atlas import pair_atlas
+
+CASES = {
+    "plane": (math.inf, 16.0, None),
+    "plane, short rods": (math.inf, 7.0, None),
+    "drum": (125.0, 16.0, 0.3),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def atlas(request):
+    drum, length, heading = CASES[request.param]
+    pair = DumbbellPair(length=length, ball_radius=3, rod_radius=1.5, drum_radius=drum)
+    return pair_atlas(pair, heading=heading or 0.0)
+
+
+def period(atlas):
+    return math.pi if atlas.heading is None else math.tau
+
+
+def test_edges_and_corners_lie_on_the_surface(atlas):
+    gap = relative_gap(atlas.pair, mean_heading=atlas.heading)
+    corners, letters = relative_corners(atlas, period(atlas))
+    assert len(corners) == len(letters) > 0
+    points = np.vstack([corners, *(line for _, line in relative_curves(atlas, period(atlas)))])
+    np.testing.assert_allclose(gap(points), 0.0, atol=1e-9)
+    assert abs(points[:, 2]).max() <= period(atlas) / 2 + 1e-12
+
+
+def test_mesh_and_atlas_have_the_same_euler_characteristic(atlas):
+    solid = forbidden_solid(atlas.pair, 40, period=period(atlas), mean_heading=atlas.heading)
+    assert solid.euler_characteristic == atlas.skeleton.euler_characteristic == 0
+
+
+def test_relative_placements_come_back(atlas):
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1, 1, (50, 3)) * np.array([20, 20, 3])
+    q = relative_placements(atlas.pair, points, mean_heading=atlas.heading)
+    back = relative_coordinates(atlas.pair, q, mean_heading=atlas.heading)
+    np.testing.assert_allclose(back, points, atol=1e-12)
+
+
+def test_files(atlas, tmp_path):
+    written = write_solid(atlas, tmp_path, resolution=24)
+    assert [path.name for path in written] == ["solid.png", "solid.glb"]
+    assert written[0].read_bytes().startswith(b"\x89PNG")
+    assert written[1].read_bytes().startswith(b"glTF")
