@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from polycorner.minima.verdicts import Entrapment, Verdict
     from polycorner.polyhedra.atlas import Completeness, Corner, Edge, Face, Skeleton
     from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
-    from polycorner.polyhedra.skeleton import skeleton
+    from polycorner.polyhedra.skeleton import resume, skeleton
     from polycorner.polyhedra.strata import LocalType, Stratum, stratum_at
     from polycorner.polyhedra.symmetry import Element, Symmetry
+    from polycorner.polyhedra.tracing import traced
     from polycorner.polyhedra.walks import End
 
 __version__ = "0.1.0"
@@ -43,12 +44,14 @@ _HOMES = {
     "AllOf": "polyhedra.polyhedron",
     "AnyOf": "polyhedra.polyhedron",
     "Polyhedron": "polyhedra.polyhedron",
+    "resume": "polyhedra.skeleton",
     "skeleton": "polyhedra.skeleton",
     "LocalType": "polyhedra.strata",
     "Stratum": "polyhedra.strata",
     "stratum_at": "polyhedra.strata",
     "Element": "polyhedra.symmetry",
     "Symmetry": "polyhedra.symmetry",
+    "traced": "polyhedra.tracing",
 }
 
 __all__ = [
@@ -74,9 +77,11 @@ __all__ = [
     "Verdict",
     "certify",
     "minimise",
+    "resume",
     "skeleton",
     "stationary_on",
     "stratum_at",
+    "traced",
 ]
 
 

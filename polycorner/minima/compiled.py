@@ -688,15 +688,25 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
 
 
 @njit(cache=True)
-def leave(problem, use, m, v, direction, F, J, H, size):
-    """Move ``v`` off a saddle, to a feasible lower point along its direction; return success."""
+def leave(problem, use, on, m, v, direction, F, J, H, size):
+    """Move ``v`` off a saddle, to a feasible lower point along its direction; return success.
+
+    A straight step first; where the set bulges, which leaves it behind, along the face instead.
+    """
     stay_whole()
     evaluate(problem, v, F, J, H, size, False)
     energy = F[F.size - 1]
-    for k in range(24):
-        step = 0.1 * 0.5 ** (k // 2) * (1.0 - 2.0 * (k % 2))
+    along = np.zeros((1, v.size))
+    along[0] = direction / length(direction)
+    for k in range(48):
+        step = 0.1 * 0.5 ** (k // 4) * (1.0 - 2.0 * (k % 2))
         trial = plus(v, step, direction)
-        if project(problem, use, m, trial, F, J, H, size, np.int64(6)) and F[F.size - 1] < energy:
+        if k % 4 < 2:
+            reached = project(problem, use, m, trial, F, J, H, size, np.int64(6))
+        else:
+            _, last = polish(problem, on, m, along, trial, F, J, H, size)
+            reached = last < 1e-8 and violation(F, J, use, m) <= FEASIBLE
+        if reached and F[F.size - 1] < energy:
             for i in range(v.size):
                 v[i] = trial[i]
             return True
@@ -791,7 +801,7 @@ def descend(problem, use, m, rows, u, size, limit):
             good, v, exact, way = finished(problem, use, on, m, u, F, J, H, size, energy)
             if good == 3:
                 return CONVERGED, iteration, v, exact
-            if good == 2 and leave(problem, use, m, v, way, F, J, H, size):
+            if good == 2 and leave(problem, use, on, m, v, way, F, J, H, size):
                 for k in range(n):
                     u[k] = v[k]
                 continue
@@ -814,7 +824,11 @@ def descend(problem, use, m, rows, u, size, limit):
                     break
             factor *= 0.5
         if not accepted:
-            good, v, exact, _ = finished(problem, use, on, m, u, F, J, H, size, energy)
+            good, v, exact, way = finished(problem, use, on, m, u, F, J, H, size, energy)
+            if good == 2 and leave(problem, use, on, m, v, way, F, J, H, size):
+                for k in range(n):
+                    u[k] = v[k]
+                continue
             return (CONVERGED if good >= 2 else STALLED), iteration, v if good else u, exact
         if factor * reach >= 0.99 * cap:
             cap *= 2.0

@@ -131,3 +131,11 @@ def test_stationary_on_says_when_newton_finds_nothing():
     c = stationary_on(D, x, [0.3, 0.1], ["disk"])
     assert not c.is_minimum
     assert c.verdict in {Verdict.NOT_CONVERGED, Verdict.OUTSIDE, Verdict.INFEASIBLE}
+
+
+def test_a_ball_dropped_straight_onto_a_pin_rolls_off():
+    """The top of a disc is a saddle that a straight step does not lead down from."""
+    board = Polyhedron(M2, {"pin": x**2 + y**2 - 1, "floor": y + 2})
+    c = minimise(board, y, [0.0, 3.0])
+    assert c.is_minimum
+    assert c.active == ("floor",)
