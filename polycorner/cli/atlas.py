@@ -73,6 +73,7 @@ def dyad(
     whole = PairAtlas(pair, found, None if pair.is_plane else angle)
     extra: dict[str, Any] = {"components": keys(whole.components)}
     if search.finished:
+        extra["components_ordered"] = keys(whole.components_ordered)
         extra["components_unordered"] = keys(whole.components_unordered)
     answer = search.answer(found, extra, names=[whole.kind(c) for c in found.corners])
     for corner in answer["corners"]:

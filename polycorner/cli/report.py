@@ -8,6 +8,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
+COUNTS = {
+    "components": "components of the strata",
+    "components_ordered": "for ordered pairs of dumbbells whose balls are alike",
+    "components_unordered": "for unordered pairs",
+}
+
+
 def keys(counts: dict[int, int]) -> dict[str, int]:
     """Return counts by dimension as JSON has them."""
     return {str(dimension): count for dimension, count in sorted(counts.items())}
@@ -37,13 +44,10 @@ def _critical(answer: dict[str, Any]) -> "Table":
 
 
 def _print_atlas(console: "Console", answer: dict[str, Any]) -> None:
-    counts = ", ".join(f"{n} of dimension {d}" for d, n in answer["components"].items())
-    console.print(f"components of the strata: {counts}")
-    if "components_unordered" in answer:
-        counts = ", ".join(
-            f"{n} of dimension {d}" for d, n in answer["components_unordered"].items()
-        )
-        console.print(f"up to relabelling: {counts}")
+    for key, words in COUNTS.items():
+        if key in answer:
+            counts = ", ".join(f"{n} of dimension {d}" for d, n in answer[key].items())
+            console.print(f"{words}: {counts}")
     if "singular_count" in answer:
         console.print(
             f"{answer['corners_count']} rigid clusters ({answer['singular_count']} singular), "

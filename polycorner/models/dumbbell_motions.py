@@ -60,6 +60,11 @@ def relabellings() -> tuple[Element, ...]:
         found = {**fresh, **found}
 
 
+def ball_relabellings() -> tuple[Element, ...]:
+    """Return the relabellings that keep dumbbell A and dumbbell B apart, but the identity."""
+    return tuple(g for g in relabellings() if g.names["A1b"].startswith("A"))
+
+
 def half_turn_in_place() -> Element:
     """Return the half-turn of the pair about the vertical axis through the lowest point.
 

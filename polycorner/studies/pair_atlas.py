@@ -2,18 +2,19 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from polycorner.geometry.manifold import Array
-from polycorner.models.dumbbell_motions import relabellings
+from polycorner.models.dumbbell_motions import ball_relabellings, relabellings
 from polycorner.models.dumbbells import DumbbellPair
 from polycorner.polyhedra.atlas import Corner, Skeleton
 from polycorner.polyhedra.orbits import Orbits, orbits
 from polycorner.polyhedra.skeleton import BUDGET, Progress, skeleton
+from polycorner.polyhedra.symmetry import Element
 
 PLACEMENTS = 6
 
@@ -37,14 +38,22 @@ class PairAtlas:
     heading: float | None
 
     @cached_property
+    def ordered(self) -> Mapping[str, Orbits]:
+        """Corners, edges and faces up to relabelling of balls; A and B are told apart."""
+        return self._orbits(ball_relabellings())
+
+    @cached_property
     def unordered(self) -> Mapping[str, Orbits]:
         """Corners, edges and faces up to relabelling of the dumbbells and of their balls.
 
         Relabelling the balls of one dumbbell turns the mean heading by a quarter turn; in the drum
         the relative placement it leads to is then told by its nearest neighbour in the section.
         """
+        return self._orbits(relabellings())
+
+    def _orbits(self, elements: Sequence[Element]) -> Mapping[str, Orbits]:
         nearby = None if self.heading is None else self.pair.relative
-        return orbits(self.skeleton, relabellings(), nearby=nearby)
+        return orbits(self.skeleton, elements, nearby=nearby)
 
     @property
     def components(self) -> dict[int, int]:
@@ -58,11 +67,19 @@ class PairAtlas:
         return {3 + k: counts[dimension] for k, dimension in enumerate(sorted(counts))}
 
     @property
+    def components_ordered(self) -> dict[int, int]:
+        """The same for ordered pairs of dumbbells whose balls are alike, headings modulo ``pi``."""
+        return self._counts(self.ordered)
+
+    @property
     def components_unordered(self) -> dict[int, int]:
-        """The same up to relabelling; a single component of ``D6`` stays single."""
-        counts = {3 + k: len(found) for k, found in enumerate(self.unordered.values())}
-        interior = self.components.get(6)
-        return counts | ({6: 1} if interior == 1 else {})
+        """The same for unordered pairs of dumbbells whose balls are alike."""
+        return self._counts(self.unordered)
+
+    def _counts(self, grouped: Mapping[str, Orbits]) -> dict[int, int]:
+        """Count orbits by dimension; a single component of ``D6`` stays single."""
+        counts = {3 + k: len(found) for k, found in enumerate(grouped.values())}
+        return counts | ({6: 1} if self.components.get(6) == 1 else {})
 
     def kind(self, corner: Corner) -> str:
         """Return the paper's letter for a corner with its chirality, as ``Delta_R``.
