@@ -1,9 +1,18 @@
 """Worked systems, one file each; the core never imports them."""
 
+from polycorner.models.disks import CriticalConfiguration, TorusDisks
 from polycorner.models.dumbbell_formulas import plane_heading_formula
 from polycorner.models.dumbbells import DumbbellPair
 from polycorner.models.pinball import Pinball
 from polycorner.models.spheres import SphereCluster
 from polycorner.models.tutorial import Tutorial
 
-__all__ = ["DumbbellPair", "Pinball", "SphereCluster", "Tutorial", "plane_heading_formula"]
+__all__ = [
+    "CriticalConfiguration",
+    "DumbbellPair",
+    "Pinball",
+    "SphereCluster",
+    "TorusDisks",
+    "Tutorial",
+    "plane_heading_formula",
+]

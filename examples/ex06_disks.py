@@ -1,0 +1,54 @@
+"""Disks on a torus: every radius at which the space of their configurations changes.
+
+Two and three equal disks lie on the square and on the hexagonal torus.  Their largest common
+radius is critical where the contacts carry a stress in equilibrium; the index counts the ways in
+which it can still grow to second order.  Radii are in units of the shortest lattice vector.
+
+On the hexagonal torus all critical configurations of three disks are isolated.  With their
+labelled copies modulo translations, ``(-1)^index`` adds up to the Euler characteristic of the
+space of three distinct points, which is 2.
+
+Run it to draw a figure of four disks: ``python examples/ex06_disks.py [FILE.png]``.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from polycorner.models.disks import TorusDisks
+
+# How many labelled copies, modulo translations, each configuration of three disks has there.
+COPIES = (2, 6, 6)
+
+
+def main() -> dict[tuple[int, str], list[tuple[float, int]]]:
+    """Return radius and index of every critical configuration, by number of disks and torus."""
+    rng = np.random.default_rng(0)
+    return {
+        (count, lattice): [(c.radius, c.index) for c in TorusDisks(count, lattice).critical(rng)]
+        for count in (2, 3)
+        for lattice in ("square", "hexagonal")
+    }
+
+
+def draw(path: Path) -> None:
+    """Draw the critical configurations of four disks on the hexagonal torus."""
+    from polycorner.pictures.plots import save
+    from polycorner.pictures.torus import draw_critical
+
+    model = TorusDisks(4, "hexagonal")
+    save(draw_critical(model, model.critical(np.random.default_rng(0))), path)
+
+
+if __name__ == "__main__":
+    for (count, lattice), found in main().items():
+        print(f"{count} disks, {lattice} torus")
+        for radius, index in found:
+            print(f"    r = {radius:.9f}, index {index}")
+        if (count, lattice) == (3, "hexagonal"):
+            total = sum((-1) ** k * copies for (_, k), copies in zip(found, COPIES, strict=True))
+            print(f"    signed count of labelled copies: {total}")
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex06_disks.png")
+    draw(target)
+    print(f"wrote {target}")
