@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from polycorner.geometry.manifold import Manifold
     from polycorner.minima.certificate import Certificate, certify
     from polycorner.minima.minimise import minimise, stationary_on
+    from polycorner.minima.proof import Proof, prove
+    from polycorner.minima.sensitivity import Sensitivity, sensitivity
     from polycorner.minima.verdicts import Entrapment, Verdict
     from polycorner.polyhedra.atlas import Completeness, Corner, Edge, Face, Skeleton
     from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
@@ -33,6 +35,10 @@ _HOMES = {
     "certify": "minima.certificate",
     "minimise": "minima.minimise",
     "stationary_on": "minima.minimise",
+    "Proof": "minima.proof",
+    "prove": "minima.proof",
+    "Sensitivity": "minima.sensitivity",
+    "sensitivity": "minima.sensitivity",
     "Entrapment": "minima.verdicts",
     "Verdict": "minima.verdicts",
     "Completeness": "polyhedra.atlas",
@@ -69,6 +75,8 @@ __all__ = [
     "Manifold",
     "PolycornerError",
     "Polyhedron",
+    "Proof",
+    "Sensitivity",
     "Skeleton",
     "SmoothFunction",
     "SolverError",
@@ -77,7 +85,9 @@ __all__ = [
     "Verdict",
     "certify",
     "minimise",
+    "prove",
     "resume",
+    "sensitivity",
     "skeleton",
     "stationary_on",
     "stratum_at",

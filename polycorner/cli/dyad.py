@@ -54,13 +54,14 @@ def dyad(config: Path | None, as_json: bool, out: Path | None, **options: float 
 def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[str, Any]:
     import math
 
-    from polycorner.studies import paper_heading
+    from polycorner.studies import critical_rod_radius, paper_heading
 
     return {
         "parameters": parameters(pair),
         "minima": [_entry(entry) for entry in entries],
         "paper_heading_deg": paper_heading(pair),
         "plane_heading_deg": math.degrees(pair.plane_corner()[0]),
+        "critical_rod_radius": critical_rod_radius(pair),
     }
 
 

@@ -1,17 +1,29 @@
 """Questions answered for a model as a whole, and results in files."""
 
+from polycorner.studies.critical import (
+    critical_length,
+    critical_rod_radius,
+    plane_critical_formula,
+)
 from polycorner.studies.dyad import DyadMinimum, dyad_minima, heading_curve, paper_heading
 from polycorner.studies.files import load_atlas, save_atlas
 from polycorner.studies.pair_atlas import PairAtlas, long_rod_length, pair_atlas
+from polycorner.studies.sensitivity import ErrorBar, heading_error_bar, pair_sensitivity
 
 __all__ = [
     "DyadMinimum",
+    "ErrorBar",
     "PairAtlas",
+    "critical_length",
+    "critical_rod_radius",
     "dyad_minima",
     "heading_curve",
+    "heading_error_bar",
     "load_atlas",
     "long_rod_length",
     "pair_atlas",
+    "pair_sensitivity",
     "paper_heading",
+    "plane_critical_formula",
     "save_atlas",
 ]

@@ -11,19 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.geometry.manifold import Array, finite, reals
 from polycorner.models.dumbbell_motions import relabellings
 from polycorner.models.dumbbells import DumbbellPair
-from polycorner.polyhedra.atlas import Completeness, Edge
-from polycorner.polyhedra.orbits import Orbits, orbits
+from polycorner.polyhedra.atlas import Completeness, Edge, Skeleton
+from polycorner.polyhedra.orbits import Orbits
 from polycorner.polyhedra.skeleton import skeleton
-from polycorner.polyhedra.symmetry import Element
 from polycorner.studies.pair_atlas import PairAtlas, long_rod_length, pair_atlas
 
 # Corners nearer to each other than about this, in ball radii, are not told apart reliably; so much
 # may a change that was found be away from where it is.
 BLUR = 2e-5
-STARTS = 4
+STARTS = 3
 
 Counts = tuple[int, int, int]
 Tally = tuple[tuple[str, int], ...]
+Groups = Mapping[str, Orbits]
 Positions = NDArray[np.int64]
 # A rod radius, a bracket of the length, and the signatures below and above.
 Change = tuple[float, tuple[float, float], tuple[int, int]]
@@ -161,14 +161,6 @@ def pair_map(
     ------
     TypeError, ValueError
         For arguments of a wrong kind, shape or range.
-
-    Examples
-    --------
-    >>> found = pair_map([2.5, 3.0], [0.5], tolerance=0.01)
-    >>> [s.labelled for s in found.signatures[:2]]
-    [(8, 12, 4), (16, 28, 12)]
-    >>> bool(found.explained.all())
-    True
     """
     across = _axis("lengths", lengths, lambda x: x >= 2, "at least 2 ball radii")
     up = _axis("rods", rods, lambda x: (x > 0) & (x < 1), "between 0 and 1 ball radius")
@@ -193,14 +185,21 @@ def pair_map(
 
 
 def signature_of(atlas: PairAtlas) -> Signature:
-    """Return what is left of an atlas in the plane without its geometry."""
-    found, up_to_all = atlas.skeleton, atlas.unordered
-    up_to_balls = orbits(found, _within())
+    """Return what is left of an atlas in the plane without its geometry.
+
+    Where relabellings do not carry the atlas to itself, something is missing: it is not sound,
+    and every corner, edge and face counts by itself.
+    """
+    found, single = atlas.skeleton, _single(atlas.skeleton)
+    try:
+        ordered, unordered = atlas.ordered, atlas.unordered
+    except ValueError:
+        return Signature(_sizes(single), _sizes(single), _pattern(atlas, single), sound=False)
     whole = found.complete is Completeness.EXHAUSTED and found.components.get(6) == 1
     return Signature(
-        labelled=(len(found.corners), len(found.edges), len(found.faces)),
-        ordered=_sizes(up_to_balls),
-        pattern=_pattern(atlas, up_to_all["corners"], up_to_all["edges"], len(up_to_all["faces"])),
+        labelled=_sizes(single),
+        ordered=_sizes(ordered),
+        pattern=_pattern(atlas, unordered),
         sound=whole and found.euler_characteristic == 0,
     )
 
@@ -214,14 +213,17 @@ def pattern_at(length: float, rod_radius: float, *, seed: int = 0) -> Pattern:
         In ball radii.
     seed : int, optional
         For the placements it starts from.
+
+    Examples
+    --------
+    >>> [pattern_at(length, 0.5).counts for length in (2.6, 2.7)]
+    [(2, 2, 1), (4, 5, 2)]
     """
     pair = DumbbellPair(length, 1.0, rod_radius)
     starts = pair.placements(np.random.default_rng(seed), STARTS)
     symmetry = replace(pair.symmetry, elements=relabellings())
     found = skeleton(pair.polyhedron, starts, symmetry=symmetry)
-    corners = tuple((k,) for k in range(len(found.corners)))
-    edges = tuple((k,) for k in range(len(found.edges)))
-    return _pattern(PairAtlas(pair, found, None), corners, edges, len(found.faces))
+    return _pattern(PairAtlas(pair, found, None), _single(found))
 
 
 class _Survey:
@@ -283,16 +285,21 @@ class _Survey:
             self.progress(self.done, self.expected)
 
 
-def _pattern(atlas: PairAtlas, corners: Orbits, edges: Orbits, faces: int) -> Pattern:
+def _pattern(atlas: PairAtlas, groups: Groups) -> Pattern:
     found = atlas.skeleton
-    kinds = Counter(atlas.kind(found.corners[group[0]]) for group in corners)
-    motions = Counter(_motion(atlas, found.edges[group[0]]) for group in edges)
-    counts = (len(corners), len(edges), faces)
-    return Pattern(counts, tuple(sorted(kinds.items())), tuple(sorted(motions.items())))
+    kinds = Counter(atlas.kind(found.corners[group[0]]) for group in groups["corners"])
+    motions = Counter(_motion(atlas, found.edges[group[0]]) for group in groups["edges"])
+    return Pattern(_sizes(groups), tuple(sorted(kinds.items())), tuple(sorted(motions.items())))
 
 
-def _sizes(found: Mapping[str, Orbits]) -> Counts:
-    return len(found["corners"]), len(found["edges"]), len(found["faces"])
+def _single(found: Skeleton) -> Groups:
+    """Return every corner, edge and face as a group by itself."""
+    parts = {"corners": found.corners, "edges": found.edges, "faces": found.faces}
+    return {kind: tuple((k,) for k in range(len(part))) for kind, part in parts.items()}
+
+
+def _sizes(groups: Groups) -> Counts:
+    return len(groups["corners"]), len(groups["edges"]), len(groups["faces"])
 
 
 def _motion(atlas: PairAtlas, edge: Edge) -> str:
@@ -300,11 +307,6 @@ def _motion(atlas: PairAtlas, edge: Edge) -> str:
     ends = sorted("none" if k is None else atlas.kind(corners[k]) for k in edge.ends)
     lengths = Counter(len(name) for name in edge.active)
     return f"{lengths[4]}{lengths[3]}{lengths[2]} {' '.join(ends)}"
-
-
-def _within() -> tuple[Element, ...]:
-    """Return the relabellings that do not exchange the dumbbells."""
-    return tuple(g for g in relabellings() if g.names["A1b"].startswith("A"))
 
 
 def _axis(

@@ -48,7 +48,14 @@ def answer(capsys, *arguments):
 
 def test_json_has_the_promised_fields(capsys):
     found = answer(capsys)
-    assert set(found) == {"parameters", "minima", "paper_heading_deg", "plane_heading_deg"}
+    assert set(found) == {
+        "parameters",
+        "minima",
+        "paper_heading_deg",
+        "plane_heading_deg",
+        "critical_rod_radius",
+    }
+    assert found["critical_rod_radius"] == pytest.approx(6 * math.sqrt(1 - (3 / 16) ** 2) - 3)
     assert [m["name"] for m in found["minima"]] == ["delta_R", "delta_L", "G"]
     for minimum in found["minima"]:
         assert set(minimum) >= FIELDS
