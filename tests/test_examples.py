@@ -7,14 +7,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from examples import ex01_heading, ex02_own_polyhedron, ex03_ridge
+from examples import (
+    ex01_heading,
+    ex02_own_polyhedron,
+    ex03_ridge,
+    ex04_tutorial,
+    ex05_solid,
+    ex06_disks,
+    ex07_pinball,
+    ex08_rods,
+    ex09_spheres,
+    ex10_critical_rod,
+)
+from polycorner import LocalType
 
 ROOT = Path(__file__).parents[1]
 
 
 def test_every_example_has_a_test():
     files = {path.stem for path in (ROOT / "examples").glob("ex*.py")}
-    assert files == {"ex01_heading", "ex02_own_polyhedron", "ex03_ridge"}
+    assert files == {name for name in globals() if name.startswith("ex")}
 
 
 def test_heading():
@@ -42,6 +54,58 @@ def test_ridge():
     np.testing.assert_allclose(rest.point, [0.0, -2.0], atol=1e-12)
     assert rest.is_minimum
     assert not corner.is_minimum
+
+
+def test_tutorial():
+    result = ex04_tutorial.main()
+    assert "".join(result.corners) == "ABCDEFG"
+    assert result.atlas.euler_characteristic == 1
+    assert all(c.local_type is LocalType.QUADRANT for c in result.corners.values())
+    assert not ex04_tutorial.REGION.polyhedron.contains(result.middle)
+    assert [name for name, c in result.heights.items() if c.is_minimum] == ["A", "B"]
+
+
+def test_solid():
+    result = ex05_solid.main()
+    assert (result.euler_characteristic, result.allowed_components) == (0, 1)
+    assert result.edge_error < 1e-12
+
+
+def test_disks():
+    found = ex06_disks.main()
+    indices = [index for _, index in found[3, "hexagonal"]]
+    signed = sum((-1) ** k * n for k, n in zip(indices, ex06_disks.COPIES, strict=True))
+    assert signed == 2
+    assert found[2, "square"][0][0] == pytest.approx(math.sqrt(2) / 4)
+
+
+def test_pinball():
+    result = ex07_pinball.main()
+    assert all(rest.is_minimum for group in result.rests.values() for rest in group)
+    kinds = {result.entrapment(name) for name in result.rests}
+    assert kinds == {"2 half-V", "half-V + U", "half-V + half-U", "half-V + free"}
+    assert not any(c.is_minimum for c in result.concave)
+    assert all(c.stratum.local_type is LocalType.UNION for c in result.concave)
+    assert result.atlas.euler_characteristic == -7
+
+
+def test_rods():
+    result = ex08_rods.main()
+    low, high = result.bracket
+    assert low < result.closed_form < high
+    assert high - low < 0.01
+
+
+def test_spheres():
+    result = ex09_spheres.main()
+    assert [len(result.atlas.corners), len(result.atlas.edges)] == [2, 5]
+    assert sorted(row.order for row in result.table) == [4, 48]
+
+
+def test_critical_rod():
+    result = ex10_critical_rod.main()
+    assert result.newton == pytest.approx(result.closed_form, abs=1e-9)
+    assert result.bisection == pytest.approx(result.closed_form, abs=1e-9)
 
 
 def test_readme_code_runs_as_printed():

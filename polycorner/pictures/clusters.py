@@ -1,0 +1,306 @@
+"""Clusters of spheres: balls joined by bars where they touch, and the motions between them."""
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.path import Path
+from numpy.typing import ArrayLike
+
+from polycorner.geometry.manifold import Array, finite, reals
+from polycorner.models.spheres import SphereCluster
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+
+BALL, SINGULAR_BALL = "#56B4E9", "#E69F00"  # Okabe and Ito
+BAR, OPENING, CLOSING = "0.25", "#D55E00", "#009E73"
+RADIUS = 0.3  # of a drawn ball, in diameters of a sphere: small enough to show the contacts
+THICKNESS = 0.09  # of a bar
+CLOSE = 1e-6  # distance from touching within which a contact is drawn, and symmetry is seen
+RINGS = (24, 12)  # circles that shade a ball: in one of a few pictures, in one of many
+LIGHT = np.array([-0.3, 0.35])  # where a ball is brightest, in radii from its middle
+FOG, HAZE = 0.45, 1.5  # how far a ball fades at most, and how deep it lies then
+TILTS = np.radians(np.arange(-40, 41, 5))  # turns tried on top of the principal axes
+NEWTON = 6  # steps that take a point of a chord, however long, to rounding
+CELL = (1.9, 1.5)  # inches across a picture: the same
+FEW = 12
+
+Pair = tuple[int, int]
+Layer = tuple[float, Path, Array]
+
+
+def draw_clusters(
+    model: SphereCluster,
+    points: ArrayLike,
+    *,
+    labels: Sequence[str] | None = None,
+    singular: Collection[int] = (),
+) -> Figure:
+    """Draw clusters side by side, each turned so that few spheres hide each other.
+
+    Spheres are drawn smaller than they are and joined by a bar where they touch; far ones are
+    paler.  All clusters have the same scale.  A caption has the label and the order of the
+    symmetry group: how many relabellings leave all distances as they are.
+
+    Parameters
+    ----------
+    model : SphereCluster
+        The number of spheres.
+    points : (k, 3 n) array
+        Clusters, in diameters; a single one may be ``(3 n,)``.
+    labels : sequence of str, optional
+        Their names; default ``C0 C1 ...`` as in an atlas.
+    singular : collection of int, optional
+        Positions of singular clusters, drawn in another colour and said to be so.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a model, points, labels or positions that are not what is said here.
+    """
+    clusters = _clusters(model, "points", points)
+    names = _names(labels, len(clusters))
+    special = _positions(singular, len(clusters))
+    shapes = [_turned(q.reshape(1, -1, 3))[0] for q in clusters]
+    figure, grid = _grid(len(clusters), shapes, lines=2 if special else 1)
+    for k, (axes, q, shape) in enumerate(zip(grid, clusters, shapes, strict=True)):
+        bars = dict.fromkeys(_touching(model, q), BAR)
+        colour = SINGULAR_BALL if k in special else BALL
+        _draw(axes, shape, bars, colour, RINGS[len(clusters) > FEW])
+        order = len(model.symmetry.relabellings(model.manifold, q, q, CLOSE))
+        remark = "\nsingular" if k in special else ""
+        axes.set_title(f"{names[k]}  order {order}{remark}", fontsize=9, pad=2)
+    kinds = f"{len(clusters)} clusters" if len(clusters) > 1 else "A cluster"
+    title = f"{kinds} of {model.count} spheres, with the order of the symmetry group"
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def draw_motion(model: SphereCluster, polyline: ArrayLike, frames: int = 6) -> Figure:
+    """Draw frames of a one-dimensional motion, from one end to the other by arc length.
+
+    A contact that holds all along has a dark bar; one that opens at the beginning or closes at
+    the end has a bar of its own colour there and is named in the caption.
+
+    Parameters
+    ----------
+    model : SphereCluster
+        The number of spheres.
+    polyline : (k, 3 n) array
+        Points along an edge, at least two, as in ``Edge.polyline``.
+    frames : int, optional
+        Number of pictures, at least 2.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For a model, polyline or number of frames that is not what is said here.
+    """
+    line = _clusters(model, "polyline", polyline)
+    if len(line) < 2:
+        msg = f"polyline: expected at least two points; got {len(line)}"
+        raise ValueError(msg)
+    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
+        msg = f"frames: expected a whole number of at least 2; got {frames!r}"
+        raise ValueError(msg)
+    held = set.intersection(*(set(_touching(model, q)) for q in line))
+    places, moments = _sampled(model, line, held, frames)
+    opening, closing = (sorted(set(_touching(model, q)) - held) for q in (line[0], line[-1]))
+    events = {0: (opening, OPENING, "opening"), frames - 1: (closing, CLOSING, "closing")}
+    shown = [(k, pair) for k, (changed, *_) in events.items() for pair in changed]
+    shapes = _turned(places.reshape(frames, -1, 3), shown)
+    figure, grid = _grid(frames, list(shapes), lines=2, columns=frames)
+    for k, (axes, shape) in enumerate(zip(grid, shapes, strict=True)):
+        changed, colour, verb = events.get(k, ([], BAR, ""))
+        bars = dict.fromkeys(sorted(held), BAR) | dict.fromkeys(changed, colour)
+        _draw(axes, shape, bars, BALL, RINGS[frames > FEW])
+        remark = f"{verb} {_named(changed)}" if changed else ""
+        axes.set_title(f"{moments[k]:.2f}\n{remark}", fontsize=9, pad=2)
+    figure.suptitle("A motion by arc length, in diameters", fontsize=10)
+    return figure
+
+
+# ------------------------------------------------------------------------------------------ shapes
+
+
+def _touching(model: SphereCluster, q: Array) -> list[Pair]:
+    i, j = np.nonzero(np.triu(model.contacts(q, tolerance=CLOSE)))
+    return list(zip(i.tolist(), j.tolist(), strict=True))
+
+
+def _named(pairs: Sequence[Pair]) -> str:
+    """Return contacts as a model calls them, or their number if a caption has no room."""
+    if len(pairs) > 3:
+        return f"{len(pairs)} contacts"
+    return ", ".join(f"{i + 1}-{j + 1}" for i, j in pairs)
+
+
+def _turned(shapes: Array, shown: Iterable[tuple[int, Pair]] = ()) -> Array:
+    """Return clusters ``(k, n, 3)``, turned together: across, upwards, and towards the eye.
+
+    The principal axes of all centres come first, the longest across.  Of some further turns the
+    one is taken that leaves the most between those centres that are nearest to each other on
+    the page; the middle of a bar that must be seen in some picture counts as a centre there.
+    """
+    centred = shapes - shapes.mean(axis=1, keepdims=True)
+    _, _, axes = np.linalg.svd(centred.reshape(-1, 3), full_matrices=False)
+    # The sign of each axis follows from the shape, so that a turned copy is drawn alike.
+    skewness = ((centred.reshape(-1, 3) @ axes[:2].T) ** 3).sum(axis=0)
+    long, middle = np.where(skewness < 0, -1, 1)[:, None] * axes[:2]
+    principal = centred @ np.array([long, middle, np.cross(long, middle)]).T
+    i, j = np.triu_indices(principal.shape[1], 1)
+    apart = [(principal[:, i] - principal[:, j]).reshape(-1, 3)]
+    apart += [principal[k] - principal[k, pair].mean(axis=0) for k, pair in shown]
+    turns = np.array([_turn(a, b) for a in TILTS for b in TILTS])
+    page = np.concatenate(apart) @ turns[:, :2].transpose(0, 2, 1)
+    clear = (page**2).sum(axis=-1).min(axis=-1)
+    # The first of several that are equally good, whatever the rounding.
+    best = turns[np.flatnonzero(clear > clear.max() - 1e-9)[0]]
+    found = principal @ best.T
+    return np.asarray(found - (found.min(axis=(0, 1)) + found.max(axis=(0, 1))) / 2)
+
+
+def _turn(a: float, b: float) -> Array:
+    """Return the rotation by ``b`` about the upward axis, then ``a`` about the one across."""
+    up = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
+    across = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
+    return np.asarray(across @ up)
+
+
+def _sampled(
+    model: SphereCluster, line: Array, held: Iterable[Pair], frames: int
+) -> tuple[Array, Array]:
+    """Return points of an edge at equal steps of arc length, and the arc lengths.
+
+    A point of a chord is off the edge by its sagitta; Newton steps close the contacts again.
+    """
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    lengths = np.concatenate([[0.0], np.cumsum(steps)])
+    moments = np.linspace(0, lengths[-1], frames)
+    places = np.stack([np.interp(moments, lengths, column) for column in line.T], axis=-1)
+    rows = [model.pairs.index(pair) for pair in sorted(held)]
+    for k in range(1, frames - 1):
+        places[k] = _closed(model, places[k], rows)
+    return places, moments
+
+
+def _closed(model: SphereCluster, q: Array, rows: list[int]) -> Array:
+    """Return a point near ``q`` at which the gaps of some contacts vanish."""
+    for _ in range(NEWTON if rows else 0):
+        gaps, slopes = model.polyhedron.values(q)[rows], model.polyhedron.gradients(q)[rows]
+        q = q - np.linalg.lstsq(slopes, gaps, rcond=RANK_TOLERANCE)[0]
+    return q
+
+
+# ----------------------------------------------------------------------------------------- drawing
+
+
+def _grid(
+    count: int, shapes: Sequence[Array], *, lines: int, columns: int | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Return axes in rows, all of the same scale."""
+    columns = columns or _columns(count)
+    rows = math.ceil(count / columns)
+    reach = np.max([abs(shape[:, :2]).max(axis=0) for shape in shapes], axis=0) + 1.1 * RADIUS
+    width = CELL[0] if count <= FEW else CELL[1]
+    height = width * reach[1] / reach[0] + 0.16 * lines + 0.1
+    figure = Figure(figsize=(max(width * columns, 5.0), height * rows + 0.4), layout="constrained")
+    grid: list[Axes] = []
+    for k in range(count):
+        axes = figure.add_subplot(rows, columns, k + 1)
+        axes.set(xlim=(-reach[0], reach[0]), ylim=(-reach[1], reach[1]))
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        grid.append(axes)
+    return figure, grid
+
+
+def _columns(count: int) -> int:
+    """Return a number of columns, rather more than rows, that leaves few places empty."""
+    if count <= 4:
+        return count
+    wide = range(math.ceil(math.sqrt(1.2 * count)), math.floor(math.sqrt(2.2 * count)) + 1)
+    return min(wide, key=lambda columns: -count % columns)
+
+
+def _draw(axes: Axes, shape: Array, bars: dict[Pair, str], colour: str, rings: int) -> None:
+    """Draw a cluster from far to near."""
+    layers: list[Layer] = []
+    near = float(shape[:, 2].max())
+    for centre in shape:
+        layers += _ball(centre, _faded(colour, near - centre[2]), rings)
+    for (i, j), shade in bars.items():
+        depth = near - (shape[i, 2] + shape[j, 2]) / 2
+        layers += _bar(shape[i], shape[j], _faded(shade, depth))
+    layers.sort(key=lambda layer: layer[0])
+    shades = np.array([shade for *_, shade in layers])
+    pieces = PathCollection([path for _, path, _ in layers], facecolors=shades, linewidths=0)
+    axes.add_collection(pieces, autolim=False)
+
+
+def _ball(centre: Array, colour: Array, rings: int) -> Iterator[Layer]:
+    """Yield the circles of a ball, dark and large to bright and small."""
+    for t in np.linspace(0, 1, rings, endpoint=False):
+        middle = centre[:2] + t * RADIUS * LIGHT
+        dark = colour * (0.45 + 0.55 * math.sqrt(min(1.0, 1.6 * t)))
+        shade = dark + (1 - dark) * 0.85 * t**3
+        yield float(centre[2]), Path.circle(tuple(middle), RADIUS * (1 - t)), shade
+
+
+def _bar(one: Array, other: Array, colour: Array) -> Iterator[Layer]:
+    """Yield the halves of a bar between the surfaces of two balls, none if it is seen end on."""
+    along = (other - one) / np.linalg.norm(other - one)
+    seen = math.hypot(along[0], along[1])
+    if seen < 1e-6:
+        return
+    side = THICKNESS / 2 / seen * np.array([-along[1], along[0]])
+    start, end = one + 0.9 * RADIUS * along, other - 0.9 * RADIUS * along
+    middle = (start + end) / 2
+    over = 0.02 * along
+    for a, b in ((start, middle + over), (middle - over, end)):
+        for share, lit in ((1.0, 0.0), (0.45, 0.45)):
+            s = share * side
+            outline = [a[:2] + s, b[:2] + s, b[:2] - s, a[:2] - s]
+            yield float(a[2] + b[2]) / 2, Path(outline), colour + lit * (1 - colour)
+
+
+def _faded(colour: str, depth: float) -> Array:
+    rgb = np.array(to_rgb(colour))
+    return np.asarray(rgb + FOG * min(1.0, depth / HAZE) * (1 - rgb))
+
+
+# --------------------------------------------------------------------------------------- arguments
+
+
+def _clusters(model: Any, argument: str, given: ArrayLike) -> Array:
+    if not isinstance(model, SphereCluster):
+        msg = f"model: expected a SphereCluster; got {type(model).__name__}"
+        raise TypeError(msg)
+    points = np.atleast_2d(finite(reals(given, argument), argument))
+    if points.ndim != 2 or points.shape[1] != 3 * model.count or not len(points):
+        msg = (
+            f"{argument}: expected points of shape (k, {3 * model.count}) with k >= 1; "
+            f"got shape {points.shape}"
+        )
+        raise ValueError(msg)
+    return points
+
+
+def _names(labels: Sequence[str] | None, count: int) -> list[str]:
+    names = [f"C{k}" for k in range(count)] if labels is None else list(labels)
+    if len(names) != count:
+        msg = f"labels: expected one for each of {count} clusters; got {len(names)}"
+        raise ValueError(msg)
+    return names
+
+
+def _positions(singular: Collection[int], count: int) -> set[int]:
+    positions = set(singular)
+    if not positions <= set(range(count)):
+        msg = f"singular: expected positions from 0 to {count - 1}; got {sorted(positions)}"
+        raise ValueError(msg)
+    return positions
