@@ -322,8 +322,7 @@ class Explorer:
             return
         edge = self._edge_at(walk.frame, active)
         if edge is not None:
-            inner = walk.points[len(walk.points) // 2]
-            self.passages.append(Passage(self.flag(k, face), self._flag_of(edge, face), inner))
+            self.passages.append(Passage(self.flag(k, face), self._flag_of(edge, face)))
 
     def flag(self, k: int, face: frozenset[int]) -> Flag:
         """Return the flag of an edge and a face beside it."""

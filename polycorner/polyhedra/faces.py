@@ -23,7 +23,6 @@ class Passage:
 
     start: Flag
     stop: Flag
-    inner: Array
 
 
 class Forest:

@@ -44,7 +44,7 @@ def save_atlas(atlas: Skeleton, path: str | os.PathLike[str]) -> Path:
         "corners": [place.spot.q.tolist() for place in explorer.places],
         "ends": [[[ray, edge] for ray, edge in p.edges.items()] for p in explorer.places],
         "curves": [_curve(curve) for curve in explorer.curves],
-        "passages": [[_flag(p.start), _flag(p.stop), p.inner.tolist()] for p in explorer.passages],
+        "passages": [[_flag(p.start), _flag(p.stop)] for p in explorer.passages],
         "seeds": [[number, seed.tolist()] for number, seed in explorer.seeds],
         "pending": list(explorer.pending),
         "shot": [[edge, sorted(face)] for edge, face in explorer.shot],
@@ -103,8 +103,7 @@ def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
         place.edges.update(dict(ends))
     explorer.curves += [_read_curve(entry) for entry in content["curves"]]
     explorer.passages += [
-        Passage(_read_flag(start), _read_flag(stop), np.array(inner))
-        for start, stop, inner in content["passages"]
+        Passage(_read_flag(start), _read_flag(stop)) for start, stop in content["passages"]
     ]
     explorer.seeds.extend((number, np.array(seed)) for number, seed in content["seeds"])
     explorer.pending.extend((corner, ray) for corner, ray in content["pending"])

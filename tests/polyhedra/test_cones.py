@@ -1,4 +1,7 @@
-"""Ranks, null spaces and inward directions of cones given by their facets' normals."""
+"""Ranks, null spaces, inward directions and rays of cones given by their facets' normals."""
+
+import itertools
+from fractions import Fraction
 
 import numpy as np
 import oracles
@@ -7,7 +10,14 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from polycorner.polyhedra.cones import inward_direction, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import (
+    extreme_rays,
+    independent_rows,
+    inward_direction,
+    null_space,
+    rank,
+    unit_rows,
+)
 
 
 def integer_matrices(rows, columns):
@@ -77,3 +87,114 @@ def test_an_inward_direction_lies_in_the_equations():
     d, rate = inward_direction(np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 1.0]]))
     assert rate == pytest.approx(1)
     assert d[0] == pytest.approx(-d[2])
+
+
+class TestIndependentRows:
+    @given(integer_matrices((1, 6), (1, 5)))
+    def test_they_are_independent_and_span_the_rows(self, matrix):
+        units = unit_rows(matrix)
+        chosen = independent_rows(units, 1e-8)
+        full = oracles.exact_rank(matrix)
+        assert len(chosen) == len(set(chosen)) == full
+        if chosen:
+            assert oracles.exact_rank(matrix[chosen]) == full
+
+    @given(arrays(np.float64, (5, 3), elements=st.floats(-1, 1)))
+    def test_the_first_is_the_longest_and_what_is_left_shrinks(self, matrix):
+        assume(np.linalg.norm(matrix, axis=1).max() > 0.1)
+        chosen = independent_rows(matrix, 1e-6)
+        sizes = np.linalg.norm(matrix, axis=1)
+        assert sizes[chosen[0]] == sizes.max()
+        left = []
+        for k, row in enumerate(chosen):
+            before = np.linalg.qr(matrix[chosen[:k]].T)[0] if k else np.zeros((3, 0))
+            left.append(np.linalg.norm(matrix[row] - before @ (before.T @ matrix[row])))
+        assert all(a >= b - 1e-9 for a, b in itertools.pairwise(left))
+        assert min(left) > 1e-6
+
+    def test_nothing_is_chosen_from_nothing(self):
+        assert independent_rows(np.empty((0, 3)), 1e-8) == []
+        assert independent_rows(np.zeros((2, 3)), 1e-8) == []
+
+
+def exact_rays(rows):
+    """Return the extreme rays of ``{d : rows d >= 0}`` and their tight rows, in the fractions.
+
+    A ray is the null line of ``n - 1`` independent rows, in the direction that all rows allow.
+    """
+    rows = [[Fraction(int(x)) for x in row] for row in rows]
+    n = len(rows[0])
+    found = {}
+    for chosen in itertools.combinations(rows, n - 1):
+        minors = [
+            (-1) ** k * _determinant([[x for j, x in enumerate(row) if j != k] for row in chosen])
+            for k in range(n)
+        ]
+        if not any(minors):
+            continue
+        for sign in (1, -1):
+            slopes = [sign * sum(a * d for a, d in zip(row, minors, strict=True)) for row in rows]
+            if min(slopes) >= 0:
+                d = np.array([float(sign * x) for x in minors])
+                tight = frozenset(i for i, slope in enumerate(slopes) if slope == 0)
+                found[tight] = d / np.linalg.norm(d)
+    return found
+
+
+def _determinant(rows):
+    if not rows:
+        return Fraction(1)
+    return sum(
+        (-1) ** k * x * _determinant([[y for j, y in enumerate(r) if j != k] for r in rows[1:]])
+        for k, x in enumerate(rows[0])
+    )
+
+
+class TestExtremeRays:
+    @given(st.integers(2, 4).flatmap(lambda n: integer_matrices((n, n + 5), (n, n))))
+    def test_they_are_those_found_by_trying_every_line(self, matrix):
+        """Whatever the cone: simplicial, not simplicial, flat, a single ray, the origin alone."""
+        matrix = matrix[abs(matrix).sum(axis=1) > 0]
+        n = matrix.shape[1]
+        assume(len(matrix) > 0)
+        assume(oracles.exact_rank(matrix) == n)
+        expected = exact_rays(matrix)
+        found = extreme_rays(matrix, 1e-9)
+        assert sorted(map(sorted, (tight for _, tight in found))) == sorted(map(sorted, expected))
+        for d, tight in found:
+            np.testing.assert_allclose(d, expected[tight], atol=1e-12)
+
+    @pytest.mark.parametrize("sides", [3, 4, 6, 11])
+    def test_a_round_cone_has_as_many_rays_as_sides(self, sides):
+        angles = 2 * np.pi * np.arange(sides) / sides
+        rows = np.column_stack([np.cos(angles), np.sin(angles), np.ones(sides)])
+        found = extreme_rays(rows, 1e-9)
+        assert len(found) == sides
+        assert {tight for _, tight in found} == {
+            frozenset((k, (k + 1) % sides)) for k in range(sides)
+        }
+        for d, _ in found:
+            assert np.linalg.norm(d) == pytest.approx(1)
+            assert (rows @ d).min() > -1e-12
+
+    @given(integer_matrices((4, 7), (3, 3)), st.permutations(range(7)), st.floats(0.01, 100))
+    def test_order_and_length_of_the_rows_do_not_matter(self, matrix, order, size):
+        matrix = matrix[abs(matrix).sum(axis=1) > 0]
+        assume(len(matrix) > 0)
+        assume(oracles.exact_rank(matrix) == 3)
+        order = [k for k in order if k < len(matrix)]
+        one = {tight: d for d, tight in extreme_rays(matrix, 1e-9)}
+        other = {
+            frozenset(order[k] for k in tight): d
+            for d, tight in extreme_rays(size * matrix[order], 1e-9)
+        }
+        assert one.keys() == other.keys()
+        for tight, d in one.items():
+            np.testing.assert_allclose(other[tight], d, atol=1e-12)
+
+    def test_the_cone_over_a_cube(self):
+        """The cone over a cube, from its six facets: a ray through every corner."""
+        rows = np.array([[*(s * e), 1] for s in (1, -1) for e in np.eye(3)])
+        found = extreme_rays(rows, 1e-9)
+        corners = {tuple((d[:3] / d[3]).round(9)) for d, _ in found}
+        assert corners == set(itertools.product((1.0, -1.0), repeat=3))
