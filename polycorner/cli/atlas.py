@@ -1,6 +1,7 @@
 """``polycorner atlas``: corners, edges and faces of a model, and how they hang together."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from polycorner.cli.search import Search
 
 # Random points that a search in the plane falls from.
 STARTS = 60
+UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
 # Corners above which a picture is clearer without their numbers.
 CROWDED = 12
 EPILOG = """\b
@@ -72,9 +74,13 @@ def dyad(
     )
     whole = PairAtlas(pair, found, None if pair.is_plane else angle)
     extra: dict[str, Any] = {"components": keys(whole.components)}
-    if search.finished:
-        extra["components_ordered"] = keys(whole.components_ordered)
-        extra["components_unordered"] = keys(whole.components_unordered)
+    try:
+        if search.finished:
+            extra["components_ordered"] = keys(whole.components_ordered)
+            extra["components_unordered"] = keys(whole.components_unordered)
+    except ValueError:
+        search.drawn = False
+        found = replace(found, notes=(*found.notes, UNMATCHED))
     answer = search.answer(found, extra, names=[whole.kind(c) for c in found.corners])
     for corner in answer["corners"]:
         corner["dimension"] += 0 if pair.is_plane else 1
@@ -89,7 +95,7 @@ def dyad(
             *pair_solid.write_solid(whole, folder),
         ]
 
-    search.finish(answer, as_json=as_json, draw=draw if search.finished else None)
+    search.finish(answer, as_json=as_json, draw=draw)
 
 
 @atlas.command()
@@ -157,7 +163,7 @@ def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) ->
     from polycorner.models.disks import TorusDisks
 
     try:
-        model = TorusDisks(count, torus)
+        model = TorusDisks(count, "hexagonal" if torus == "hexagonal" else "square")
     except (TypeError, ValueError) as error:
         fail(f"--{error}")
     search = Search("disks", {"count": count, "torus": torus}, out, seed, 1)

@@ -35,7 +35,7 @@ class Search:
             fail(f"--budget: expected a positive number of edges; got {budget}")
         self.model, self.parameters, self.out = model, chosen, out
         self.seed, self.budget = seed, budget
-        self.finished, self.interrupted = True, False
+        self.finished, self.interrupted, self.drawn = True, False, True
 
     @property
     def state(self) -> Path:
@@ -80,11 +80,12 @@ class Search:
                 save_atlas(found, self.state)
                 found = go_on(found, budget=min(CHUNK, left), progress=progress)
                 left -= CHUNK
-        self.finished = found.complete in (Completeness.EXHAUSTED, Completeness.SEEDS)
+        self.finished = found.complete not in (Completeness.BUDGET, Completeness.INTERRUPTED)
         if self.finished:
             self.state.unlink(missing_ok=True)
         else:
             save_atlas(found, self.state)
+        self.drawn = self.finished
         self.interrupted = found.complete is Completeness.INTERRUPTED
         return found
 
@@ -197,7 +198,7 @@ class Search:
                 file.write_text(json_text(answer) + "\n", encoding="utf-8")
             except OSError as error:
                 fail(f"--out: {self.out} cannot be written ({error.strerror})")
-            written = [file, *(draw(self.out) if draw is not None else [])]
+            written = [file, *(draw(self.out) if draw is not None and self.drawn else [])]
         if as_json:
             click.echo(json_text(answer))
         else:

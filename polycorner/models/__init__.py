@@ -1,6 +1,7 @@
 """Worked systems, one file each; the core never imports them."""
 
-from polycorner.models.disks import CriticalConfiguration, TorusDisks
+from polycorner.models.disk_critical import CriticalConfiguration
+from polycorner.models.disks import TorusDisks
 from polycorner.models.dumbbell_formulas import plane_heading_formula
 from polycorner.models.dumbbells import DumbbellPair
 from polycorner.models.pinball import Pinball

@@ -59,6 +59,20 @@ def plane_energy() -> functions.Family:
     return _family(("trough",), PLANE, ("l", "w"), _plane_heights)
 
 
+@lru_cache(maxsize=1)
+def mean_heading() -> functions.Family:
+    """Return ``sin((theta1 + theta2)/2 - h)``; parameter ``h``, in radians."""
+    key = repr((kernels.source_key(__name__), "heading"))
+    return functions.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key)
+
+
+def _mean_heading() -> "Formulas":
+    import sympy
+
+    first, second, h = _symbols("theta1 theta2 h")
+    return {}, {"heading": sympy.sin((first + second) / 2 - h)}
+
+
 def _family(
     names: tuple[str, ...],
     coordinates: tuple[str, ...],

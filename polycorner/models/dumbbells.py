@@ -120,14 +120,16 @@ class DumbbellPair:
         is given modulo half a turn.  Modulo the symmetry, relative placements in three dimensions
         remain, each of them once.
         """
-        import sympy
-
-        angle = sympy.Float(_number("heading", heading))
-        mean = (sympy.Symbol("theta1", real=True) + sympy.Symbol("theta2", real=True)) / 2
+        mean = SmoothFunction.member(
+            formulas.mean_heading(),
+            "heading",
+            self.manifold,
+            parameters=(_number("heading", heading),),
+        )
         return Polyhedron(
             self.manifold,
             AllOf(*self.polyhedron.functions),
-            {"heading": sympy.sin(mean - angle)},
+            mean,
             annotations=self.polyhedron.annotations,
         )
 

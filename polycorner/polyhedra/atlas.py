@@ -19,6 +19,7 @@ class Completeness(Enum):
     """How complete an atlas is; the value says it in a sentence."""
 
     EXHAUSTED = "everything that was met has been walked; what nothing led to stays unseen"
+    GAPS = "some edges could not be followed: the notes say which"
     BUDGET = "the budget was used up: edges are left to walk"
     INTERRUPTED = "interrupted: edges are left to walk"
     SEEDS = "no start leads to an edge or a corner: nothing to walk"

@@ -18,6 +18,8 @@ from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, lo
 from polycorner.polyhedra.symmetry import Symmetry
 
 EXACT = 1e-13
+# Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
+SINGULAR = 1e-14
 LAST = 1e-8
 NEWTON = 8
 
@@ -143,7 +145,7 @@ def settle(ground: Ground, q: Array, kept: Sequence[int], reach: float) -> Frame
     moved, last = 0.0, math.inf
     for _ in range(NEWTON):
         frame = Frame(ground, q, kept)
-        if not frame.finite or frame.condition == 0.0:
+        if not frame.finite or frame.condition < SINGULAR:
             return None
         step = frame.correction()
         size = math.sqrt(float(step @ step))

@@ -15,9 +15,9 @@ from polycorner.geometry.manifold import Array
 from polycorner.polyhedra.atlas import Completeness
 from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.curves import Frame, Ground, Spot, settle
-from polycorner.polyhedra.faces import Flag, Passage, inward
+from polycorner.polyhedra.faces import Flag, Passage
 from polycorner.polyhedra.places import Place, Places
-from polycorner.polyhedra.rays import Ray
+from polycorner.polyhedra.rays import Ray, faces_beside
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.polyhedra.walks import End, Walk, follow
@@ -43,6 +43,7 @@ class Curve:
     relabelled: Relabelling
     length: float
     branches: int
+    beside: dict[frozenset[int], Ray] | None = None
 
     @property
     def middle(self) -> Array:
@@ -79,7 +80,9 @@ class Explorer:
                     progress(len(self.places), len(self.curves), len(self.pending))
         except KeyboardInterrupt:
             return Completeness.INTERRUPTED
-        return Completeness.EXHAUSTED if self.curves or self.places else Completeness.SEEDS
+        if not self.curves and not self.places:
+            return Completeness.SEEDS
+        return Completeness.GAPS if self.register.lost else Completeness.EXHAUSTED
 
     def _tasks(self) -> Iterator[Callable[[], None]]:
         """Yield what to do next; a task leaves the lists only once it is done."""
@@ -144,10 +147,12 @@ class Explorer:
         label = self.register.written(curve.active)
         for kind in curve.kinds:
             if kind not in (End.CORNER, End.CLOSED):
-                self.register.note(f"the edge {label} {kind.value}")
+                lost = kind is End.SINGULAR
+                self.register.note(f"the edge {label} {kind.value}", lost=lost)
         if curve.branches:
             self.register.note(
-                f"the edge {label} meets other curves on the same functions: not followed"
+                f"the edge {label} meets other curves on the same functions: not followed",
+                lost=True,
             )
 
     def _arrive(self, walk: Walk, ray: Ray) -> tuple[Half | None, Relabelling]:
@@ -170,7 +175,8 @@ class Explorer:
         if match is None:
             self.register.note(
                 f"the edge {self.register.written(ray.active)} arrives at a corner "
-                f"that no edge of this kind leaves"
+                f"that no edge of this kind leaves",
+                lost=True,
             )
             return None, {}
         return (k, match[0]), match[1]
@@ -295,26 +301,17 @@ class Explorer:
                 if (k, face) not in self.shot:
                     yield k, face
 
-    def faces_beside(self, curve: Curve) -> list[frozenset[int]]:
-        """Return the active sets of the two-dimensional faces that meet an edge."""
-        if curve.start is not None:
-            k, i = curve.start
-            return list({s.active for s in self.places[k].star.sectors if i in s.rays})
-        found = []
-        for dropped in sorted(curve.active):
-            face = curve.active - {dropped}
-            if inward(self.ground, curve.middle, curve.active, face) is not None:
-                found.append(face)
-        return found
+    def faces_beside(self, curve: Curve) -> dict[frozenset[int], Ray]:
+        """Return the two-dimensional faces that meet an edge, and the way into each."""
+        if curve.beside is None:
+            found = faces_beside(self.ground.spot(curve.middle), curve.active)
+            curve.beside = {ray.active: ray for ray in found}
+        return curve.beside
 
     def _shoot(self, k: int, face: frozenset[int]) -> None:
         """Go straight across a face from the middle of an edge and record where it ends."""
-        curve = self.curves[k]
-        start = inward(self.ground, curve.middle, curve.active, face)
-        if start is None:
-            return
-        frame, way = start
-        walk = follow(frame, way, passive=face)
+        ray = self.faces_beside(self.curves[k])[face]
+        walk = follow(ray.frame, ray.direction, passive=face)
         active = walk.frame.active() if walk.end is End.CORNER else None
         if active is None or not active > face:
             return

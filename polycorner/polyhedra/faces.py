@@ -4,15 +4,6 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from polycorner.geometry.manifold import Array
-from polycorner.polyhedra.cones import null_space
-from polycorner.polyhedra.curves import Frame, Ground, settle
-from polycorner.polyhedra.strata import RANK_TOLERANCE
-
-STEP = 1e-3
-
 # An edge (its end at a corner, or its position) and the names of a face beside it.
 Flag = tuple[str, Any, frozenset[str]]
 
@@ -50,26 +41,3 @@ class Forest:
         for item in items:
             found.setdefault(self.find(item), []).append(item)
         return list(found.values())
-
-
-def inward(
-    ground: Ground, q: Array, active: frozenset[int], face: frozenset[int]
-) -> tuple[Frame, Array] | None:
-    """Return a point a little inside a face from a point of an edge, and the way there.
-
-    None where the face is not beside the edge.
-    """
-    spot = ground.spot(q)
-    along = null_space(spot.matrix(spot.basis(active)), RANK_TOLERANCE)[:, 0]
-    kept = spot.basis(face)
-    frame = Frame(ground, q, kept)
-    scales = ground.polyhedron.manifold.scale_array
-    opened = sorted(active - face)
-    slopes = spot.gradients[opened] / np.linalg.norm(spot.gradients[opened], axis=1)[:, None]
-    v = frame.tangent(slopes.sum(axis=0))
-    v = v - (v @ along) * along
-    for way in (v, -v) if ground.polyhedron.is_union else (v,):
-        ahead = settle(ground, q + STEP * scales * way, kept, STEP)
-        if ahead is not None and ahead.active() == face:
-            return ahead, way
-    return None

@@ -45,6 +45,7 @@ class Places:
         self.polyhedron, self.manifold = ground.polyhedron, ground.polyhedron.manifold
         self.places: list[Place] = []
         self.notes: dict[str, None] = {}
+        self.lost = False
 
     def names(self, rows: Iterable[int]) -> Names:
         """Return the names of functions."""
@@ -54,9 +55,10 @@ class Places:
         """Return the names of functions for a sentence."""
         return ", ".join(self.polyhedron.names[i] for i in sorted(rows))
 
-    def note(self, sentence: str) -> None:
-        """Keep a sentence for the user, once."""
+    def note(self, sentence: str, *, lost: bool = False) -> None:
+        """Keep a sentence for the user, once; say whether something could not be followed."""
         self.notes.setdefault(sentence)
+        self.lost |= lost
 
     def find(self, spot: Spot) -> tuple[int, list[Relabelling]] | None:
         """Return the position of the corner at a point, new or known, and how to get there.
@@ -65,7 +67,7 @@ class Places:
         """
         active = spot.active()
         if active is None:
-            self.note(f"a walk ended outside the polyhedron at {_written(spot.q)}")
+            self.note(f"a walk ended outside the polyhedron at {_written(spot.q)}", lost=True)
             return None
         spot = self._polished(spot, active)
         key = self._key(spot.q)
@@ -118,7 +120,7 @@ class Places:
     def _add(self, spot: Spot, active: frozenset[int], key: Array) -> tuple[int, list[Relabelling]]:
         star = star_at(spot, active)
         for sentence in star.notes:
-            self.note(sentence)
+            self.note(sentence, lost=True)
         stabiliser = self.symmetry.relabellings(self.manifold, spot.q, spot.q, SAME)
         place = Place(spot, active, star, key, stabiliser, [])
         for i, ray in enumerate(star.rays):

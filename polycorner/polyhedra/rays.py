@@ -21,7 +21,7 @@ from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, uni
 from polycorner.polyhedra.curves import Frame, Spot, settle
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 
-SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6)
+SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 MAX_CANDIDATES = 20_000
 MAX_BASES = 64
 FLAT = 1e-7
@@ -90,12 +90,18 @@ def star_at(spot: Spot, active: frozenset[int]) -> Star:
     found = _singular(spot, rows, slopes, notes) if r < full else _regular(spot, rows, slopes)
     rays: list[Ray] = []
     for y, tight in found:
+        known = len(rays)
         for base in _bases(rows, slopes, tight):
             covered = [x for x in rays if x.direction @ (frame @ y) > 1 - FLAT]
             if not any(x.active >= base for x in covered):
                 ray = _tested(spot, active, frame @ y, base)
                 if ray is not None and all(x.active != ray.active for x in covered):
                     rays.append(ray)
+        if len(rows) == full == r and len(rays) == known:
+            notes.append(
+                f"an edge out of the corner {_names(spot, rows)} is shorter than "
+                f"{SAMPLES[-1]:g} scale units: not followed"
+            )
     if r == full:
         sectors = _sectors(spot, rows, slopes, [x.direction @ frame for x in rays])
     else:
@@ -104,6 +110,26 @@ def star_at(spot: Spot, active: frozenset[int]) -> Star:
 
 
 Candidate = tuple[Array, frozenset[int]]
+
+
+def faces_beside(spot: Spot, active: frozenset[int]) -> list[Ray]:
+    """Return the two-dimensional faces that meet an edge, as rays across it.
+
+    Modulo the direction of the edge they are what edges are at a corner.
+    """
+    rows = sorted(active)
+    along = null_space(spot.matrix(rows), RANK_TOLERANCE)
+    across = null_space(np.vstack([spot.matrix([]), along.T]), RANK_TOLERANCE)
+    slopes = unit_rows(spot.gradients[rows]) @ across
+    if across.shape[1] == 0 or along.shape[1] != 1:
+        return []
+    found: list[Ray] = []
+    for y, tight in _regular(spot, rows, slopes):
+        for base in _bases(rows, slopes, tight):
+            ray = _tested(spot, active, across @ y, base)
+            if ray is not None and all(ray.active != other.active for other in found):
+                found.append(ray)
+    return found
 
 
 def _regular(spot: Spot, rows: list[int], slopes: Array) -> Iterator[Candidate]:
@@ -143,9 +169,10 @@ def _singular(spot: Spot, rows: list[int], slopes: Array, notes: list[str]) -> I
     Where the others still have a null plane and one relation ``sum w_i a_i = 0``, their common
     zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
     """
-    names = ", ".join(spot.ground.polyhedron.names[i] for i in rows)
     if not _isolated(spot, rows, slopes):
-        notes.append(f"{names}: rank too low, and second order does not show an isolated point")
+        notes.append(
+            f"{_names(spot, rows)}: rank too low, and second order does not show an isolated point"
+        )
     for k in range(len(rows)):
         rest = [i for i in range(len(rows)) if i != k]
         held = Rows(slopes[rest], RANK_TOLERANCE)
@@ -163,6 +190,10 @@ def _singular(spot: Spot, rows: list[int], slopes: Array, notes: list[str]) -> I
                 f"breaking {spot.ground.polyhedron.names[rows[k]]} leaves "
                 f"{plane.shape[1]} free directions to first order: not followed"
             )
+
+
+def _names(spot: Spot, rows: list[int]) -> str:
+    return ", ".join(spot.ground.polyhedron.names[i] for i in rows)
 
 
 def _curvature(spot: Spot, rows: list[int], weights: Array, plane: Array) -> Array:

@@ -136,7 +136,12 @@ class _Follower:
                 return self._walk(End.SINGULAR)
             if self.length > self.extent:
                 return self._walk(End.INFINITY)
-            h = min(1.6 * h, LONGEST_STEP * (1 + self.length / 20))
+            h = min(1.6 * h, max(LONGEST_STEP, self._room() / 2))
+
+    def _room(self) -> float:
+        """Return how far the nearest watched function is, to first order."""
+        away = abs(self.frame.distances[self.watched])
+        return float(away.min(initial=self.extent))
 
     def _walk(self, end: End) -> Walk:
         points = np.array(self.points)

@@ -49,6 +49,7 @@ def save_atlas(atlas: Skeleton, path: str | os.PathLike[str]) -> Path:
         "pending": list(explorer.pending),
         "shot": [[edge, sorted(face)] for edge, face in explorer.shot],
         "notes": explorer.notes,
+        "lost": explorer.register.lost,
         "random": explorer.rng.bit_generator.state,
     }
     target = Path(path)
@@ -110,6 +111,7 @@ def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
     explorer.shot.update((edge, frozenset(face)) for edge, face in content["shot"])
     for sentence in content["notes"]:
         explorer.register.note(sentence)
+    explorer.register.lost = content["lost"]
 
 
 def _curve(curve: Curve) -> dict[str, Any]:

@@ -52,5 +52,5 @@ def test_other_files_are_refused(tmp_path):
     ring = save_atlas(skeleton(RING, [[0.0, 1.5]]), tmp_path / "ring")
     disc = Polyhedron(M, AllOf(1 - X**2 - Y**2))
     for path, polyhedron in ((tmp_path / "text", RING), (tmp_path / "other", RING), (ring, disc)):
-        with pytest.raises(ValueError, match="^path: expected an atlas"):
+        with pytest.raises(ValueError, match=r"^path: expected an atlas"):
             load_atlas(path, polyhedron)
