@@ -52,23 +52,26 @@ def search_options(command: Command) -> Command:
 @atlas.command()
 @pair_options
 @click.option("--plane", is_flag=True, help="The developed plane: the same as --drum inf.")
-@click.option("--heading", type=float, default=0.0, help="Mean heading in the drum, degrees. [0]")
+@click.option("--heading", type=float, help="Mean heading in the drum, degrees. [0]")
 @search_options
 def dyad(
-    config: Path | None, plane: bool, heading: float, as_json: bool, out: Path | None,
+    config: Path | None, plane: bool, heading: float | None, as_json: bool, out: Path | None,
     seed: int, budget: int, resume: bool, **options: float | None,
 ) -> None:  # fmt: skip
     """Walk through the placements of two dumbbells: corners, and the motions that join them."""
+    if plane and options["drum"] is not None:
+        fail(f"--plane: expected no --drum beside it; got {options['drum']:g}")
     if plane:
         options["drum"] = math.inf
     pair = chosen_pair(config, options)
-    if not math.isfinite(heading):
-        fail(f"--heading: expected an angle in degrees; got {heading}")
+    if heading is not None and (pair.is_plane or not math.isfinite(heading)):
+        fail(f"--heading: expected an angle in degrees, of a pair in a drum; got {heading:g}")
+    degrees = heading or 0.0
     from polycorner.studies.pair_atlas import PairAtlas, pair_starts
 
-    angle = math.radians(heading)
+    angle = math.radians(degrees)
     polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
-    search = Search("dyad", parameters(pair) | {"heading": heading}, out, seed, budget)
+    search = Search("dyad", parameters(pair) | {"heading": degrees}, out, seed, budget)
     found = search.run(
         polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
     )
@@ -125,7 +128,11 @@ def spheres(
     def draw(folder: Path) -> list[Path]:
         from polycorner.pictures import clusters, plots
 
-        figure = clusters.draw_clusters(model, [c.point for c in found.corners])
+        if not found.corners:
+            return []
+        special = [k for k, corner in enumerate(found.corners) if corner.singular]
+        points = [corner.point for corner in found.corners]
+        figure = clusters.draw_clusters(model, points, singular=special)
         return [plots.save(figure, folder / "clusters.png")]
 
     search.finish(answer, as_json=as_json, draw=draw)

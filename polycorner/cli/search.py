@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Progress = Callable[[int, int, int], None]
 
 # Edges walked between two savings of a long search.
-CHUNK = 100
+CHUNK = 500
 
 
 class Search:
@@ -35,7 +35,17 @@ class Search:
             fail(f"--budget: expected a positive number of edges; got {budget}")
         self.model, self.parameters, self.out = model, chosen, out
         self.seed, self.budget = seed, budget
+        if out is not None:
+            try:
+                out.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                fail(f"--out: {out} cannot be written ({error.strerror})")
         self.finished, self.interrupted, self.drawn = True, False, True
+
+    @property
+    def label(self) -> str:
+        """What the search is called in a file."""
+        return repr((self.model, sorted(self.parameters.items()), self.seed))
 
     @property
     def state(self) -> Path:
@@ -44,8 +54,9 @@ class Search:
             return self.out / "atlas-state.json"
         from polycorner.geometry.kernels import cache_directory
 
-        told = repr((self.model, sorted(self.parameters.items()), self.seed))
-        return cache_directory() / f"atlas-{hashlib.sha256(told.encode()).hexdigest()[:16]}.json"
+        return (
+            cache_directory() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
+        )
 
     def run(
         self,
@@ -77,14 +88,14 @@ class Search:
                 left -= budget
             while left > 0 and (resume or found.complete is Completeness.BUDGET):
                 resume = False
-                save_atlas(found, self.state)
+                save_atlas(found, self.state, label=self.label)
                 found = go_on(found, budget=min(CHUNK, left), progress=progress)
                 left -= CHUNK
         self.finished = found.complete not in (Completeness.BUDGET, Completeness.INTERRUPTED)
         if self.finished:
             self.state.unlink(missing_ok=True)
         else:
-            save_atlas(found, self.state)
+            save_atlas(found, self.state, label=self.label)
         self.drawn = self.finished
         self.interrupted = found.complete is Completeness.INTERRUPTED
         return found
@@ -95,7 +106,7 @@ class Search:
         if not self.state.exists():
             fail("--resume: expected an unfinished search with the same options; got none")
         try:
-            return load_atlas(self.state, polyhedron, symmetry=symmetry)
+            return load_atlas(self.state, polyhedron, symmetry=symmetry, label=self.label)
         except ValueError as error:
             fail(f"--resume: {error}")
 
@@ -111,7 +122,6 @@ class Search:
             MofNCompleteColumn,
             Progress,
             TextColumn,
-            TimeRemainingColumn,
         )
 
         with Progress(
@@ -119,20 +129,21 @@ class Search:
             BarColumn(),
             MofNCompleteColumn(),
             TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
             console=Console(stderr=True),
             transient=True,
         ) as bar:
             task = bar.add_task(self.model, total=None, rate="")
 
             def progress(corners: int, edges: int, pending: int) -> None:
-                speed = bar.tasks[0].finished_speed or bar.tasks[0].speed
+                elapsed = bar.tasks[0].elapsed
                 bar.update(
                     task,
                     completed=edges,
                     total=edges + pending,
                     description=f"{self.model}: {corners} corners, edges",
-                    rate=f"{speed:.0f}/s" if speed else "",
+                    rate=f"{edges / elapsed:.0f}/s, {pending * elapsed / max(edges, 1):.0f} s left"
+                    if elapsed
+                    else "",
                 )
 
             yield progress

@@ -24,8 +24,9 @@ LETTERS = {"Delta": "$\\Delta$", "E": "$E$"}
 def relative_curves(atlas: PairAtlas, period: float) -> list[tuple[str, Array]]:
     """Return the edges as ``(kind of contacts, (k, 3))`` in relative placements.
 
-    The relative heading is brought into one period about zero; an edge that leaves it is cut.  Balls
-    of a dumbbell are alike here, so in the drum a half-turn about the vertical gives a second image.
+    The relative heading is brought into one period about zero; an edge that leaves it is cut.
+    Balls of a dumbbell are alike here, so in the drum a half-turn about the vertical gives a
+    second image.
     """
     curves = []
     for edge in atlas.skeleton.edges:

@@ -1,5 +1,6 @@
 """From what an explorer found to the frozen atlas."""
 
+from collections import Counter
 from collections.abc import Iterator
 
 from polycorner.polyhedra.atlas import Completeness, Corner, Edge, Face, Skeleton
@@ -37,8 +38,21 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
         complete=complete,
         notes=tuple(explorer.notes),
         components=components,
+        whole=_whole(explorer),
         state=explorer,
     )
+
+
+def _whole(explorer: Explorer) -> bool:
+    """Whether faces and Euler characteristic can be trusted everywhere."""
+    if explorer.symmetry.relabels or any(curve.branches for curve in explorer.curves):
+        return False
+    for place in explorer.places:
+        star = place.star
+        flags = [(i, sector.active) for sector in star.sectors for i in sector.rays]
+        if (star.singular and star.full > 2) or max(Counter(flags).values(), default=0) > 1:
+            return False
+    return True
 
 
 def _ordered(explorer: Explorer, names: frozenset[str]) -> tuple[str, ...]:

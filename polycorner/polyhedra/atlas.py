@@ -148,6 +148,10 @@ class Skeleton:
     components : mapping from int to int
         How many connected components the faces of each dimension have: corners, edges, faces,
         and the interior where it comes next.
+    whole : bool
+        Whether the faces were put together everywhere and edges meet in corners only: not at
+        singular corners beyond the plane, where edges cross, where a face lies on both sides of
+        an edge, or modulo relabellings.
     """
 
     polyhedron: Polyhedron
@@ -157,6 +161,7 @@ class Skeleton:
     complete: Completeness
     notes: tuple[str, ...]
     components: Mapping[int, int]
+    whole: bool = True
     state: Any = None
 
     def __repr__(self) -> str:
@@ -170,10 +175,15 @@ class Skeleton:
 
         It is that of the union of all of them: the polyhedron itself if it has dimension two,
         its boundary if it has dimension three, provided that faces have no handles.  A closed
-        edge counts zero.  None where a face is not closed or an edge runs to infinity.
+        edge counts zero.  It is that of what was found: islands that no walk met are not in it.
+        None where a face is not closed, an edge runs to infinity, or not ``whole``.
         """
-        whole = all(face.closed for face in self.faces) and self.faces
-        if not whole or any(edge.kinds[1] not in (End.CORNER, End.CLOSED) for edge in self.edges):
+        closed = all(face.closed for face in self.faces) and self.faces
+        if (
+            not self.whole
+            or not closed
+            or any(edge.kinds[1] not in (End.CORNER, End.CLOSED) for edge in self.edges)
+        ):
             return None
         open_edges = sum(not edge.is_closed for edge in self.edges)
         surfaces = sum(face.euler_characteristic for face in self.faces)

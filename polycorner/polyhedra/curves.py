@@ -126,9 +126,14 @@ class Frame(Spot):
         """Return the shortest scaled step to the zeros of the linearised held functions."""
         return np.asarray(self._normal @ np.linalg.solve(self._factor.T, self._target))
 
+    @property
+    def is_curve(self) -> bool:
+        """Whether the held functions leave a curve, modulo the symmetry."""
+        return len(self._target) + 1 == len(self.q)
+
     def orientation(self, t: Array) -> float:
         """Return the sign of the determinant of held gradients and tangent, where it is square."""
-        if self._factor.shape[0] + 1 != len(t):
+        if not self.is_curve:
             return 1.0
         frame = np.vstack([self._normal.T, t])
         return float(np.sign(np.linalg.det(frame) * np.diagonal(self._factor).prod()))

@@ -16,13 +16,14 @@ from polycorner.polyhedra.atlas import Completeness
 from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.curves import Frame, Ground, Spot, settle
 from polycorner.polyhedra.faces import Flag, Passage
-from polycorner.polyhedra.places import Place, Places
+from polycorner.polyhedra.places import SAME, Place, Places
 from polycorner.polyhedra.rays import Ray, faces_beside
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.polyhedra.walks import End, Walk, follow
 
 FALLS = 6
+ARC_SEARCH = 40
 
 Half = tuple[int, int]
 Progress = Callable[[int, int, int], None]
@@ -73,7 +74,7 @@ class Explorer:
         limit = len(self.curves) + budget
         try:
             for task in self._tasks():
-                if len(self.curves) >= limit:
+                if len(self.curves) >= limit and (self.pending or self.seeds):
                     return Completeness.BUDGET
                 task()
                 if progress is not None:
@@ -136,11 +137,12 @@ class Explorer:
             points, ray.active, (End.CORNER, walk.end), half, stop, carried,
             walk.length + ray.distance, walk.branches,
         )  # fmt: skip
-        place.edges[i] = len(self.curves)
+        self.curves.append(curve)
+        number = len(self.curves) - 1
+        place.edges[i] = number
         if stop is not None:
             there = self.places[stop[0]]
-            there.edges[there.orbit[stop[1]]] = len(self.curves)
-        self.curves.append(curve)
+            there.edges[there.orbit[stop[1]]] = number
         self._remark(curve)
 
     def _remark(self, curve: Curve) -> None:
@@ -224,12 +226,30 @@ class Explorer:
         )
 
     def lies_on(self, q: Array, curve: Curve) -> bool:
-        """Whether a point lies on a curve, up to the sagitta of its chords."""
+        """Whether a point lies on a curve: on one of the chords' arcs beside its nearest vertex."""
         apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
         nearest = int(np.argmin(apart))
         chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
-        around = chords[max(nearest - 1, 0) : nearest + 1]
-        return bool(apart[nearest] <= 0.6 * around.max())
+        beside = range(max(nearest - 1, 0), min(nearest + 1, len(chords)))
+        if apart[nearest] > max(chords[k] for k in beside):
+            return False
+        return any(self._on_arc(q, curve, k) for k in beside)
+
+    def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
+        """Whether a point lies on the arc over chord ``k``, by ternary search."""
+        start, end = curve.points[k], curve.points[k + 1]
+        kept = self.ground.spot(start).basis(curve.active)
+
+        def apart(s: float) -> float:
+            at = settle(self.ground, start + s * (end - start), kept, np.inf)
+            p = start if at is None else at.q
+            return self.symmetry.separation(self.manifold, q, p)
+
+        low, high = 0.0, 1.0
+        for _ in range(ARC_SEARCH):
+            left, right = (2 * low + high) / 3, (low + 2 * high) / 3
+            low, high = (low, right) if apart(left) < apart(right) else (left, high)
+        return apart((low + high) / 2) < SAME
 
     # ---------------------------------------------------------------------------------------- falls
 
@@ -267,7 +287,7 @@ class Explorer:
         for _ in range(FALLS):
             v = frame.tangent(self.rng.standard_normal(len(spot.q)))
             for way in (v, -v):
-                walk = follow(frame, way, passive=active)
+                walk = follow(frame, way, passive=active, home=True)
                 there = walk.frame.active() if walk.end is End.CORNER else None
                 if there is not None:
                     yield walk.frame, there

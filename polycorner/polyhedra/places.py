@@ -100,7 +100,7 @@ class Places:
                 f"point: corners closer together than it count as one"
             )
         gaps = {i: away[i] for i in range(self.ground.count) if i not in active}
-        near = [i for i, gap in gaps.items() if abs(gap) < SAME]
+        near = [i for i, gap in gaps.items() if abs(gap) < SAME and not self.polyhedron.is_union]
         for i in near:
             self.note(
                 f"at the corner {self.written(active)} {self.written([i])} is only "
@@ -121,6 +121,8 @@ class Places:
         star = star_at(spot, active)
         for sentence in star.notes:
             self.note(sentence, lost=True)
+        if star.singular and star.full > 2:
+            self.note(f"faces at the singular corner {self.written(active)} are not put together")
         stabiliser = self.symmetry.relabellings(self.manifold, spot.q, spot.q, SAME)
         place = Place(spot, active, star, key, stabiliser, [])
         for i, ray in enumerate(star.rays):

@@ -250,7 +250,8 @@ def _tested(
     ground = spot.ground
     scales = ground.polyhedron.manifold.scale_array
     kept = sorted(base)
-    for h in SAMPLES:
+    far = 10 * ground.tolerance
+    for h in [h for h in SAMPLES if h >= far] or [10 * far]:
         frame = settle(ground, spot.q + h * scales * direction, kept, 0.5 * h)
         if frame is None:
             continue

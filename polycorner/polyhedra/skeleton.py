@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from polycorner.geometry.manifold import reals
 from polycorner.polyhedra.assembly import assembled
-from polycorner.polyhedra.atlas import Skeleton
+from polycorner.polyhedra.atlas import Completeness, Skeleton
 from polycorner.polyhedra.curves import Ground
 from polycorner.polyhedra.explorer import Explorer
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -92,10 +92,15 @@ def skeleton(
     if isinstance(extent, bool) or not isinstance(extent, int | float) or not extent > 0:
         msg = f"extent: expected a positive length in scale units; got {extent!r}"
         raise ValueError(msg)
+    _check_progress(progress)
     points = polyhedron.manifold.points(np.atleast_2d(reals(starts, "starts")), "starts")
+    if points.ndim != 2:
+        msg = (
+            f"starts: expected a list of points, shape (k, {points.shape[-1]}); got {points.shape}"
+        )
+        raise ValueError(msg)
     ground = Ground(polyhedron, symmetry or Symmetry(), tolerance, extent)
-    explorer = Explorer(ground, points, np.random.default_rng(0 if rng is None else rng))
-    return assembled(explorer, explorer.run(budget, progress))
+    return _run(Explorer(ground, points, _generator(rng)), budget, progress)
 
 
 def resume(atlas: Skeleton, *, budget: int = BUDGET, progress: Progress | None = None) -> Skeleton:
@@ -112,7 +117,34 @@ def resume(atlas: Skeleton, *, budget: int = BUDGET, progress: Progress | None =
         msg = f"atlas: expected a Skeleton that skeleton() returned; got {type(atlas).__name__}"
         raise TypeError(msg)
     _check_budget(budget)
-    return assembled(atlas.state, atlas.state.run(budget, progress))
+    _check_progress(progress)
+    return _run(atlas.state, budget, progress)
+
+
+def _run(explorer: Explorer, budget: int, progress: Progress | None) -> Skeleton:
+    complete = explorer.run(budget, progress)
+    try:
+        return assembled(explorer, complete)
+    except KeyboardInterrupt:
+        return assembled(explorer, Completeness.INTERRUPTED)
+
+
+def _generator(rng: np.random.Generator | int | None) -> np.random.Generator:
+    expected = "rng: expected a Generator or a whole number not below 0"
+    whole = isinstance(rng, int) and not isinstance(rng, bool)
+    if rng is not None and not whole and not isinstance(rng, np.random.Generator):
+        msg = f"{expected}; got {rng!r}"
+        raise TypeError(msg)
+    if isinstance(rng, int) and rng < 0:
+        msg = f"{expected}; got {rng}"
+        raise ValueError(msg)
+    return np.random.default_rng(0 if rng is None else rng)
+
+
+def _check_progress(progress: Progress | None) -> None:
+    if progress is not None and not callable(progress):
+        msg = f"progress: expected a callable or None; got {progress!r}"
+        raise TypeError(msg)
 
 
 def _check_budget(budget: int) -> None:

@@ -20,6 +20,9 @@ FIRST_STEP = 0.2
 LONGEST_STEP = 0.5
 SHORTEST_STEP = 1e-7
 TURN = 0.25
+STRAY = 0.01
+# Step below which a change of orientation is taken for a crossing of curves, not for a jump.
+FLIP = 1e-3
 # Passive functions may drift this far, in scale units, before a walk has lost its curve.
 DRIFT = 1e-6
 
@@ -136,12 +139,19 @@ class _Follower:
                 return self._walk(End.SINGULAR)
             if self.length > self.extent:
                 return self._walk(End.INFINITY)
-            h = min(1.6 * h, max(LONGEST_STEP, self._room() / 2))
+            h = min(1.6 * h, self._longest())
 
-    def _room(self) -> float:
-        """Return how far the nearest watched function is, to first order."""
+    def _longest(self) -> float:
+        """Return how long a step may be: longer far out, where nothing is near.
+
+        On circles a step stays a small part of the way around.
+        """
         away = abs(self.frame.distances[self.watched])
-        return float(away.min(initial=self.extent))
+        room = float(away.min(initial=self.extent))
+        manifold = self.ground.polyhedron.manifold
+        around = [p / s for p, s in zip(manifold.periods, manifold.scales, strict=True)]
+        far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), 0.05 * min(around))
+        return max(LONGEST_STEP, far)
 
     def _walk(self, end: End) -> Walk:
         points = np.array(self.points)
@@ -156,17 +166,23 @@ class _Follower:
 
     def _step(self, h: float) -> tuple[Frame, Array, float] | End:
         """Return the next point, the tangent there and the step that worked."""
+        blocked = False
         while h > SHORTEST_STEP:
-            frame = settle(
-                self.ground, self.frame.q + h * self.scales * self.t, self.frame.kept, 0.3 * h
-            )
-            if frame is not None:
+            ahead = self.frame.q + h * self.scales * self.t
+            frame = settle(self.ground, ahead, self.frame.kept, 0.3 * h)
+            if frame is None:
+                blocked |= not Frame(self.ground, ahead, self.frame.kept).finite
+            else:
                 t = frame.tangent(self.t)
-                if t @ self.t > math.cos(TURN):
+                turn = math.acos(min(1.0, float(t @ self.t)))
+                off = (frame.q - self.frame.q) / self.scales - h * self.t
+                # Farther off than the turn explains: another curve of the same functions.
+                strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + STRAY)
+                flipped = frame.orientation(t) * self.side < 0 and h > FLIP
+                if turn < TURN and not strayed and not flipped:
                     return frame, t, h
             h /= 2
-        ahead = Frame(self.ground, self.frame.q + h * self.scales * self.t, self.frame.kept)
-        return End.CHART if not ahead.finite else End.SINGULAR
+        return End.CHART if blocked else End.SINGULAR
 
     # ------------------------------------------------------------------------------------ events
 
@@ -207,27 +223,33 @@ class _Follower:
         return not active <= held
 
     def _suspects(self, frame: Frame, t: Array) -> list[tuple[int, float]]:
-        """Return functions that change sign or may dip to zero in this step, by their cubic."""
+        """Return functions that change sign or may dip to zero in this step.
+
+        One that falls first and rises then may, if the cubic through values and slopes does, or
+        if the slopes at both ends, kept up, would let it.
+        """
         here, there, rows = self.frame, frame, self.watched
         f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
-        near = np.minimum(f0, f1) < 2 * self._reach(frame)
         slope0 = self.signs * (here.gradients[rows] @ self.t)
         slope1 = self.signs * (there.gradients[rows] @ t)
-        dips = (slope0 < 0) & (slope1 > 0)
+        dips = (slope0 < 0) & (slope1 >= 0)
         crosses = f1 < 0
+        chord = self._chord(frame)
+        reach = np.maximum(self._sizes(here), self._sizes(there)) * chord
+        near = f0 + f1 < reach
         return [
             (int(rows[k]), float(self.signs[k]))
-            for k in np.flatnonzero(crosses | (near & dips))
-            if crosses[k] or _dip(f0[k], f1[k], slope0[k], slope1[k], self._chord(frame))
+            for k in np.flatnonzero(crosses | dips)
+            if crosses[k] or near[k] or _dip(f0[k], f1[k], slope0[k], slope1[k], chord)
         ]
 
     def _chord(self, frame: Frame) -> float:
         return float(np.linalg.norm((frame.q - self.frame.q) / self.scales))
 
-    def _reach(self, frame: Frame) -> Array:
-        """Return how much each watched function may change in this step, to first order."""
-        sizes = np.sqrt(np.einsum("ij,ij->i", self.frame.gradients, self.frame.gradients))
-        return np.asarray(sizes[self.watched] * self._chord(frame))
+    def _sizes(self, frame: Frame) -> Array:
+        """Return the lengths of the watched functions' gradients."""
+        rows = frame.gradients[self.watched]
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", rows, rows)))
 
     def _closing(self, frame: Frame, j: int, sign: float) -> tuple[float, Frame, bool] | None:
         """Return where function ``j`` first reaches zero: fraction, point, and whether it crosses.
@@ -253,7 +275,7 @@ class _Follower:
             at = self._between(frame, s)
             return sign * float(at.values[j]), at
 
-        if end is frame:
+        if end is frame and self.frame.is_curve:
             quick = self._crossing(frame, j)
             if quick is not None:
                 return (*quick, True)
@@ -299,20 +321,20 @@ class _Follower:
 
 def _dip(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
     """Whether the cubic through values and slopes at both ends comes near zero in between."""
-    s = np.linspace(0.0, 1.0, 17)
-    cubic = (
-        f0 * (1 + 2 * s) * (1 - s) ** 2
-        + f1 * s**2 * (3 - 2 * s)
-        + h * slope0 * s * (1 - s) ** 2
-        - h * slope1 * s**2 * (1 - s)
-    )
-    return bool(cubic.min() < 0.25 * min(f0, f1) + 1e-9)
+    m0, m1 = h * slope0, h * slope1
+    curve = [f0, m0, 3 * (f1 - f0) - 2 * m0 - m1, 2 * (f0 - f1) + m0 + m1]
+    flat = np.roots([3 * curve[3], 2 * curve[2], curve[1]])
+    lowest = flat.real[(abs(flat.imag) < 1e-6) & (flat.real > 0) & (flat.real < 1.01)]
+    values = np.polyval(curve[::-1], lowest)
+    return bool((values < 0.25 * min(f0, f1) + 1e-9).any())
 
 
 def _root(value: Callable[[float], tuple[float, Frame]], far: float = 1.0) -> tuple[float, Frame]:
     """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
     a, b = 0.0, far
-    (fa, at), (fb, _) = value(a), value(b)
+    (fa, _), (fb, at) = value(a), value(b)
+    if abs(fb) < 1e-15:
+        return b, at
     s, side = far, 0
     for _ in range(80):
         if b - a < 1e-15 or fb == fa:

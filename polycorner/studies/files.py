@@ -20,7 +20,7 @@ from polycorner.polyhedra.walks import End
 VERSION = 1
 
 
-def save_atlas(atlas: Skeleton, path: str | os.PathLike[str]) -> Path:
+def save_atlas(atlas: Skeleton, path: str | os.PathLike[str], *, label: str = "") -> Path:
     """Write an atlas, finished or not, as JSON; the file appears whole or not at all.
 
     Parameters
@@ -29,6 +29,8 @@ def save_atlas(atlas: Skeleton, path: str | os.PathLike[str]) -> Path:
         What :func:`~polycorner.polyhedra.skeleton.skeleton` returned.
     path : path
         The file; its folder is made if need be.
+    label : str, optional
+        What the search is called; :func:`load_atlas` can insist on it.
 
     Returns
     -------
@@ -37,6 +39,7 @@ def save_atlas(atlas: Skeleton, path: str | os.PathLike[str]) -> Path:
     explorer: Explorer = atlas.state
     content = {
         "polycorner atlas": VERSION,
+        "label": label,
         "functions": list(atlas.polyhedron.names),
         "complete": atlas.complete.name,
         "tolerance": explorer.ground.tolerance,
@@ -62,7 +65,11 @@ def save_atlas(atlas: Skeleton, path: str | os.PathLike[str]) -> Path:
 
 
 def load_atlas(
-    path: str | os.PathLike[str], polyhedron: Polyhedron, *, symmetry: Symmetry | None = None
+    path: str | os.PathLike[str],
+    polyhedron: Polyhedron,
+    *,
+    symmetry: Symmetry | None = None,
+    label: str | None = None,
 ) -> Skeleton:
     """Read an atlas back; :func:`~polycorner.polyhedra.skeleton.resume` goes on with it.
 
@@ -72,6 +79,8 @@ def load_atlas(
         A file that :func:`save_atlas` wrote.
     polyhedron, symmetry
         Those it was computed for: formulas are not in the file.
+    label : str, optional
+        What the search must be called.
 
     Raises
     ------
@@ -86,10 +95,21 @@ def load_atlas(
     if not isinstance(content, dict) or content.get("polycorner atlas") != VERSION:
         msg = f"path: expected an atlas that save_atlas wrote; {path} is something else"
         raise ValueError(msg)
-    if content["functions"] != list(polyhedron.names):
+    if label is not None and content.get("label") != label:
+        msg = f"path: expected an atlas called {label!r}; {path} is called {content.get('label')!r}"
+        raise ValueError(msg)
+    if content.get("functions") != list(polyhedron.names):
         msg = f"path: expected an atlas of {', '.join(polyhedron.names)}; {path} has others"
         raise ValueError(msg)
-    ground = Ground(polyhedron, symmetry or Symmetry(), content["tolerance"], content["extent"])
+    try:
+        return _restored(content, polyhedron, symmetry or Symmetry())
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        msg = f"path: expected an atlas that save_atlas wrote; {path} is damaged ({error!r})"
+        raise ValueError(msg) from error
+
+
+def _restored(content: dict[str, Any], polyhedron: Polyhedron, symmetry: Symmetry) -> Skeleton:
+    ground = Ground(polyhedron, symmetry, content["tolerance"], content["extent"])
     rng = np.random.default_rng()
     rng.bit_generator.state = content["random"]
     explorer = Explorer(ground, [], rng)

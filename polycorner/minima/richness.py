@@ -1,0 +1,120 @@
+"""How many kinds there are in all, judged by how often each was met."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from numbers import Integral
+
+NORMAL = 1.959963984540054  # half of a 95 % interval of the normal distribution, in deviations
+DOUBT = 0.05
+
+
+@dataclass(frozen=True)
+class Richness:
+    """An estimate of the number of kinds from a sample of independent draws; see :func:`richness`.
+
+    Attributes
+    ----------
+    observed : int
+        Kinds that were met.
+    draws : int
+        Draws in all.
+    singles, doubles : int
+        Kinds that were met once, and twice.
+    estimate : float
+        Kinds in all, met or not.
+    variance : float
+        Variance of the estimate.
+    interval : (float, float)
+        The number of kinds at a nominal level of 95 %.
+    """
+
+    observed: int
+    draws: int
+    singles: int
+    doubles: int
+    estimate: float
+    variance: float
+    interval: tuple[float, float]
+
+    @property
+    def coverage(self) -> float:
+        """Estimated share of the distribution that belongs to kinds that were met: ``1 - f1/n``.
+
+        The estimator of Good and Turing ([Good]); 0 without draws.
+        """
+        return 1 - self.singles / self.draws if self.draws else 0.0
+
+    @property
+    def unseen(self) -> float:
+        """Estimated number of kinds that were not met."""
+        return self.estimate - self.observed
+
+    @property
+    def overlooked(self) -> float:
+        """Largest share of a kind that so many draws miss with a probability of 5 % or more."""
+        return 1 - DOUBT ** (1 / self.draws) if self.draws else 1.0
+
+
+def richness(counts: Iterable[int]) -> Richness:
+    r"""Estimate the number of kinds in a population by the abundances of rare ones in a sample.
+
+    With ``S`` kinds met in ``n`` draws, ``f1`` of them once and ``f2`` of them twice, the estimate
+    of Chao ([Chao]) in its bias-corrected form is
+
+    .. math:: S + \frac{n-1}{n} \frac{f_1 (f_1 - 1)}{2 (f_2 + 1)} .
+
+    It is a lower bound: kinds so rare that hardly one of them was met do not show in ``f1`` and
+    ``f2``.  Its interval is log-normal in the number of unseen kinds ([Chao87]); with only a few
+    draws for each kind it contains the truth less often than its level says.  Where the estimate
+    is ``S``, each kind met ``k`` times is taken to be missed with the probability ``exp(-k)`` of
+    a Poisson distribution of that mean.
+
+    Parameters
+    ----------
+    counts : sequence of int
+        How often each kind was met, at least once.
+
+    Raises
+    ------
+    ValueError
+        If a count is no positive whole number.
+
+    Examples
+    --------
+    >>> found = richness([12, 5, 2, 1, 1, 1])
+    >>> round(found.estimate, 2), round(found.coverage, 2)
+    (7.43, 0.86)
+    """
+    met = list(counts)
+    wrong = [c for c in met if not isinstance(c, Integral) or isinstance(c, bool) or c < 1]
+    if wrong:
+        msg = f"counts: expected positive whole numbers; got {wrong[0]!r}"
+        raise ValueError(msg)
+    observed, n, f1, f2 = len(met), sum(met), met.count(1), met.count(2)
+    if not n:
+        return Richness(0, 0, 0, 0, 0.0, 0.0, (0.0, math.inf))
+    k = (n - 1) / n
+    unseen = k * f1 * (f1 - 1) / (2 * (f2 + 1))
+    if unseen > 0:
+        variance = unseen + k**2 * f1 * (2 * f1 - 1) ** 2 / (4 * (f2 + 1) ** 2)
+        if f2:
+            variance += k**2 * f1**2 * f2 * (f1 - 1) ** 2 / (4 * (f2 + 1) ** 4)
+        else:
+            variance -= k**2 * f1**4 / (4 * (observed + unseen))
+        spread = math.exp(NORMAL * math.sqrt(math.log1p(variance / unseen**2)))
+        interval = (observed + unseen / spread, observed + unseen * spread)
+    else:
+        variance, interval = _by_chance(met, n)
+    return Richness(observed, n, f1, f2, observed + unseen, variance, interval)
+
+
+def _by_chance(met: list[int], n: int) -> tuple[float, tuple[float, float]]:
+    """Return variance and interval of the number of kinds if each of them may have been missed."""
+    observed = len(met)
+    missed = math.fsum(math.exp(-c) for c in met)
+    variance = missed - math.fsum(math.exp(-2 * c) for c in met)
+    variance = max(0.0, variance - math.fsum(c * math.exp(-c) for c in met) ** 2 / n)
+    seen = 1 - missed / observed
+    middle, reach = observed / seen, NORMAL * math.sqrt(variance) / seen
+    return variance, (max(float(observed), middle - reach), middle + reach)
