@@ -230,7 +230,9 @@ class Explorer:
         apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
         nearest = int(np.argmin(apart))
         chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
-        beside = range(max(nearest - 1, 0), min(nearest + 1, len(chords)))
+        # A closed curve has its first point twice.
+        nearest = nearest or len(chords)
+        beside = {nearest - 1, nearest % len(chords)}
         if apart[nearest] > max(chords[k] for k in beside):
             return False
         return any(self._on_arc(q, curve, k) for k in beside)
