@@ -40,10 +40,10 @@ dyad: .venv/.runtime ## the nested pair of dumbbells in the drum, certified and 
 test thorough: export OPENBLAS_NUM_THREADS = 1
 test thorough: export OMP_NUM_THREADS = 1
 
-test: .venv/.dev ## tests and doctests
-	@$(PYTEST) -n auto
+test: .venv/.dev ## tests and doctests, without those marked slow
+	@$(PYTEST) -n auto -m "not slow"
 
-thorough: .venv/.dev ## the same with many more generated inputs
+thorough: .venv/.dev ## all tests, with many more generated inputs
 	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto
 
 lint: .venv/.dev ## ruff: rules and format
