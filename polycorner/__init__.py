@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from polycorner.minima.certificate import Certificate, certify
     from polycorner.minima.minimise import minimise, stationary_on
     from polycorner.minima.proof import Proof, prove
+    from polycorner.minima.search import Minima, minima
     from polycorner.minima.sensitivity import Sensitivity, sensitivity
     from polycorner.minima.verdicts import Entrapment, Verdict
     from polycorner.polyhedra.atlas import Completeness, Corner, Edge, Face, Skeleton
@@ -37,6 +38,7 @@ _HOMES = {
     "stationary_on": "minima.minimise",
     "Proof": "minima.proof",
     "prove": "minima.proof",
+    "Minima": "minima.search",
     "Sensitivity": "minima.sensitivity",
     "sensitivity": "minima.sensitivity",
     "Entrapment": "minima.verdicts",
@@ -73,6 +75,7 @@ __all__ = [
     "Face",
     "LocalType",
     "Manifold",
+    "Minima",
     "PolycornerError",
     "Polyhedron",
     "Proof",
@@ -84,6 +87,7 @@ __all__ = [
     "Symmetry",
     "Verdict",
     "certify",
+    "minima",
     "minimise",
     "prove",
     "resume",
@@ -96,6 +100,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
+    if name == "minima":  # a room that is called like a verb
+        return import_module("polycorner.minima")
     if name not in _HOMES:
         msg = f"module 'polycorner' has no attribute {name!r}"
         raise AttributeError(msg)

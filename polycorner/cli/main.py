@@ -14,6 +14,7 @@ import click
 from polycorner import __version__
 from polycorner.cli.atlas import atlas
 from polycorner.cli.dyad import dyad
+from polycorner.cli.minima import minima
 from polycorner.cli.prove import prove
 
 EXAMPLES = """\b
@@ -35,6 +36,7 @@ def cli() -> None:
 cli.add_command(dyad)
 cli.add_command(atlas)
 cli.add_command(prove)
+cli.add_command(minima)
 
 
 def main() -> None:

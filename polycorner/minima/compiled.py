@@ -498,6 +498,20 @@ def lagrangian_hessian(H, lam):
 
 
 @njit(cache=True)
+def finite(J, H, lam, last):
+    """Whether the gradients and the Hessians that count are finite, as at the end of a chart."""
+    stay_whole()
+    for i in range(last + 1):
+        for a in range(J.shape[1]):
+            if not np.isfinite(J[i, a]):
+                return False
+            for b in range(J.shape[1]):
+                if (i == last or lam[i] != 0.0) and not np.isfinite(H[i, a, b]):
+                    return False
+    return True
+
+
+@njit(cache=True)
 def convexified(B, g, A, L):
     """Factor ``B``, made definite: curved up across the rows of ``A``, then along the identity.
 
@@ -681,6 +695,9 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
         return 0, v, lam, direction
     if not (stationary and largest(pull) <= 1e-9 * reference):
         return 1, v, lam, direction
+    for i in range(m):
+        # A function without a multiplier holds nothing: the energy may fall as its contact opens.
+        rows[i] = rows[i] and lam[i] * length(J[i]) > 1e-9 * reference
     if steepest_curve(F, J, H, lam, rows, m, direction) >= -CURVED:
         return 3, v, lam, direction
     # A saddle that was left must not draw the descent back, not even by a rounding error.
@@ -777,6 +794,8 @@ def descend(problem, use, m, rows, u, size, limit):
     for iteration in range(1, limit + 1):
         evaluate(problem, u, F, J, H, size, True)
         energy, g = F[rows - 1], J[rows - 1].copy()
+        if not finite(J, H, lam, rows - 1):
+            return STALLED, iteration, u, lam
         if rows - 1 > m or iteration > PATIENCE:
             section, _, _, _ = system(F, J, on if iteration > PATIENCE else nothing, m)
         convexified(lagrangian_hessian(H, lam), g, section, L)

@@ -8,12 +8,16 @@ from polycorner.studies.critical import (
 from polycorner.studies.dyad import DyadMinimum, dyad_minima, heading_curve, paper_heading
 from polycorner.studies.files import load_atlas, save_atlas
 from polycorner.studies.pair_atlas import PairAtlas, long_rod_length, pair_atlas
+from polycorner.studies.pair_map import PairMap, pair_map
+from polycorner.studies.pair_minima import MinimaMap, minima_map, pair_minima
 from polycorner.studies.sensitivity import ErrorBar, heading_error_bar, pair_sensitivity
 
 __all__ = [
     "DyadMinimum",
     "ErrorBar",
+    "MinimaMap",
     "PairAtlas",
+    "PairMap",
     "critical_length",
     "critical_rod_radius",
     "dyad_minima",
@@ -21,7 +25,10 @@ __all__ = [
     "heading_error_bar",
     "load_atlas",
     "long_rod_length",
+    "minima_map",
     "pair_atlas",
+    "pair_map",
+    "pair_minima",
     "pair_sensitivity",
     "paper_heading",
     "plane_critical_formula",
