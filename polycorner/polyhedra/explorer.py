@@ -23,6 +23,7 @@ from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.polyhedra.walks import End, Walk, follow
 
 FALLS = 6
+SHORT = 20
 ARC_SEARCH = 40
 
 Half = tuple[int, int]
@@ -284,15 +285,21 @@ class Explorer:
     def _straight(
         self, spot: Spot, active: frozenset[int]
     ) -> Iterator[tuple[Spot, frozenset[int]]]:
-        """Yield where straight walks in random directions, forth and back, meet something."""
+        """Yield where straight walks in random directions, forth and back, meet something.
+
+        Walks are short first; only where none of them meets anything they go all the way.
+        """
         frame = Frame(self.ground, spot.q, spot.basis(active))
-        for _ in range(FALLS):
-            v = frame.tangent(self.rng.standard_normal(len(spot.q)))
-            for way in (v, -v):
-                walk = follow(frame, way, passive=active, home=True)
-                there = walk.frame.active() if walk.end is End.CORNER else None
-                if there is not None:
-                    yield walk.frame, there
+        met = False
+        for extent in (self.ground.extent / SHORT, self.ground.extent):
+            for _ in range(0 if met else FALLS):
+                v = frame.tangent(self.rng.standard_normal(len(spot.q)))
+                for way in (v, -v):
+                    walk = follow(frame, way, passive=active, home=True, extent=extent)
+                    there = walk.frame.active() if walk.end is End.CORNER else None
+                    if there is not None:
+                        met = True
+                        yield walk.frame, there
 
     def _free(self, spot: Spot, active: frozenset[int]) -> int:
         fixed = null_space(spot.matrix([]), RANK_TOLERANCE)

@@ -149,8 +149,9 @@ class _Follower:
         away = abs(self.frame.distances[self.watched])
         room = float(away.min(initial=self.extent))
         manifold = self.ground.polyhedron.manifold
-        around = [p / s for p, s in zip(manifold.periods, manifold.scales, strict=True)]
-        far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), 0.05 * min(around))
+        turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
+        circle = 0.05 / turning if turning > 0 else math.inf
+        far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), circle)
         return max(LONGEST_STEP, far)
 
     def _walk(self, end: End) -> Walk:
