@@ -1,0 +1,56 @@
+"""Minima on the command line."""
+
+import json
+import sys
+
+import pytest
+
+from polycorner.cli.main import main
+
+
+def run(capsys, *arguments):
+    sys.argv = ["polycorner", "minima", *arguments]
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    captured = capsys.readouterr()
+    return stopped.value.code, captured.out, captured.err
+
+
+def test_pair_rests_in_three_ways(capsys, tmp_path):
+    code, out, err = run(capsys, "dyad", "--starts", "300", "--json", "--out", str(tmp_path))
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert [row["name"] for row in found["minima"]] == ["G", "delta", "delta"]
+    assert [len(row["active"]) for row in found["minima"]] == [0, 3, 3]
+    assert sum(row["count"] for row in found["minima"]) + sum(found["elsewhere"].values()) == 300
+    assert found["minima"][0]["energy"] == pytest.approx(12)
+    assert json.loads((tmp_path / "minima.json").read_text()) == found
+
+
+def test_same_seed_same_answer(capsys):
+    first = run(capsys, "pinball", "--starts", "40", "--seed", "5", "--json")
+    assert first == run(capsys, "pinball", "--starts", "40", "--seed", "5", "--json")
+    assert first[0] == 0
+
+
+def test_table_says_how_complete_it_is(capsys):
+    code, out, _ = run(capsys, "pinball", "--starts", "40")
+    assert code == 0
+    assert "coverage" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("dyad", "--starts", "0"), "--starts"),
+        (("pinball", "--starts", "many"), "--starts"),
+        (("dyad", "--seed", "-1"), "--seed"),
+        (("dyad", "--ball", "0"), "--ball"),
+        (("marble",), "marble"),
+    ],
+)
+def test_mistakes_get_one_line(capsys, arguments, option):
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert option in err
