@@ -1,6 +1,7 @@
 """Where the atlas of the pair changes: the closed form from its definition, and the bisection."""
 
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,6 @@ from hypothesis import strategies as st
 
 from polycorner.models import DumbbellPair
 from polycorner.polyhedra.atlas import Completeness
-from polycorner.studies import pair_map as module
 from polycorner.studies.pair_atlas import long_rod_length, pair_atlas
 from polycorner.studies.pair_map import (
     BLUR,
@@ -21,6 +21,9 @@ from polycorner.studies.pair_map import (
     pattern_at,
     signature_of,
 )
+
+# The file, not the function of the same name that its package exports.
+module = sys.modules["polycorner.studies.pair_map"]
 
 ROD = 0.4
 LONG, SHORT = "long", "short"
