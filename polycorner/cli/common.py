@@ -131,6 +131,17 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def write_answer(answer: dict[str, Any], out: Path, name: str) -> Path:
+    """Write an answer as JSON into the folder of ``--out`` and return the file."""
+    file = out / name
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        file.write_text(json_text(answer) + "\n", encoding="utf-8")
+    except OSError as error:
+        fail(f"--out: {out} cannot be written ({error.strerror})")
+    return file
+
+
 def parameters(pair: "DumbbellPair") -> dict[str, Any]:
     """Return the parameters of a pair under the names of the options."""
     values: dict[str, Any] = {name: getattr(pair, field) for name, field, _ in PARAMETERS}

@@ -8,12 +8,12 @@ import click
 
 from polycorner.cli.common import (
     chosen_pair,
-    fail,
     json_text,
     output_options,
     pair_options,
     parameters,
     patience,
+    write_answer,
 )
 
 if TYPE_CHECKING:
@@ -103,13 +103,7 @@ def _write(
 
     from polycorner.pictures import plots
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        file = out / "dyad.json"
-        file.write_text(json_text(answer) + "\n", encoding="utf-8")
-    except OSError as error:
-        fail(f"--out: {out} cannot be written ({error.strerror})")
-    written = [file]
+    written = [write_answer(answer, out, "dyad.json")]
     written += [plots.save(plots.draw_pair(e), out / f"{e.name}.png") for e in entries]
     longest = 2 * (pair.drum_radius - pair.ball_radius)
     lengths = np.linspace(2 * pair.ball_radius, min(10 * pair.ball_radius, longest), 49)

@@ -15,6 +15,7 @@ from polycorner.cli.common import (
     pair_options,
     parameters,
     patience,
+    write_answer,
 )
 
 if TYPE_CHECKING:
@@ -114,11 +115,7 @@ def _report(
         "interrupted": found.interrupted,
     }
     if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            (out / "minima.json").write_text(json_text(answer) + "\n", encoding="utf-8")
-        except OSError as error:
-            fail(f"--out: {out} cannot be written ({error.strerror})")
+        write_answer(answer, out, "minima.json")
     if as_json:
         click.echo(json_text(answer))
     else:

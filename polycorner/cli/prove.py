@@ -14,6 +14,7 @@ from polycorner.cli.common import (
     pair_options,
     parameters,
     patience,
+    write_answer,
 )
 
 if TYPE_CHECKING:
@@ -121,13 +122,7 @@ def _answer(proof: "Proof") -> dict[str, Any]:
 
 
 def _write(proof: "Proof", answer: dict[str, Any], out: Path) -> None:
-    file = out / "proof.json"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        file.write_text(json_text(answer) + "\n", encoding="utf-8")
-    except OSError as error:
-        fail(f"--out: {out} cannot be written ({error.strerror})")
-    written = [file]
+    written = [write_answer(answer, out, "proof.json")]
     if proof.cells:
         from polycorner.pictures import cells, plots
 

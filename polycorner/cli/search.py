@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import fail, json_text
+from polycorner.cli.common import fail, json_text, write_answer
 from polycorner.cli.report import keys, print_answer
 
 if TYPE_CHECKING:
@@ -203,12 +203,7 @@ class Search:
         """Print the answer, write the files, and end the process if it was interrupted."""
         written = []
         if self.out is not None:
-            file = self.out / "atlas.json"
-            try:
-                self.out.mkdir(parents=True, exist_ok=True)
-                file.write_text(json_text(answer) + "\n", encoding="utf-8")
-            except OSError as error:
-                fail(f"--out: {self.out} cannot be written ({error.strerror})")
+            file = write_answer(answer, self.out, "atlas.json")
             written = [file, *(draw(self.out) if draw is not None and self.drawn else [])]
         if as_json:
             click.echo(json_text(answer))
