@@ -67,6 +67,7 @@ class Explorer:
         self.seeds: deque[tuple[int, Array]] = deque(enumerate(seeds))
         self.pending: deque[Half] = deque()
         self.shot: set[tuple[int, frozenset[int]]] = set()
+        self.crossed = 0  # edges beside which every face was crossed
 
     # --------------------------------------------------------------------------- order of the work
 
@@ -325,10 +326,11 @@ class Explorer:
         """Yield edges and faces beside them that were not crossed yet."""
         if self.symmetry.relabels:
             return
-        for k, curve in enumerate(self.curves):
-            for face in self.faces_beside(curve):
-                if (k, face) not in self.shot:
-                    yield k, face
+        while self.crossed < len(self.curves):
+            for face in self.faces_beside(self.curves[self.crossed]):
+                if (self.crossed, face) not in self.shot:
+                    yield self.crossed, face
+            self.crossed += 1
 
     def faces_beside(self, curve: Curve) -> dict[frozenset[int], Ray]:
         """Return the two-dimensional faces that meet an edge, and the way into each."""
