@@ -1,4 +1,4 @@
-"""Curvilinear polyhedra: faces, corners, and where an energy comes to rest on them, and why.
+"""Curvilinear polyhedra: faces, corners, where an energy comes to rest and why, and motion on them.
 
 The names below are loaded when they are first used, so that importing the package costs NumPy
 and little more.
@@ -17,6 +17,20 @@ if TYPE_CHECKING:
     from polycorner.minima.search import Minima, minima
     from polycorner.minima.sensitivity import Sensitivity, sensitivity
     from polycorner.minima.verdicts import Entrapment, Verdict
+    from polycorner.motion.events import Event, EventKind
+    from polycorner.motion.friction import (
+        ConvexPolygon,
+        ConvexSet,
+        CutDisc,
+        Disc,
+        Ellipse,
+        Interval,
+    )
+    from polycorner.motion.noise import Noise, Solver
+    from polycorner.motion.reference import reference_step
+    from polycorner.motion.simulate import simulate, step
+    from polycorner.motion.system import Friction, State, System, velocities
+    from polycorner.motion.trajectory import Trajectory
     from polycorner.polyhedra.atlas import Completeness, Corner, Edge, Face, Skeleton
     from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
     from polycorner.polyhedra.skeleton import resume, skeleton
@@ -43,6 +57,24 @@ _HOMES = {
     "sensitivity": "minima.sensitivity",
     "Entrapment": "minima.verdicts",
     "Verdict": "minima.verdicts",
+    "Event": "motion.events",
+    "EventKind": "motion.events",
+    "ConvexPolygon": "motion.friction",
+    "ConvexSet": "motion.friction",
+    "CutDisc": "motion.friction",
+    "Disc": "motion.friction",
+    "Ellipse": "motion.friction",
+    "Interval": "motion.friction",
+    "Noise": "motion.noise",
+    "Solver": "motion.noise",
+    "reference_step": "motion.reference",
+    "simulate": "motion.simulate",
+    "step": "motion.simulate",
+    "Friction": "motion.system",
+    "State": "motion.system",
+    "System": "motion.system",
+    "velocities": "motion.system",
+    "Trajectory": "motion.trajectory",
     "Completeness": "polyhedra.atlas",
     "Corner": "polyhedra.atlas",
     "Edge": "polyhedra.atlas",
@@ -67,35 +99,53 @@ __all__ = [
     "AnyOf",
     "Certificate",
     "Completeness",
+    "ConvexPolygon",
+    "ConvexSet",
     "Corner",
+    "CutDisc",
+    "Disc",
     "Edge",
     "Element",
+    "Ellipse",
     "End",
     "Entrapment",
+    "Event",
+    "EventKind",
     "Face",
+    "Friction",
+    "Interval",
     "LocalType",
     "Manifold",
     "Minima",
+    "Noise",
     "PolycornerError",
     "Polyhedron",
     "Proof",
     "Sensitivity",
     "Skeleton",
     "SmoothFunction",
+    "Solver",
     "SolverError",
+    "State",
     "Stratum",
     "Symmetry",
+    "System",
+    "Trajectory",
     "Verdict",
     "certify",
     "minima",
     "minimise",
     "prove",
+    "reference_step",
     "resume",
     "sensitivity",
+    "simulate",
     "skeleton",
     "stationary_on",
+    "step",
     "stratum_at",
     "traced",
+    "velocities",
 ]
 
 

@@ -1,0 +1,1 @@
+"""Nonsmooth dynamics: bodies that touch, rub, roll, rest and move again."""

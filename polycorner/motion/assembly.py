@@ -1,0 +1,145 @@
+"""What one step asks, written out in NumPy: the inclusion that both step functions solve.
+
+From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the half step
+``q_M = q + h v / 2``, find the velocity after the step and the impulses with ([Moreau], [AB])
+
+.. code-block:: text
+
+    M (v+ - v_free) = sum_i J_i' lam_i + sum_b B_b' p_b,      v_free = v + h M^-1 F
+    0 <= lam_i   perp   J_i v+ - bound_i >= 0
+    p_b in L_b C_b   and   -(B_b v+ + d_b) normal to L_b C_b at p_b
+
+======================================  =====================================================
+``bound_i = -e_i J_i v``                contact ``i`` closes in this step and bounces
+``bound_i = -gap_i / h``                otherwise: it may just be reached ([StewartTrinkle])
+``L_b = h N_b(q_M)``                    known normal force
+``L_b = lam_i``                         friction on the unilateral contact ``i``
+``C_b``                                 static set if the contact stuck before, else dynamic
+======================================  =====================================================
+
+Slip that reverses within a step was zero within it, and there it is the static set that decides
+whether it starts again: such a step is solved anew with the static set (:func:`turned_back`).
+
+A contact bounces if it approaches and would leave faster than the forces bring it back within
+the step, ``e |J v| > |J (v_free - v)|``; what bounces more slowly than that is at rest within
+the resolution of the step, and Zeno's infinitely many bounces end there.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.geometry.manifold import Array
+from polycorner.motion.formulation import moment
+from polycorner.motion.friction import ConvexSet
+from polycorner.motion.system import State, System
+
+CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
+
+
+@dataclass(frozen=True)
+class FrictionBlock:
+    """Friction in one step.
+
+    Attributes
+    ----------
+    matrix, drift : (d, n) and (d,) array
+        The slip is ``matrix @ v + drift``.
+    shape : ConvexSet
+        Admissible force per unit load.
+    load : float
+        Impulse that presses; not used when ``owner >= 0``.
+    owner : int
+        Row of the unilateral contact that presses, or -1.
+    """
+
+    matrix: Array
+    drift: Array
+    shape: ConvexSet
+    load: float
+    owner: int
+
+
+@dataclass(frozen=True)
+class StepProblem:
+    """One step as an inclusion; see the head of the module.
+
+    Attributes
+    ----------
+    mass : (n, n) array
+    v, v_free : (n,) array
+    middle : (n,) array
+        ``q_M``.
+    gaps, bounds : (m,) array
+    normals : (m, n) array
+        Gradients ``J_i`` of the gaps.
+    blocks : tuple of FrictionBlock
+    """
+
+    mass: Array
+    v: Array
+    v_free: Array
+    middle: Array
+    gaps: Array
+    normals: Array
+    bounds: Array
+    blocks: tuple[FrictionBlock, ...]
+
+
+def assemble(system: System, state: State, dt: float) -> StepProblem:
+    """Return what a step of length ``dt`` from ``state`` asks."""
+    middle = state.q + dt / 2 * state.v
+    now = moment(system.formulation, system.parameters, middle, state.v)
+    v_free = state.v + dt * np.linalg.solve(now.mass, now.force)
+    gaps, normals = system.polyhedron.bundle.evaluate(middle, 1)
+    normals = normals.reshape(gaps.size, middle.size)
+    closing = gaps + dt * normals @ v_free < 0
+    bounds = _bounds(system, gaps, normals @ state.v, normals @ v_free, closing, dt)
+    blocks = _blocks(system, state.sticking, now.slip_matrix, now.drift, dt * now.loads)
+    return StepProblem(now.mass, state.v, v_free, middle, gaps, normals, bounds, blocks)
+
+
+def _bounds(
+    system: System,
+    gaps: Array,
+    before: Array,
+    free: Array,
+    closing: NDArray[np.bool_],
+    dt: float,
+) -> Array:
+    e = system.restitutions
+    bounces = closing & (before < 0) & (-e * before > np.abs(free - before))
+    depth = np.where((gaps < 0) & (gaps > -CLOSED * length_scale(system)), 0.0, gaps)
+    return np.where(bounces, -e * before, -depth / dt)
+
+
+def turned_back(system: System, problem: StepProblem, velocity: Array) -> StepProblem | None:
+    """Return the step with static sets where slip reversed; nothing if none did."""
+    blocks, found = [], False
+    for friction, block in zip(system.friction, problem.blocks, strict=True):
+        before = block.matrix @ problem.v + block.drift
+        after = block.matrix @ velocity + block.drift
+        reverses = block.shape != friction.static and float(before @ after) < 0
+        blocks.append(replace(block, shape=friction.static) if reverses else block)
+        found = found or reverses
+    return replace(problem, blocks=tuple(blocks)) if found else None
+
+
+def length_scale(system: System) -> float:
+    """Return the smallest scale of the coordinates, in which closed gaps are measured."""
+    return min(system.manifold.scales)
+
+
+def _blocks(
+    system: System, sticking: NDArray[np.bool_], matrix: Array, drift: Array, loads: Array
+) -> tuple[FrictionBlock, ...]:
+    blocks, row = [], 0
+    for number, friction in enumerate(system.friction):
+        rows = slice(row, row + len(friction.slip))
+        row = rows.stop
+        pressing = max(0.0, float(sum(loads[i] for i in system.load_sources[number])))
+        shape = friction.static if sticking[number] else friction.moving
+        owner = system.owners[number]
+        blocks.append(FrictionBlock(matrix[rows], drift[rows], shape, pressing, owner))
+    return tuple(blocks)

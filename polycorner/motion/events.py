@@ -1,0 +1,55 @@
+"""What happens during a motion."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class EventKind(IntEnum):
+    """Kinds of events; the numbers are those of the compiled core."""
+
+    MADE = 0
+    LOST = 1
+    IMPACT = 2
+    REST = 3
+    MOTION = 4
+    EXIT = 5
+
+    @property
+    def sentence(self) -> str:
+        """What happened, in words."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    EventKind.MADE: "a contact closed",
+    EventKind.LOST: "a contact opened",
+    EventKind.IMPACT: "a contact closed and bounced off at once",
+    EventKind.REST: "a body came to rest on its substrate",
+    EventKind.MOTION: "a body began to move",
+    EventKind.EXIT: "a body left",
+}
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at a time.
+
+    Attributes
+    ----------
+    time : float
+        For a contact that closes, the moment at which the gap vanishes if motion goes on as
+        before; otherwise the end or, where motion begins, the start of the step.
+    kind : EventKind
+    bodies : tuple of int
+        Number of the body, or of both.
+    contact : str
+        Name of the contact, or empty.
+    impulse : float
+        Normal impulse in that step, for contacts.
+    """
+
+    time: float
+    kind: EventKind
+    bodies: tuple[int, ...]
+    contact: str
+    impulse: float

@@ -1,0 +1,228 @@
+"""The equations of motion, derived in SymPy from energies and compiled once.
+
+From a kinetic energy ``T = v . M(q) v / 2``, a potential ``V(q)`` and applied forces ``Q(q, v)``
+Lagrange's equations give ``M v' = F`` with ``F = Q - dV/dq + dT/dq - (dM/dt) v`` ([Lanczos] ch. 5).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polycorner.geometry.functions import Family
+from polycorner.geometry.manifold import Array
+
+if TYPE_CHECKING:
+    import sympy
+
+
+def dotted(name: str) -> str:
+    """Return the name of a coordinate's velocity: ``x`` moves with ``x_dot``."""
+    return f"{name}_dot"
+
+
+@dataclass(frozen=True)
+class Laws:
+    """What a motion obeys, in SymPy.
+
+    Attributes
+    ----------
+    kinetic, potential : sympy.Expr
+        ``T(q, v)``, quadratic in the velocities, and ``V(q)``.
+    forces : mapping from str to sympy.Expr
+        Applied generalised forces, by coordinate.
+    slips : tuple of sympy.Expr
+        Slip velocities ``s(q, v)``, affine in the velocities.
+    loads : tuple of sympy.Expr
+        Known normal forces ``N(q)``.
+    """
+
+    kinetic: "sympy.Expr"
+    potential: "sympy.Expr"
+    forces: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
+    slips: "tuple[sympy.Expr, ...]" = ()
+    loads: "tuple[sympy.Expr, ...]" = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Formulation:
+    """Compiled equations of motion of ``k`` coordinates.
+
+    Attributes
+    ----------
+    coordinates, parameters : tuple of str
+        Names of the symbols the laws are written in.
+    laws : callable
+        Returns the :class:`Laws`; with a ``key`` only called when nothing is compiled yet.
+    slips, loads : int
+        How many there are.
+    key : str
+        Identifies the laws between processes.
+    """
+
+    coordinates: tuple[str, ...]
+    parameters: tuple[str, ...]
+    laws: Callable[[], Laws]
+    slips: int
+    loads: int
+    key: str = ""
+
+    @classmethod
+    def of(cls, coordinates: Sequence[str], parameters: Sequence[str], laws: Laws) -> "Formulation":
+        """Return the formulation of given laws, checking each symbol and the kinetic energy."""
+        found = cls(
+            tuple(coordinates), tuple(parameters), lambda: laws, len(laws.slips), len(laws.loads)
+        )
+        found.check()
+        digest = repr([f.program().digest() for f in (found.forces, found.slip, found.energies)])
+        return cls(
+            found.coordinates, found.parameters, found.laws, found.slips, found.loads, digest
+        )
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Coordinates, then velocities."""
+        return (*self.coordinates, *(dotted(name) for name in self.coordinates))
+
+    @cached_property
+    def forces(self) -> Family:
+        """Upper triangle of ``M`` row by row, ``F`` (k), applied forces (k), known loads."""
+        k = len(self.coordinates)
+        mass = [f"M{i}_{j}" for i in range(k) for j in range(i, k)]
+        rest = [f"{letter}{i}" for letter in "FQ" for i in range(k)]
+        names = (*mass, *rest, *(f"N{i}" for i in range(self.loads)))
+        return self._family(names, self._forces)
+
+    @cached_property
+    def slip(self) -> Family:
+        """The slip velocities."""
+        names = tuple(f"s{i}" for i in range(self.slips))
+        return self._family(names, lambda: list(self.laws().slips))
+
+    @cached_property
+    def energies(self) -> Family:
+        """Kinetic and potential energy."""
+        return self._family(("T", "V"), lambda: [self.laws().kinetic, self.laws().potential])
+
+    def _family(self, names: tuple[str, ...], expressions: Callable[[], list[Any]]) -> Family:
+        def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+            from sympy import sympify
+
+            values = [sympify(expression) for expression in expressions()]
+            return {}, dict(zip(names, values, strict=True))
+
+        key = repr((self.key, names)) if self.key else ""
+        return Family(names, self.variables, self.parameters, formulas, key)
+
+    def _symbols(self) -> "tuple[list[sympy.Symbol], list[sympy.Symbol]]":
+        import sympy
+
+        q = [sympy.Symbol(name, real=True) for name in self.coordinates]
+        return q, [sympy.Symbol(dotted(name), real=True) for name in self.coordinates]
+
+    def _mass(self) -> "sympy.Matrix":
+        import sympy
+
+        _, v = self._symbols()
+        return sympy.hessian(sympy.sympify(self.laws().kinetic), v)
+
+    def _forces(self) -> "list[sympy.Expr]":
+        import sympy
+
+        laws = self.laws()
+        q, v = self._symbols()
+        k, mass, velocity = len(q), self._mass(), sympy.Matrix(v)
+        change = sum((mass.diff(x) * y for x, y in zip(q, v, strict=True)), sympy.zeros(k, k))
+        inertial = (
+            sympy.Matrix([sympy.diff(sympy.sympify(laws.kinetic), x) for x in q])
+            - change * velocity
+        )
+        applied = [sympy.sympify(laws.forces.get(name, 0)) for name in self.coordinates]
+        total = [
+            applied[i] - sympy.diff(sympy.sympify(laws.potential), q[i]) + inertial[i]
+            for i in range(k)
+        ]
+        upper = [mass[i, j] for i in range(k) for j in range(i, k)]
+        return [*upper, *total, *applied, *(sympy.sympify(load) for load in laws.loads)]
+
+    def check(self) -> None:
+        """Refuse laws that are not of the stated form, naming the one that is not."""
+        import sympy
+
+        laws = self.laws()
+        q, v = self._symbols()
+        kinetic = sympy.sympify(laws.kinetic)
+        still = dict.fromkeys(v, 0)
+        lower = [kinetic.subs(still), *(sympy.diff(kinetic, x).subs(still) for x in v)]
+        curved = self._mass().free_symbols & set(v)
+        if curved or any(sympy.simplify(term) != 0 for term in lower):
+            msg = f"kinetic: expected a quadratic form in {', '.join(map(str, v))}; got {kinetic}"
+            raise ValueError(msg)
+        for name, expressions in (("potential", [laws.potential]), ("load", laws.loads)):
+            for expression in expressions:
+                moving = sympy.sympify(expression).free_symbols & set(v)
+                if moving:
+                    msg = f"{name}: expected no velocity in it; got {min(map(str, moving))}"
+                    raise ValueError(msg)
+        for slip in laws.slips:
+            curved = sympy.hessian(sympy.sympify(slip), v)
+            if sympy.simplify(curved) != sympy.zeros(len(v), len(v)):
+                msg = f"slip: expected an affine function of the velocities; got {slip}"
+                raise ValueError(msg)
+        unknown = sorted(set(laws.forces) - set(self.coordinates))
+        if unknown:
+            msg = f"forces: expected the coordinates {', '.join(self.coordinates)}; got {unknown}"
+            raise ValueError(msg)
+        del q
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The equations of motion at one ``(q, v)``, in NumPy.
+
+    Attributes
+    ----------
+    mass : (k, k) array
+    force, applied : (k,) array
+        All forces, and of these the applied ones.
+    loads : (loads,) array
+    slip_matrix, drift : (slips, k) and (slips,) array
+        ``s = B v + d``.
+    """
+
+    mass: Array
+    force: Array
+    applied: Array
+    loads: Array
+    slip_matrix: Array
+    drift: Array
+
+
+def moment(formulation: Formulation, parameters: Array, q: Array, v: Array) -> Moment:
+    """Evaluate the equations of motion at one point."""
+    k = len(formulation.coordinates)
+    at = np.concatenate([q, v])
+    numbers = np.array([*parameters, 0.0])
+    (values,) = formulation.forces.kernel.at(at, numbers.ctypes.data, 0)
+    mass = np.zeros((k, k))
+    upper = np.triu_indices(k)
+    mass[upper] = values[: len(upper[0])]
+    mass = mass + np.triu(mass, 1).T
+    rest = values[len(upper[0]) :]
+    if formulation.slips:
+        slips, gradients = formulation.slip.kernel.at(at, numbers.ctypes.data, 1)
+        matrix = gradients[:, k:]
+    else:
+        slips, matrix = np.empty(0), np.empty((0, k))
+    return Moment(mass, rest[:k], rest[k : 2 * k], rest[2 * k :], matrix, slips - matrix @ v)
+
+
+def energies(
+    formulation: Formulation, parameters: Array, q: Array, v: Array
+) -> tuple[float, float]:
+    """Return kinetic and potential energy."""
+    numbers = np.array([*parameters, 0.0])
+    (values,) = formulation.energies.kernel.at(np.concatenate([q, v]), numbers.ctypes.data, 0)
+    return float(values[0]), float(values[1])

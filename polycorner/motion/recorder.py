@@ -1,0 +1,75 @@
+"""Collects what a running engine passes through, and turns it into a trajectory."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polycorner.motion.engine import Engine
+from polycorner.motion.events import Event, EventKind
+from polycorner.motion.trajectory import Touch, Trajectory
+
+if TYPE_CHECKING:
+    from polycorner.motion.scene import Herd
+    from polycorner.motion.system import System
+
+WORK = ("substrate", "applied", "noise")
+
+
+class Recorder:
+    """Instants and events of one run."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self.columns: dict[str, list[Any]] = {
+            name: [] for name in ("t", "q", "v", "rests", "alive", "energies", "sums")
+        }
+        self.touching: list[tuple[Touch, ...]] = []
+        self.events: list[Event] = []
+        self.left: list[float] = []
+        self.gone = 0.0
+
+    def instant(self) -> None:
+        """Record the present state."""
+        motion, add = self.engine.motion, self.columns
+        add["t"].append(self.engine.time)
+        add["q"].append(motion.q.copy())
+        add["v"].append(motion.v.copy())
+        add["rests"].append(motion.rests != 0)
+        add["alive"].append(motion.alive != 0)
+        add["energies"].append(self.engine.energies())
+        add["sums"].append(motion.sums.copy())
+        self.touching.append(tuple(self.engine.touching()))
+        self.left.append(self.gone)
+
+    def advance(self, steps: int) -> None:
+        """Advance the engine, recording events and the energy that leaves with bodies."""
+        happened = self.engine.advance(steps)
+        self.events += happened
+        for event in happened:
+            if event.kind == EventKind.EXIT:
+                self.gone -= self.engine.energy_of(event.bodies[0])
+
+    def trajectory(self, system: "System | Herd") -> Trajectory:
+        """Return what was recorded."""
+        herd, columns = self.engine.herd, self.columns
+        sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
+        work = {name: sums[:, i] for i, name in enumerate(WORK)}
+        if herd.exit_place >= 0:
+            work["left"] = np.array(self.left)
+        return Trajectory(
+            system=system,
+            dt=self.engine.dt,
+            times=np.array(columns["t"]),
+            q=np.array(columns["q"]),
+            v=np.array(columns["v"]),
+            rests=np.array(columns["rests"]),
+            present=np.array(columns["alive"]),
+            touching=tuple(self.touching),
+            kinetic=energies[:, 0],
+            potential=energies[:, 1],
+            dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(herd.causes)},
+            work=work,
+            events=tuple(self.events),
+            max_penetration=float(self.engine.motion.sums[3]),
+            effort=self.engine.effort,
+        )

@@ -1,0 +1,122 @@
+"""A motion as it was recorded: states, contacts, energies, and where the energy went."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.geometry.manifold import Array
+from polycorner.motion.engine import Effort
+from polycorner.motion.events import Event, EventKind
+
+if TYPE_CHECKING:
+    from polycorner.motion.scene import Herd
+    from polycorner.motion.system import System
+    from polycorner.polyhedra.strata import Stratum
+
+Touch = tuple[tuple[int, ...], str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion, recorded at ``T`` instants and at every event between them.
+
+    Attributes
+    ----------
+    system : System or Herd
+        What moves: ``N`` bodies (one, for a system) of ``k`` coordinates.
+    dt : float
+        The step, in s.
+    times : (T,) array
+    q, v : (T, N, k) array
+        Coordinates, not wrapped, and velocities.
+    rests, present : (T, N) array of bool
+        Which bodies are at rest on their substrate, and which have not left.
+    touching : tuple of T tuples
+        Contacts that touch at each instant: bodies, name, and the force that presses.
+    kinetic, potential : (T,) array
+        Energies of the bodies that are present.
+    dissipated : mapping from str to (T,) array
+        Energy lost until each instant, by cause: ``impact`` and the kinds of friction.
+    work : mapping from str to (T,) array
+        Work done until each instant by the moving ``substrate``, by ``applied`` forces and by
+        ``noise``, and what ``left`` with bodies that left (negative).
+    events : tuple of Event
+    max_penetration : float
+        The deepest overlap met, in units of the gaps.
+    effort : Effort
+    """
+
+    system: "System | Herd"
+    dt: float
+    times: Array
+    q: Array
+    v: Array
+    rests: NDArray[np.bool_]
+    present: NDArray[np.bool_]
+    touching: tuple[tuple[Touch, ...], ...]
+    kinetic: Array
+    potential: Array
+    dissipated: Mapping[str, Array]
+    work: Mapping[str, Array]
+    events: tuple[Event, ...]
+    max_penetration: float
+    effort: Effort
+
+    def __len__(self) -> int:
+        """Return the number of recorded instants."""
+        return len(self.times)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every step was solved to the tolerance."""
+        return self.effort.unconverged == 0
+
+    @property
+    def energy_audit(self) -> Array:
+        """Energy that is not accounted for, ``(T,)``: gained minus worked plus dissipated.
+
+        Impulses and velocities balance exactly; what is left is what the scheme does to a
+        potential that is not linear within a step, of second order in the step, and rounding.
+        """
+        total = self.kinetic + self.potential
+        worked = sum(self.work.values(), np.zeros(len(self)))
+        lost = sum(self.dissipated.values(), np.zeros(len(self)))
+        return np.asarray(total - total[0] - worked + lost)
+
+    @property
+    def audit(self) -> float:
+        """The largest entry of :attr:`energy_audit`, relative to the energy that was moved."""
+        moved = sum((np.abs(w) for w in self.work.values()), np.zeros(len(self)))
+        moved = moved + sum(self.dissipated.values(), np.zeros(len(self)))
+        size = float(np.abs(self.kinetic + self.potential).max())
+        scale = max(float(moved.max()), float(np.ptp(self.potential)), float(self.kinetic.max()))
+        scale = max(scale, 1e-12 * size)
+        worst = float(np.abs(self.energy_audit).max())
+        return worst / scale if scale > 0 else worst
+
+    def of_kind(self, kind: EventKind) -> list[Event]:
+        """Return the events of one kind, in time."""
+        return [event for event in self.events if event.kind == kind]
+
+    def stratum(self, index: int, *, tolerance: float = 1e-6) -> "Stratum":
+        """Return the face of the polyhedron at a recorded instant.
+
+        Only for a :class:`~polycorner.motion.system.System`, which has a polyhedron.
+        """
+        from polycorner.motion.system import System
+        from polycorner.polyhedra.strata import stratum_at
+
+        if not isinstance(self.system, System):
+            msg = f"stratum: expected the trajectory of a System; got one of {self.system!r}"
+            raise TypeError(msg)
+        return stratum_at(self.system.polyhedron, self.q[index, 0], tolerance=tolerance)
+
+    def at(self, time: float) -> int:
+        """Return the index of the last recorded instant that is not after ``time``."""
+        if not self.times[0] <= time <= self.times[-1]:
+            msg = f"time: expected one from {self.times[0]:g} to {self.times[-1]:g}; got {time:g}"
+            raise ValueError(msg)
+        return int(np.searchsorted(self.times, time, side="right")) - 1
