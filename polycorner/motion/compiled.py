@@ -41,13 +41,13 @@ CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
 TOUCH = 1e-7  # scaled gap up to which bodies touch
 NEAR = 1e-2  # scaled gap up to which a contact is watched
 FIT = 1e-9  # relative slack with which forces at rest fit in their sets
-NEWTON_ROWS = 24  # unknowns up to which an island is solved by Newton's method
+NEWTON_ROWS = 48  # rows up to which an island is solved by Newton's method
 SKIN = 0.4  # of the reach, by which lists of neighbours are wider
 GUESS = 1e-2  # residual, relative to the speeds, from which Newton's method is tried
 MARGIN = 0.95  # share of friction with which a heap at rest is asked to rest
 SPARE = 0.01  # share of friction that lets a sleeper sleep unasked
 LONGEST = np.int64(50)  # steps for which it does
-SOFT = 1e-6  # relative softness of contacts in the method of multipliers
+SOFT = 1e-6  # relative softness of contacts in Newton steps, so that redundant ones have a solution
 
 
 class Scene(NamedTuple):
@@ -168,9 +168,7 @@ class Room(NamedTuple):
     stiff: Field  # (B, 4) d00, d01, d11, rho
     p: Field  # (B, 2)
     order: Field  # (B,)
-    local: Field  # (N,) where a body's velocities stand in its island
     mass: Field  # (N, k, k)
-    soft: Field  # (B, 2) impulses of soft contacts
     turned: Field  # (B,) whose slip passed through zero in this step
     safe: Field  # (B, 2) impulses before Newton's method
     square: Field  # (k, k)
@@ -179,8 +177,9 @@ class Room(NamedTuple):
     two: Field
     six: Field
     slots: Field  # (max(C, P),)
-    large: Field  # (2, NEWTON_ROWS)
-    large_square: Field
+    matrix: Field  # (2, NEWTON_ROWS, NEWTON_ROWS)
+    vectors: Field  # (4, NEWTON_ROWS)
+    which: Field  # (NEWTON_ROWS, 2) block and row
 
 
 # ------------------------------------------------------------------------------------ convex sets
@@ -1045,136 +1044,115 @@ def solve_dense(A, b, n):
 
 
 @inner
-def balance(scene, room, first, last, n, F, A, q, u, out):
-    """Evaluate ``F = M (v - v_free) - B' q(v)`` and its derivative; return its size.
-
-    ``q = proj(p - tau u(v))`` are the impulses of contacts made soft, ``tau = rho / SOFT``; the
-    size is that of ``M^-1 F``, as the largest speed.
-    """
+def coupling(scene, room, a, r, b, c):
+    """Return the speed that a unit impulse of row ``c`` of block ``b`` gives to a row."""
     k = scene.size
-    for s in range(n):
-        F[s] = 0.0
-        for t in range(n):
-            A[s, t] = 0.0
-    for i in range(scene.bodies):
-        at = room.local[i]
-        if at >= 0:
-            for c in range(k):
-                for d in range(k):
-                    m = room.mass[i, c, d]
-                    F[at + c] += m * (room.new[i, d] - room.free[i, d])
-                    A[at + c, at + d] += m
-    for s in range(first, last):
-        b = room.order[s]
-        d = max(1, room.rows[b])
-        tau = room.stiff[b, 3] / SOFT
-        slip_of(scene, room, b, room.new, u)
-        owner = room.press_by[b]
-        pressed = False
-        if room.rows[b] == 0:
-            z = room.p[b, 0] - tau * u[0]
-            q[b, 0], out[2] = max(0.0, z), 1.0 if z > 0.0 else 0.0
-        else:
-            load = room.ease[b] * (room.weight[b] if owner < 0 else q[owner, 0])
-            x = room.p[b, 0] - tau * u[0]
-            y = room.p[b, 1] - tau * u[1] if d == 2 else 0.0
-            project(scene, room.block_shape[b], x, y, load, out)
-            q[b, 0], q[b, 1] = out[0], out[1]
-            pressed = owner >= 0 and load > 0.0
-        for side in range(2):
-            i = room.body[b, side]
-            if i < 0 or room.local[i] < 0:
-                continue
-            at = room.local[i]
-            for c in range(k):
-                for r in range(d):
-                    F[at + c] -= room.slant[b, r, side * k + c] * q[b, r]
-        for other in range(2):
-            j = room.body[b, other]
-            if j < 0 or room.local[j] < 0:
-                continue
-            for e in range(k):
-                for r in range(d):
-                    slope = out[2 + 2 * r] * room.slant[b, 0, other * k + e]
-                    if d == 2:
-                        slope += out[3 + 2 * r] * room.slant[b, 1, other * k + e]
-                    add_column(scene, room, b, r, tau * slope, room.local[j] + e, A)
-        if pressed:
-            scale = room.ease[b] * room.stiff[owner, 3] / SOFT
-            for other in range(2):
-                j = room.body[owner, other]
-                if j < 0 or room.local[j] < 0:
-                    continue
-                for r in range(d):
-                    turn = out[2 + 2 * r] * x + (out[3 + 2 * r] * y if d == 2 else 0.0)
-                    gain = scale * (out[r] - turn) / load
-                    for e in range(k):
-                        slope = gain * room.slant[owner, 0, other * k + e]
-                        add_column(scene, room, b, r, slope, room.local[j] + e, A)
-    size = 0.0
-    for i in range(scene.bodies):
-        at = room.local[i]
-        if at >= 0:
-            for c in range(k):
-                value = 0.0
-                for d in range(k):
-                    value += room.inverse[i, c, d] * F[at + d]
-                size = max(size, abs(value) * scene.unit[c])
-    return size
-
-
-@inner
-def add_column(scene, room, b, r, factor, column, A):
-    """Add a multiple of a row of a block's Jacobian to a column."""
-    k = scene.size
+    value = 0.0
     for side in range(2):
-        i = room.body[b, side]
-        if i >= 0 and room.local[i] >= 0:
-            for c in range(k):
-                A[room.local[i] + c, column] += factor * room.slant[b, r, side * k + c]
+        i = room.body[a, side]
+        if i < 0:
+            continue
+        for other in range(2):
+            if room.body[b, other] == i:
+                for x in range(k):
+                    value += room.slant[a, r, side * k + x] * room.pushed[b, c, other * k + x]
+    return value
 
 
 @inner
 def newton(scene, room, first, last, goal, u, out):
-    """Solve an island by the method of multipliers, each of its problems by Newton's method.
+    """Take semismooth Newton steps on the natural map of an island; keep the best impulses.
 
-    Contacts are made soft: ``q = proj(p - u rho / SOFT)``.  For given multipliers ``p`` the
-    velocities balance a piecewise smooth force, which a few semismooth Newton steps find when
-    sweeps have found nearly the right modes; then ``p := q`` ([Rockafellar76]).  Redundant
-    contacts do no harm, for the matrix is never singular.  A result that is no better than what
-    the sweeps had is thrown away.
+    The unknowns are the impulses, ``u = W p + constant`` the velocities of the rows, and the map
+    ``p - proj(p - rho u)``; its derivative is that of the projection, and for friction also that
+    of its load ([Acary]).  Redundant contacts have a solution because all are a little soft.
     """
-    k, n = scene.size, 0
-    for i in range(scene.bodies):
-        room.local[i] = NONE
+    W, A, vectors, which = room.matrix[0], room.matrix[1], room.vectors, room.which
+    constant, p, best, phi = vectors[0], vectors[1], vectors[2], vectors[3]
+    n = 0
     for s in range(first, last):
-        for side in range(2):
-            i = room.body[room.order[s], side]
-            if i >= 0 and room.awake[i] and room.local[i] < 0:
-                room.local[i] = n
-                n += k
-    if n > NEWTON_ROWS:
-        return ZERO
-    F, A, step, q = room.large[0], room.large_square, room.large[1], room.soft
-    steps = ZERO
-    for _ in range(3):
-        size = balance(scene, room, first, last, n, F, A, q, u, out)
-        for _ in range(3):
-            if size <= 0.01 * goal or not solve_dense(A, F, n):
-                break
-            for t in range(n):
-                step[t] = -F[t]
-            move(scene, room, step)
-            steps += ONE
-            size = balance(scene, room, first, last, n, F, A, q, u, out)
-        for t in range(first, last):
-            b = room.order[t]
-            for r in range(max(1, room.rows[b])):
-                room.p[b, r] = q[b, r]
-        rebuild(scene, room, first, last)
-        if residual(scene, room, first, last, u, out) <= 0.1 * goal:
+        b = room.order[s]
+        room.origin[b, 3] = n
+        rows = max(1, room.rows[b])
+        if n + rows > NEWTON_ROWS:
+            return ZERO
+        slip_of(scene, room, b, room.free, u)
+        for r in range(rows):
+            which[n, 0], which[n, 1], constant[n], p[n] = b, r, u[r], room.p[b, r]
+            n += 1
+    for i in range(n):
+        for j in range(i + 1):
+            W[i, j] = coupling(scene, room, which[i, 0], which[i, 1], which[j, 0], which[j, 1])
+            W[j, i] = W[i, j]
+    least, former, steps = np.inf, np.inf, ZERO
+    while True:
+        worst = natural_map(scene, room, n, u, out)
+        if worst < least:
+            least = worst
+            for i in range(n):
+                best[i] = p[i]
+        settled = worst <= goal and worst > 0.1 * former
+        if settled or worst <= 1e-5 * goal or steps == 8 or not worst < 1e6 * least:
             break
+        former = worst
+        if not solve_dense(A, phi, n):
+            break
+        for i in range(n):
+            p[i] -= phi[i]
+        steps += ONE
+    for s in range(first, last):
+        b = room.order[s]
+        for r in range(max(1, room.rows[b])):
+            change = best[room.origin[b, 3] + r] - room.p[b, r]
+            room.p[b, r] += change
+            push(scene, room, b, r, change)
     return steps
+
+
+@inner
+def natural_map(scene, room, n, u, out):
+    """Fill the natural map and its derivative at the impulses in ``vectors[1]``; its size."""
+    W, A, which = room.matrix[0], room.matrix[1], room.which
+    constant, p, phi = room.vectors[0], room.vectors[1], room.vectors[3]
+    worst, i = 0.0, 0
+    while i < n:
+        b = which[i, 0]
+        rho, d = room.stiff[b, 3], max(1, room.rows[b])
+        for r in range(d):
+            u[r] = constant[i + r]
+            for j in range(n):
+                u[r] += W[i + r, j] * p[j]
+        if room.rows[b] == 0:
+            is_open = p[i] - rho * u[0] <= 0.0
+            phi[i] = p[i] if is_open else rho * u[0]
+            for j in range(n):
+                A[i, j] = 0.0 if is_open else rho * W[i, j]
+            A[i, i] += 1.0 if is_open else SOFT
+            worst = max(worst, abs(phi[i]) / rho)
+            i += 1
+            continue
+        owner = room.press_by[b]
+        pressing = room.weight[b] if owner < 0 else p[room.origin[owner, 3]]
+        load = room.ease[b] * pressing
+        x = p[i] - rho * u[0]
+        y = p[i + 1] - rho * u[1] if d == 2 else 0.0
+        project(scene, room.block_shape[b], x, y, load, out)
+        for r in range(d):
+            phi[i + r] = p[i + r] - out[r]
+            worst = max(worst, abs(phi[i + r]) / rho)
+            for j in range(n):
+                A[i + r, j] = out[2 + 2 * r] * rho * W[i, j]
+                if d == 2:
+                    A[i + r, j] += out[3 + 2 * r] * rho * W[i + 1, j]
+            A[i + r, i + r] += 1.0 + SOFT
+            A[i + r, i] -= out[2 + 2 * r]
+            if d == 2:
+                A[i + r, i + 1] -= out[3 + 2 * r]
+            if owner >= 0 and load > 0.0:
+                turn = out[2 + 2 * r] * x + (out[3 + 2 * r] * y if d == 2 else 0.0)
+                A[i + r, room.origin[owner, 3]] -= (out[r] - turn) / pressing
+        i += d
+    return worst
 
 
 @inner
@@ -1191,23 +1169,14 @@ def keep(room, first, last, source, target):
 
 
 @inner
-def move(scene, room, step):
-    """Add a Newton step to the velocities."""
-    for i in range(scene.bodies):
-        at = room.local[i]
-        if at >= 0:
-            for c in range(scene.size):
-                room.new[i, c] += step[at + c]
-
-
-@inner
 def rebuild(scene, room, first, last):
     """Compute the velocities of an island from its impulses."""
-    k = scene.size
-    for i in range(scene.bodies):
-        if room.local[i] >= 0:
-            for c in range(k):
-                room.new[i, c] = room.free[i, c]
+    for s in range(first, last):
+        for side in range(2):
+            i = room.body[room.order[s], side]
+            if i >= 0:
+                for c in range(scene.size):
+                    room.new[i, c] = room.free[i, c]
     for s in range(first, last):
         b = room.order[s]
         for r in range(max(1, room.rows[b])):
