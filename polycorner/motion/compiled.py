@@ -777,6 +777,8 @@ def bound_of(gap, before, free, bounce, h, scale):
         return -bounce * before
     if -CLOSED * scale < gap < 0.0:
         return 0.0
+    if gap < 0.0 and before < 0.0:
+        return max(0.0, 0.5 * before - gap / h)
     return -gap / h
 
 
