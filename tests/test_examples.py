@@ -18,6 +18,9 @@ from examples import (
     ex08_rods,
     ex09_spheres,
     ex10_critical_rod,
+    ex11_keel,
+    ex15_entrapment,
+    ex16_dyad_climbs,
 )
 from polycorner import LocalType
 
@@ -115,3 +118,30 @@ def test_readme_code_runs_as_printed():
     for block in blocks:
         exec(block, scope)
     np.testing.assert_allclose(scope["c"].point, [-0.5, 0.25], atol=1e-12)
+
+
+def test_keel():
+    result = ex11_keel.main()
+    level = ex11_keel.HEADINGS.index(0.0)
+    assert result.turning.upper[level] == pytest.approx(math.atan(0.1))
+    assert result.order == pytest.approx(2, abs=0.05)
+    assert result.difference < 0.15
+    assert list(result.turning.rolls) == [True] * 6 + [False]
+
+
+@pytest.mark.slow
+def test_entrapment():
+    result = ex15_entrapment.main()
+    for run, expected in zip(result.absorbing, result.expected, strict=True):
+        assert run.mean == pytest.approx(expected, abs=5 * run.error + 0.1 * expected)
+    assert result.expected == sorted(result.expected)
+    assert result.elastic[2] < result.elastic[0] == pytest.approx(result.elastic[1], rel=0.02)
+
+
+def test_a_dyad_climbs():
+    result = ex16_dyad_climbs.main()
+    for one, onset in zip(result.zigzags, result.onsets, strict=True):
+        assert one.upper[0] == pytest.approx(onset, abs=1.1e-5)  # what the drum turns in a step
+    right, left = result.pairs.climb_rates(after=10.0)  # over few zigzags, the last one cut
+    assert right == pytest.approx(result.law, rel=0.25)
+    assert left == pytest.approx(-result.law, rel=0.25)

@@ -13,6 +13,7 @@ import click
 
 from polycorner import __version__
 from polycorner.cli.atlas import atlas
+from polycorner.cli.drum import drum
 from polycorner.cli.dyad import dyad
 from polycorner.cli.minima import minima
 from polycorner.cli.prove import prove
@@ -37,6 +38,7 @@ cli.add_command(dyad)
 cli.add_command(atlas)
 cli.add_command(prove)
 cli.add_command(minima)
+cli.add_command(drum)
 
 
 def main() -> None:

@@ -225,7 +225,7 @@ class DumbbellDrum:
         from polycorner.motion.engine import Engine
 
         places = self.placed(q)
-        check_step(dt, self.largest_step)
+        check_step(dt, self.largest_step, "in which a ball falls by a tenth of the rod's radius")
         sticking = np.ones((self.count, 3), dtype=np.bool_)
         if v is None:
             speeds = np.zeros((self.count, 4))

@@ -9,6 +9,7 @@ has ``<dv^2> = (kick / mass)^2 t``.
 """
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,26 +77,38 @@ def _sloping_barrier(well: Well, kick: float) -> float:
         lift = well.rim + well.slope * (weights @ responses)
         return float(math.log(lift**2 / (2 * kick**2 * (weights @ responses**2))))
 
-    # Without drag and spring the best time is sqrt(6 a m / f), with much drag a c / f; a spring
-    # shortens it, to half a period at most.
+    # Without drag and spring the best time is sqrt(6 a m / f), with much drag a c / f.  A spring
+    # shortens it, below the half swing after which the mass would be back at the wall.
     fast = math.sqrt(6 * well.rim * well.mass / well.slope)
-    slow = fast + 2 * well.rim * well.drag / well.slope
+    slow = 2 * fast + 4 * well.rim * well.drag / well.slope
     if well.stiffness > 0:
         fast = min(fast, math.pi / well.frequency)
-    span = (math.log(0.2 * fast), math.log(2 * slow))
+        square = well.frequency**2 - (well.drag / (2 * well.mass)) ** 2
+        slow = min(slow, math.pi / math.sqrt(square)) if square > 0 else slow
+    span = (math.log(0.2 * fast), math.log(slow))
     return math.exp(float(minimize_scalar(action, bounds=span, method="bounded").fun))
 
 
 def _responses(well: Well, time: float) -> tuple[Array, Array]:
-    """Return the place after a unit impulse at the nodes of a rule on ``[0, time]``."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    s, half = time * (1 + nodes) / 2, well.drag / (2 * well.mass)
+    """Return the place after a unit impulse at the nodes of a rule on ``[0, time]``.
+
+    The nodes crowd at 0, where drag makes it change most.
+    """
+    nodes, weights = _rule()
+    s, half = time * nodes**3, well.drag / (2 * well.mass)
     root = np.sqrt(complex(half**2 - well.frequency**2))
     if abs(root) * time < 1e-6:
         found = s * np.exp(-half * s)
     else:
         found = ((np.exp((root - half) * s) - np.exp((-root - half) * s)) / (2 * root)).real
-    return found / well.mass, time / 2 * weights
+    return found / well.mass, 3 * time * nodes**2 * weights
+
+
+@lru_cache(maxsize=1)
+def _rule() -> tuple[Array, Array]:
+    """Return Gauss's rule on ``[0, 1]``."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    return (1 + nodes) / 2, weights / 2
 
 
 def overdamped_escape_time(well: Well, kick: float) -> float:
@@ -111,11 +124,10 @@ def overdamped_escape_time(well: Well, kick: float) -> float:
     """
     well.check_no("friction")
     temperature = well.temperature(kick)
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    y, w = well.rim * (1 + nodes) / 2, well.rim * weights / 2
-    z = y[:, None] * (1 + nodes) / 2
-    factor = np.exp((well.potential(y)[:, None] - well.potential(z)) / temperature)
-    return float(well.drag / temperature * ((w * y) @ factor @ weights) / 2)
+    nodes, weights = _rule()
+    y = well.rim * nodes
+    factor = np.exp((well.potential(y)[:, None] - well.potential(np.outer(y, nodes))) / temperature)
+    return float(well.drag / temperature * well.rim * ((weights * y) @ factor @ weights))
 
 
 def mean_escape_time(well: Well, kick: float, *, cells: int = CELLS) -> float:

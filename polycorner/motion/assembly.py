@@ -12,8 +12,8 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
 ======================================  =====================================================
 ``bound_i = -e_i J_i v``                contact ``i`` closes in this step and bounces
 ``bound_i = -gap_i / h``                otherwise: it may just be reached ([StewartTrinkle]);
-                                        if it overlaps and approaches, only what overlapped
-                                        before the half step, ``gap_i - h J_i v / 2``, counts
+                                        what overlaps is pushed out no faster than
+                                        ``|J_i (v_free - v)|``, what forces do within a step
 ``L_b = h N_b(q_M)``                    known normal force
 ``L_b = lam_i``                         friction on the unilateral contact ``i``
 ``C_b``                                 static set if the contact stuck before, else dynamic
@@ -113,9 +113,8 @@ def _bounds(
     e = system.restitutions
     bounces = closing & (before < 0) & (-e * before > np.abs(free - before))
     depth = np.where((gaps < 0) & (gaps > -CLOSED * length_scale(system)), 0.0, gaps)
-    overlap = np.maximum(0.0, before / 2 - depth / dt)
-    rests = np.where((depth < 0) & (before < 0), overlap, -depth / dt)
-    return np.where(bounces, -e * before, rests)
+    limit = np.where(depth < 0, np.abs(free - before), np.inf)
+    return np.where(bounces, -e * before, np.minimum(-depth / dt, limit))
 
 
 def turned_back(system: System, problem: StepProblem, velocity: Array) -> StepProblem | None:

@@ -108,6 +108,7 @@ class Motion(NamedTuple):
     alive: Field  # (N,)
     rests: Field
     asleep: Field
+    worked: Field  # (N, F, 2) friction impulses when the work was booked last
     due: Field  # (N,) step in which a sleeper is asked again
     since: Field  # (N,) step up to which its work is booked
     pull: Field  # (N, k) impulses from other bodies
@@ -777,8 +778,8 @@ def bound_of(gap, before, free, bounce, h, scale):
         return -bounce * before
     if -CLOSED * scale < gap < 0.0:
         return 0.0
-    if gap < 0.0 and before < 0.0:
-        return max(0.0, 0.5 * before - gap / h)
+    if gap < 0.0:  # pushed out no faster than forces push back within a step
+        return min(-gap / h, abs(free - before))
     return -gap / h
 
 
@@ -1074,8 +1075,12 @@ def newton(scene, room, first, last, goal, u, out):
     n = 0
     for s in range(first, last):
         b = room.order[s]
+        owner, rows = room.press_by[b], max(1, room.rows[b])
+        room.origin[b, 3] = NONE
+        idle = room.p[b, 0] == 0.0 and room.p[b, 1] == 0.0
+        if idle and (room.rows[b] == 0 or (owner >= 0 and room.origin[owner, 3] < 0)):
+            continue  # an open contact stays so, and does not rub
         room.origin[b, 3] = n
-        rows = max(1, room.rows[b])
         if n + rows > NEWTON_ROWS:
             return ZERO
         slip_of(scene, room, b, room.free, u)
@@ -1104,6 +1109,8 @@ def newton(scene, room, first, last, goal, u, out):
         steps += ONE
     for s in range(first, last):
         b = room.order[s]
+        if room.origin[b, 3] < 0:
+            continue
         for r in range(max(1, room.rows[b])):
             change = best[room.origin[b, 3] + r] - room.p[b, r]
             room.p[b, r] += change
@@ -1342,8 +1349,10 @@ def ask(scene, motion, room, i, pull, h, time, index):
         share = 0.5 * steps if asleep else 0.0
         for f in range(scene.shape.shape[0]):
             for r in range(scene.row[f + 1] - scene.row[f]):
-                p = (steps - share) * motion.grip[i, f, r] + share * room.fit_grip[i, f, r]
+                p = (steps - share) * motion.worked[i, f, r] + share * room.fit_grip[i, f, r]
                 motion.sums[0] -= p * room.drift[i, scene.row[f] + r]
+                if asleep:
+                    motion.worked[i, f, r] = room.fit_grip[i, f, r]
         motion.since[i] = index
     return asleep
 
@@ -1553,8 +1562,9 @@ def settle(scene, motion, room, h, index):
                 motion.since[i] = index + 1
                 motion.due[i] = sleep_on(scene, motion, room, i, h, index)
             for f in range(scene.shape.shape[0]):
-                motion.grip[i, f, 0] = room.fit_grip[i, f, 0]
-                motion.grip[i, f, 1] = room.fit_grip[i, f, 1]
+                for r in range(2):
+                    motion.grip[i, f, r] = room.fit_grip[i, f, r]
+                    motion.worked[i, f, r] = room.fit_grip[i, f, r]
             for g in range(scene.bounce.size):
                 motion.lam[i, g] = room.fit_lam[i, g]
 

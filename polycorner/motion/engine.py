@@ -201,6 +201,7 @@ def _still(herd: Herd, q: Array, v: Array, sticking: NDArray[np.bool_], capacity
         alive=np.ones(N, dtype=np.int64),
         rests=flags(N),
         asleep=flags(N),
+        worked=np.zeros((N, F, 2)),
         due=flags(N),
         since=flags(N),
         pull=np.zeros((N, k)),

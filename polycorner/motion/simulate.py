@@ -144,13 +144,16 @@ def start(
     )
 
 
-def check_step(dt: object, largest: float) -> None:
-    """Refuse a step that is no positive time or longer than the largest stable one."""
+UNSTABLE = "beyond which the motion is unstable"
+
+
+def check_step(dt: object, largest: float, why: str = UNSTABLE) -> None:
+    """Refuse a step that is no positive time or longer than the largest, with the reason."""
     if isinstance(dt, bool) or not isinstance(dt, Real) or not 0 < float(dt) < math.inf:
         msg = f"dt: expected a positive time in s; got {dt!r}"
         raise ValueError(msg)
     if float(dt) > largest:
-        msg = f"dt: expected at most {largest:.3g} s, beyond which the motion is unstable; got {dt}"
+        msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
         raise ValueError(msg)
 
 

@@ -27,7 +27,7 @@ def first_slip(drum, azimuth, heading, duration):
 
 
 @given(st.floats(-30, 30))
-@settings(max_examples=10)
+@settings(max_examples=6)
 def test_motion_begins_on_the_eastern_boundary_of_the_region_of_rest(degrees):
     """The drum carries it there from a tenth of a degree before; the boundary is that of keel.py.
 
@@ -96,18 +96,21 @@ def test_it_stops_where_its_energy_is_used_up(degrees):
 
 
 def test_a_raft_has_no_keel():
-    """In a level drum, with sliding as easy as rolling, it does not climb; otherwise it does."""
+    """Where sliding is as easy as rolling it slides down, and neither rolls nor climbs."""
     boat = replace(DRUM, tilt=0.0)
-    raft = replace(boat, sliding=boat.rolling)
-    climbs = []
+    raft = replace(boat, sliding=(0.1, 0.1))
+    climbs, spins = [], []
     for drum in (boat, raft):
         path = drum.simulate([[0.08, 0.0, 0.2]], 20.0)
         assert path.of_kind(EventKind.MOTION)
-        phi, eta = path.q[-1, 0, :2]
+        phi, eta, _, psi = path.q[-1, 0]
         carried = drum.centre_radius * (drum.spin * 20.0 - (phi - 0.08))
         climbs.append(eta / (carried * math.tan(0.2)))
+        spins.append(psi)
     assert climbs[0] == pytest.approx(1.0, abs=1e-6)
+    assert spins[0] > 1.0
     assert abs(climbs[1]) < 0.05
+    assert abs(spins[1]) < 1e-6
 
 
 @pytest.mark.parametrize("noise", [Noise(), Noise(chatter=0.4, seed=3)])
@@ -132,8 +135,12 @@ def test_in_a_level_drum_the_opposite_heading_climbs_as_far_down(noise):
     assert math.pi - second[:, 2] == pytest.approx(first[:, 2], abs=1e-6)
 
 
-def test_energy_is_accounted_for():
-    path = DRUM.simulate([[0.1, 0.0, 0.2]], 12.0)
-    assert path.converged
-    assert path.audit < 1e-4
-    assert path.work["substrate"][-1] > 0
+def test_energy_is_accounted_for_better_with_shorter_steps():
+    """What is left is the scheme's own error: at least of first order in the step."""
+    errors = []
+    for dt in (1e-3, 2.5e-4):
+        path = DRUM.simulate([[0.1, 0.0, 0.2]], 12.0, dt=dt)
+        assert path.converged
+        assert path.work["substrate"][-1] > 0
+        errors.append(path.audit)
+    assert 0 < errors[1] < errors[0] / 4 < 1e-3

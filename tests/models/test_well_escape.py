@@ -83,12 +83,12 @@ def test_absorbing_walls_raise_barriers_in_the_papers_order(depth, drag):
 
 def test_barriers_are_those_of_equilibrium_when_overdamped():
     for kind in KINDS:
-        rises = [
-            barrier(well, kick_at(well, 0.2)) / 5 - 1
-            for well in (Well.of_depth(kind, 1.0, drag=c) for c in (20.0, 40.0, 80.0))
-        ]
-        assert rises == sorted(rises, reverse=True)
-        assert 0 <= rises[-1] < 1e-3
+        wells = [Well.of_depth(kind, 1.0, drag=c) for c in (20.0, 40.0, 80.0)]
+        rises = [barrier(well, kick_at(well, 0.2)) / 5 - 1 for well in wells]
+        if kind is HALF_V:
+            orders = np.log2(np.array(rises[:-1]) / rises[1:])
+            assert orders == pytest.approx(2, abs=0.05)
+        assert rises[-1] == pytest.approx(0, abs=1e-3)
 
 
 def test_elastic_walls_change_no_barrier():
@@ -164,7 +164,8 @@ def test_deep_and_overdamped_half_v_is_weaker_by_a_root():
 def test_an_elastic_half_u_well_is_the_folded_u_well(drag):
     """Two grids, one with a wall and one without."""
     walled = Well.of_depth(HALF_U, 1.5, drag=drag, restitution=1.0)
-    both = [mean_escape_time(w, 1.3) for w in (walled, Well.of_depth(U, 1.5, drag=drag))]
+    kick = kick_at(walled, 0.75) if drag > 0 else 1.0
+    both = [mean_escape_time(w, kick) for w in (walled, Well.of_depth(U, 1.5, drag=drag))]
     assert both[0] == pytest.approx(both[1], rel=5e-3)
 
 
@@ -179,13 +180,12 @@ def test_units_do_not_matter(rim, mass, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_differences_are_of_second_order(kind):
+def test_differences_are_of_second_order_at_least(kind):
     well = Well.of_depth(kind, 2.0, drag=1.0, restitution=1.0)
-    found = [mean_escape_time(well, kick_at(well, 1.0), cells=n) for n in (15, 30, 60, 120)]
-    first, second, third = np.abs(np.diff(found))
-    assert second / third > 2.5
-    assert third < 4e-3 * found[-1]
-    assert first > third
+    found = [mean_escape_time(well, kick_at(well, 1.0), cells=n) for n in (15, 30, 60)]
+    first, second = np.abs(np.diff(found))
+    assert math.log2(first / second) > 1.6
+    assert second < 0.02 * found[-1]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -217,7 +217,7 @@ def test_times_grow_like_the_exponential_of_the_barrier(kind, low):
     """A power of the noise is left, so that the slope comes near to 1 slowly."""
     well = Well.of_depth(kind, 1.0, drag=2.0)
     kicks = [kick_at(well, 1 / ratio) for ratio in (3.0, 4.0, 5.0)]
-    logs = np.log([mean_escape_time(well, kick) for kick in kicks])
+    logs = np.log([mean_escape_time(well, kick, cells=50) for kick in kicks])
     slopes = np.diff(logs) / np.diff([barrier(well, kick) for kick in kicks])
     assert ((low < slopes) & (slopes < 1.06)).all()
 
@@ -227,7 +227,7 @@ def test_friction_and_losses_lengthen_the_time(restitution):
     for kind in KINDS:
         well = Well.of_depth(kind, 1.5, drag=1.0, restitution=restitution if kind is not U else 0)
         times = [
-            mean_escape_time(replace(well, friction=friction), 1.4) for friction in (0.0, 0.2, 0.4)
+            mean_escape_time(replace(well, friction=f), 1.4, cells=30) for f in (0.0, 0.2, 0.4)
         ]
         assert times == sorted(times)
         assert times[1] > 1.1 * times[0]

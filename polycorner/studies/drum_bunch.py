@@ -1,0 +1,238 @@
+"""A bunch of dumbbells at the bottom of the turning drum: who rolls, who slides, who leaves.
+
+The experiment of [GMBN] sec. 3.2: 60 dumbbells are put into the bottom, and after twenty minutes
+some forty have left at the top, as right-handed dyads.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.geometry.manifold import Array
+from polycorner.models.drum import DumbbellDrum
+from polycorner.motion.events import EventKind
+from polycorner.motion.noise import Noise
+from polycorner.motion.simulate import run
+from polycorner.studies.drum_dyads import handedness, is_dyad
+from polycorner.studies.drum_single import Mean
+
+TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
+COUNT = 60
+WIDTH = 0.35  # rad, half the width of the strip in which the bunch is put
+GAP = 0.05  # mm, least distance at the start
+TRIES = 1000  # places in vain before the strip grows
+MEMORY = 5.0  # s before leaving in which a dumbbell counts as member of a dyad
+WINDOW = 10.0  # s, longer than a zigzag
+ROLLING = math.radians(30.0)  # own spin within the window beyond which it counts as a roller
+KINDS = ("right", "left", "single")
+
+
+def drum_for_bunch(drum: DumbbellDrum, *, count: int = COUNT, top: float = TOP) -> DumbbellDrum:
+    """Return the drum with a flat bottom, an open top and ``count`` dumbbells."""
+    return replace(drum, count=count, floor=True, top=top)
+
+
+def scattered(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WIDTH) -> Array:
+    """Return dumbbells scattered near the bottom without overlap, ``(count, 3)``.
+
+    Places and headings are uniform in a strip ``|phi| <= width``; what overlaps is drawn anew, and
+    the strip, at first two lengths high, grows by a tenth whenever it is full.
+    """
+    height, tries = 2 * drum.length + 2 * drum.ball_radius, 0
+    found = np.empty((0, 3))
+    while len(found) < drum.count:
+        theta = rng.uniform(-math.pi / 2, math.pi / 2)
+        low = drum.length / 2 * math.cos(theta) + drum.ball_radius + GAP
+        new = np.array([rng.uniform(-width, width), rng.uniform(low, max(low, height)), theta])
+        tries += 1
+        if _is_free(drum, found, new):
+            found, tries = np.concatenate([found, new[None]]), 0
+        elif tries > TRIES:
+            height, tries = 1.1 * height, 0
+    return found
+
+
+def _is_free(drum: DumbbellDrum, others: Array, new: Array) -> bool:
+    apart = np.hypot(drum.centre_radius * (others[:, 0] - new[0]), others[:, 1] - new[1])
+    near = others[apart < drum.length + 2 * drum.ball_radius + GAP]
+    if len(near) == 0:
+        return True
+    pairs = np.concatenate([near, np.tile(new, (len(near), 1))], axis=1)
+    return bool(drum.pair.polyhedron.bundle.evaluate(pairs, 0)[0].min() > GAP)
+
+
+@dataclass(frozen=True, eq=False)
+class BunchRun:
+    """A bunch followed for a time.
+
+    Attributes
+    ----------
+    drum : DumbbellDrum
+    times : (T,) array
+    q : (T, N, 4) array
+        Placements; those of dumbbells that have left stay as they were.
+    present : (T, N) array of bool
+    exits : tuple of (float, int)
+        Time of leaving at the top, and number.
+    unconverged, islands : int
+        Islands of touching dumbbells not solved to the tolerance, and all that were solved.
+    max_penetration : float
+        In mm.
+    """
+
+    drum: DumbbellDrum
+    times: Array
+    q: Array
+    present: NDArray[np.bool_]
+    exits: tuple[tuple[float, int], ...]
+    unconverged: int
+    islands: int
+    max_penetration: float
+
+    def dyads(self, index: int) -> list[tuple[int, int, int]]:
+        """Return the dyads at an instant: two numbers and the chirality +1 (right) or -1.
+
+        By :func:`polycorner.studies.drum_dyads.is_dyad`; a dumbbell may be in several.
+        """
+        here = np.flatnonzero(self.present[index])
+        q = self.q[index, here]
+        flat = np.stack([self.drum.centre_radius * q[:, 0], q[:, 1]], axis=-1)
+        apart = np.linalg.norm(flat[:, None] - flat, axis=-1)
+        close = np.argwhere(np.triu(apart < self.drum.length + 2 * self.drum.ball_radius, 1))
+        if len(close) == 0:
+            return []
+        pairs = q[close]
+        hand = np.where(is_dyad(self.drum, pairs), handedness(self.drum, pairs), 0)
+        return [
+            (int(here[i]), int(here[j]), int(h)) for (i, j), h in zip(close, hand, strict=True) if h
+        ]
+
+    @cached_property
+    def exit_kinds(self) -> tuple[str, ...]:
+        """As what each dumbbell left, in the order of :attr:`exits`.
+
+        ``right`` or ``left`` as a member of a dyad at most 5 s before, by the latest record in
+        which it was one, else ``single``.
+        """
+        return tuple(self._kind(time, body) for time, body in self.exits)
+
+    def _kind(self, time: float, body: int) -> str:
+        last = int(np.searchsorted(self.times, time)) - 1
+        while last >= 0 and self.times[last] >= time - MEMORY:
+            hands = [h for i, j, h in self.dyads(last) if body in (i, j)]
+            if hands:
+                return "right" if sum(hands) > 0 else "left"
+            last -= 1
+        return "single"
+
+    def exit_counts(self) -> dict[str, int]:
+        """Return how many left, by kind."""
+        return {kind: self.exit_kinds.count(kind) for kind in KINDS}
+
+    def census(self, index: int) -> dict[str, int]:
+        """Return how many dumbbells are in right and left dyads, single, and present."""
+        hands: dict[int, int] = {}
+        for i, j, hand in self.dyads(index):
+            for body in (i, j):
+                hands[body] = hands.get(body, 0) + hand
+        found = {"right": 0, "left": 0, "single": 0, "present": int(self.present[index].sum())}
+        for total in hands.values():
+            found["right" if total > 0 else "left"] += 1
+        found["single"] = found["present"] - len(hands)
+        return found
+
+    def rollers(self, index: int) -> NDArray[np.bool_]:
+        """Return which dumbbells roll, ``(N,)``: sliders and those that left do not.
+
+        A roller has turned about its own axis by more than 30 degrees, in sum, up and down, within
+        the 10 s before the instant.
+        """
+        first = int(np.searchsorted(self.times, self.times[index] - WINDOW))
+        spun = np.abs(np.diff(self.q[first : index + 1, :, 3], axis=0)).sum(axis=0)
+        return np.asarray(self.present[index] & (spun > ROLLING))
+
+    def azimuths(self, index: int) -> tuple[float, float]:
+        """Return the mean azimuths of rollers and of sliders, in rad; nan for none."""
+        rolls = self.rollers(index)
+        slides = self.present[index] & ~rolls
+        phi = self.q[index, :, 0]
+        return (
+            float(phi[rolls].mean()) if rolls.any() else math.nan,
+            float(phi[slides].mean()) if slides.any() else math.nan,
+        )
+
+
+def follow_bunch(
+    drum: DumbbellDrum,
+    duration: float,
+    *,
+    seed: int = 0,
+    chatter: float = 0.0,
+    dt: float = 1e-3,
+    interval: float = 0.5,
+    progress: Callable[[float], None] | None = None,
+) -> BunchRun:
+    """Follow a scattered bunch for ``duration`` s.
+
+    Parameters
+    ----------
+    drum : DumbbellDrum
+        With a bottom, as of :func:`drum_for_bunch`.
+    seed : int, optional
+        Of the start and of the noise.
+    chatter : float, optional
+        Amplitude of the noise of the loads.
+    dt, interval : float, optional
+        Step, and time between records, in s.
+    progress : callable, optional
+        Called with the time now and then.
+    """
+    if not drum.floor:
+        msg = "drum: expected one with a bottom, on which the bunch lies; got floor=False"
+        raise ValueError(msg)
+    q = scattered(drum, np.random.default_rng(seed))
+    noise = Noise(chatter=chatter, seed=seed)
+    engine = drum.engine(q, dt=dt, noise=noise)
+    steps, stride = round(duration / dt), max(1, round(interval / dt))
+    path = run(engine, steps, stride, progress).trajectory(engine.herd)
+    left = tuple((e.time, e.bodies[0]) for e in path.of_kind(EventKind.EXIT))
+    effort = path.effort
+    return BunchRun(
+        drum,
+        path.times,
+        path.q,
+        path.present,
+        left,
+        effort.unconverged,
+        effort.islands,
+        path.max_penetration,
+    )
+
+
+@dataclass(frozen=True)
+class Exits:
+    """How many of a bunch left, over an ensemble: mean with standard error of each kind."""
+
+    duration: float
+    count: int
+    by_kind: dict[str, Mean]
+    total: Mean
+
+
+def exit_statistics(runs: Iterable[BunchRun]) -> Exits:
+    """Return means over runs of the same drum and duration."""
+    many = list(runs)
+    if not many:
+        msg = "runs: expected at least one run; got none"
+        raise ValueError(msg)
+    counts = [one.exit_counts() for one in many]
+    return Exits(
+        float(many[0].times[-1]),
+        many[0].drum.count,
+        {kind: Mean.of([c[kind] for c in counts]) for kind in KINDS},
+        Mean.of([len(one.exits) for one in many]),
+    )

@@ -1,0 +1,413 @@
+"""The compiled step against the readable one, and against the inclusion written out here.
+
+Both solve the step of :mod:`polycorner.motion.assembly`, the one by convex programmes, the other by
+sweeps and Newton's method on impulses: nothing but the assembly is common to them.  For dumbbells
+in the drum the inclusion is put together below from the model's formulas.
+"""
+
+import math
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import numpy as np
+import pytest
+import sympy
+
+from polycorner import Manifold, Polyhedron, minimise
+from polycorner.errors import SolverError
+from polycorner.models import drum_formulas, dumbbell_formulas, scenes
+from polycorner.models.drum import GRAVITY, DumbbellDrum
+from polycorner.motion.assembly import FrictionBlock, StepProblem, assemble, turned_back
+from polycorner.motion.formulation import moment
+from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
+from polycorner.motion.noise import Solver
+from polycorner.motion.reference import reference_step, solve_step
+from polycorner.motion.residual import natural_residual, speed
+from polycorner.motion.simulate import start, step
+from polycorner.motion.system import Friction, State, System, velocities
+
+ACCURATE = Solver(1e-10)
+SAME = 1e-8  # of the speeds in a step
+
+# -------------------------------------------------------------------------------- random systems
+
+
+def random_shape(rng, dimension, size):
+    """A set of any kind, no larger than ``size``, and the same made smaller."""
+    a, b = rng.uniform(size / 20, size, 2)
+    less = rng.uniform(0.3, 1.0)
+    if dimension == 1:
+        b *= rng.integers(2)  # with 0 it holds in one direction only
+        return Interval(lower=-a, upper=b), Interval(lower=-a * less, upper=b * less)
+    angles = np.array([0.1, 2.2, 4.3, *rng.uniform(0, math.tau, 4)])
+    corners = a * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    shapes = (
+        lambda f: Disc(a * f),
+        lambda f: Ellipse(a * f, b * f),
+        lambda f: CutDisc(a * f, a * b / size * f),
+        lambda f: ConvexPolygon(corners * f),
+    )
+    shape = shapes[rng.integers(4)]
+    return shape(1.0), shape(less)
+
+
+@lru_cache
+def random_system(seed):
+    """Three to six coordinates, up to three gaps, plane or curved, up to three friction contacts.
+
+    The mass matrix is full and depends on the place.  Loads are known functions or contacts;
+    coefficients on contacts are moderate, so that the step has one solution.  Substrates move.
+    """
+    rng = np.random.default_rng(seed)
+    n, m, count = rng.integers(3, 7), rng.integers(1, 4), rng.integers(1, 4)
+    M = Manifold.euclidean(" ".join(f"q{i}" for i in range(n)))
+    q, v = sympy.Matrix(M.symbols), sympy.Matrix(velocities(M))
+
+    def linear(of):
+        return (sympy.Matrix(rng.normal(size=n).round(3)).T * of)[0]
+
+    root = sympy.Matrix(rng.normal(size=(n, n)).round(2))
+    kinetic = (v.T * (root * root.T + sympy.eye(n)) * v)[0] / 2
+    kinetic += v[0] ** 2 * (1 + sympy.cos(q[1])) / 3
+    gaps = {}
+    for i in range(m):
+        curved = sympy.sqrt((q[0] - q[2] + 1) ** 2 + (q[1] + 1) ** 2) - math.sqrt(2)
+        gaps[f"g{i}"] = linear(q) / 5 + curved if rng.integers(2) else linear(q)
+    friction = []
+    for k in range(count):
+        dimension = int(rng.integers(1, 3))
+        drift = rng.normal(size=dimension).round(3) * rng.integers(2)
+        slip = tuple(linear(v) * (1 + sympy.sin(q[1]) / 10) - d for d in drift)
+        if rng.integers(2):
+            load, size = f"g{rng.integers(m)}", 0.3
+        else:
+            load, size = (rng.uniform(1, 20) * (1 + sympy.sin(q[0]) / 5),), 1.0
+        static, less = random_shape(rng, dimension, size)
+        dynamic = less if rng.integers(2) else None
+        friction.append(Friction(f"f{k}", slip, static, load, dynamic))
+    restitution = {name: float(rng.integers(3)) / 2 for name in gaps}
+    forces = {"q1": -v[1] / 5}
+    potential = 3 * linear(q) + (q.T * q)[0] / 2
+    return System(Polyhedron(M, gaps), kinetic, potential, forces, tuple(friction), restitution)
+
+
+def random_state(system, rng, dt, base=None):
+    """A state in which some contacts touch and some friction contacts stick.
+
+    Gaps are zero or of the order that a step covers; velocities are zero, slow or fast.
+    """
+    base = np.zeros(len(system.manifold.names)) if base is None else np.array(base, dtype=float)
+    n, count = len(base), len(system.friction)
+    q = np.array([-1.0])
+    while not (q.size == n and (system.polyhedron.values(q) >= -1e-10).all()):
+        away = 3 * dt * rng.normal(size=n) * rng.integers(2)
+        q = closed(system, base + away, rng.integers(2, size=len(system.contacts)).astype(bool))
+    v = rng.normal(size=n) * rng.choice([0.0, 1e-2, 1.0])
+    sticking = rng.integers(2, size=count).astype(bool)
+    now = moment(system.formulation, system.parameters, q, v)
+    rows = np.repeat(sticking, [len(f.slip) for f in system.friction])
+    matrix, drift = now.slip_matrix[rows], now.drift[rows]
+    v = v - np.linalg.lstsq(matrix, matrix @ v + drift, rcond=None)[0] if rows.any() else v
+    return State(0.0, q, v, sticking)
+
+
+def closed(system, q, touching):
+    """Move a place so that the chosen gaps vanish, by Newton's method."""
+    for _ in range(30 if touching.any() else 0):
+        gaps, slopes = system.polyhedron.bundle.evaluate(q, 1)
+        slopes = slopes.reshape(gaps.size, q.size)
+        q = q - np.linalg.lstsq(slopes[touching], gaps[touching], rcond=None)[0]
+    return q
+
+
+# ------------------------------------------------------------------------------------- comparison
+
+
+def compiled_step(system, state, dt):
+    """Velocity, impulses and which contacts stick, by the compiled core."""
+    engine = start(system, state, dt, solver=ACCURATE)
+    engine.advance(1)
+    motion = engine.motion
+    rows = [len(f.slip) for f in system.friction]
+    friction = [p[:d].copy() for p, d in zip(motion.grip[0], rows, strict=True)]
+    after = State(dt, motion.q[0], motion.v[0], motion.stick[0].astype(bool))
+    return after, motion.lam[0], friction
+
+
+def solved(problem, turn):
+    """The step and its solution by convex programmes, with static sets where slip reversed."""
+    solution = solve_step(problem)
+    while (turned := turn(problem, solution.velocity)) is not None:
+        problem, solution = turned, solve_step(turned)
+    return problem, solution
+
+
+def check(system, state, dt):
+    """Assert that both steps agree; return whether the readable one found a solution."""
+    after, normal, friction = compiled_step(system, state, dt)
+    turn = partial(turned_back, system)
+    try:
+        problem, expected = solved(assemble(system, state, dt), turn)
+    except SolverError:
+        return False
+    assert natural_residual(problem, after.v, normal, friction) < SAME
+    root, size = np.linalg.cholesky(problem.mass), speed(problem, expected.velocity)
+    assert np.linalg.norm(root.T @ (after.v - expected.velocity)) <= SAME * size
+    q = problem.middle + dt / 2 * after.v
+    np.testing.assert_allclose(after.q, q, rtol=1e-14, atol=1e-15)
+    for contact, block, sticks in zip(system.friction, problem.blocks, after.sticking, strict=True):
+        slip = np.linalg.norm(block.matrix @ expected.velocity + block.drift)
+        pressed = not isinstance(contact.load, str) or normal[system.contacts.index(contact.load)]
+        assert bool(sticks) == (slip < 10 * SAME * size) or not pressed
+    return True
+
+
+def checked(systems, steps):
+    """Compare so many steps of each system; return the share that the readable step solved."""
+    found = []
+    for seed in systems:
+        system, rng = random_system(seed), np.random.default_rng(1000 + seed)
+        for _ in range(steps):
+            dt = rng.choice([1e-3, 1e-2, 0.1])
+            found.append(check(system, random_state(system, rng, dt), dt))
+    return np.mean(found)
+
+
+def test_both_steps_agree():
+    assert checked(range(3), 4) == 1
+
+
+@pytest.mark.slow
+def test_both_steps_agree_on_many_systems():
+    assert checked(range(3, 60), 8) > 0.98
+
+
+WORKED = {
+    "box": (scenes.box_on_plane(1.0, 0.5, Interval(0.5), angle=0.3, restitution=0.5), [0, 0.5, 0]),
+    "belt": (scenes.box_on_plane(0.5, 1.0, Interval(0.3), belt=0.5), [0, 1, 0]),
+    "groove": (scenes.groove(Interval(0.4)), [0, math.sqrt(2), 0]),
+    "row": (scenes.row_of_balls((1, 2, 3, 4), 0.7), [0, 1, 2, 3]),
+    "ball": (scenes.ball_on_plane(Ellipse(0.3, 0.2), CutDisc(0.1, 0.05), angle=0.1), [0] * 4),
+    "thrown": (scenes.thrown_ball(Interval(0.2), 0.6), [0, 1, 0]),
+}
+
+
+@pytest.mark.parametrize("name", WORKED)
+def test_both_steps_agree_on_textbook_systems(name):
+    system, base = WORKED[name]
+    rng = np.random.default_rng(5)
+    for _ in range(6):
+        dt = rng.choice([1e-3, 1e-2])
+        assert check(system, random_state(system, rng, dt, base), dt)
+
+
+def test_both_steps_agree_along_a_motion():
+    """From the flight of a box through its impacts to its rest; each step from the same state."""
+    box = scenes.box_on_plane(0.5, 0.3, Interval(0.4), angle=0.2, restitution=0.3)
+    dt, kinds = 5e-3, set()
+    state = box.state([0.0, 0.7, 0.3], [0.5, 0.0, 1.0])
+    for number in range(300):
+        after = step(box, state, dt)
+        if number % 8 == 0:
+            expected = reference_step(box, state, dt)
+            size = speed(assemble(box, state, dt), expected.v)
+            assert np.linalg.norm(after.v - expected.v) <= 10 * SAME * size
+        kinds.add((bool(after.v.any()), *after.sticking.tolist()))
+        state = after
+    assert not state.v.any()
+    assert len(kinds) >= 3
+
+
+# ---------------------------------------------------------------------------------------- the drum
+
+CONTACTS = dumbbell_formulas.drum_gaps().names
+NAMES = ("phi", "eta", "theta", "psi")
+
+
+def values(family, drum, at, order, **more):
+    """Evaluate formulas of the drum at coordinates and velocities given by name."""
+    weight = drum.ball_mass * GRAVITY
+    numbers = {
+        "l": drum.length,
+        "r": drum.ball_radius,
+        "t": drum.rod_radius,
+        "rho": drum.centre_radius,
+        "m": drum.ball_mass,
+        "surface": drum.spin * drum.centre_radius,
+        "weight": weight * math.cos(drum.tilt),
+        "pull": weight * math.sin(drum.tilt),
+        **more,
+    }
+    parameters = np.array([numbers[name] for name in family.parameters])
+    place = np.array([at[name] for name in family.variables])
+    return [part.copy() for part in family.kernel.at(place, parameters.ctypes.data, order)]
+
+
+def drum_problem(drum, q, v, dt, sticks, rubbing):
+    """One step of two dumbbells as an inclusion, from motion's equations and the formulas.
+
+    ``sticks`` ``(2, 3)`` and ``rubbing``, by contact, say which friction contacts stuck.
+    """
+    middle = q + dt / 2 * v
+    one = [
+        {**dict(zip(NAMES, place, strict=True)), **rates(speeds, "")}
+        for place, speeds in zip(middle, v, strict=True)
+    ]
+    mass = np.tile(
+        drum_formulas.inertia(drum.length, drum.ball_radius, drum.centre_radius, drum.ball_mass),
+        2,
+    )
+    force, blocks = np.zeros(8), []
+    for body, at in enumerate(one):
+        (_, pull) = values(drum_formulas.weight(), drum, at, 1)
+        force[4 * body : 4 * body + 3] = -pull[0]
+        grip = drum_formulas.grip()
+        numbers, slopes = values(grip, drum, at, 1)
+        columns = [grip.variables.index(f"{name}_dot") for name in NAMES]
+        loads = dict(zip(grip.names, numbers, strict=True))
+        for number, (rows, load, sets) in enumerate(
+            (
+                (("slip1_r", "slip1_s"), loads["load1"], drum.sliding),
+                (("slip2_r", "slip2_s"), loads["load2"], drum.sliding),
+                (("spin",), loads["load1"] + loads["load2"], drum.rolling),
+            )
+        ):
+            picked = [grip.names.index(row) for row in rows]
+            matrix = np.zeros((len(rows), 8))
+            matrix[:, 4 * body : 4 * body + 4] = slopes[picked][:, columns]
+            mu = sets[0 if sticks[body, number] else 1]
+            shape = Disc(mu) if len(rows) == 2 else Interval(mu)
+            drift = numbers[picked] - matrix @ v.ravel()
+            blocks.append(FrictionBlock(matrix, drift, shape, dt * load, -1))
+    family = dumbbell_formulas.drum_gaps()
+    both = {f"{name}{i + 1}": middle[i, c] for i in (0, 1) for c, name in enumerate(NAMES)}
+    gaps, slopes = values(family, drum, both, 1)
+    normals = np.zeros((len(gaps), 8))
+    normals[:, [coordinate(name) for name in family.variables]] = slopes
+    for row, contact in enumerate(family.names):
+        matrix = rub_matrix(drum, contact, middle, v)
+        mu = drum.rubbing[0 if rubbing.get(contact) else 1]
+        blocks.append(FrictionBlock(matrix, np.zeros(2), Disc(mu), 0.0, row))
+    v_free = v.ravel() + dt * force / mass
+    bounds = plastic_bounds(gaps, normals @ (v_free - v.ravel()), dt)
+    return StepProblem(
+        np.diag(mass), v.ravel(), v_free, middle, gaps, normals, bounds, tuple(blocks)
+    )
+
+
+def plastic_bounds(gaps, gained, dt):
+    """Least speeds of contacts that do not bounce: an overlap goes as fast as forces may undo."""
+    closed_ones = (gaps < 0) & (gaps > -1e-9)
+    overlaps = (gaps < 0) & ~closed_ones
+    reached = np.where(closed_ones, 0.0, -gaps / dt)
+    return np.where(overlaps, np.minimum(reached, abs(gained)), reached)
+
+
+def rates(speeds, number):
+    return {f"{name}{number}_dot": x for name, x in zip(NAMES, speeds, strict=True)}
+
+
+def coordinate(name):
+    """Number of ``eta2`` or ``psi1_dot`` among the eight."""
+    stem = name.removesuffix("_dot")
+    return 4 * (int(stem[-1]) - 1) + NAMES.index(stem[:-1])
+
+
+def rub_matrix(drum, contact, q, v):
+    """How the surfaces rub at a contact, as a matrix on the eight velocities."""
+    balls = [int(c) for c in contact if c in "12"]
+    kind = ("rod_rod", "ball_rod", "ball_ball")[len(balls)]
+    swapped = kind == "ball_rod" and contact.startswith("a")
+    first, second = (1, 0) if swapped else (0, 1)
+    family = drum_formulas.rubs(kind)
+    at = {
+        f"{name}{i + 1}": q[b, c]
+        for i, b in enumerate((first, second))
+        for c, name in enumerate(NAMES)
+    }
+    at |= rates(v[first], 1) | rates(v[second], 2)
+    ends = dict(zip(("e1", "e2"), [2.0 * ball - 3.0 for ball in balls] + [0.0, 0.0], strict=False))
+    _, slopes = values(family, drum, at, 1, **ends)
+    matrix = np.zeros((2, 8))
+    for column, name in enumerate(family.variables):
+        if name.endswith("_dot"):
+            place = coordinate(name)
+            matrix[:, (place + 4) % 8 if swapped else place] = slopes[:, column]
+    return matrix
+
+
+def drum_solution(drum, engine, before):
+    """The step that the engine did last, its velocity and impulses."""
+    motion, known = engine.motion, int(before["counts"][0])
+    flags = zip(before["keys"][:known], before["flags"][:known, 0], strict=True)
+    stuck = {CONTACTS[key % len(CONTACTS)]: bool(flag) for key, flag in flags}
+    problem = drum_problem(drum, before["q"], before["v"], engine.dt, before["stick"], stuck)
+    normal, rubs = np.zeros(len(CONTACTS)), np.zeros((len(CONTACTS), 2))
+    count = int(motion.counts[0])
+    for key, press in zip(motion.keys[:count], motion.press[:count], strict=True):
+        normal[key % len(CONTACTS)], rubs[key % len(CONTACTS)] = press[0], press[1:]
+    grips = [motion.grip[b, f, : (2, 2, 1)[f]] for b in (0, 1) for f in (0, 1, 2)]
+    velocity = motion.v.ravel()
+    if any(may_turn(block, problem.v, velocity) for block in problem.blocks):
+        problem, _ = solved(problem, partial(turned_in_drum, drum))
+    return problem, velocity, normal, [*grips, *rubs]
+
+
+def may_turn(block, before, after):
+    """Whether slip was there before and is gone or reversed after."""
+    first, last = (block.matrix @ v + block.drift for v in (before, after))
+    return first @ last <= 1e-12 * first @ first and abs(first).max() > 1e-9
+
+
+def turned_in_drum(drum, problem, velocity):
+    """The step with static sets where slip reversed; nothing if none did."""
+    one = [Disc(drum.sliding[0]), Disc(drum.sliding[0]), Interval(drum.rolling[0])]
+    static = [*one, *one, *[Disc(drum.rubbing[0])] * len(CONTACTS)]
+    blocks = []
+    for block, shape in zip(problem.blocks, static, strict=True):
+        first, last = (block.matrix @ v + block.drift for v in (problem.v, velocity))
+        blocks.append(replace(block, shape=shape) if first @ last < 0 else block)
+    changed = any(a.shape != b.shape for a, b in zip(blocks, problem.blocks, strict=True))
+    return replace(problem, blocks=tuple(blocks)) if changed else None
+
+
+def thrown_together(drum, rng):
+    """An engine of two dumbbells that roll at each other along a circle of the drum."""
+    rho = drum.centre_radius
+    q = np.array([[-13.0 / rho, 50.0, 0.2], [13.0 / rho, 52.0, -0.1]])
+    q[:, 2] += 0.3 * rng.normal(size=2)
+    v = np.array([[90.0 / rho, 0, 1, 20], [-90.0 / rho, 0, -1, -20]])
+    return drum.engine(q, v * rng.uniform(0.7, 1.3, (2, 4)), dt=1e-3, solver=ACCURATE)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_steps_of_two_dumbbells_solve_the_inclusion(seed):
+    """Rolling, sliding, colliding, rubbing: every step until one of them rests."""
+    drum = DumbbellDrum(count=2, rubbing=(0.3, 0.2))
+    engine = thrown_together(drum, np.random.default_rng(seed))
+    pressed = []
+    while not engine.motion.rests.any() and engine.steps < 400:
+        before = {name: array.copy() for name, array in engine.save().items()}
+        engine.advance(1)
+        if not engine.motion.rests.any():
+            problem, velocity, normal, friction = drum_solution(drum, engine, before)
+            assert natural_residual(problem, velocity, normal, friction) < SAME
+            pressed.append(int((normal > 0).sum()))
+    assert engine.effort.unconverged == 0
+    assert np.count_nonzero(pressed) > 10
+
+
+def test_a_dyad_rests_where_the_inclusion_says_so():
+    """Its velocity is the one that convex programming finds, with nothing but the formulas."""
+    drum = DumbbellDrum(count=2, spin=1e-3)
+    certificate = minimise(drum.pair.polyhedron, drum.pair.energy, drum.pair.nested("R"))
+    q = np.array(certificate.point).reshape(2, 3)
+    q[:, 1] += 50.0
+    engine = drum.engine(q)
+    engine.advance(100)
+    motion = engine.motion
+    assert motion.rests.all()
+    stuck = dict.fromkeys(CONTACTS, True)
+    problem = drum_problem(drum, motion.q, motion.v, engine.dt, motion.stick, stuck)
+    expected = solve_step(problem).velocity
+    np.testing.assert_allclose(motion.v.ravel(), expected, atol=1e-9)
