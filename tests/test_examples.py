@@ -19,6 +19,9 @@ from examples import (
     ex09_spheres,
     ex10_critical_rod,
     ex11_keel,
+    ex12_bouncing_ball,
+    ex13_rolling,
+    ex14_impact_and_stack,
     ex15_entrapment,
     ex16_dyad_climbs,
 )
@@ -145,3 +148,25 @@ def test_a_dyad_climbs():
     right, left = result.pairs.climb_rates(after=10.0)  # over few zigzags, the last one cut
     assert right == pytest.approx(result.law, rel=0.25)
     assert left == pytest.approx(-result.law, rel=0.25)
+
+
+def test_a_bouncing_ball_comes_to_rest():
+    result = ex12_bouncing_ball.main()
+    assert result.lost == pytest.approx(1, abs=1e-9)
+    assert result.orders[0] == pytest.approx(2, abs=0.3)
+    assert 0.5 < result.orders[1] < 1.2  # dt log(1 / dt)
+
+
+def test_rolling():
+    result = ex13_rolling.main()
+    assert result.rests == pytest.approx(result.expected, abs=2e-3)
+    assert abs(result.slips[:4]).max() < 1e-9 < result.slips[4]
+    assert result.period[0] == pytest.approx(result.period[1], rel=5e-3)
+
+
+def test_impacts_and_stacks():
+    result = ex14_impact_and_stack.main()
+    assert result.touching == pytest.approx([-1 / 3, 2 / 3, 2 / 3])
+    assert result.apart == pytest.approx([0, 0, 1], abs=1e-12)
+    assert result.kept == pytest.approx(result.housner, abs=5e-3)
+    assert result.moved == (0, 0)

@@ -116,6 +116,17 @@ def test_a_plastic_ball_stays_where_it_lands():
     assert path.q[-1, 0, 0] == pytest.approx(0, abs=1e-12)
 
 
+def test_a_plastic_ball_that_starts_on_the_floor_does_not_rebound():
+    """The step begins with half a step of approach; that overlap is not thrown out."""
+    ball, speed, dt = scenes.bouncing_ball(0.0), 3.0, 1e-3
+    path = simulate(ball, ball.state([0.0], [-speed]), 1.0, dt)
+    assert path.v[1:].max() <= G * dt * (1 + 1e-9)
+    assert path.q.max() < 1e-12
+    assert path.max_penetration == pytest.approx(speed * dt / 2)
+    assert path.q[-1, 0, 0] == pytest.approx(0, abs=1e-12)
+    assert path.dissipated["impact"][-1] == pytest.approx(speed**2 / 2, rel=1e-9)
+
+
 # ---------------------------------------------------------------------------------- sliding block
 
 
