@@ -169,6 +169,18 @@ def test_a_block_holds_exactly_up_to_the_angle_of_friction(margin):
     assert path.v[-1, 0, 0] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("margin", [1e-7, 1e-3])
+def test_a_box_on_its_feet_holds_up_to_the_same_angle(margin):
+    """There friction is on contacts: what presses on each foot is found with it."""
+    angle, dt = 0.4, 1e-3
+    holds = scenes.box_on_plane(1.0, 0.5, Interval(math.tan(angle) * (1 + margin)), angle=angle)
+    assert end(holds, holds.state([0, 0.5, 0]), 0.1, dt).q[-1].tolist() == [[0, 0.5, 0]]
+    slides = scenes.box_on_plane(1.0, 0.5, Interval(math.tan(angle) * (1 - margin)), angle=angle)
+    path = end(slides, slides.state([0, 0.5, 0]), 0.1, dt)
+    expected = 0.1 * G * math.sin(angle) * margin
+    assert path.v[-1, 0, 0] == pytest.approx(expected, rel=1e-3)
+
+
 def test_a_block_slides_down_evenly_accelerated():
     angle, mu = 0.5, 0.3
     block = scenes.sliding_block(Disc(0.4), Disc(mu), angle=angle)
