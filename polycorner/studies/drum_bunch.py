@@ -18,12 +18,13 @@ from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulate import run
 from polycorner.studies.drum_dyads import handedness, is_dyad
+from polycorner.studies.drum_pairs import Sizes, latest_hands, listed, near_pairs
 from polycorner.studies.drum_single import Mean
+from polycorner.studies.drum_starts import scatter
 
 TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
 COUNT = 60
 WIDTH = 0.35  # rad, half the width of the strip in which the bunch is put
-GAP = 0.05  # mm, least distance at the start
 TRIES = 1000  # places in vain before the strip grows
 MEMORY = 5.0  # s before leaving in which a dumbbell counts as member of a dyad
 WINDOW = 10.0  # s, longer than a zigzag
@@ -42,27 +43,8 @@ def scattered(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WI
     Places and headings are uniform in a strip ``|phi| <= width``; what overlaps is drawn anew, and
     the strip, at first two lengths high, grows by a tenth whenever it is full.
     """
-    height, tries = 2 * drum.length + 2 * drum.ball_radius, 0
-    found = np.empty((0, 3))
-    while len(found) < drum.count:
-        theta = rng.uniform(-math.pi / 2, math.pi / 2)
-        low = drum.length / 2 * math.cos(theta) + drum.ball_radius + GAP
-        new = np.array([rng.uniform(-width, width), rng.uniform(low, max(low, height)), theta])
-        tries += 1
-        if _is_free(drum, found, new):
-            found, tries = np.concatenate([found, new[None]]), 0
-        elif tries > TRIES:
-            height, tries = 1.1 * height, 0
-    return found
-
-
-def _is_free(drum: DumbbellDrum, others: Array, new: Array) -> bool:
-    apart = np.hypot(drum.centre_radius * (others[:, 0] - new[0]), others[:, 1] - new[1])
-    near = others[apart < drum.length + 2 * drum.ball_radius + GAP]
-    if len(near) == 0:
-        return True
-    pairs = np.concatenate([near, np.tile(new, (len(near), 1))], axis=1)
-    return bool(drum.pair.polyhedron.bundle.evaluate(pairs, 0)[0].min() > GAP)
+    height = 2 * drum.length + 2 * drum.ball_radius
+    return scatter(drum, rng, width=width, height=height, tries=TRIES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +82,10 @@ class BunchRun:
         """
         here = np.flatnonzero(self.present[index])
         q = self.q[index, here]
-        flat = np.stack([self.drum.centre_radius * q[:, 0], q[:, 1]], axis=-1)
-        apart = np.linalg.norm(flat[:, None] - flat, axis=-1)
-        close = np.argwhere(np.triu(apart < self.drum.length + 2 * self.drum.ball_radius, 1))
-        if len(close) == 0:
-            return []
+        close = near_pairs(Sizes.of_drum(self.drum), q)
         pairs = q[close]
         hand = np.where(is_dyad(self.drum, pairs), handedness(self.drum, pairs), 0)
-        return [
-            (int(here[i]), int(here[j]), int(h)) for (i, j), h in zip(close, hand, strict=True) if h
-        ]
+        return listed(here[close], hand)
 
     @cached_property
     def exit_kinds(self) -> tuple[str, ...]:
@@ -121,13 +97,10 @@ class BunchRun:
         return tuple(self._kind(time, body) for time, body in self.exits)
 
     def _kind(self, time: float, body: int) -> str:
-        last = int(np.searchsorted(self.times, time)) - 1
-        while last >= 0 and self.times[last] >= time - MEMORY:
-            hands = [h for i, j, h in self.dyads(last) if body in (i, j)]
-            if hands:
-                return "right" if sum(hands) > 0 else "left"
-            last -= 1
-        return "single"
+        hands = latest_hands(self.times, time, body, self.dyads, MEMORY)
+        if not hands:
+            return "single"
+        return "right" if sum(hands) > 0 else "left"
 
     def exit_counts(self) -> dict[str, int]:
         """Return how many left, by kind."""

@@ -19,6 +19,7 @@ from polycorner.models.dumbbell_formulas import CONTACTS
 from polycorner.models.dumbbells import Chirality
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulate import run
+from polycorner.studies.drum_pairs import Sizes, chirality
 from polycorner.studies.drum_single import APART, Mean
 
 Start = tuple[Chirality, float]
@@ -30,10 +31,9 @@ NEAR = 0.5  # of the ball radius: in a dyad each rod has a ball of the other clo
 
 
 def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
-    """Return the chirality of pairs: +1 right, -1 left, 0 where the farthest balls are not unique.
+    """Return the chirality of pairs: +1 right, -1 left, 0 not defined.
 
-    With ``A_i, B_j`` the farthest centres and ``A_p, B_q`` the other two, a pair is right-handed
-    when ``A_i B_j`` and ``A_p B_q`` are positively oriented in ``(rho phi, eta)`` ([GMBN] sec. 5).
+    By :func:`polycorner.studies.drum_pairs.chirality`.
 
     Parameters
     ----------
@@ -41,21 +41,7 @@ def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
     q : (..., 2, k) array
         Placements of A and B, beginning with ``phi, eta, theta``.
     """
-    ends = np.array([-0.5, 0.5]) * drum.length
-    rho = drum.centre_radius
-    across = np.arcsin(ends * np.sin(q[..., 2, None]) / rho)
-    x = rho * (q[..., 0, None] + across)
-    balls = np.stack([x, q[..., 1, None] + ends * np.cos(q[..., 2, None])], axis=-1)
-    links = balls[..., 1, None, :, :] - balls[..., 0, :, None, :]  # from A_i to B_j
-    flat = links.reshape(*links.shape[:-3], 4, 2)  # entries k and 3 - k share no ball
-    reach = np.hypot(flat[..., 0], flat[..., 1])
-    far = np.argmax(reach, axis=-1)[..., None, None]
-    outer = np.take_along_axis(flat, far, axis=-2)[..., 0, :]
-    inner = np.take_along_axis(flat, 3 - far, axis=-2)[..., 0, :]
-    turn = outer[..., 0] * inner[..., 1] - outer[..., 1] * inner[..., 0]
-    ranked = np.sort(reach, axis=-1)
-    clear = ranked[..., 3] - ranked[..., 2] > 1e-9 * drum.length
-    return np.where(clear, np.sign(turn), 0).astype(np.int64)
+    return chirality(Sizes.of_drum(drum).balls(q).reshape(*q.shape[:-2], 4, 2))
 
 
 def is_dyad(drum: DumbbellDrum, q: Array) -> NDArray[np.bool_]:
@@ -63,7 +49,8 @@ def is_dyad(drum: DumbbellDrum, q: Array) -> NDArray[np.bool_]:
 
     Headings, as directions, differ by less than 20 degrees, and each rod has a ball of the other
     dumbbell closer than ``r/2``.  The third contact, between the inner balls, may be open: then the
-    two have slid along each other and are nested all the same.
+    two have slid along each other and are nested all the same.  With it closed too they are
+    :func:`polycorner.studies.drum_pairs.nested`.
     """
     gaps = _gaps(drum, q)
     rods = [
@@ -158,10 +145,9 @@ class DyadPaths:
 
         Near means centres closer than ``l + 2 r`` in the developed plane.
         """
-        apart = self.q[..., 1, :] - self.q[..., 0, :]
-        distance = np.hypot(self.drum.centre_radius * apart[..., 0], apart[..., 1])
-        reach = self.drum.length + 2 * self.drum.ball_radius
-        lost = (distance >= reach) | (self.hand != self.hand[0])
+        sizes = Sizes.of_drum(self.drum)
+        apart = sizes.apart(self.q[..., 0, :], self.q[..., 1, :])
+        lost = (apart >= sizes.reach) | (self.hand != self.hand[0])
         when = self.times[np.argmax(lost, axis=0)]
         return np.where(lost.any(axis=0), when, math.inf)
 

@@ -4,15 +4,16 @@ Everything is read off places in the developed plane ``(rho phi, eta)``, for all
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from functools import cache
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.geometry.manifold import Array
-from polycorner.models.drum import PARAMETERS
+from polycorner.models.drum import PARAMETERS, DumbbellDrum
 from polycorner.models.dumbbells import Chirality
 from polycorner.motion.events import EventKind
 from polycorner.motion.scene import Herd
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from polycorner.motion.trajectory import Trajectory
 
 Dyad = tuple[int, int, Chirality]
+Hand = TypeVar("Hand")
 MEMORY = 10.0  # s, longer than a zigzag of the experiment
 NEAR = 0.25  # of the ball radius: contacts of a dyad are open by less
 PARALLEL = 1e-9  # of the length: vectors and distances this close have no orientation, no order
@@ -47,6 +49,24 @@ class Sizes:
         if between is not None:
             numbers |= dict(zip(between.gaps.parameters, between.parameters, strict=True))
         return cls(numbers["l"], numbers["r"], numbers["rho"], numbers.get("t", math.nan))
+
+    @classmethod
+    def of_drum(cls, drum: DumbbellDrum) -> "Sizes":
+        """Return those of a drum's dumbbells."""
+        return cls(drum.length, drum.ball_radius, drum.centre_radius, drum.rod_radius)
+
+    @property
+    def reach(self) -> float:
+        """``l + 2 r``: dumbbells whose centres are not closer cannot be a dyad."""
+        return self.length + 2 * self.ball_radius
+
+    def apart(self, one: Array, other: Array) -> Array:
+        """Return the distances of centres in the developed plane, in mm.
+
+        Placements are ``(..., k)`` and begin with ``phi, eta``.
+        """
+        gap = other[..., :2] - one[..., :2]
+        return np.asarray(np.hypot(self.centre_radius * gap[..., 0], gap[..., 1]))
 
     def balls(self, q: Array) -> Array:
         """Return the centres of both balls in the developed plane, ``(..., 2, 2)``, in mm.
@@ -120,11 +140,13 @@ def _from_line(points: Array, line: Array) -> Array:
 
 
 def nested(balls: Array, sizes: Sizes) -> NDArray[np.bool_]:
-    """Return which pairs are dyads: those in ``U`` whose three contacts of the corner are closed.
+    """Return which pairs are nested: those in ``U`` whose three contacts of the corner are closed.
 
     The inner balls ``A_p, B_q``, those that do not belong to the farthest pair, are less than
     ``r/4`` from touching each other, and each is less than ``r/4`` from touching the line of the
-    other's rod.  In ``U`` the headings then agree to about ``asin((r - t) / l)``, 7 degrees.
+    other's rod.  In ``U`` the headings then agree to about ``asin((r - t) / l)``, 7 degrees.  Pairs
+    that have slid along each other are left out; :func:`polycorner.studies.drum_dyads.is_dyad`
+    takes them in.
 
     Parameters
     ----------
@@ -146,22 +168,42 @@ def dyads(trajectory: "Trajectory", index: int) -> list[Dyad]:
 
     A dyad is a pair that is :func:`nested` and has a chirality; a dumbbell may be in several.
     """
-    present = np.flatnonzero(trajectory.present[index])
-    return _dyads(Sizes.of(trajectory), trajectory.q[index], present)
-
-
-def _dyads(sizes: Sizes, q: Array, present: NDArray[np.intp]) -> list[Dyad]:
-    places = np.stack([sizes.centre_radius * q[present, 0], q[present, 1]], axis=-1)
-    apart = np.linalg.norm(places[:, None] - places[None], axis=-1)
-    close = np.argwhere(np.triu(apart < sizes.length + 2 * sizes.ball_radius, 1))
-    first, second = present[close[:, 0]], present[close[:, 1]]
-    balls = np.concatenate([sizes.balls(q[first]), sizes.balls(q[second])], axis=-2)
+    sizes, here = Sizes.of(trajectory), np.flatnonzero(trajectory.present[index])
+    q = trajectory.q[index, here]
+    close = near_pairs(sizes, q)
+    balls = sizes.balls(q[close]).reshape(-1, 4, 2)
     hand = np.where(nested(balls, sizes), chirality(balls), 0)
-    return [
-        (int(i), int(j), "R" if sign > 0 else "L")
-        for i, j, sign in zip(first, second, hand, strict=True)
-        if sign
-    ]
+    return [(i, j, "R" if sign > 0 else "L") for i, j, sign in listed(here[close], hand)]
+
+
+def near_pairs(sizes: Sizes, q: Array) -> NDArray[np.intp]:
+    """Return the pairs among dumbbells ``(N, k)`` that are near enough for a dyad, ``(n, 2)``."""
+    return np.argwhere(np.triu(sizes.apart(q[:, None], q) < sizes.reach, 1))
+
+
+def listed(bodies: NDArray[np.intp], hand: NDArray[np.int64]) -> list[tuple[int, int, int]]:
+    """Return the numbers and the chirality of pairs ``(n, 2)`` that have one."""
+    return [(int(i), int(j), int(h)) for (i, j), h in zip(bodies, hand, strict=True) if h]
+
+
+def latest_hands(
+    times: Array,
+    time: float,
+    body: int,
+    dyads_at: Callable[[int], Iterable[tuple[int, int, Hand]]],
+    memory: float,
+) -> list[Hand]:
+    """Return the chiralities of a dumbbell's dyads when it was last in one; none: an empty list.
+
+    Records before ``time`` count, but none more than ``memory`` s before it.
+    """
+    last = int(np.searchsorted(times, time)) - 1
+    first = int(np.searchsorted(times, time - memory))
+    for index in range(last, first - 1, -1):
+        hands = [hand for i, j, hand in dyads_at(index) if body in (i, j)]
+        if hands:
+            return hands
+    return []
 
 
 def exits(trajectory: "Trajectory", *, memory: float = MEMORY) -> dict[str, int]:
@@ -171,25 +213,15 @@ def exits(trajectory: "Trajectory", *, memory: float = MEMORY) -> dict[str, int]
     it left; so both members count although one leaves first.
     """
     counts = {"right": 0, "left": 0, "single": 0}
-    leaving = [event for event in trajectory.events if event.kind == EventKind.EXIT]
-    found: dict[int, list[Dyad]] = {}
-    for event in leaving:
-        body, last = event.bodies[0], int(np.searchsorted(trajectory.times, event.time)) - 1
-        first = int(np.searchsorted(trajectory.times, event.time - memory))
-        kind = "single"
-        for index in range(last, first - 1, -1):
-            if index not in found:
-                found[index] = dyads(trajectory, index)
-            hands = _hands(found[index], body)
-            if hands:
-                kind = "right" if hands[0] == "R" else "left"
-                break
-        counts[kind] += 1
+
+    @cache
+    def found(index: int) -> list[Dyad]:
+        return dyads(trajectory, index)
+
+    for event in trajectory.of_kind(EventKind.EXIT):
+        hands = latest_hands(trajectory.times, event.time, event.bodies[0], found, memory)
+        counts[{"R": "right", "L": "left"}[hands[0]] if hands else "single"] += 1
     return counts
-
-
-def _hands(pairs: Iterable[Dyad], body: int) -> list[Chirality]:
-    return [hand for i, j, hand in pairs if body in (i, j)]
 
 
 def held(trajectory: "Trajectory") -> bool:
@@ -202,9 +234,8 @@ def held(trajectory: "Trajectory") -> bool:
     if q.shape[1] != 2:
         msg = f"trajectory: expected one of two dumbbells; got one of {q.shape[1]}"
         raise ValueError(msg)
-    apart = np.hypot(sizes.centre_radius * (q[:, 0, 0] - q[:, 1, 0]), q[:, 0, 1] - q[:, 1, 1])
     hands = chirality(sizes.balls(q).reshape(-1, 4, 2))
-    near = bool((apart < sizes.length + 2 * sizes.ball_radius).all())
+    near = bool((sizes.apart(q[:, 0], q[:, 1]) < sizes.reach).all())
     return near and bool(trajectory.present.all()) and bool(hands[0] and (hands == hands[0]).all())
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from polycorner.geometry.manifold import Array, reals
 from polycorner.models.drum import DumbbellDrum
-from polycorner.models.keel import Keel, Turning, exact_eastern_boundary
+from polycorner.models.keel import Keel, exact_eastern_boundary
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulate import run
@@ -111,17 +111,6 @@ def onset_azimuths(drum: DumbbellDrum, headings: ArrayLike) -> Array:
     kappa = drum.length / (2 * drum.centre_radius)
     theta = sign * reals(headings, "headings")
     return sign * np.asarray(exact_eastern_boundary(theta, keel_of(drum).onset, kappa))
-
-
-def turning_points(drum: DumbbellDrum, headings: ArrayLike) -> Turning:
-    """Return the formulas' turning points, those of a short dumbbell, for ``spin > 0``."""
-    return keel_of(drum).turning(headings)
-
-
-def rolling_inertia_share(drum: DumbbellDrum) -> float:
-    """Return the inertia of spinning as a share of that of rolling, 2/7 for solid balls."""
-    mass, spin = 2 * drum.ball_mass, 4 / 5 * drum.ball_mass
-    return spin / (mass + spin)
 
 
 def follow(

@@ -13,7 +13,7 @@ from polycorner.models.dumbbells import Chirality, DumbbellPair
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
 ROOM = 3.0  # area of that strip in areas of the dumbbells
 GAP = 0.05  # mm, between dumbbells of a bunch
-TRIES = 2000  # random places per dumbbell before the strip grows by a tenth
+TRIES = 2000  # places in vain before the strip grows
 NEWTON_STEPS = 30
 
 
@@ -133,26 +133,39 @@ def bunch(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WIDTH)
     room = ROOM * drum.count * (2 * math.pi * drum.ball_radius**2)
     room += ROOM * drum.count * 2 * drum.rod_radius * drum.length
     height = drum.length + 2 * drum.ball_radius + room / (2 * width * drum.centre_radius)
-    placed = np.empty((0, 3))
-    tries = 0
-    while len(placed) < drum.count:
+    return scatter(drum, rng, width=width, height=height, tries=TRIES)
+
+
+def scatter(
+    drum: DumbbellDrum, rng: np.random.Generator, *, width: float, height: float, tries: int
+) -> Array:
+    """Return dumbbells scattered without overlap in a strip above the bottom, ``(N, 3)``.
+
+    Parameters
+    ----------
+    rng : Generator
+    width, height : float
+        Half the strip's width as an angle, in rad, and up to where centres lie, in mm.
+    tries : int
+        Places in vain before the strip grows by a tenth.
+    """
+    found, vain = np.empty((0, 3)), 0
+    while len(found) < drum.count:
         theta = rng.uniform(-math.pi / 2, math.pi / 2)
-        low = drum.length / 2 * abs(math.cos(theta)) + drum.ball_radius + GAP
-        new = np.array([rng.uniform(-width, width), rng.uniform(low, height), theta])
-        if _free(drum, placed, new):
-            placed = np.concatenate([placed, new[None]])
-            tries = 0
-        tries += 1
-        if tries > TRIES:
-            height, tries = 1.1 * height, 0
-    return placed
+        low = drum.length / 2 * math.cos(theta) + drum.ball_radius + GAP
+        new = np.array([rng.uniform(-width, width), rng.uniform(low, max(low, height)), theta])
+        vain += 1
+        if _is_free(drum, found, new):
+            found, vain = np.concatenate([found, new[None]]), 0
+        elif vain > tries:
+            height, vain = 1.1 * height, 0
+    return found
 
 
-def _free(drum: DumbbellDrum, placed: Array, new: Array) -> bool:
-    across = drum.centre_radius * (placed[:, 0] - new[0])
-    near = np.hypot(across, placed[:, 1] - new[1]) < drum.length + 2 * drum.ball_radius + GAP
-    if not near.any():
+def _is_free(drum: DumbbellDrum, others: Array, new: Array) -> bool:
+    apart = np.hypot(drum.centre_radius * (others[:, 0] - new[0]), others[:, 1] - new[1])
+    near = others[apart < drum.length + 2 * drum.ball_radius + GAP]
+    if len(near) == 0:
         return True
-    others = placed[near]
-    pairs = np.concatenate([others, np.tile(new, (len(others), 1))], axis=1)
+    pairs = np.concatenate([near, np.tile(new, (len(near), 1))], axis=1)
     return bool(drum.pair.polyhedron.bundle.evaluate(pairs, 0)[0].min() > GAP)

@@ -13,9 +13,9 @@ from polycorner.studies.drum_single import (
     Mean,
     follow,
     heading_decay,
+    keel_of,
     keel_ratio,
     onset_azimuths,
-    turning_points,
     zigzags,
 )
 
@@ -38,7 +38,7 @@ def test_every_zigzag_turns_where_the_region_of_rest_ends(path):
 
 def test_widths_are_those_of_coasting(path):
     """The formula is that of a short dumbbell."""
-    turning = turning_points(DRUM, HEADINGS)
+    turning = keel_of(DRUM).turning(HEADINGS)
     widths = [zigzag.width.mean() for zigzag in zigzags(path, DRUM.spin)]
     assert widths == pytest.approx(turning.upper - turning.coasting, rel=0.005)
     assert 4.5 < np.degrees(widths).min() < np.degrees(widths).max() < 5.0
