@@ -3,9 +3,7 @@
 With `--nine` also the clusters of nine spheres (minutes for the plain walker).
 """
 
-import resource
 import statistics
-import subprocess
 import sys
 from functools import partial
 from itertools import product
@@ -13,7 +11,7 @@ from itertools import product
 import numpy as np
 from plain_walker import clusters
 from scipy.spatial import HalfspaceIntersection
-from side_by_side import interleave, print_table, ratio, write
+from side_by_side import interleave, peak, print_table, ratio, write
 
 from polycorner import Manifold, Polyhedron, skeleton
 from polycorner.models import DumbbellPair, SphereCluster
@@ -42,18 +40,6 @@ def cross_polytope() -> tuple[Polyhedron, np.ndarray]:
     return Polyhedron(space, facets), np.array([[*row, -1.0] for row in signs])
 
 
-def peak(count: int) -> float:
-    """Return the peak memory of a fresh process that computes the clusters, in MiB."""
-    code = f"import bench_atlas; bench_atlas.spheres({count}); print(bench_atlas.used())"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    return float(run.stdout)
-
-
-def used() -> float:
-    """Return the peak memory of this process in MiB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
 def main() -> None:
     rows, figures = [], {}
     counts = (*COUNTS, 9) if "--nine" in sys.argv else COUNTS
@@ -63,7 +49,7 @@ def main() -> None:
         ours, plain = (statistics.median(times[name]) for name in tasks)
         factor = ratio(times["plain"], times["polycorner"])
         atlas = spheres(count)
-        memory = peak(count)
+        memory = peak(f"import bench_atlas; bench_atlas.spheres({count})")
         figures[f"spheres {count}"] = {
             "seconds": ours, "plain over ours": factor, "corners": len(atlas.corners),
             "edges": len(atlas.edges), "plain finds": len(clusters(count)), "MiB": memory,

@@ -7,16 +7,14 @@ given for the model as `polycorner.models.drum_mjcf` writes it, for a drum of ha
 
 import math
 import statistics
-import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from side_by_side import interleave, print_table, ratio, write
+from side_by_side import interleave, peak, print_table, ratio, write
 
 from polycorner.models import DumbbellDrum, DumbbellPair
 from polycorner.models.drum_mjcf import GRAVITY, DrumScene
@@ -101,7 +99,7 @@ def speed() -> dict[str, Any]:
                 "us a step": round(1e6 * step, 1),
                 "steps a second": round(1 / step),
                 "time over ours": round(ratio(taken, times[OURS]), 2) if OURS in times else None,
-                "MiB": peak(name, count),
+                "MiB": memory(name, count),
             }
     for key in ("us a step", "steps a second", "time over ours", "MiB"):
         rows = [[name, *(row[str(n)][key] for n in COUNTS)] for name, row in figures.items()]
@@ -109,25 +107,10 @@ def speed() -> dict[str, Any]:
     return figures
 
 
-def peak(name: str, count: int) -> float:
+def memory(name: str, count: int) -> float:
     """Return the peak memory of a fresh process that moves dumbbells with one engine, in MiB."""
     call = f"ours({count}, 0.05)" if name == OURS else f"theirs({count}, 0.05, **{THEIRS[name]})"
-    code = f"import bench_motion; bench_motion.{call}(); print(bench_motion.used())"
-    here = Path(__file__).parent
-    run = subprocess.run(
-        [sys.executable, "-c", code], cwd=here, capture_output=True, text=True, check=True
-    )
-    return float(run.stdout)
-
-
-def used() -> float:
-    """Return the peak memory of this process in MiB, on Linux.
-
-    `getrusage` would not do: a process inherits the peak of the one that started it.
-    """
-    status = Path("/proc/self/status").read_text()
-    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
-    return round(int(line.split()[1]) / 1024, 1)
+    return peak(f"import bench_motion; bench_motion.{call}()")
 
 
 def creep(**changes: Any) -> float:

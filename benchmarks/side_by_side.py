@@ -97,3 +97,25 @@ def fresh(*arguments: str, folder: Path) -> None:
         stdout=subprocess.DEVNULL,
         check=True,
     )
+
+
+def peak(code: str) -> float:
+    """Return the peak memory, in MiB, of a fresh interpreter that runs code beside these files."""
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}; import side_by_side; print(side_by_side.used())"],
+        cwd=ROOT / "benchmarks",
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return float(run.stdout)
+
+
+def used() -> float:
+    """Return the peak memory of this process in MiB, on Linux.
+
+    `getrusage` would not do: a process inherits the peak of the one that started it.
+    """
+    status = Path("/proc/self/status").read_text()
+    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
+    return round(int(line.split()[1]) / 1024, 1)
