@@ -4,11 +4,16 @@
 """
 
 import os
+import signal
 
 import matplotlib as mpl
 from hypothesis import HealthCheck, settings
 
 mpl.use("Agg")
+
+# A shell starts background jobs with Ctrl-C ignored; tests that send it need it to interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The first call of a kernel compiles it, so a deadline would measure the compiler.
 settings.register_profile(
