@@ -18,7 +18,8 @@ import numpy as np
 
 from polycorner.models import DumbbellPair
 from polycorner.pictures.meshes import components_of_complement, write_mesh
-from polycorner.pictures.solids import draw_solid, forbidden_solid, relative_placements
+from polycorner.pictures.solid_view import draw_solid
+from polycorner.pictures.solids import forbidden_solid, relative_placements
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 P = PAIR.ball_radius + PAIR.rod_radius

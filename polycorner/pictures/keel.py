@@ -10,7 +10,7 @@ from polycorner.geometry.manifold import Array
 from polycorner.models.keel import Keel, RestRegion
 from polycorner.models.keel_formulas import net_torque, s_curve
 
-CURVE, POSITIVE, NEGATIVE = "#C1272D", "#0072B2", "#009E73"
+CURVE, POSITIVE, NEGATIVE = "#D55E00", "#0072B2", "#009E73"
 OUTER, INNER, GROWING = "#F3DFB8", "#DDBB77", "#D7B5D8"
 HEADINGS = (-25.0, -15.0, -5.0, 5.0, 15.0, 25.0)  # of the zigzags that are drawn, in degrees
 SAMPLES = 1441
@@ -29,11 +29,14 @@ def draw_keel(keel: Keel, *, friction: float | None = None) -> Figure:
     friction = keel.sliding_dynamic if friction is None else friction
     figure = Figure(figsize=(12.5, 6.2), layout="constrained")
     first, second = figure.subplots(1, 2)
-    _draw_regions(first, keel)
-    _draw_torque(second, keel, friction)
+    place_regions(first, keel)
+    first.set_title("(a) regions of rest, turning points")
+    place_torque(second, keel, friction)
+    second.set_title(f"(b) torque while sliding down the slope, friction {friction:g}")
     for axes in (first, second):
         axes.set(ylim=(-90, 90), yticks=range(-90, 91, 30), ylabel="heading θ (degrees)")
         axes.set_xlabel("azimuth φ (degrees)")
+        axes.legend(loc="upper left", fontsize=9, framealpha=1.0)
         axes.axhline(0, color="0.75", linewidth=0.6, zorder=0.5)
         axes.axvline(0, color="0.75", linewidth=0.6, zorder=0.5)
     tilt = f"α = {math.degrees(keel.tilt):g}°"
@@ -47,20 +50,30 @@ def _headings() -> Array:
     return np.radians(np.linspace(-90, 90, SAMPLES))
 
 
-def _draw_regions(axes: Axes, keel: Keel) -> None:
+def place_regions(axes: Axes, keel: Keel) -> None:
+    """Draw ``A`` with its eastern boundary, ``B``, ``S`` and zigzags, in degrees, on given axes."""
     _fill(axes, keel.onset, OUTER, "A: stays at rest")
     _fill(axes, keel.arrest, INNER, "B: even when nudged")
+    _draw_boundary(axes, keel.onset)
+    _draw_zigzags(axes, keel)
+
+
+def place_region(axes: Axes, region: RestRegion) -> None:
+    """Draw a region ``A`` with its eastern boundary and ``S``, in degrees, on given axes."""
+    _fill(axes, region, OUTER, "A: stays at rest")
+    _draw_boundary(axes, region)
+
+
+def _draw_boundary(axes: Axes, region: RestRegion) -> None:
     theta = _headings()
-    east = np.degrees(keel.onset.eastern_boundary(theta))
-    for colour, side, sign in ((POSITIVE, theta >= 0, "θ > 0"), (NEGATIVE, theta <= 0, "θ < 0")):
-        label = f"eastern boundary of A, {sign}"
+    east = np.degrees(region.eastern_boundary(theta))
+    for colour, side, sign in ((POSITIVE, theta >= 0, ">"), (NEGATIVE, theta <= 0, "<")):
+        label = rf"eastern boundary of A, $\theta {sign} 0$"
         along = np.degrees(theta[side])
         axes.plot(east[side], along, color=colour, linewidth=2.6, label=label, zorder=3)
-    limit = 30.0 if math.isnan(keel.onset.limit) else 1.55 * math.degrees(keel.onset.limit)
-    _draw_curve(axes, keel.tilt, limit)
-    _draw_zigzags(axes, keel)
-    axes.set(xlim=(-limit, limit), title="(a) regions of rest, turning points")
-    axes.legend(loc="upper left", fontsize=9, framealpha=1.0)
+    limit = 30.0 if math.isnan(region.limit) else 1.55 * math.degrees(region.limit)
+    _draw_curve(axes, region.tilt, limit)
+    axes.set_xlim(-limit, limit)
 
 
 def _fill(axes: Axes, region: RestRegion, colour: str, label: str) -> None:
@@ -89,7 +102,8 @@ def _draw_zigzags(axes: Axes, keel: Keel) -> None:
     axes.plot([], [], "-k", linewidth=1.1, marker="<", markersize=5, label="rolls back, stops")
 
 
-def _draw_torque(axes: Axes, keel: Keel, friction: float) -> None:
+def place_torque(axes: Axes, keel: Keel, friction: float) -> None:
+    """Draw ``S``, and hatch where the torque on a dumbbell that slides increases ``|theta|``."""
     edge = 89.999  # at 90 degrees nothing presses on the wall
     phi = np.radians(np.linspace(-edge, edge, RESOLUTION))
     theta = np.radians(np.linspace(-90, 90, RESOLUTION))
@@ -100,10 +114,10 @@ def _draw_torque(axes: Axes, keel: Keel, friction: float) -> None:
         axes.contourf(*degrees, levels=[0, np.inf], colors=[GROWING], hatches=["////"], zorder=1)
         axes.contour(*degrees, levels=[0], colors=["black"], linewidths=0.9, zorder=1.5)
     _draw_curve(axes, keel.tilt, 90.0)
-    axes.fill_between([], [], color=GROWING, hatch="////", linewidth=0, label="|θ| grows")
+    axes.fill_between(
+        [], [], color=GROWING, hatch="////", ec="black", linewidth=0, label=r"$|\theta|$ grows"
+    )
     if not math.isnan(keel.onset.limit):
         limit = math.degrees(keel.onset.limit)
-        axes.axvspan(-limit, limit, color="0.93", zorder=0, label="|φ| ≤ φ$_s$")
+        axes.axvspan(-limit, limit, color="0.93", zorder=0, label=r"$|\varphi| \leq \varphi_s$")
     axes.set(xlim=(-90, 90), xticks=range(-90, 91, 30))
-    axes.set_title(f"(b) torque while sliding down the slope, friction {friction:g}")
-    axes.legend(loc="upper left", fontsize=9, framealpha=1.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 from polycorner.models.keel import Keel
 from polycorner.models.keel_formulas import net_torque, rolling_cosine
@@ -18,6 +19,7 @@ from polycorner.pictures.keel import (
     OUTER,
     POSITIVE,
     draw_keel,
+    place_region,
 )
 from polycorner.pictures.plots import save
 
@@ -107,6 +109,15 @@ def test_where_headings_grow_it_is_hatched(figure, pixels):
 
 def test_saved_as_an_image(figure, tmp_path):
     assert save(figure, tmp_path / "keel.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_region_alone_has_its_boundary_and_the_curve():
+    axes = Figure().add_subplot()
+    place_region(axes, KEEL.onset)
+    phi, theta = curve(axes, POSITIVE)
+    assert KEEL.onset.margin(phi, theta) == pytest.approx(np.zeros(len(phi)), abs=1e-9)
+    assert len(axes.lines) == 3
+    assert not axes.texts
 
 
 @pytest.mark.parametrize("tilt", [0.0, 25.0])

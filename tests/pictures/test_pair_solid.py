@@ -42,6 +42,39 @@ def test_edges_and_corners_lie_on_the_surface(atlas):
     assert abs(points[:, 2]).max() <= period(atlas) / 2 + 1e-12
 
 
+def test_every_edge_is_there_once(atlas):
+    """In the plane, balls of B being alike, half of the labelled edges are images of the others."""
+    curves = relative_curves(atlas, period(atlas))
+    middles = np.array([line[len(line) // 2] for _, line in curves])
+    apart = np.linalg.norm(middles[:, None] - middles, axis=-1) + 1e3 * np.eye(len(middles))
+    assert apart.min() > 0.1
+    whole = [line for _, line in curves if abs(line[[0, -1], 2]).max() < period(atlas) / 2 - 0.1]
+    if atlas.heading is None:
+        ends = {tuple(np.round(line[k], 6)) for line in whole for k in (0, -1)}
+        corners, _ = relative_corners(atlas, period(atlas))
+        assert ends <= {tuple(np.round(corner, 6)) for corner in corners}
+        assert 2 * len(corners) == len(atlas.skeleton.corners)
+
+
+def test_edges_are_named_as_asked(atlas):
+    names = {name for name, _ in relative_curves(atlas, period(atlas), "+".join)}
+    assert names <= {"+".join(edge.active) for edge in atlas.skeleton.edges}
+    words = {name for name, _ in relative_curves(atlas, period(atlas))}
+    assert words <= {"ball on ball twice", "ball on ball, ball on rod", "two balls on rods"}
+
+
+def test_hands_are_those_of_the_corners(atlas):
+    points, names = relative_corners(atlas, period(atlas), hands=True)
+    plain = relative_corners(atlas, period(atlas))[1]
+    for point, name, letter in zip(points, names, plain, strict=True):
+        q = relative_placements(atlas.pair, point, mean_heading=atlas.heading)
+        hand = atlas.pair.chirality(q)
+        if letter.startswith("$"):
+            assert name == f"{letter[:-1]}_{hand}$"
+        else:
+            assert name == letter
+
+
 def test_mesh_and_atlas_have_the_same_euler_characteristic(atlas):
     solid = forbidden_solid(atlas.pair, 40, period=period(atlas), mean_heading=atlas.heading)
     assert solid.euler_characteristic == atlas.skeleton.euler_characteristic == 0
