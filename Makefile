@@ -3,7 +3,7 @@
 PYTEST := .venv/bin/python -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad test thorough lint format types imports docs bench constraints clean
+.PHONY: help env env-pip dyad paper test thorough lint format types imports docs bench constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,6 +34,9 @@ env-pip: ## the same environment with venv and pip alone, where uv cannot be had
 dyad: .venv/.runtime ## the nested pair of dumbbells in the drum, certified and drawn, in out/dyad
 	@.venv/bin/polycorner dyad --length 16 --ball 3 --rod 1.5 --drum 125 --out out/dyad
 
+paper: .venv/.runtime ## every claim of the paper checked, slow ones too; the report in out/paper
+	@.venv/bin/polycorner paper --slow --out out/paper
+
 # ----------------------------------------------------------------------------------------- check
 
 # The workers already use every core; threads inside the linear algebra would only compete.
@@ -54,7 +57,7 @@ format: .venv/.dev ## let ruff repair what it can
 	@.venv/bin/ruff check --fix .
 	@.venv/bin/ruff format .
 
-types: .venv/.dev ## mypy --strict on the package
+types: .venv/.dev ## mypy --strict on the package and the checks of the paper
 	@.venv/bin/mypy
 
 imports: .venv/.dev ## which folder and which file may import which

@@ -1,16 +1,8 @@
-"""``python -m paper_checks``: run every check and print what was found."""
+"""``python -m paper_checks``: the same as ``polycorner paper``."""
 
-import textwrap
+import sys
 
-from paper_checks import CLAIMS
-
-
-def main() -> None:
-    for claim in CLAIMS:
-        finding = claim.check()
-        print(f"{claim.id:<4} {finding.outcome.value:<30} {claim.statement} [{claim.section}]")
-        print(textwrap.indent(textwrap.fill(finding.evidence, 94), " " * 5))
-
+from polycorner.cli.main import main
 
 if __name__ == "__main__":
-    main()
+    main(["paper", *sys.argv[1:]])

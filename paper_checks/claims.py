@@ -1,11 +1,11 @@
-"""What a check is: a claim restated, and a finding with the numbers that decide it."""
+"""What a check is: a claim restated, and a finding whose numbers were computed when it ran."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
 
-class Outcome(Enum):
+class Verdict(Enum):
     """What became of a claim."""
 
     HOLDS = "holds"
@@ -15,23 +15,37 @@ class Outcome(Enum):
     NOT_TESTABLE = "not testable"
 
 
+class Means(Enum):
+    """How a claim was checked, the strongest first."""
+
+    SYMBOLIC = "symbolic"
+    PROOF = "proof"
+    NUMERICAL = "numerical"
+    SIMULATION = "simulation"
+
+
 @dataclass(frozen=True)
 class Finding:
-    """The outcome of a check.
+    """What a check found.
 
     Attributes
     ----------
-    outcome : Outcome
+    verdict : Verdict
         What became of the claim.
     evidence : str
-        A sentence, its numbers computed when the check ran.
-    figures : mapping from str to float
-        Those numbers.
+        One to three sentences. Every number and expression in it was computed when the check ran.
+        Formulas are TeX between dollars.
+    numbers : mapping from str to float
+        Those numbers by name; all finite.
+    correction : str
+        The right statement where the printed one is corrected, or the condition under which it
+        holds; what an author would act on.
     """
 
-    outcome: Outcome
+    verdict: Verdict
     evidence: str
-    figures: Mapping[str, float] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    correction: str = ""
 
 
 @dataclass(frozen=True)
@@ -41,19 +55,32 @@ class Claim:
     Attributes
     ----------
     id : str
-        A letter and a number, such as ``E4``.
+        A letter and a number, such as ``E4``; a part of a claim has one more letter, ``E4a``.
     section : str
-        Where in the paper.
+        Of the paper, as it prints it: ``2`` to ``8``, ``A``, ``B`` or ``C``.
+    place : str
+        Where in that section, in words.
     statement : str
-        The claim in our words.
-    means : str
-        ``symbolic``, ``proof``, ``numerical`` or ``simulation``.
+        The claim in our words and symbols. Formulas are TeX between dollars.
+    means : Means
+        The strongest means that applies.
     check : callable
-        Returns the finding.
+        Takes no arguments, returns the finding.
+    perturbed : callable or None
+        The same check of a deliberately different statement: its verdict must be another one, or
+        the check could not fail. None only for a claim that is not testable.
+    slow : bool
+        Whether the check takes more than about ten seconds.
+    figure : str or None
+        Name of the figure in ``paper_checks.figures`` that shows the claim.
     """
 
     id: str
     section: str
+    place: str
     statement: str
-    means: str
+    means: Means
     check: Callable[[], Finding]
+    perturbed: Callable[[], Finding] | None
+    slow: bool = False
+    figure: str | None = None

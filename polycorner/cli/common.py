@@ -2,7 +2,7 @@
 
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
@@ -33,15 +33,20 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 def pair_options(command: Command) -> Command:
     """Add the options that describe a pair of dumbbells, and ``--config``."""
-    command = click.option(
-        "--config",
-        type=click.Path(path_type=Path),
-        help="TOML file with these names as keys; options override it.",
-    )(command)
+    command = config_option(command)
     for name, _, default in reversed(PARAMETERS):
         flag = f"--{name.replace('_', '-')}"
         command = click.option(flag, type=float, help=f"{HELP[name]} [{default:g}]")(command)
     return command
+
+
+def config_option(command: Command) -> Command:
+    """Add ``--config``."""
+    return click.option(
+        "--config",
+        type=click.Path(path_type=Path),
+        help="TOML file with these names as keys; options override it.",
+    )(command)
 
 
 def output_options(command: Command) -> Command:
@@ -76,17 +81,20 @@ def _merged(config: Path | None, options: dict[str, float | None]) -> dict[str, 
     return values | {name: value for name, value in options.items() if value is not None}
 
 
-def _read(config: Path) -> dict[str, Any]:
+def toml_table(config: Path) -> dict[str, Any]:
+    """Return what is in the file of ``--config``."""
     try:
         with config.open("rb") as file:
-            table = tomllib.load(file)
+            return tomllib.load(file)
     except OSError as error:
-        reason = error.strerror or error
-        fail(f"--config: {config} cannot be read ({reason})")
+        fail(f"--config: {config} cannot be read ({error.strerror or error})")
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         fail(f"--config: {config} is no TOML file: {error}")
+
+
+def _read(config: Path) -> dict[str, Any]:
     known = {name for name, _, _ in PARAMETERS}
-    renamed = {key.replace("-", "_"): value for key, value in table.items()}
+    renamed = {key.replace("-", "_"): value for key, value in toml_table(config).items()}
     unknown = sorted(set(renamed) - known)
     if unknown:
         expected = ", ".join(name for name, _, _ in PARAMETERS)
@@ -113,7 +121,7 @@ def chosen_pair(config: Path | None, options: dict[str, float | None]) -> "Dumbb
         fail(message)
 
 
-def json_text(answer: dict[str, Any]) -> str:
+def json_text(answer: dict[str, Any] | list[Any]) -> str:
     """Return JSON with ``null`` in place of numbers it does not have."""
     import json
 
@@ -140,6 +148,22 @@ def write_answer(answer: dict[str, Any], out: Path, name: str) -> Path:
     except OSError as error:
         fail(f"--out: {out} cannot be written ({error.strerror})")
     return file
+
+
+def deliver(
+    answer: dict[str, Any],
+    show: Callable[[], object],
+    written: Iterable[Path] = (),
+    *,
+    as_json: bool,
+) -> None:
+    """Print an answer as JSON, or as ``show`` does and with the files that were written."""
+    if as_json:
+        click.echo(json_text(answer))
+        return
+    show()
+    for path in written:
+        click.echo(f"wrote {path}")
 
 
 def parameters(pair: "DumbbellPair") -> dict[str, Any]:

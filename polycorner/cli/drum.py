@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import fail, json_text, output_options, write_answer
+from polycorner.cli.common import deliver, fail, output_options, write_answer
 from polycorner.cli.drum_options import drum_options, merged
 from polycorner.cli.drum_report import drum_answer, print_drum
 
@@ -263,12 +263,7 @@ def _finish(
     written = _write(run, answer, out) if out is not None else []
     if film is not None:
         written.append(_write_film(run, film))
-    if as_json:
-        click.echo(json_text(answer))
-    else:
-        print_drum(answer)
-        for path in written:
-            click.echo(f"wrote {path}")
+    deliver(answer, lambda: print_drum(answer), written, as_json=as_json)
     if not run.finished:
         click.echo(f"polycorner: unfinished, kept in {folder}; --resume goes on", err=True)
         raise click.exceptions.Exit(130)

@@ -1,13 +1,12 @@
 """Options of ``polycorner drum``, which are also the keys of its TOML file."""
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
-from polycorner.cli.common import Command, fail
+from polycorner.cli.common import Command, config_option, fail, toml_table
 
 
 @dataclass(frozen=True)
@@ -74,11 +73,7 @@ def _shown(value: Any) -> str:
 
 def drum_options(command: Command) -> Command:
     """Add all that describes a run, and ``--config``."""
-    command = click.option(
-        "--config",
-        type=click.Path(path_type=Path),
-        help="TOML file with these names as keys; options override it.",
-    )(command)
+    command = config_option(command)
     for option in reversed(OPTIONS):
         command = option.decorate(command)
     return command
@@ -96,16 +91,9 @@ def merged(config: Path | None, options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read(config: Path) -> dict[str, Any]:
-    try:
-        with config.open("rb") as file:
-            table = tomllib.load(file)
-    except OSError as error:
-        fail(f"--config: {config} cannot be read ({error.strerror or error})")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        fail(f"--config: {config} is no TOML file: {error}")
     known = {option.name: option for option in OPTIONS}
     read: dict[str, Any] = {}
-    for key, value in table.items():
+    for key, value in toml_table(config).items():
         name = key.replace("-", "_")
         if name not in known:
             fail(f"--config: {config}: expected one of {', '.join(known)}; got {key}")

@@ -8,7 +8,7 @@ import click
 
 from polycorner.cli.common import (
     chosen_pair,
-    json_text,
+    deliver,
     output_options,
     pair_options,
     parameters,
@@ -43,12 +43,7 @@ def dyad(config: Path | None, as_json: bool, out: Path | None, **options: float 
         entries = dyad_minima(pair)
         answer = _answer(pair, entries)
         written = _write(pair, entries, answer, out) if out is not None else []
-    if as_json:
-        click.echo(json_text(answer))
-        return
-    _print_tables(pair, entries, answer)
-    for path in written:
-        click.echo(f"wrote {path}")
+    deliver(answer, lambda: _print_tables(pair, entries, answer), written, as_json=as_json)
 
 
 def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[str, Any]:

@@ -2,12 +2,14 @@
 
 =====  ==================================================
 0      an answer, whatever it says
+1      a check of ``polycorner paper`` broke
 2      bad input: one line on standard error says which
 130    interrupted
 =====  ==================================================
 """
 
 import sys
+from collections.abc import Sequence
 
 import click
 
@@ -16,6 +18,7 @@ from polycorner.cli.atlas import atlas
 from polycorner.cli.drum import drum
 from polycorner.cli.dyad import dyad
 from polycorner.cli.minima import minima
+from polycorner.cli.paper import paper
 from polycorner.cli.prove import prove
 
 EXAMPLES = """\b
@@ -39,12 +42,20 @@ cli.add_command(atlas)
 cli.add_command(prove)
 cli.add_command(minima)
 cli.add_command(drum)
+cli.add_command(paper)
 
 
-def main() -> None:
-    """Run the command line and end the process with its exit code."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What follows the name of the command; those of the process unless given.
+    """
+    given = None if arguments is None else list(arguments)
     try:
-        code = cli.main(prog_name="polycorner", standalone_mode=False)
+        code = cli.main(given, prog_name="polycorner", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         code = 0

@@ -9,8 +9,8 @@ import click
 from polycorner.cli.common import (
     Command,
     chosen_pair,
+    deliver,
     fail,
-    json_text,
     output_options,
     pair_options,
     parameters,
@@ -114,14 +114,8 @@ def _report(
         "completeness": found.completeness,
         "interrupted": found.interrupted,
     }
-    if out is not None:
-        write_answer(answer, out, "minima.json")
-    if as_json:
-        click.echo(json_text(answer))
-    else:
-        _print(answer)
-        if out is not None:
-            click.echo(f"wrote {out / 'minima.json'}")
+    written = [write_answer(answer, out, "minima.json")] if out is not None else []
+    deliver(answer, lambda: _print(answer), written, as_json=as_json)
     if found.interrupted:
         raise click.exceptions.Exit(130)
 

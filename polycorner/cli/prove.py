@@ -8,8 +8,8 @@ import click
 
 from polycorner.cli.common import (
     chosen_pair,
+    deliver,
     fail,
-    json_text,
     output_options,
     pair_options,
     parameters,
@@ -73,10 +73,11 @@ def prove(
         }
     if out is not None:
         _write(proof, answer, out)
-    if as_json:
-        click.echo(json_text(answer))
-        return
-    click.echo(f"{minimum}\n{proof}")
+    deliver(answer, lambda: _print(answer, proof), as_json=as_json)
+
+
+def _print(answer: dict[str, Any], proof: "Proof") -> None:
+    click.echo(f"{answer['minimum']}\n{proof}")
     for angle in ("theta1", "theta2"):
         if f"{angle}_deg" in answer["enclosures"]:
             lower, upper = answer["enclosures"][f"{angle}_deg"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import fail, json_text, write_answer
+from polycorner.cli.common import deliver, fail, write_answer
 from polycorner.cli.report import keys, print_answer
 
 if TYPE_CHECKING:
@@ -205,12 +205,7 @@ class Search:
         if self.out is not None:
             file = write_answer(answer, self.out, "atlas.json")
             written = [file, *(draw(self.out) if draw is not None and self.drawn else [])]
-        if as_json:
-            click.echo(json_text(answer))
-        else:
-            print_answer(answer)
-            for path in written:
-                click.echo(f"wrote {path}")
+        deliver(answer, lambda: print_answer(answer), written, as_json=as_json)
         if not self.finished:
             click.echo(f"polycorner: unfinished, kept in {self.state}; --resume goes on", err=True)
         if self.interrupted:

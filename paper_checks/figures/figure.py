@@ -1,0 +1,77 @@
+"""What a figure is: a name, the words that go with it, and how it is drawn."""
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Drawing
+from PIL import Image
+
+from paper_checks.figures.style import styled
+
+DPI = 200
+SHADES = 128  # of a PNG
+
+
+# A text, or a function that computes it when it is first read.
+Words = str | Callable[[], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A figure of the paper, drawn from the model.
+
+    Attributes
+    ----------
+    name : str
+        By which it is asked for.
+    title : str
+        A few words.
+    caption_words, alt_words : str or callable
+        Its caption and its alternative text. Functions are called when they are first read: their
+        numbers are computed.
+    draw : callable
+        Returns the matplotlib figure.
+    slow : bool
+        Whether that takes a simulation.
+    """
+
+    name: str
+    title: str
+    caption_words: Words
+    alt_words: Words
+    draw: Callable[[], Drawing]
+    slow: bool = False
+
+    @cached_property
+    def caption(self) -> str:
+        """What is drawn, with parameters and units."""
+        return self.caption_words if isinstance(self.caption_words, str) else self.caption_words()
+
+    @cached_property
+    def alt(self) -> str:
+        """What a reader who does not see it has to know."""
+        return self.alt_words if isinstance(self.alt_words, str) else self.alt_words()
+
+    def write(self, folder: Path) -> list[Path]:
+        """Write ``name.png`` and ``name.svg``; text in them needs no fonts where they are shown."""
+        folder.mkdir(parents=True, exist_ok=True)
+        drawing = self.draw()
+        paths = [folder / f"{self.name}.{ending}" for ending in ("png", "svg")]
+        with styled():
+            _save_png(drawing, paths[0])
+            drawing.savefig(paths[1], metadata={"Date": None, "Title": self.title})
+        return paths
+
+
+def _save_png(drawing: Drawing, path: Path) -> None:
+    """Save with few colours, which halves the file and is not seen."""
+    FigureCanvasAgg(drawing)
+    raw = io.BytesIO()
+    drawing.savefig(raw, format="png", dpi=DPI)
+    with Image.open(raw) as image:
+        few = image.convert("RGB").quantize(SHADES, dither=Image.Dither.NONE)
+        few.save(path, optimize=True, dpi=(DPI, DPI))

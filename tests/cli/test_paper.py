@@ -1,0 +1,142 @@
+"""The claims on the command line: what is printed and written, and one line for a mistake."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import small_catalogue
+
+import paper_checks
+from paper_checks import running
+from paper_checks.figures import FIGURES
+from paper_checks.running import Result, Run
+from polycorner.cli.main import main
+
+ROOT = Path(paper_checks.__file__).parents[1]
+A, B, C = small_catalogue.CLAIMS[:3]
+GOOD = Result(A, small_catalogue.found())
+BROKEN = Result(B, None, "ValueError: no such thing")
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(["paper", *arguments])
+    captured = capsys.readouterr()
+    return stopped.value.code, captured.out, captured.err
+
+
+@pytest.fixture
+def pretended(monkeypatch):
+    """Let a run come to a given end."""
+
+    def come_to(*results, missed=()):
+        monkeypatch.setattr(running, "run", lambda *_, **__: Run(results, missed=missed))
+
+    return come_to
+
+
+def test_claims_by_name_as_json(capsys):
+    code, out, err = run(capsys, "G4", "P3a", "--json")
+    assert (code, err) == (0, "")
+    first, second = json.loads(out)
+    assert (first["id"], first["section"], first["means"]) == ("G4", "2", "symbolic")
+    assert (second["id"], second["section"], second["verdict"]) == ("P3a", "B", "holds")
+    assert first["claim"]
+    assert "7 corners" in second["evidence"]
+
+
+def test_files_and_table(capsys, tmp_path):
+    out = tmp_path / "deep" / "out"
+    code, told, _ = run(capsys, "P2b", "--out", str(out))
+    assert code == 0
+    assert "corrected" in told
+    assert "What an author would act on" in told
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert 'id="P2b"' in page
+    (record,) = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert record["verdict"] == "corrected"
+    assert "| P2b |" in (out / "report.md").read_text(encoding="utf-8")
+
+
+def test_quiet(capsys):
+    code, out, err = run(capsys, "P3", "--quiet")
+    assert (code, out, err) == (0, "2 claims: 2 holds\n", "")
+
+
+def test_a_check_that_breaks_is_told_and_counts(capsys, pretended, tmp_path):
+    pretended(GOOD, BROKEN)
+    code, out, err = run(capsys, "--out", str(tmp_path))
+    assert code == 1
+    assert "2 claims: 1 holds, 1 error" in out
+    assert err == "polycorner: A2: ValueError: no such thing\n"
+    assert "ValueError: no such thing" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_interrupted_runs_keep_what_was_found(capsys, pretended, tmp_path):
+    pretended(GOOD, missed=(B, C))
+    code, out, err = run(capsys, "--out", str(tmp_path), "--json")
+    assert code == 130
+    assert [record["id"] for record in json.loads(out)] == ["A1"]
+    assert err == "polycorner: interrupted; not run: A2, A3a\n"
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Interrupted before these were checked: A2, A3a." in page
+
+
+def test_slow_claims_are_left_out_and_said_to_be(capsys, monkeypatch):
+    monkeypatch.setattr(paper_checks, "CLAIMS", (A, small_catalogue.CLAIMS[-1]))
+    monkeypatch.setattr(running, "run", lambda claims, **_: Run((GOOD,) if claims == (A,) else ()))
+    assert "left out, too slow without --slow: S1" in run(capsys)[1]
+    assert "left out" not in run(capsys, "--slow")[1]
+    assert "left out" not in run(capsys, "S1")[1]
+
+
+def test_figures(capsys, tmp_path):
+    code, out, _ = run(capsys, "figures", "tutorial", "--out", str(tmp_path))
+    assert code == 0
+    assert (tmp_path / "tutorial.png").read_bytes().startswith(b"\x89PNG")
+    assert out.count("wrote ") == len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--section", "9"), "--section: expected one of 2, 3, 4, 5, 6, 7, 8, A, B, C; got '9'"),
+        (("X1",), "id: expected one such as G1a or L7b; got 'X1'"),
+        (("figures",), "figures: expected --out DIR, the folder they go to; got none"),
+        (("--workers", "0"), "Invalid value for '--workers': 0 is not in the range 1<=x<=64."),
+    ],
+)
+def test_mistakes_get_one_line(capsys, arguments, sentence):
+    assert run(capsys, *arguments) == (2, "", f"polycorner: {sentence}\n")
+
+
+def test_mistakes_with_figures_and_folders(capsys, tmp_path):
+    out = ("--out", str(tmp_path))
+    code, _, err = run(capsys, "figures", "nosuch", *out)
+    assert (code, err) == (2, f"polycorner: figures: expected {', '.join(FIGURES)}; got 'nosuch'\n")
+    code, _, err = run(capsys, "figures", "--section", "2", *out)
+    assert (code, err.count("\n")) == (2, 1)
+    (tmp_path / "file").touch()
+    code, told, err = run(capsys, "G4", "--out", str(tmp_path / "file" / "folder"))
+    assert (code, told) == (2, "")
+    assert err.startswith("polycorner: --out: ")
+    assert err.count("\n") == 1
+
+
+def test_help(capsys):
+    code, out, _ = run(capsys, "--help")
+    assert code == 0
+    assert "python -m paper_checks" in out
+
+
+def test_python_dash_m_is_the_same_command():
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "paper_checks", "G4", "--quiet"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout, done.stderr) == ("1 claims: 1 holds\n", "")

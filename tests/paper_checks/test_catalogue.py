@@ -1,0 +1,88 @@
+"""Every check runs, comes to the verdict that the documentation records, and can fail."""
+
+import math
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import paper_checks
+from paper_checks import CLAIMS, Claim, Verdict
+from paper_checks.figures import FIGURES
+from paper_checks.records import SECTIONS
+from paper_checks.typesetting import html, plain, sentence
+
+TABLE = Path(paper_checks.__file__).parents[1] / "docs" / "paper_table.md"
+ROW = re.compile(r"^\| ([A-Z]\d+[a-z]?) \| (.*) \| ([a-z]+) \| ([a-z ]+) \|$", re.MULTILINE)
+NAMES = re.compile(r"\*\*[^*]*\(([A-Z]\d[^)]*)\)\.\*\*")
+# Verdicts a wrong statement may get instead of `holds`, and a right one instead of the others.
+NO = (Verdict.REFUTED, Verdict.CORRECTED)
+YES = (Verdict.HOLDS, Verdict.HOLDS_UNDER)
+
+
+def recorded():
+    """Return statement, means and verdict of each claim in the table of the documentation."""
+    return {found[1]: found.groups()[1:] for found in ROW.finditer(TABLE.read_text("utf-8"))}
+
+
+RECORDED = recorded()
+CHECKED = [
+    pytest.param(claim, id=claim.id, marks=[pytest.mark.slow] if claim.slow else [])
+    for claim in CLAIMS
+]
+
+
+def test_the_table_has_these_claims_and_no_others():
+    assert list(RECORDED) == [claim.id for claim in CLAIMS]
+
+
+def test_the_page_explains_what_is_corrected_or_refuted_and_names_no_other_claim():
+    page = (TABLE.parent / "paper.md").read_text("utf-8")
+    named = {name for names in NAMES.findall(page) for name in re.findall(r"[A-Z]\d+[a-z]?", names)}
+    assert named <= set(RECORDED)
+    wrong = {
+        name for name, (*_, verdict) in RECORDED.items() if verdict in ("corrected", "refuted")
+    }
+    assert wrong <= named
+
+
+def test_ids_are_distinct_and_in_the_order_of_the_sections():
+    assert max(Counter(claim.id for claim in CLAIMS).values()) == 1
+    positions = [list(SECTIONS).index(claim.section) for claim in CLAIMS]
+    assert positions == sorted(positions)
+    assert {claim.section for claim in CLAIMS} == set(SECTIONS)
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.id)
+def test_a_claim_is_whole(claim: Claim):
+    assert re.fullmatch(r"[A-Z]\d+[a-z]?", claim.id)
+    assert claim.statement
+    assert claim.place
+    assert claim.figure is None or claim.figure in FIGURES
+    statement, means, _ = RECORDED[claim.id]
+    assert statement == sentence(claim.statement).replace("|", r"\vert ")
+    assert means == claim.means.value
+
+
+@pytest.mark.parametrize("claim", CHECKED)
+def test_check(claim: Claim):
+    finding = claim.check()
+    assert finding.verdict.value == RECORDED[claim.id][2]
+    assert finding.evidence
+    assert all(math.isfinite(number) for number in finding.numbers.values())
+    assert bool(finding.correction) or finding.verdict not in (
+        Verdict.CORRECTED,
+        Verdict.HOLDS_UNDER,
+    )
+    for text in (finding.evidence, finding.correction):
+        assert text.count("$") % 2 == 0
+        html(text)
+        assert "\\" not in plain(text)
+    if finding.verdict is Verdict.NOT_TESTABLE:
+        assert claim.perturbed is None
+        return
+    assert claim.perturbed is not None
+    other = claim.perturbed()
+    assert other.verdict is not finding.verdict
+    assert other.verdict in (YES if finding.verdict in NO else NO)
