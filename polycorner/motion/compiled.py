@@ -11,8 +11,9 @@ block that presses on it.  A step (:func:`step_once`) is
 
 1. drift half a step and evaluate every body; wake what can no longer rest;
 2. blocks of the bodies that are awake and of the contacts between them; islands of contacts;
-3. solve each island: Gauss-Seidel sweeps over the blocks, and Newton's method on the natural map
-   ``p = proj(p - rho u)`` ([Acary]) once the sweeps have found which blocks stick and which slip;
+3. solve each island: Gauss-Seidel sweeps over the blocks, Newton's method on the natural map
+   ``p = proj(p - rho u)`` ([Acary]) once the sweeps have found which blocks stick and which slip,
+   and the method of multipliers where it cycles; both solve systems as large as the velocities;
 4. bodies at rest within the solver's accuracy get exactly the velocity of rest; an island whose
    forces fit in their sets sleeps, and is only asked whether they still fit;
 5. events, energies, and drift the other half of the step.
@@ -26,7 +27,23 @@ from numba import njit
 from polycorner.minima.compiled import call_kernel, stay_whole
 
 # Without reference counts, which would cost more than the arithmetic: work space comes in Room.
-inner = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, error_model="numpy", _nrt=False)
+inner = njit(
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+    error_model="numpy",
+    _nrt=False,
+    forceinline=False,
+)
+
+# A scene and a room are some hundred arrays: what is called for every contact is copied into its
+# caller, where handing them over would cost more than the work.
+small = njit(
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+    error_model="numpy",
+    _nrt=False,
+    forceinline=True,
+)
 
 Field = Any  # an array or a number, as Numba finds it
 
@@ -41,9 +58,9 @@ CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
 TOUCH = 1e-7  # scaled gap up to which bodies touch
 NEAR = 1e-2  # scaled gap up to which a contact is watched
 FIT = 1e-9  # relative slack with which forces at rest fit in their sets
-NEWTON_ROWS = 48  # rows up to which an island is solved by Newton's method
+GUESS = 1e-2  # residual, relative to the speeds, from which Newton's method is tried at once
+STIFF, STIFFEST = 1e2, 1e4  # of the augmented Lagrangian, relative to the contacts
 SKIN = 0.4  # of the reach, by which lists of neighbours are wider
-GUESS = 1e-2  # residual, relative to the speeds, from which Newton's method is tried
 MARGIN = 0.95  # share of friction with which a heap at rest is asked to rest
 SPARE = 0.01  # share of friction that lets a sleeper sleep unasked
 LONGEST = np.int64(50)  # steps for which it does
@@ -155,6 +172,8 @@ class Room(NamedTuple):
     where: Field  # (N, 2) when the list was made
     near: Field  # (C, 3) body, body, which gap
     near_gap: Field
+    near_old: Field  # (C,) where it stood in the list of the last step, or -1
+    near_press: Field  # (C, 3) impulses to start from
     near_normal: Field  # (C, 2k)
     body: Field  # (B, 2)
     rows: Field  # (B,) dimension; 0 for a unilateral contact
@@ -171,22 +190,32 @@ class Room(NamedTuple):
     order: Field  # (B,)
     mass: Field  # (N, k, k)
     turned: Field  # (B,) whose slip passed through zero in this step
-    safe: Field  # (B, 2) impulses before Newton's method
+    best: Field  # (B, 2) impulses of the least residual
+    hat: Field  # (B, 2) multipliers
+    held: Field  # (B,) load of friction, or what is added to a normal velocity, while they are held
+    cone: Field  # (B,) the other block of a contact and its friction that form a cone, or -1
+    curve: Field  # (B, 9) derivative of the law of a block, and of the contact that presses on it
+    answer: Field  # (B, 2) impulses of a Newton step before the velocities answer
+    jac: Field  # (3, 2k)
+    bent: Field  # (3, 2k)
     square: Field  # (k, k)
     side: Field  # (k,)
     rest: Field  # (k,)
     two: Field
-    six: Field
+    image: Field  # (12,) of a projection, and its derivative
     slots: Field  # (max(C, P),)
-    matrix: Field  # (2, NEWTON_ROWS, NEWTON_ROWS)
-    vectors: Field  # (4, NEWTON_ROWS)
-    which: Field  # (NEWTON_ROWS, 2) block and row
+    members: Field  # (N,) bodies of an island
+    local: Field  # (N,) their numbers in it
+    back: Field  # (N, k) their velocities before a step
+    step: Field  # (N k,)
+    slope_of: Field  # (N k,)
+    matrix: Field  # band, row by row
 
 
 # ------------------------------------------------------------------------------------ convex sets
 
 
-@inner
+@small
 def inside(scene, shape, x, y, load, slack):
     """Return whether ``(x, y)`` lies in ``load`` times a set, up to a relative slack."""
     kind = scene.kinds[shape]
@@ -210,7 +239,7 @@ def inside(scene, shape, x, y, load, slack):
     return True
 
 
-@inner
+@small
 def project(scene, shape, x, y, load, out):
     """Project ``(x, y)`` on ``load`` times a set; out: the point, its derivative (4 numbers)."""
     kind = scene.kinds[shape]
@@ -468,7 +497,7 @@ def add_square(A, row, weight, k):
                 A[i, j] += f * row[j]
 
 
-@inner
+@small
 def load_of(scene, room, lam, i, f):
     """Return the impulse that presses on a friction contact of a body."""
     if scene.owner[f] < 0:
@@ -598,7 +627,7 @@ def balanced(scene, motion, room, i, pull, again):
 # ------------------------------------------------------------------------------------- neighbours
 
 
-@inner
+@small
 def place_of(scene, motion, i, a, time):
     """Return a body's place, in lengths, as seen from the moving substrate."""
     c = scene.place[a]
@@ -606,7 +635,7 @@ def place_of(scene, motion, i, a, time):
     return x - scene.carried * time if a == 0 else x
 
 
-@inner
+@small
 def stale(scene, motion, room, time):
     """Return whether a body has moved so far that the list of neighbours may lack a pair."""
     if room.listed[1] == 0:
@@ -681,7 +710,7 @@ def list_neighbours(scene, motion, room, time):
     return True
 
 
-@inner
+@small
 def watch_pair(scene, motion, room, a, b, limit, count):
     """Evaluate the gaps of a pair and note the small ones; return how many are noted, or -1."""
     k, work = scene.size, room.work
@@ -704,6 +733,10 @@ def watch_pair(scene, motion, room, a, b, limit, count):
                 return -1
             room.near[count, 0], room.near[count, 1], room.near[count, 2] = a, b, g
             room.near_gap[count] = work[n + g]
+            old = find(motion, (a * scene.bodies + b) * m + g)
+            room.near_old[count] = old
+            for c in range(3):
+                room.near_press[count, c] = motion.press[old, c] if old >= 0 else 0.0
             for c in range(2 * k):
                 room.near_normal[count, c] = 0.0
             for r in range(n):
@@ -713,7 +746,7 @@ def watch_pair(scene, motion, room, a, b, limit, count):
     return count
 
 
-@inner
+@small
 def watch(scene, motion, room, h, count):
     """Note all small gaps between bodies of which one is awake; return how many, or -1."""
     fastest = 0.0
@@ -796,7 +829,7 @@ def new_block(room, b, k, first, second, rows):
             room.slant[b, r, c] = 0.0
 
 
-@inner
+@small
 def body_blocks(scene, motion, room, i, h, count):
     """Append the blocks of a body's own contacts."""
     k, m = scene.size, scene.bounce.size
@@ -847,7 +880,7 @@ def body_blocks(scene, motion, room, i, h, count):
     return count
 
 
-@inner
+@small
 def pair_blocks(scene, motion, room, slot, h, count):
     """Append the two blocks of a contact between bodies."""
     k, work = scene.size, room.work
@@ -858,7 +891,7 @@ def pair_blocks(scene, motion, room, slot, h, count):
         before += room.near_normal[slot, k + c] * motion.v[j, c]
         free += room.near_normal[slot, c] * room.free[i, c]
         free += room.near_normal[slot, k + c] * room.free[j, c]
-    old = find(motion, (i * scene.bodies + j) * scene.pair_gaps + g)
+    old = room.near_old[slot]
     n = count
     new_block(room, n, k, i, j, ZERO)
     for c in range(2 * k):
@@ -866,8 +899,7 @@ def pair_blocks(scene, motion, room, slot, h, count):
     gap = room.near_gap[slot]
     room.offset[n, 0] = -bound_of(gap, before, free, scene.pair_bounce, h, scene.scale)
     room.origin[n, 0], room.origin[n, 1], room.origin[n, 2] = 2, slot, g
-    if old >= 0:
-        room.p[n, 0] = motion.press[old, 0]
+    room.p[n, 0] = room.near_press[slot, 0]
     finish_block(scene, room, n)
     if scene.rub_table.shape[0] == 0:
         return count + 1
@@ -891,8 +923,7 @@ def pair_blocks(scene, motion, room, slot, h, count):
             room.slant[b, r, c] = slope
             value -= slope * work[reads + c]
         room.offset[b, r] = value
-        if old >= 0:
-            room.p[b, r] = motion.press[old, 1 + r]
+        room.p[b, r] = room.near_press[slot, 1 + r]
     sticks = old >= 0 and motion.flags[old, 0]
     room.block_shape[b] = scene.rub_shape[0 if sticks else 1]
     room.press_by[b] = n
@@ -914,7 +945,7 @@ def find(motion, key):
     return low if low < motion.counts[0] and motion.keys[low] == key else -1
 
 
-@inner
+@small
 def root_of(root, i):
     """Return the representative of a body's island."""
     while root[i] != i:
@@ -926,7 +957,7 @@ def root_of(root, i):
 # ------------------------------------------------------------------------------------- one island
 
 
-@inner
+@small
 def slip_of(scene, room, b, v, out):
     """Evaluate ``J v + d`` of a block."""
     k = scene.size
@@ -941,7 +972,7 @@ def slip_of(scene, room, b, v, out):
         out[r] = value
 
 
-@inner
+@small
 def push(scene, room, b, r, change):
     """Add an impulse of one row to the velocities."""
     k = scene.size
@@ -955,7 +986,7 @@ def push(scene, room, b, r, change):
             room.new[j, c] += room.pushed[b, r, k + c] * change
 
 
-@inner
+@small
 def relax(scene, room, b, u, out):
     """Solve one block with all others held; return how far it was from its law, as a speed."""
     owner = room.press_by[b]
@@ -1017,164 +1048,454 @@ def residual(scene, room, first, last, u, out):
     return worst
 
 
+@small
+def number_bodies(scene, motion, room, first, last):
+    """Number the bodies of an island along the substrate; return how many, and the bandwidth.
+
+    Contacts couple only bodies that are near, so that in this order the matrix of
+    :func:`solve_band` is a band.  Nothing is numbered (0 is returned) if there is no room for it.
+    """
+    k, n, reach = scene.size, ZERO, ZERO
+    members, local = room.members, room.local
+    for i in range(scene.bodies):
+        local[i] = NONE
+    for s in range(first, last):
+        for side in range(2):
+            i = room.body[room.order[s], side]
+            if i >= 0 and room.awake[i] and local[i] < 0:
+                local[i] = ZERO
+                along = motion.q[i, scene.place[1]]
+                at = n
+                while at > 0 and motion.q[members[at - 1], scene.place[1]] > along:
+                    members[at] = members[at - 1]
+                    at -= 1
+                members[at] = i
+                n += 1
+    for at in range(n):
+        local[members[at]] = at
+    for s in range(first, last):
+        i, j = room.body[room.order[s], 0], room.body[room.order[s], 1]
+        if i >= 0 and j >= 0 and room.awake[i] and room.awake[j]:
+            reach = max(reach, abs(local[i] - local[j]))
+    width = (reach + 1) * k - 1
+    if n * k * (2 * width + 1) > room.matrix.size:
+        n = ZERO
+    return n, width
+
+
 @inner
-def solve_dense(A, b, n):
-    """Solve ``A x = b`` in place by elimination with row pivots."""
+def solve_band(A, b, n, width):
+    """Solve ``A x = b`` in place for a band matrix; row ``i`` starts with column ``i - width``.
+
+    The symmetric part of ``A`` is definite or nearly so: no rows are exchanged.
+    """
     stay_whole()
+    stride = 2 * width + 1
     for j in range(n):
-        best, top = j, abs(A[j, j])
-        for i in range(j + 1, n):
-            if abs(A[i, j]) > top:
-                best, top = i, abs(A[i, j])
-        if top == 0.0:
+        pivot = A[j * stride + width]
+        if not abs(pivot) > 0.0:
             return False
-        if best != j:
-            for c in range(j, n):
-                A[j, c], A[best, c] = A[best, c], A[j, c]
-            b[j], b[best] = b[best], b[j]
-        for i in range(j + 1, n):
-            f = A[i, j] / A[j, j]
+        last = min(n, j + width + 1)
+        for i in range(j + 1, last):
+            at = i * stride + width - i
+            f = A[at + j] / pivot
             if f != 0.0:
-                for c in range(j + 1, n):
-                    A[i, c] -= f * A[j, c]
+                other = j * stride + width - j
+                for c in range(j + 1, last):
+                    A[at + c] -= f * A[other + c]
                 b[i] -= f * b[j]
     for i in range(n - 1, -1, -1):
+        at = i * stride + width - i
         value = b[i]
-        for c in range(i + 1, n):
-            value -= A[i, c] * b[c]
-        b[i] = value / A[i, i]
+        for c in range(i + 1, min(n, i + width + 1)):
+            value -= A[at + c] * b[c]
+        b[i] = value / A[at + i]
     return True
 
 
 @inner
-def coupling(scene, room, a, r, b, c):
-    """Return the speed that a unit impulse of row ``c`` of block ``b`` gives to a row."""
-    k = scene.size
-    value = 0.0
-    for side in range(2):
-        i = room.body[a, side]
-        if i < 0:
+def start_matrix(scene, room, n, width):
+    """Fill the matrix with the masses of the bodies of an island."""
+    k, stride = scene.size, 2 * width + 1
+    for a in range(n * k * stride):
+        room.matrix[a] = 0.0
+    for at in range(n):
+        i = room.members[at]
+        for x in range(k):
+            for y in range(k):
+                room.matrix[(at * k + x) * stride + width + y - x] = room.mass[i, x, y]
+
+
+@small
+def couple(scene, room, b, width):
+    """Add ``J' G J`` of a block to the matrix.
+
+    ``G`` stands in ``room.curve``, row by row, for three rows: that of the contact that presses
+    on the block, and the block's own.
+    """
+    k, stride = scene.size, 2 * width + 1
+    jac, bent, curve, owner = room.jac, room.bent, room.curve, room.press_by[b]
+    sides = 2 if room.body[b, 1] >= 0 else 1
+    rows = max(1, room.rows[b])
+    start = 0 if owner >= 0 else 1
+    if owner >= 0:
+        swap = sides == 2 and room.body[owner, 0] != room.body[b, 0]
+        for x in range(sides * k):
+            jac[0, x] = room.slant[owner, 0, (x + k) % (2 * k) if swap else x]
+    for r in range(rows):
+        for x in range(sides * k):
+            jac[1 + r, x] = room.slant[b, r, x]
+    for r in range(start, 1 + rows):
+        for x in range(sides * k):
+            value = 0.0
+            for c in range(start, 1 + rows):
+                value += curve[b, 3 * r + c] * jac[c, x]
+            bent[r, x] = value
+    for side in range(sides):
+        i = room.body[b, side]
+        if not room.awake[i]:
             continue
-        for other in range(2):
-            if room.body[b, other] == i:
-                for x in range(k):
-                    value += room.slant[a, r, side * k + x] * room.pushed[b, c, other * k + x]
+        for other in range(sides):
+            j = room.body[b, other]
+            if not room.awake[j]:
+                continue
+            for x in range(k):
+                row = room.local[i] * k + x
+                at = row * stride + width - row + room.local[j] * k
+                for y in range(k):
+                    value = 0.0
+                    for r in range(start, 1 + rows):
+                        value += jac[r, side * k + x] * bent[r, other * k + y]
+                    room.matrix[at + y] += value
+
+
+@small
+def pull_with(scene, room, b, r, value, target):
+    """Add ``value J'`` of a row to a vector over the bodies of an island."""
+    k = scene.size
+    for side in range(2):
+        i = room.body[b, side]
+        if i >= 0 and room.awake[i]:
+            for x in range(k):
+                target[room.local[i] * k + x] += value * room.slant[b, r, side * k + x]
+
+
+@small
+def along_row(scene, room, b, r, vector):
+    """Return ``J x`` of a row for a vector over the bodies of an island."""
+    k, value = scene.size, 0.0
+    for side in range(2):
+        i = room.body[b, side]
+        if i >= 0 and room.awake[i]:
+            for x in range(k):
+                value += room.slant[b, r, side * k + x] * vector[room.local[i] * k + x]
     return value
 
 
-@inner
-def newton(scene, room, first, last, goal, u, out):
-    """Take semismooth Newton steps on the natural map of an island; keep the best impulses.
+@small
+def newton(scene, room, first, last, n, width, goal, most, worst, u, out):
+    """Take semismooth Newton steps on the natural map; keep the best impulses and their residual.
 
-    The unknowns are the impulses, ``u = W p + constant`` the velocities of the rows, and the map
-    ``p - proj(p - rho u)``; its derivative is that of the projection, and for friction also that
-    of its load ([Acary]).  Redundant contacts have a solution because all are a little soft.
+    The map is ``p - proj(p - rho u)`` with the velocities ``u = J v + d`` of the rows; its
+    derivative is that of the projection, and for friction also that of its load ([Acary]).  The
+    steps ``dp = a - G J dv`` of the blocks are put into ``M dv = J' dp``, so that what is solved is
+    as large as the velocities and not as the impulses.  Redundant contacts have a solution because
+    all are a little soft.
     """
-    W, A, vectors, which = room.matrix[0], room.matrix[1], room.vectors, room.which
-    constant, p, best, phi = vectors[0], vectors[1], vectors[2], vectors[3]
-    n = 0
-    for s in range(first, last):
-        b = room.order[s]
-        owner, rows = room.press_by[b], max(1, room.rows[b])
-        room.origin[b, 3] = NONE
-        idle = room.p[b, 0] == 0.0 and room.p[b, 1] == 0.0
-        if idle and (room.rows[b] == 0 or (owner >= 0 and room.origin[owner, 3] < 0)):
-            continue  # an open contact stays so, and does not rub
-        room.origin[b, 3] = n
-        if n + rows > NEWTON_ROWS:
-            return ZERO
-        slip_of(scene, room, b, room.free, u)
-        for r in range(rows):
-            which[n, 0], which[n, 1], constant[n], p[n] = b, r, u[r], room.p[b, r]
-            n += 1
-    for i in range(n):
-        for j in range(i + 1):
-            W[i, j] = coupling(scene, room, which[i, 0], which[i, 1], which[j, 0], which[j, 1])
-            W[j, i] = W[i, j]
+    size, x = n * scene.size, room.step
     least, former, steps = np.inf, np.inf, ZERO
     while True:
-        worst = natural_map(scene, room, n, u, out)
         if worst < least:
             least = worst
-            for i in range(n):
-                best[i] = p[i]
+            keep(room, first, last, room.p, room.best)
         settled = worst <= goal and worst > 0.1 * former
-        if settled or worst <= 1e-5 * goal or steps == 8 or not worst < 1e6 * least:
+        if settled or worst <= 1e-5 * goal or steps == most or not worst < 1e6 * least:
             break
         former = worst
-        if not solve_dense(A, phi, n):
+        natural_map(scene, room, first, last, n, width, u, out)
+        if not solve_band(room.matrix, x, size, width):
             break
-        for i in range(n):
-            p[i] -= phi[i]
+        for s in range(first, last):
+            take_step(scene, room, room.order[s], x)
         steps += ONE
+        worst = residual(scene, room, first, last, u, out)
+    if worst > least:
+        keep(room, first, last, room.best, room.p)
+        rebuild(scene, room, first, last)
+    return steps, least
+
+
+@small
+def take_step(scene, room, b, x):
+    """Change the impulses of a block by a Newton step; see :func:`newton`."""
+    curve, owner, rows = room.curve, room.press_by[b], max(1, room.rows[b])
+    pressed = along_row(scene, room, owner, ZERO, x) if owner >= 0 else 0.0
+    along = along_row(scene, room, b, ZERO, x)
+    across = along_row(scene, room, b, ONE, x) if rows == 2 else 0.0
+    for r in range(rows):
+        change = room.answer[b, r] - curve[b, 4 + 3 * r] * along
+        if owner >= 0:
+            change -= curve[b, 3 + 3 * r] * pressed
+        if rows == 2:
+            change -= curve[b, 5 + 3 * r] * across
+        room.p[b, r] += change
+        push(scene, room, b, r, change)
+
+
+@small
+def natural_map(scene, room, first, last, n, width, u, out):
+    """Linearise the natural map of an island.
+
+    ``room.curve`` and ``room.answer`` get ``G`` and ``a`` of each block; see :func:`newton`.
+    """
+    curve, answer, x = room.curve, room.answer, room.step
+    start_matrix(scene, room, n, width)
+    for c in range(n * scene.size):
+        x[c] = 0.0
     for s in range(first, last):
         b = room.order[s]
-        if room.origin[b, 3] < 0:
-            continue
+        slip_of(scene, room, b, room.new, u)
+        rho = room.stiff[b, 3]
+        if room.rows[b] == 0:
+            p = room.p[b, 0]
+            if p - rho * u[0] <= 0.0:
+                curve[b, 4], answer[b, 0] = 0.0, -p
+            else:
+                curve[b, 4], answer[b, 0] = rho / SOFT, -rho * u[0] / SOFT
+        else:
+            friction_map(scene, room, b, u, out)
+        couple(scene, room, b, width)
         for r in range(max(1, room.rows[b])):
-            change = best[room.origin[b, 3] + r] - room.p[b, r]
-            room.p[b, r] += change
-            push(scene, room, b, r, change)
-    return steps
+            pull_with(scene, room, b, r, answer[b, r], x)
+
+
+@small
+def friction_map(scene, room, b, u, out):
+    """Linearise the natural map of one friction contact."""
+    curve, rho, d, owner = room.curve, room.stiff[b, 3], room.rows[b], room.press_by[b]
+    pressing = room.weight[b] if owner < 0 else room.p[owner, 0]
+    load = room.ease[b] * pressing
+    px, py = room.p[b, 0], room.p[b, 1] if d == 2 else 0.0
+    zx, zy = px - rho * u[0], py - rho * u[1] if d == 2 else 0.0
+    project(scene, room.block_shape[b], zx, zy, load, out)
+    fx, fy = px - out[0], py - out[1] if d == 2 else 0.0
+    d00, d01, d10, d11 = out[2], out[3], out[4], out[5]
+    if d == 1:
+        d01 = d10 = d11 = 0.0
+    if owner >= 0 and load > 0.0:  # the load changes, too
+        change = room.answer[owner, 0] / pressing
+        ex = out[0] - d00 * zx - d01 * zy
+        ey = out[1] - d10 * zx - d11 * zy if d == 2 else 0.0
+        fx -= ex * change
+        fy -= ey * change
+        stiff = curve[owner, 4] / pressing
+        ex *= stiff
+        ey *= stiff
+    else:
+        ex = ey = 0.0
+    # the inverse of 1 - D, a little soft
+    s00, s11 = 1.0 + SOFT - d00, 1.0 + SOFT - d11
+    determinant = s00 * s11 - d01 * d10
+    i00, i01, i10, i11 = s11 / determinant, d01 / determinant, d10 / determinant, s00 / determinant
+    curve[b, 3], curve[b, 6] = i00 * ex + i01 * ey, i10 * ex + i11 * ey
+    curve[b, 4], curve[b, 5] = rho * (i00 * d00 + i01 * d10), rho * (i00 * d01 + i01 * d11)
+    curve[b, 7], curve[b, 8] = rho * (i10 * d00 + i11 * d10), rho * (i10 * d01 + i11 * d11)
+    curve[b, 0] = curve[b, 1] = curve[b, 2] = 0.0
+    room.answer[b, 0], room.answer[b, 1] = -(i00 * fx + i01 * fy), -(i10 * fx + i11 * fy)
 
 
 @inner
-def natural_map(scene, room, n, u, out):
-    """Fill the natural map and its derivative at the impulses in ``vectors[1]``; its size."""
-    W, A, which = room.matrix[0], room.matrix[1], room.which
-    constant, p, phi = room.vectors[0], room.vectors[1], room.vectors[3]
-    worst, i = 0.0, 0
-    while i < n:
-        b = which[i, 0]
-        rho, d = room.stiff[b, 3], max(1, room.rows[b])
-        for r in range(d):
-            u[r] = constant[i + r]
-            for j in range(n):
-                u[r] += W[i + r, j] * p[j]
-        if room.rows[b] == 0:
-            is_open = p[i] - rho * u[0] <= 0.0
-            phi[i] = p[i] if is_open else rho * u[0]
-            for j in range(n):
-                A[i, j] = 0.0 if is_open else rho * W[i, j]
-            A[i, i] += 1.0 if is_open else SOFT
-            worst = max(worst, abs(phi[i]) / rho)
-            i += 1
+def project_cone(mu, z, x, y, out):
+    """Project on the cone ``|(x, y)| <= mu z``; out: the point (3), its derivative (9 numbers)."""
+    for a in range(12):
+        out[a] = 0.0
+    far = np.sqrt(x * x + y * y)
+    if far <= mu * z:
+        out[0], out[1], out[2] = z, x, y
+        out[3] = out[7] = out[11] = 1.0
+        return
+    if mu * far <= -z:
+        return
+    ex, ey = x / far, y / far
+    f = 1.0 / (1.0 + mu * mu)
+    top = f * (z + mu * far)
+    g = mu * top / far
+    out[0], out[1], out[2] = top, mu * top * ex, mu * top * ey
+    out[3], out[4], out[5] = f, f * mu * ex, f * mu * ey
+    out[6], out[9] = out[4], out[5]
+    out[7] = f * mu * mu * ex * ex + g * ey * ey
+    out[8] = out[10] = (f * mu * mu - g) * ex * ey
+    out[11] = f * mu * mu * ey * ey + g * ex * ex
+
+
+@inner
+def find_cones(scene, room, first, last):
+    """Note which contacts form a cone with their friction: those whose friction is a disc."""
+    for s in range(first, last):
+        b = room.order[s]
+        room.cone[b] = NONE
+        owner, shape = room.press_by[b], room.block_shape[b]
+        if room.rows[b] == 0 or owner < 0 or room.cone[owner] >= 0:
             continue
-        owner = room.press_by[b]
-        pressing = room.weight[b] if owner < 0 else p[room.origin[owner, 3]]
-        load = room.ease[b] * pressing
-        x = p[i] - rho * u[0]
-        y = p[i + 1] - rho * u[1] if d == 2 else 0.0
-        project(scene, room.block_shape[b], x, y, load, out)
-        for r in range(d):
-            phi[i + r] = p[i + r] - out[r]
-            worst = max(worst, abs(phi[i + r]) / rho)
-            for j in range(n):
-                A[i + r, j] = out[2 + 2 * r] * rho * W[i, j]
-                if d == 2:
-                    A[i + r, j] += out[3 + 2 * r] * rho * W[i + 1, j]
-            A[i + r, i + r] += 1.0 + SOFT
-            A[i + r, i] -= out[2 + 2 * r]
-            if d == 2:
-                A[i + r, i + 1] -= out[3 + 2 * r]
-            if owner >= 0 and load > 0.0:
-                turn = out[2 + 2 * r] * x + (out[3 + 2 * r] * y if d == 2 else 0.0)
-                A[i + r, room.origin[owner, 3]] -= (out[r] - turn) / pressing
-        i += d
-    return worst
+        kind = scene.kinds[shape]
+        even = kind == INTERVAL and scene.sizes[shape, 0] == -scene.sizes[shape, 1]
+        if (kind == DISC and room.rows[b] == 2) or even:
+            room.cone[b], room.cone[owner] = owner, b
+
+
+@small
+def radius_of(scene, shape):
+    """Return the radius of a disc, or half the length of an interval about zero."""
+    return scene.sizes[shape, 1 if scene.kinds[shape] == INTERVAL else 0]
+
+
+@inner
+def augment(scene, motion, room, first, last, n, width, goal, stiff, worst, u, out):
+    """Solve by the method of multipliers; keep the best impulses; the stiffness, and the residual.
+
+    With the loads of friction held, or for a disc with ``mu |u_T|`` held that De Saxce and Feng add
+    to the normal velocity ([Acary]), the step is a convex programme: its augmented Lagrangian in
+    the velocities is minimised by Newton's method, whose step is halved while it goes beyond the
+    minimum along it, and the multipliers are renewed.  This is slower than :func:`newton`, and
+    does not cycle where it does.
+    """
+    find_cones(scene, room, first, last)
+    least, idle = worst, 0
+    keep(room, first, last, room.p, room.best)
+    for _ in range(10):
+        keep(room, first, last, room.p, room.hat)
+        for s in range(first, last):
+            b = room.order[s]
+            owner = room.press_by[b]
+            room.held[b] = room.weight[b] if owner < 0 else room.p[owner, 0]
+            if room.rows[b] == 0:
+                room.held[b] = 0.0
+        for s in range(first, last):
+            b = room.order[s]
+            owner = room.cone[b]
+            if room.rows[b] > 0 and owner >= 0 and room.p[owner, 0] > 0.0:
+                slip_of(scene, room, b, room.new, u)
+                slip = np.sqrt(u[0] * u[0] + (u[1] * u[1] if room.rows[b] == 2 else 0.0))
+                mu = room.ease[b] * radius_of(scene, room.block_shape[b])
+                room.held[owner] = mu * slip
+        descend(scene, motion, room, first, last, n, width, goal, stiff, u, out)
+        rebuild(scene, room, first, last)
+        worst = residual(scene, room, first, last, u, out)
+        idle = 0 if worst < 0.9 * least else idle + 1
+        if worst < least:
+            least = worst
+            keep(room, first, last, room.p, room.best)
+        if worst <= goal or idle == 4:
+            break
+        stiff = min(2.0 * stiff, STIFFEST)
+    if least < worst:
+        keep(room, first, last, room.best, room.p)
+        rebuild(scene, room, first, last)
+    return stiff, least
+
+
+@inner
+def descend(scene, motion, room, first, last, n, width, goal, stiff, u, out):
+    """Minimise the augmented Lagrangian of an island over the velocities."""
+    k, x, slope = scene.size, room.step, room.slope_of
+    size = n * k
+    respond(scene, room, first, last, n, stiff, u, out)
+    for _ in range(10):
+        far = 0.0
+        for at in range(n):
+            i = room.members[at]
+            for c in range(k):
+                value = 0.0
+                for a in range(k):
+                    value += room.inverse[i, c, a] * slope[at * k + a]
+                far = max(far, abs(value) * scene.unit[c])
+        if far <= 0.1 * goal:
+            break
+        start_matrix(scene, room, n, width)
+        for c in range(size):
+            x[c] = -slope[c]
+        for s in range(first, last):
+            b = room.order[s]
+            if room.rows[b] > 0 or room.cone[b] < 0:
+                couple(scene, room, b, width)
+        if not solve_band(room.matrix, x, size, width):
+            break
+        motion.counts[4] += 1
+        before, share = 0.0, 1.0
+        for c in range(size):
+            before += x[c] * slope[c]
+        for at in range(n):
+            for c in range(k):
+                room.back[at, c] = room.new[room.members[at], c]
+        while True:
+            for at in range(n):
+                for c in range(k):
+                    room.new[room.members[at], c] = room.back[at, c] + share * x[at * k + c]
+            respond(scene, room, first, last, n, stiff, u, out)
+            after = 0.0
+            for c in range(size):
+                after += x[c] * slope[c]
+            if after <= 0.5 * abs(before) or share < 0.01:
+                break
+            share *= 0.5
+
+
+@inner
+def respond(scene, room, first, last, n, stiff, u, out):
+    """Set the impulses that answer the velocities, their derivatives, and the slope that is left.
+
+    The impulses are ``proj(hat - sigma u)`` with the multipliers ``hat`` and the stiffness
+    ``sigma``; the slope is ``M (v - v_free) - J' p``.
+    """
+    k, slope, curve = scene.size, room.slope_of, room.curve
+    for at in range(n):
+        i = room.members[at]
+        for c in range(k):
+            value = 0.0
+            for a in range(k):
+                value += room.mass[i, c, a] * (room.new[i, a] - room.free[i, a])
+            slope[at * k + c] = value
+    for s in range(first, last):
+        b = room.order[s]
+        partner, rows = room.cone[b], room.rows[b]
+        if rows == 0 and partner >= 0:
+            continue
+        slip_of(scene, room, b, room.new, u)
+        sigma = stiff * room.stiff[b, 3]
+        if partner >= 0:
+            sigma = min(sigma, stiff * room.stiff[partner, 3])
+        x = room.hat[b, 0] - sigma * u[0]
+        y = room.hat[b, 1] - sigma * u[1] if rows == 2 else 0.0
+        if rows == 0:
+            room.p[b, 0] = max(0.0, x)
+            curve[b, 4] = sigma if x > 0.0 else 0.0
+        elif partner < 0:
+            project(scene, room.block_shape[b], x, y, room.ease[b] * room.held[b], out)
+            for a in range(4):
+                curve[b, a] = 0.0
+            curve[b, 4], curve[b, 5] = sigma * out[2], sigma * out[3]
+            curve[b, 6], curve[b, 7], curve[b, 8] = 0.0, sigma * out[4], sigma * out[5]
+            room.p[b, 0], room.p[b, 1] = out[0], out[1]
+        else:
+            slip_of(scene, room, partner, room.new, u)
+            z = room.hat[partner, 0] - sigma * (u[0] + room.held[partner])
+            mu = room.ease[b] * radius_of(scene, room.block_shape[b])
+            project_cone(mu, z, x, y, out)
+            room.p[partner, 0], room.p[b, 0], room.p[b, 1] = out[0], out[1], out[2]
+            for a in range(9):
+                curve[b, a] = sigma * out[3 + a]
+            pull_with(scene, room, partner, ZERO, -room.p[partner, 0], slope)
+        for r in range(max(1, rows)):
+            pull_with(scene, room, b, r, -room.p[b, r], slope)
 
 
 @inner
 def keep(room, first, last, source, target):
-    """Copy the impulses of an island to a safe place, or back."""
+    """Copy the impulses of an island."""
     for s in range(first, last):
         b = room.order[s]
         for r in range(2):
-            kept = room.p[b, r] if source == 0 else room.safe[b, r]
-            if target == 0:
-                room.p[b, r] = kept
-            else:
-                room.safe[b, r] = kept
+            target[b, r] = source[b, r]
 
 
 @inner
@@ -1194,34 +1515,43 @@ def rebuild(scene, room, first, last):
 
 @inner
 def iterate(scene, motion, room, first, last, speed, sweeps):
-    """Sweep over the blocks, with Newton's method once they are nearly solved; the residual."""
-    u, out = room.two, room.six
+    """Sweep over the blocks, and go on with Newton's method and multipliers; the residual.
+
+    It ends when the residual has reached its goal, when ``sweeps`` are done, or when all three
+    together no longer reduce it to a half.
+    """
+    u, out = room.two, room.image
     goal = scene.tolerance * speed
-    done, chunk, worst = 0, 2, np.inf
+    worst = residual(scene, room, first, last, u, out)
+    if worst <= goal:
+        return worst
+    n, width = number_bodies(scene, motion, room, first, last)
+    done, stiff, former = 0, STIFF, np.inf
     while True:
-        for _ in range(chunk):
+        for _ in range(2 if done == 0 else 30):
             worst = 0.0
             for s in range(first, last):
                 worst = max(worst, relax(scene, room, room.order[s], u, out))
             done += 1
             if worst <= goal:
                 break
-        if goal < worst and (done <= 2 or worst <= GUESS * speed):
-            keep(room, first, last, 0, 1)
-            before = residual(scene, room, first, last, u, out)
-            motion.counts[4] += newton(scene, room, first, last, goal, u, out)
-            if not residual(scene, room, first, last, u, out) < before:
-                keep(room, first, last, 1, 0)
-                rebuild(scene, room, first, last)
         worst = residual(scene, room, first, last, u, out)
-        if worst <= goal or done >= sweeps:
+        if worst > goal and n > 0 and (done > 2 or worst <= GUESS * speed):
+            most = 4 if done > 2 else 3
+            steps, worst = newton(scene, room, first, last, n, width, goal, most, worst, u, out)
+            motion.counts[4] += steps
+        if worst > goal and n > 0 and done > 2:
+            stiff, worst = augment(
+                scene, motion, room, first, last, n, width, goal, stiff, worst, u, out
+            )
+        if worst <= goal or done >= sweeps or (done > 32 and n > 0 and worst > 0.5 * former):
             break
-        chunk = min(2 * chunk, 32)
+        former = worst
     motion.counts[3] += done
     return worst
 
 
-@inner
+@small
 def sticks_all(scene, room, first, last, limit):
     """Return whether no friction contact of an island slips faster than a limit."""
     u = room.two
@@ -1238,7 +1568,7 @@ def sticks_all(scene, room, first, last, limit):
     return True
 
 
-@inner
+@small
 def turn_back(scene, motion, room, first, last):
     """Give the static set to contacts whose slip passed through zero; return whether any did.
 
@@ -1265,7 +1595,7 @@ def turn_back(scene, motion, room, first, last):
     return found
 
 
-@inner
+@small
 def solve_island(scene, motion, room, first, last):
     """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
 
@@ -1302,7 +1632,7 @@ def solve_island(scene, motion, room, first, last):
     if quiet:
         for s in range(first, last):
             room.ease[room.order[s]] = MARGIN
-        worst = iterate(scene, motion, room, first, last, speed, 64)
+        worst = iterate(scene, motion, room, first, last, speed, scene.sweeps)
         goal = scene.tolerance * speed
         for s in range(first, last):
             room.ease[room.order[s]] = 1.0
@@ -1310,7 +1640,7 @@ def solve_island(scene, motion, room, first, last):
             return worst / speed
     while True:
         worst = iterate(scene, motion, room, first, last, speed, scene.sweeps)
-        if not turn_back(scene, motion, room, first, last):
+        if worst > scene.tolerance * speed or not turn_back(scene, motion, room, first, last):
             break
     return worst / speed
 
@@ -1318,7 +1648,7 @@ def solve_island(scene, motion, room, first, last):
 # ----------------------------------------------------------------------------------------- a step
 
 
-@inner
+@small
 def rouse(scene, motion, room, h, time, index):
     """Put to work the bodies that are awake and sleepers whose forces fit no more.
 
@@ -1386,7 +1716,7 @@ def sleep_on(scene, motion, room, i, h, index):
     return index + 1 + steps
 
 
-@inner
+@small
 def start_bodies(scene, motion, room):
     """Give bodies that are awake the velocities of forces alone, and measure their speeds."""
     k = scene.size
@@ -1415,7 +1745,7 @@ def home(room, b):
     return room.root[first if room.awake[first] else room.body[b, 1]]
 
 
-@inner
+@small
 def islands(scene, room, blocks):
     """Order blocks by islands of touching bodies; ``room.size`` says where islands start."""
     N = scene.bodies
@@ -1444,7 +1774,7 @@ def islands(scene, room, blocks):
         place[r] += 1
 
 
-@inner
+@small
 def account(scene, motion, room, blocks, h):
     """Book the work of this step by cause."""
     k, u = scene.size, room.two
@@ -1479,7 +1809,7 @@ def account(scene, motion, room, blocks, h):
                     motion.sums[0] -= room.fit_grip[i, f, r] * drift
 
 
-@inner
+@small
 def gather_pulls(scene, motion, room, blocks, h, time, index):
     """Add up what contacts do to each body; return whether it woke one that cannot bear it."""
     k, N = scene.size, scene.bodies
@@ -1515,21 +1845,32 @@ def gather_pulls(scene, motion, room, blocks, h, time, index):
     return woken
 
 
-@inner
-def keep_impulses(scene, motion, room, blocks):
-    """Store the impulses and which friction contacts stick."""
-    u = room.two
+@small
+def keep_impulses(motion, room, blocks):
+    """Store the impulses: of this step's solution, or for another round of it to start from."""
     for b in range(blocks):
         kind, i, f = room.origin[b, 0], room.origin[b, 1], room.origin[b, 2]
         if kind == 0:
             motion.lam[i, f] = room.p[b, 0]
-        elif kind == 1:
-            motion.stick[i, f] = 1 if holds(scene, room, b, u) else 0
-            for r in range(room.rows[b]):
+        elif kind == 2:
+            room.near_press[i, 0] = room.p[b, 0]
+        for r in range(room.rows[b]):
+            if kind == 1:
                 motion.grip[i, f, r] = room.p[b, r]
+            else:
+                room.near_press[i, 1 + r] = room.p[b, r]
 
 
-@inner
+@small
+def keep_sticking(scene, motion, room, blocks):
+    """Store which friction contacts of bodies stick."""
+    for b in range(blocks):
+        if room.origin[b, 0] == 1:
+            sticks = holds(scene, room, b, room.two)
+            motion.stick[room.origin[b, 1], room.origin[b, 2]] = 1 if sticks else 0
+
+
+@small
 def holds(scene, room, b, u):
     """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
     slip_of(scene, room, b, room.new, u)
@@ -1540,7 +1881,7 @@ def holds(scene, room, b, u):
     return slip <= 2.0 * scene.tolerance * size
 
 
-@inner
+@small
 def settle(scene, motion, room, h, index):
     """Give bodies that have come to rest exactly the velocity of rest; let what fits sleep."""
     k = scene.size
@@ -1569,7 +1910,7 @@ def settle(scene, motion, room, h, index):
                 motion.lam[i, g] = room.fit_lam[i, g]
 
 
-@inner
+@small
 def comes_to_rest(scene, motion, room, i, rest):
     """Return whether a body rests after the step; then its velocity is exactly that of rest.
 
@@ -1597,7 +1938,7 @@ def comes_to_rest(scene, motion, room, i, rest):
     return True
 
 
-@inner
+@small
 def note(events, numbers, count, kind, i, j, which, time, value):
     """Record an event."""
     events[count, 0], events[count, 1] = kind, i
@@ -1606,7 +1947,7 @@ def note(events, numbers, count, kind, i, j, which, time, value):
     return count + 1
 
 
-@inner
+@small
 def touch_event(room, motion, b, was, gap, h, time, scale, u, out):
     """Compare a contact with what it was: out is whether it touches, which event, and when."""
     bounces = room.offset[b, 0] < 0.0 < gap
@@ -1621,10 +1962,10 @@ def touch_event(room, motion, b, was, gap, h, time, scale, u, out):
         out[1] = LOST
 
 
-@inner
+@small
 def contact_events(scene, motion, room, blocks, h, time, events, numbers, count):
     """Record which contacts were made, lost or bounced; renew the list of contacts."""
-    u, out = room.two, room.six
+    u, out = room.two, room.image
     k, C = scene.size, 0
     slots = room.slots
     for b in range(blocks):
@@ -1642,8 +1983,7 @@ def contact_events(scene, motion, room, blocks, h, time, events, numbers, count)
             slots[C] = b
             C += 1
             gap = room.near_gap[i]
-            j, key = room.near[i, 1], key_of(scene, room, i)
-            old = find(motion, key)
+            j, old = room.near[i, 1], room.near_old[i]
             was = old >= 0 and motion.flags[old, 1]
             i = room.near[i, 0]
         motion.sums[3] = max(motion.sums[3], -gap)
@@ -1700,14 +2040,14 @@ def contact_events(scene, motion, room, blocks, h, time, events, numbers, count)
     return count
 
 
-@inner
+@small
 def key_of(scene, room, slot):
     """Return the number under which a contact between bodies is kept."""
     a, b, g = room.near[slot, 0], room.near[slot, 1], room.near[slot, 2]
     return (a * scene.bodies + b) * scene.pair_gaps + g
 
 
-@inner
+@small
 def listed_again(scene, room, slots, C, key):
     """Return whether a contact is in this step's list."""
     found = False
@@ -1716,7 +2056,7 @@ def listed_again(scene, room, slots, C, key):
     return found
 
 
-@inner
+@small
 def sort_contacts(motion, size):
     """Sort contacts by key, by insertion: they are nearly sorted already."""
     for s in range(1, size):
@@ -1738,7 +2078,7 @@ def sort_contacts(motion, size):
             t -= 1
 
 
-@inner
+@small
 def collect(scene, motion, room, h, near):
     """Build the blocks of all bodies that are awake and of all contacts noted; return how many."""
     blocks = ZERO
@@ -1754,7 +2094,7 @@ def collect(scene, motion, room, h, near):
     return blocks
 
 
-@inner
+@small
 def step_once(scene, motion, room, h, events, numbers, count):
     """Advance by one step; return whether there was room for all contacts, and the events."""
     k, N = scene.size, scene.bodies
@@ -1782,6 +2122,7 @@ def step_once(scene, motion, room, h, events, numbers, count):
                 far = solve_island(scene, motion, room, starts[i], starts[i + 1])
                 worst = max(worst, far)
                 missed += 1 if far > scene.tolerance else 0
+        keep_impulses(motion, room, blocks)
         if scene.pair_at == 0 or not gather_pulls(
             scene, motion, room, blocks, h, time + 0.5 * h, index
         ):
@@ -1790,7 +2131,7 @@ def step_once(scene, motion, room, h, events, numbers, count):
     motion.sums[4] = max(motion.sums[4], worst)
     account(scene, motion, room, blocks, h)
     count = contact_events(scene, motion, room, blocks, h, time, events, numbers, count)
-    keep_impulses(scene, motion, room, blocks)
+    keep_sticking(scene, motion, room, blocks)
     for i in range(N):
         room.seen_rest[i] = motion.rests[i]
     settle(scene, motion, room, h, index)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 CONTACTS_PER_BODY = 8  # for a start; more room is made when needed
 EVENTS = 4096
+BAND = 192  # columns of the widest band in which Newton's method is tried
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,7 @@ def _still(herd: Herd, q: Array, v: Array, sticking: NDArray[np.bool_], capacity
 
 def _room(herd: Herd, capacity: int) -> "Room":
     """Return the work space of a herd."""
-    from polycorner.motion.compiled import NEWTON_ROWS, Room
+    from polycorner.motion.compiled import Room
 
     N, k = herd.count, herd.coordinates
     F, m = len(herd.body.grips), len(herd.body.contacts)
@@ -264,6 +265,8 @@ def _room(herd: Herd, capacity: int) -> "Room":
         where=np.zeros((N, 2)),
         near=whole(capacity, 3),
         near_gap=np.zeros(capacity),
+        near_old=whole(capacity),
+        near_press=np.zeros((capacity, 3)),
         near_normal=np.zeros((capacity, 2 * k)),
         body=whole(B, 2),
         rows=whole(B),
@@ -280,14 +283,24 @@ def _room(herd: Herd, capacity: int) -> "Room":
         order=whole(B),
         mass=np.zeros((N, k, k)),
         turned=whole(B),
-        safe=np.zeros((B, 2)),
+        best=np.zeros((B, 2)),
+        hat=np.zeros((B, 2)),
+        held=np.zeros(B),
+        cone=whole(B),
+        curve=np.zeros((B, 9)),
+        answer=np.zeros((B, 2)),
+        jac=np.zeros((3, 2 * k)),
+        bent=np.zeros((3, 2 * k)),
         square=np.zeros((k, k)),
         side=np.zeros(k),
         rest=np.zeros(k),
         two=np.zeros(2),
-        six=np.zeros(6),
+        image=np.zeros(12),
         slots=whole(max(capacity, pairs, 1)),
-        matrix=np.zeros((2, NEWTON_ROWS, NEWTON_ROWS)),
-        vectors=np.zeros((4, NEWTON_ROWS)),
-        which=whole(NEWTON_ROWS, 2),
+        members=whole(N),
+        local=whole(N),
+        back=np.zeros((N, k)),
+        step=np.zeros(N * k),
+        slope_of=np.zeros(N * k),
+        matrix=np.zeros(N * k * min(2 * N * k, BAND)),
     )

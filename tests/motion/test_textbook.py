@@ -13,6 +13,7 @@ from scipy.special import ellipkinc
 from polycorner.models import scenes
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc, Ellipse, Interval
+from polycorner.motion.noise import Solver
 from polycorner.motion.simulate import simulate, start, step
 
 G = scenes.GRAVITY
@@ -428,8 +429,9 @@ def test_a_ball_hits_two_that_touch(e):
     row = scenes.row_of_balls((1, 1, 1), e)
     path = end(row, row.state([0, 1.5, 2.5], [1, 0, 0]), 1.0, 1e-3)
     expected = [(1 - 2 * e) / 3, (1 + e) / 3, (1 + e) / 3]
-    np.testing.assert_allclose(path.v[-1, 0], expected, atol=1e-9)
-    assert path.dissipated["impact"][-1] == pytest.approx((1 - e**2) / 3, abs=1e-9)
+    solved = Solver().tolerance  # of speeds and energies that are about one
+    np.testing.assert_allclose(path.v[-1, 0], expected, atol=solved)
+    assert path.dissipated["impact"][-1] == pytest.approx((1 - e**2) / 3, abs=solved)
 
 
 @pytest.mark.parametrize("e", [1.0, 0.8, 0.7])
