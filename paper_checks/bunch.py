@@ -21,7 +21,8 @@ from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulate import run
 from polycorner.studies.drum_bunch import BunchRun, drum_for_bunch, exit_statistics, follow_bunch
-from polycorner.studies.drum_dyads import handedness, is_dyad
+from polycorner.studies.drum_dyads import handedness
+from polycorner.studies.drum_pairs import is_dyad
 
 PICTURE = (8.0, 2.0, 0.5)  # l, r, t of the paper's picture of a bunch
 LARGER = (16.0, 3.0, 1.5)  # of its dyads

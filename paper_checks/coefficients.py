@@ -98,20 +98,6 @@ def captions_agree(
     )
 
 
-def dumbbells_are_small(
-    share: float = 0.1, lengths: Sequence[float] = (8.0, 14.0, 16.0), radius: float = 125.0
-) -> Finding:
-    """Compare the lengths of all captions with the radius of the drum, in mm."""
-    shares = [length / radius for length in lengths]
-    listed = ", ".join(f"{n:g} mm: {s:.3f}" for n, s in zip(lengths, shares, strict=True))
-    return Finding(
-        judged(max(shares) <= share, Verdict.CORRECTED),
-        f"$\\ell/R$ for the lengths in the captions is {listed}; stated at most {share:g}",
-        {"largest": max(shares)},
-        f"$\\ell/R$ up to {max(shares):.3f} in the experiments shown",
-    )
-
-
 def ordering_holds(mu_r: float = 0.1, mu_s: float = 0.3, tilt: float = 7.0) -> Finding:
     """Check the part of the chain for which the paper gives numbers."""
     slope = math.tan(math.radians(tilt))
@@ -175,15 +161,6 @@ def inequalities_mean(
 
 
 CLAIMS = (
-    Claim(
-        "O14",
-        "2",
-        "size of the dumbbells, against the captions of section 3",
-        "the dumbbells' length is at most a tenth of the radius of the drum",
-        Means.NUMERICAL,
-        dumbbells_are_small,
-        partial(dumbbells_are_small, 0.13),
-    ),
     Claim(
         "F1",
         "A",

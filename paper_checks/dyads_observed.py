@@ -14,7 +14,8 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.driven import LASTING, LATE, TWO, Kind, Starts, dyads, pairs
 from paper_checks.forces import judged
 from polycorner.geometry.manifold import Array
-from polycorner.studies.drum_dyads import handedness, is_dyad
+from polycorner.studies.drum_dyads import handedness
+from polycorner.studies.drum_pairs import is_dyad
 
 FOUR: Starts = (("R", 2.0), ("R", 6.0), ("R", 10.0), ("R", 14.0))
 STRONG = 0.4  # chatter under which headings of pairs change within minutes

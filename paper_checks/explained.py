@@ -113,33 +113,6 @@ def level_heading_rolls_in_place(heading: float = 0.0) -> Finding:
     )
 
 
-def tilt_is_a_body_force(transverse: str = "1") -> Finding:
-    """Compare the weight in the drum's frame with a transverse weight and an axial force.
-
-    ``transverse`` is the part of ``m g`` that is left as weight of the level drum; ``sin(alpha)``
-    acts along the drum.
-    """
-    import sympy
-
-    symbols, down = frame()
-    alpha, phi = symbols["alpha"], symbols["phi"]
-    weight = sympy.sympify(transverse, locals=symbols)
-    claimed = (-weight * sympy.sin(phi), -sympy.sin(alpha), weight * sympy.cos(phi))
-    rest = [sympy.simplify(a - b) for a, b in zip(down, claimed, strict=True)]
-    right = is_zero(down[0] + sympy.cos(alpha) * sympy.sin(phi)) and rest[1] == 0
-    holds = all(r == 0 for r in rest)
-    size = sympy.sqrt(sympy.simplify(weight**2 + sympy.sin(alpha) ** 2))
-    return Finding(
-        judged(holds, Verdict.CORRECTED if right else Verdict.REFUTED),
-        f"the weight less what is claimed is $mg$ times {row(rest)}; the claimed forces add up to "
-        f"$mg$ times {tex(size)}, "
-        f"{float(size.subs(alpha, DRUM.tilt)) if size.free_symbols else float(size):.5f} at 7°",
-        correction="besides the force $mg\\sin\\alpha$ along $-\\eta$ the transverse weight "
-        "becomes $mg\\cos\\alpha$; without that, forces on the drum are too large and the ratio "
-        "$\\tan\\alpha/\\cos\\varphi$ of appendix A would read $\\sin\\alpha/\\cos\\varphi$",
-    )
-
-
 def steep_rolls_down(part: str = "sin(theta)") -> Finding:
     """Check that on the lowest line the weight makes a dumbbell roll towards smaller ``eta``.
 
@@ -179,15 +152,6 @@ CLAIMS = (
         Means.SIMULATION,
         rises_in_energy,
         partial(rises_in_energy, -10.0),
-    ),
-    Claim(
-        "O11",
-        "4",
-        "tilt as a body force",
-        "a tilted drum is a level one with the additional force $mg\\sin\\alpha$ along $-\\eta$",
-        Means.SYMBOLIC,
-        tilt_is_a_body_force,
-        partial(tilt_is_a_body_force, "cos(alpha)"),
     ),
     Claim(
         "O6a",

@@ -1050,9 +1050,9 @@ def residual(scene, room, first, last, u, out):
 
 @small
 def number_bodies(scene, motion, room, first, last):
-    """Number the bodies of an island along the substrate; return how many, and the bandwidth.
+    """Give numbers to the bodies of an island; return how many, and the bandwidth.
 
-    Contacts couple only bodies that are near, so that in this order the matrix of
+    They ascend along the substrate.  Contacts couple only bodies that are near, so that the matrix of
     :func:`solve_band` is a band.  Nothing is numbered (0 is returned) if there is no room for it.
     """
     k, n, reach = scene.size, ZERO, ZERO

@@ -17,8 +17,7 @@ from polycorner.models.drum import DumbbellDrum
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulate import run
-from polycorner.studies.drum_dyads import handedness, is_dyad
-from polycorner.studies.drum_pairs import Sizes, latest_hands, listed, near_pairs
+from polycorner.studies.drum_pairs import LEFT_AS, Handed, Sizes, dyads_among, left_as
 from polycorner.studies.drum_single import Mean
 from polycorner.studies.drum_starts import scatter
 
@@ -26,10 +25,9 @@ TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
 COUNT = 60
 WIDTH = 0.35  # rad, half the width of the strip in which the bunch is put
 TRIES = 1000  # places in vain before the strip grows
-MEMORY = 5.0  # s before leaving in which a dumbbell counts as member of a dyad
 WINDOW = 10.0  # s, longer than a zigzag
 ROLLING = math.radians(30.0)  # own spin within the window beyond which it counts as a roller
-KINDS = ("right", "left", "single")
+KINDS = tuple(LEFT_AS.values())
 
 
 def drum_for_bunch(drum: DumbbellDrum, *, count: int = COUNT, top: float = TOP) -> DumbbellDrum:
@@ -75,48 +73,38 @@ class BunchRun:
     islands: int
     max_penetration: float
 
-    def dyads(self, index: int) -> list[tuple[int, int, int]]:
+    def dyads(self, index: int) -> list[Handed]:
         """Return the dyads at an instant: two numbers and the chirality +1 (right) or -1.
 
-        By :func:`polycorner.studies.drum_dyads.is_dyad`; a dumbbell may be in several.
+        By :func:`polycorner.studies.drum_pairs.is_dyad`; a dumbbell may be in several.
         """
-        here = np.flatnonzero(self.present[index])
-        q = self.q[index, here]
-        close = near_pairs(Sizes.of_drum(self.drum), q)
-        pairs = q[close]
-        hand = np.where(is_dyad(self.drum, pairs), handedness(self.drum, pairs), 0)
-        return listed(here[close], hand)
+        return dyads_among(Sizes.of_drum(self.drum), self.q[index], self.present[index])
 
     @cached_property
     def exit_kinds(self) -> tuple[str, ...]:
         """As what each dumbbell left, in the order of :attr:`exits`.
 
-        ``right`` or ``left`` as a member of a dyad at most 5 s before, by the latest record in
-        which it was one, else ``single``.
+        By :func:`polycorner.studies.drum_pairs.left_as`.
         """
-        return tuple(self._kind(time, body) for time, body in self.exits)
-
-    def _kind(self, time: float, body: int) -> str:
-        hands = latest_hands(self.times, time, body, self.dyads, MEMORY)
-        if not hands:
-            return "single"
-        return "right" if sum(hands) > 0 else "left"
+        return tuple(left_as(self.times, self.exits, self.dyads))
 
     def exit_counts(self) -> dict[str, int]:
         """Return how many left, by kind."""
         return {kind: self.exit_kinds.count(kind) for kind in KINDS}
 
     def census(self, index: int) -> dict[str, int]:
-        """Return how many dumbbells are in right and left dyads, single, and present."""
+        """Return how many dumbbells are in right and left dyads, single, and present.
+
+        Of several dyads the commoner chirality counts; where they balance, ``both``.
+        """
         hands: dict[int, int] = {}
         for i, j, hand in self.dyads(index):
             for body in (i, j):
                 hands[body] = hands.get(body, 0) + hand
-        found = {"right": 0, "left": 0, "single": 0, "present": int(self.present[index].sum())}
-        for total in hands.values():
-            found["right" if total > 0 else "left"] += 1
-        found["single"] = found["present"] - len(hands)
-        return found
+        found = [{1: "right", -1: "left", 0: "both"}[int(np.sign(n))] for n in hands.values()]
+        present = int(self.present[index].sum())
+        counts = {kind: found.count(kind) for kind in ("right", "left", "both")}
+        return counts | {"single": present - len(hands), "present": present}
 
     def rollers(self, index: int) -> NDArray[np.bool_]:
         """Return which dumbbells roll, ``(N,)``: sliders and those that left do not.

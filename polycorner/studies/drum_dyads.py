@@ -19,15 +19,13 @@ from polycorner.models.dumbbell_formulas import CONTACTS
 from polycorner.models.dumbbells import Chirality
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulate import run
-from polycorner.studies.drum_pairs import Sizes, chirality
+from polycorner.studies.drum_pairs import Sizes, chirality, gaps
 from polycorner.studies.drum_single import APART, Mean
 
 Start = tuple[Chirality, float]
 SOLVER = Solver(tolerance=1e-6, sweeps=300)
 TOUCH = 0.01  # mm, below which a gap counts as a contact
 CLEARANCE = 0.05  # mm, between the dumbbells of a pair at the start
-PARALLEL = math.radians(20.0)  # headings of a dyad differ by less
-NEAR = 0.5  # of the ball radius: in a dyad each rod has a ball of the other closer than that
 
 
 def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
@@ -42,31 +40,6 @@ def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
         Placements of A and B, beginning with ``phi, eta, theta``.
     """
     return chirality(Sizes.of_drum(drum).balls(q).reshape(*q.shape[:-2], 4, 2))
-
-
-def is_dyad(drum: DumbbellDrum, q: Array) -> NDArray[np.bool_]:
-    """Return which pairs ``(..., 2, k)`` are dyads, by the criterion used in these studies.
-
-    Headings, as directions, differ by less than 20 degrees, and each rod has a ball of the other
-    dumbbell closer than ``r/2``.  The third contact, between the inner balls, may be open: then the
-    two have slid along each other and are nested all the same.  With it closed too they are
-    :func:`polycorner.studies.drum_pairs.nested`.
-    """
-    gaps = _gaps(drum, q)
-    rods = [
-        gaps[..., [CONTACTS.index(name) for name in names]].min(axis=-1)
-        for names in (("A1b", "A2b"), ("aB1", "aB2"))
-    ]
-    close = np.maximum(*rods) < NEAR * drum.ball_radius
-    return np.asarray(close & (abs(np.sin(q[..., 1, 2] - q[..., 0, 2])) < math.sin(PARALLEL)))
-
-
-def _gaps(drum: DumbbellDrum, q: Array) -> Array:
-    flat = q[..., :3].reshape(-1, 6)
-    gaps = np.empty((len(flat), len(CONTACTS)))
-    if len(flat):
-        gaps = drum.pair.polyhedron.bundle.evaluate(flat, 0)[0]
-    return np.asarray(gaps).reshape(*q.shape[:-2], len(CONTACTS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +98,7 @@ class DyadPaths:
     @cached_property
     def contacts(self) -> NDArray[np.bool_]:
         """Which of the nine gaps are closed to within 0.01 mm, ``(T, n, 9)``."""
-        return _gaps(self.drum, self.q) < TOUCH
+        return gaps(self.drum, self.q) < TOUCH
 
     def strata(self, *, after: float = 0.0) -> dict[str, float]:
         """Return shares of time by the contacts that touch, commonest first.

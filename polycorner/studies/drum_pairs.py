@@ -4,17 +4,18 @@ Everything is read off places in the developed plane ``(rho phi, eta)``, for all
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, TypeVar, cast
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.geometry.manifold import Array
 from polycorner.models.drum import PARAMETERS, DumbbellDrum
-from polycorner.models.dumbbells import Chirality
+from polycorner.models.dumbbell_formulas import CONTACTS
+from polycorner.models.dumbbells import Chirality, DumbbellPair
 from polycorner.motion.events import EventKind
 from polycorner.motion.scene import Herd
 
@@ -22,10 +23,12 @@ if TYPE_CHECKING:
     from polycorner.motion.trajectory import Trajectory
 
 Dyad = tuple[int, int, Chirality]
-Hand = TypeVar("Hand")
-MEMORY = 10.0  # s, longer than a zigzag of the experiment
-NEAR = 0.25  # of the ball radius: contacts of a dyad are open by less
-PARALLEL = 1e-9  # of the length: vectors and distances this close have no orientation, no order
+Handed = tuple[int, int, int]  # two numbers and the chirality, +1 right or -1 left
+MEMORY = 100.0  # s; a dyad of the experiment's size climbs by its shift, 12 mm, in 50 to 70
+NEAR = 0.5  # of ``r - t``: in a dyad each rod has a ball of the other closer than that
+PARALLEL = math.radians(20.0)  # headings of a dyad differ by less
+NO_ORDER = 1e-9  # of the length: vectors and distances this close have no orientation, no order
+LEFT_AS = {1: "right", -1: "left", 0: "single"}
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,11 @@ class Sizes:
         """``l + 2 r``: dumbbells whose centres are not closer cannot be a dyad."""
         return self.length + 2 * self.ball_radius
 
+    @property
+    def pair(self) -> DumbbellPair:
+        """Two of the dumbbells."""
+        return _pair(self)
+
     def apart(self, one: Array, other: Array) -> Array:
         """Return the distances of centres in the developed plane, in mm.
 
@@ -80,6 +88,12 @@ class Sizes:
         return np.stack([x, y], axis=-1)
 
 
+@lru_cache(maxsize=8)
+def _pair(sizes: Sizes) -> DumbbellPair:
+    drum_radius = sizes.centre_radius + sizes.ball_radius
+    return DumbbellPair(sizes.length, sizes.ball_radius, sizes.rod_radius, drum_radius)
+
+
 def chirality(balls: Array) -> NDArray[np.int64]:
     """Return +1 for right-handed pairs, -1 for left-handed ones, 0 where it is not defined.
 
@@ -92,24 +106,23 @@ def chirality(balls: Array) -> NDArray[np.int64]:
     balls : (..., 4, 2) array
         Centres ``A1, A2, B1, B2`` in the developed plane.
     """
-    outer, inner, reach, _ = _links(balls)
+    outer, inner, reach = _links(balls)
     turn = outer[..., 0] * inner[..., 1] - outer[..., 1] * inner[..., 0]
-    scale = PARALLEL * np.linalg.norm(balls[..., 1, :] - balls[..., 0, :], axis=-1)
+    scale = NO_ORDER * np.linalg.norm(balls[..., 1, :] - balls[..., 0, :], axis=-1)
     unclear = reach[..., 3] - reach[..., 2] <= scale
     unclear |= np.abs(turn) <= scale * reach[..., 3]
     return np.where(unclear, 0, np.sign(turn)).astype(np.int64)
 
 
-def _links(balls: Array) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-    """Return ``A_i B_j``, ``A_p B_q``, all four distances in order, and ``p, q``, from 0."""
+def _links(balls: Array) -> tuple[Array, Array, Array]:
+    """Return ``A_i B_j``, ``A_p B_q`` and all four distances in order."""
     links = balls[..., None, 2:, :] - balls[..., :2, None, :]  # (..., i, j, 2)
     flat = links.reshape(*links.shape[:-3], 4, 2)  # 11, 12, 21, 22: k and 3 - k share no ball
     reach = np.hypot(flat[..., 0], flat[..., 1])
     far = np.argmax(reach, axis=-1)
     outer = np.take_along_axis(flat, far[..., None, None], axis=-2)[..., 0, :]
     inner = np.take_along_axis(flat, 3 - far[..., None, None], axis=-2)[..., 0, :]
-    near = 3 - far
-    return outer, inner, np.sort(reach, axis=-1), np.stack([near // 2, near % 2], axis=-1)
+    return outer, inner, np.sort(reach, axis=-1)
 
 
 def in_neighbourhood(balls: Array, ball_radius: float) -> NDArray[np.bool_]:
@@ -139,89 +152,115 @@ def _from_line(points: Array, line: Array) -> Array:
     return np.asarray(np.abs(turn) / np.linalg.norm(axis, axis=-1)[..., None])
 
 
-def nested(balls: Array, sizes: Sizes) -> NDArray[np.bool_]:
-    """Return which pairs are nested: those in ``U`` whose three contacts of the corner are closed.
+def gaps(sizes: DumbbellDrum | Sizes, q: Array) -> Array:
+    """Return the nine gaps of pairs ``(..., 2, k)`` in a drum, ``(..., 9)``, in mm.
 
-    The inner balls ``A_p, B_q``, those that do not belong to the farthest pair, are less than
-    ``r/4`` from touching each other, and each is less than ``r/4`` from touching the line of the
-    other's rod.  In ``U`` the headings then agree to about ``asin((r - t) / l)``, 7 degrees.  Pairs
-    that have slid along each other are left out; :func:`polycorner.studies.drum_dyads.is_dyad`
-    takes them in.
+    In the order of :attr:`polycorner.models.dumbbell_formulas.CONTACTS`.
+    """
+    flat = q[..., :3].reshape(-1, 6)
+    found = np.empty((len(flat), len(CONTACTS)))
+    if len(flat):
+        found = sizes.pair.polyhedron.bundle.evaluate(flat, 0)[0]
+    return np.asarray(found).reshape(*q.shape[:-2], len(CONTACTS))
+
+
+def is_dyad(sizes: DumbbellDrum | Sizes, q: Array) -> NDArray[np.bool_]:
+    """Return which pairs are dyads: those near the subset ``T`` of [GMBN] sec. 7.
+
+    In ``T`` dumbbells are parallel and a ball of each touches the other's rod.  Here headings, as
+    directions, differ by less than 20 degrees, and each rod has a ball of the other dumbbell closer
+    than ``(r - t)/2``, half of what dumbbells have that touch side by side or end to end.  The
+    third contact of the corner, between the inner balls, may be open: then the two have slid
+    along each other and are nested all the same.
 
     Parameters
     ----------
-    balls : (..., 4, 2) array
-        Centres ``A1, A2, B1, B2`` in the developed plane, in mm.
+    sizes : DumbbellDrum or Sizes
+    q : (..., 2, k) array
+        Placements of A and B, beginning with ``phi, eta, theta``.
     """
-    _, inner, _, which = _links(balls)
-    one, other = balls[..., :2, :], balls[..., 2:, :]
-    r, slack = sizes.ball_radius, NEAR * sizes.ball_radius
-    close = np.hypot(inner[..., 0], inner[..., 1]) < 2 * r + slack
-    for bodies, line, k in ((one, other, 0), (other, one, 1)):
-        apart = np.take_along_axis(_from_line(bodies, line), which[..., k, None], axis=-1)[..., 0]
-        close &= apart < r + sizes.rod_radius + slack
-    return np.asarray(close & in_neighbourhood(balls, r))
+    open_by = gaps(sizes, q)
+    rods = [
+        open_by[..., [CONTACTS.index(name) for name in names]].min(axis=-1)
+        for names in (("A1b", "A2b"), ("aB1", "aB2"))
+    ]
+    close = np.maximum(*rods) < NEAR * (sizes.ball_radius - sizes.rod_radius)
+    return np.asarray(close & (abs(np.sin(q[..., 1, 2] - q[..., 0, 2])) < math.sin(PARALLEL)))
 
 
 def dyads(trajectory: "Trajectory", index: int) -> list[Dyad]:
     """Return the dyads at a recorded instant: two numbers and the chirality, ``"R"`` or ``"L"``.
 
-    A dyad is a pair that is :func:`nested` and has a chirality; a dumbbell may be in several.
+    A dyad is a pair for which :func:`is_dyad` holds and that has a chirality; a dumbbell may be in
+    several.
     """
-    sizes, here = Sizes.of(trajectory), np.flatnonzero(trajectory.present[index])
-    q = trajectory.q[index, here]
-    close = near_pairs(sizes, q)
-    balls = sizes.balls(q[close]).reshape(-1, 4, 2)
-    hand = np.where(nested(balls, sizes), chirality(balls), 0)
-    return [(i, j, "R" if sign > 0 else "L") for i, j, sign in listed(here[close], hand)]
+    found = dyads_among(Sizes.of(trajectory), trajectory.q[index], trajectory.present[index])
+    return [(i, j, "R" if hand > 0 else "L") for i, j, hand in found]
 
 
-def near_pairs(sizes: Sizes, q: Array) -> NDArray[np.intp]:
-    """Return the pairs among dumbbells ``(N, k)`` that are near enough for a dyad, ``(n, 2)``."""
-    return np.argwhere(np.triu(sizes.apart(q[:, None], q) < sizes.reach, 1))
+def dyads_among(sizes: Sizes, q: Array, present: NDArray[np.bool_]) -> list[Handed]:
+    """Return the dyads among dumbbells: two numbers and the chirality, +1 right or -1 left.
+
+    Parameters
+    ----------
+    sizes : Sizes
+    q : (N, k) array
+        Placements, beginning with ``phi, eta, theta``.
+    present : (N,) array of bool
+        Which count.
+    """
+    here = np.flatnonzero(present)
+    places = q[here]
+    near = np.argwhere(np.triu(sizes.apart(places[:, None], places) < sizes.reach, 1))
+    pairs = places[near]
+    hand = chirality(sizes.balls(pairs).reshape(-1, 4, 2))
+    hand[~is_dyad(sizes, pairs)] = 0
+    return [(int(i), int(j), int(h)) for (i, j), h in zip(here[near], hand, strict=True) if h]
 
 
-def listed(bodies: NDArray[np.intp], hand: NDArray[np.int64]) -> list[tuple[int, int, int]]:
-    """Return the numbers and the chirality of pairs ``(n, 2)`` that have one."""
-    return [(int(i), int(j), int(h)) for (i, j), h in zip(bodies, hand, strict=True) if h]
-
-
-def latest_hands(
+def left_as(
     times: Array,
-    time: float,
-    body: int,
-    dyads_at: Callable[[int], Iterable[tuple[int, int, Hand]]],
-    memory: float,
-) -> list[Hand]:
-    """Return the chiralities of a dumbbell's dyads when it was last in one; none: an empty list.
+    exits: Sequence[tuple[float, int]],
+    dyads_at: Callable[[int], list[Handed]],
+    memory: float = MEMORY,
+) -> list[str]:
+    """Return as what dumbbells left: as members of ``right`` or ``left`` dyads, or ``single``.
 
-    Records before ``time`` count, but none more than ``memory`` s before it.
+    A dumbbell counts with the dyads it was last recorded in, if that was at most ``memory`` s
+    before it left; so both members count although one leaves first.  Of several dyads the commoner
+    chirality counts; where they balance, the record before decides.
+
+    Parameters
+    ----------
+    times : (T,) array
+        Times of the records.
+    exits : sequence of (float, int)
+        Time of leaving, and number.
+    dyads_at : callable
+        Gives the dyads of a record, as :func:`dyads_among`.
+    memory : float, optional
+        In s.
     """
-    last = int(np.searchsorted(times, time)) - 1
-    first = int(np.searchsorted(times, time - memory))
-    for index in range(last, first - 1, -1):
-        hands = [hand for i, j, hand in dyads_at(index) if body in (i, j)]
-        if hands:
-            return hands
-    return []
+    found = cache(dyads_at)
+    kinds = []
+    for time, body in exits:
+        first, stop = (int(np.searchsorted(times, t)) for t in (time - memory, time))
+        totals = (
+            sum(hand for i, j, hand in found(index) if body in (i, j))
+            for index in reversed(range(first, stop))
+        )
+        kinds.append(LEFT_AS[int(np.sign(next((total for total in totals if total), 0)))])
+    return kinds
 
 
 def exits(trajectory: "Trajectory", *, memory: float = MEMORY) -> dict[str, int]:
-    """Return how many dumbbells left, as members of right or left dyads or ``single``.
-
-    A dumbbell counts with the dyad it was last recorded in, if that was at most ``memory`` s before
-    it left; so both members count although one leaves first.
-    """
-    counts = {"right": 0, "left": 0, "single": 0}
-
-    @cache
-    def found(index: int) -> list[Dyad]:
-        return dyads(trajectory, index)
-
-    for event in trajectory.of_kind(EventKind.EXIT):
-        hands = latest_hands(trajectory.times, event.time, event.bodies[0], found, memory)
-        counts[{"R": "right", "L": "left"}[hands[0]] if hands else "single"] += 1
-    return counts
+    """Return how many dumbbells left, as what: see :func:`left_as`."""
+    sizes, q, present = Sizes.of(trajectory), trajectory.q, trajectory.present
+    left = [(event.time, event.bodies[0]) for event in trajectory.of_kind(EventKind.EXIT)]
+    kinds = left_as(
+        trajectory.times, left, lambda at: dyads_among(sizes, q[at], present[at]), memory
+    )
+    return {kind: kinds.count(kind) for kind in LEFT_AS.values()}
 
 
 def held(trajectory: "Trajectory") -> bool:

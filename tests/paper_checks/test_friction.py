@@ -12,7 +12,6 @@ from paper_checks import Verdict, coefficients, forces, friction, rest, torque, 
 from polycorner.models.keel_formulas import force_ratio, net_torque
 
 VERDICTS = {
-    "O14": Verdict.CORRECTED,
     "F1": Verdict.HOLDS_UNDER,
     "F2a": Verdict.HOLDS,
     "F2b": Verdict.HOLDS,

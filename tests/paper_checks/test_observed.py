@@ -8,7 +8,8 @@ import pytest
 
 from paper_checks import Verdict, bunch, driven, dyad_zigzag, observed, steep
 from polycorner.motion.events import Event, EventKind
-from polycorner.studies.drum_dyads import handedness, is_dyad
+from polycorner.studies.drum_dyads import handedness
+from polycorner.studies.drum_pairs import is_dyad
 
 VERDICTS = {
     "O1": Verdict.HOLDS,
@@ -45,7 +46,6 @@ VERDICTS = {
     "B7b": Verdict.NOT_TESTABLE,
     "O8": Verdict.HOLDS,
     "O10": Verdict.HOLDS,
-    "O11": Verdict.CORRECTED,
     "O6a": Verdict.HOLDS,
     "O6b": Verdict.HOLDS_UNDER,
     "O7": Verdict.HOLDS,

@@ -37,12 +37,13 @@ def two():
 
 @pytest.fixture(scope="module")
 def many():
-    """Seven dumbbells: two dyads of different hands among them, one leaves."""
+    """Seven dumbbells: two dyads of different hands, the first slid, among them; one leaves."""
     drum = DumbbellDrum(count=7, floor=True, top=150.0)
     q = np.zeros((7, 3))
-    q[:2] = drum_starts.nested_pair(DumbbellDrum(count=2), "R", eta=30.0)
-    q[2:4] = drum_starts.nested_pair(DumbbellDrum(count=2), "L", eta=80.0)
-    q[4:, :2] = [[0.3, 30.0], [-0.3, 60.0], [0.3, 110.0]]
+    q[:2] = drum.pair.nested("R", heading=0.0, clearance=0.05).reshape(2, 3)
+    q[:2, 1] += [30.0, 26.0]  # the inner balls have parted by 4 mm
+    q[2:4] = drum_starts.nested_pair(DumbbellDrum(count=2), "L", eta=100.0)
+    q[4:, :2] = [[0.08, 60.0], [-0.08, 60.0], [0.0, 130.0]]
     path = run(drum, q, 0.5, every=25)
     present = path.trajectory.present.copy()
     present[10:, 6] = False

@@ -15,9 +15,13 @@ from polycorner.studies.drum_bunch import (
     follow_bunch,
     scattered,
 )
-from polycorner.studies.drum_dyads import handedness, is_dyad
+from polycorner.studies.drum_dyads import handedness
+from polycorner.studies.drum_pairs import is_dyad
 
 SMALL = drum_for_bunch(DumbbellDrum(length=8, ball_radius=2, rod_radius=0.5), count=8)
+
+
+NOBODY = {"right": 0, "left": 0, "both": 0, "single": 0, "present": 0}
 
 
 def still(drum, q, times, present=None, exits=()):
@@ -70,8 +74,18 @@ def test_both_members_of_a_dyad_leave_as_such(hand, kind):
     run = exits_of(hand)
     assert run.exit_kinds == (kind, kind, "single")
     assert run.exit_counts() == {"right": 0, "left": 0, "single": 1} | {kind: 2}
-    assert run.census(0) == {"right": 0, "left": 0, "single": 2, "present": 4} | {kind: 2}
-    assert run.census(4) == {"right": 0, "left": 0, "single": 1, "present": 1}
+    assert run.census(0) == NOBODY | {"single": 2, "present": 4, kind: 2}
+    assert run.census(4) == NOBODY | {"single": 1, "present": 1}
+
+
+def test_who_is_between_a_right_and_a_left_dyad_is_of_both_hands():
+    """Three side by side, the middle one shifted up against both."""
+    p, up = 2.6, 5.0
+    places = np.array([[-p, 50.0, 0.0], [0.0, 50.0 + up, 0.0], [p, 50.0, 0.0]])
+    run = still(replace(SMALL, count=3), places / [SMALL.centre_radius, 1.0, 1.0], [0.0])
+    assert {(i, j) for i, j, _ in run.dyads(0)} == {(0, 1), (1, 2)}
+    assert sum(hand for *_, hand in run.dyads(0)) == 0
+    assert run.census(0) == {"right": 1, "left": 1, "both": 1, "single": 0, "present": 3}
 
 
 def test_statistics_over_runs():
@@ -99,7 +113,7 @@ def test_a_bunch_stays_in_the_drum_and_sorts_itself():
     assert run.max_penetration < 0.01
     low = run.q[-1, :, 1] - SMALL.length / 2 * abs(np.cos(run.q[-1, :, 2])) - SMALL.ball_radius
     assert low.min() > -0.01
-    assert sum(run.census(-1)[k] for k in ("right", "left", "single")) == 8
+    assert sum(run.census(-1)[k] for k in ("right", "left", "both", "single")) == 8
 
 
 def test_dumbbells_leave_at_the_top():

@@ -15,10 +15,10 @@ from polycorner.studies.drum_dyads import (
     follow_dyads,
     handedness,
     heading_at_shift,
-    is_dyad,
     minimiser_heading,
     steady,
 )
+from polycorner.studies.drum_pairs import is_dyad
 from polycorner.studies.dyad import dyad_minima
 
 DRUM = DumbbellDrum()

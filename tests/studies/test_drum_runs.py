@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from oracles import gaps
 
 from polycorner.models.drum import DumbbellDrum
+from polycorner.models.dumbbell_formulas import CONTACTS
 from polycorner.models.dumbbells import DumbbellPair
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise
@@ -162,13 +163,13 @@ def test_the_neighbourhood_is_the_three_inequalities(q):
 
 @given(st.lists(PLACES, min_size=2, max_size=5))
 def test_many_pairs_are_judged_as_each_alone(places):
-    stacked = np.stack([centres(q) for q in places])
-    for judge in (
-        drum_pairs.chirality,
-        lambda balls: drum_pairs.nested(balls, SIZES),
-        lambda balls: drum_pairs.in_neighbourhood(balls, 3.0),
+    balls, pairs = np.stack([centres(q) for q in places]), np.stack(places).reshape(-1, 2, 3)
+    for judge, stacked in (
+        (drum_pairs.chirality, balls),
+        (lambda balls: drum_pairs.in_neighbourhood(balls, 3.0), balls),
+        (lambda pairs: drum_pairs.is_dyad(SIZES, pairs), pairs),
     ):
-        np.testing.assert_array_equal(judge(stacked), [judge(balls) for balls in stacked])
+        np.testing.assert_array_equal(judge(stacked), [judge(one) for one in stacked])
 
 
 @pytest.mark.parametrize("chirality", ["R", "L"])
@@ -177,18 +178,67 @@ def test_many_pairs_are_judged_as_each_alone(places):
 def test_nested_pairs_are_dyads_however_they_are_named(chirality, heading, gap):
     q = PAIR.nested(chirality, heading=heading, clearance=gap)
     for named in (q, PAIR.swap(q), PAIR.half_turn(q, "A"), PAIR.half_turn(q, "B")):
-        assert drum_pairs.nested(centres(named), SIZES)
+        assert drum_pairs.is_dyad(SIZES, named.reshape(2, 3))
         assert drum_pairs.chirality(centres(named)) == {"R": 1, "L": -1}[chirality]
 
 
-def test_pairs_that_are_not_nested_are_no_dyads():
-    apart = PAIR.nested("R", clearance=0.9)  # more than a quarter of the ball radius
-    shifted = PAIR.nested("R")
-    shifted[4] -= 3.0
+def slid(pair, by):
+    """Return a pair ``(..., 2, k)`` with B moved along its axis, towards A if A is below."""
+    moved = np.array(pair)
+    heading = moved[..., 1, 2]
+    moved[..., 1, 0] -= by * np.sin(heading) / SIZES.centre_radius
+    moved[..., 1, 1] -= by * np.cos(heading)
+    return moved
+
+
+SHIFT = 16 - math.sqrt(6**2 - 4.5**2)  # mm along their axis, of two in the corner
+
+
+@given(
+    st.sampled_from("RL"),
+    st.floats(-0.3, 0.3),
+    st.floats(0.02, 0.6),
+    st.floats(0, 2 * SHIFT - 16),
+)
+def test_pairs_that_have_slid_along_each_other_are_dyads(chirality, heading, gap, by):
+    """Parallel, a ball of each beside the other's rod: ``T`` asks for no more."""
+    corner = PAIR.nested(chirality, heading=heading, clearance=gap).reshape(2, 3)
+    pair = slid(corner, by)
+    assert min(gaps_of(pair).values()) > 0
+    assert drum_pairs.is_dyad(SIZES, pair)
+    assert drum_pairs.is_dyad(DumbbellDrum(), pair)
+    assert drum_pairs.chirality(centres(pair.ravel())) == {"R": 1, "L": -1}[chirality]
+
+
+def gaps_of(pair):
+    return dict(zip(CONTACTS, gaps(PAIR, pair.ravel()), strict=True))
+
+
+@given(PLACES)
+def test_dyads_are_parallel_and_hold_each_others_rods(q):
+    found = gaps_of(q)
+    rods = [min(found[name] for name in names) for names in (("A1b", "A2b"), ("aB1", "aB2"))]
+    turned = math.degrees(abs(math.remainder(q[5] - q[2], math.pi)))
+    assert drum_pairs.is_dyad(SIZES, q.reshape(2, 3)) == (max(rods) < 0.75 and turned < 20)
+
+
+@pytest.mark.parametrize("rod_radius", [0.5, 1.5, 2.0, 2.8])
+@pytest.mark.parametrize("gap", [0.1, 0.0, -1e-3])
+def test_dumbbells_that_touch_side_by_side_or_end_to_end_are_no_dyads(rod_radius, gap):
+    """Also when the rods are so thick that the balls are not far from them."""
+    pair, sizes = replace(PAIR, rod_radius=rod_radius), replace(SIZES, rod_radius=rod_radius)
+    for q in (pair.side_by_side(clearance=gap), pair.end_to_end(gap=gap)):
+        assert not drum_pairs.is_dyad(sizes, q.reshape(2, 3))
+    nest = pair.nested("R", clearance=0.05).reshape(2, 3)
+    assert drum_pairs.is_dyad(sizes, nest)
+
+
+def test_pairs_that_are_apart_or_crossed_are_no_dyads():
+    apart = PAIR.nested("R", clearance=0.9)  # more than half of r - t
     crossed = PAIR.nested("R", clearance=0.5)
-    crossed[5] += math.radians(20)
-    for q in (apart, shifted, crossed, PAIR.side_by_side(), PAIR.end_to_end(gap=0.0)):
-        assert not drum_pairs.nested(centres(q), SIZES)
+    crossed[5] += math.radians(21)
+    for q in (apart, crossed):
+        assert not drum_pairs.is_dyad(SIZES, q.reshape(2, 3))
 
 
 # ------------------------------------------------------------------------- what is told of a motion
@@ -240,10 +290,16 @@ def nested_in_time(chirality, eta):
     return placed
 
 
-def test_exits_are_counted_by_kind():
-    """A right dyad, a left one and a single leave; the second of the dyad some time later."""
+@pytest.mark.parametrize("by", [0.0, 4.0])
+def test_exits_are_counted_by_kind(by):
+    """A right dyad, a left one and a single leave; the second of the dyad some time later.
+
+    In the corner, and after the two have slid along each other.
+    """
     T = 20
-    right, left = nested_in_time("R", [50.0] * T), nested_in_time("L", [150.0] * T)
+    right, left = (
+        slid(nested_in_time(hand, [eta] * T), by) for hand, eta in (("R", 50.0), ("L", 150.0))
+    )
     single = np.zeros((T, 1, 4))
     single[:, 0, 1] = 250
     q = np.concatenate([right, left, single], axis=1)
@@ -260,6 +316,30 @@ def test_exits_are_counted_by_kind():
     assert drum_pairs.exits(path, memory=2.0) == {"right": 1, "left": 1, "single": 2}
     assert drum_pairs.dyads(path, 0) == [(0, 1, "R"), (2, 3, "L")]
     assert drum_pairs.dyads(path, 5) == [(2, 3, "L")]
+
+
+def test_the_second_of_a_dyad_that_climbs_out_leaves_as_one_too():
+    """It follows the first by its shift along the drum, as long as the climb takes for that."""
+    drum = DumbbellDrum(count=2, top=50.0)
+    start = drum_starts.nested_pair(drum, "R", heading=math.radians(12), eta=50.5 - SHIFT / 2)
+    path = drum.simulate(start, 80.0, dt=2e-3)
+    first, second = (event.time for event in path.of_kind(EventKind.EXIT))
+    assert second - first > 20
+    assert drum_pairs.exits(path) == {"right": 2, "left": 0, "single": 0}
+    assert drum_pairs.exits(path, memory=20.0) == {"right": 1, "left": 0, "single": 1}
+
+
+def test_the_commoner_hand_counts_and_where_they_balance_the_record_before():
+    records = [[(0, 1, -1)], [(0, 1, 1)], [(0, 1, 1), (0, 2, -1)], [(1, 3, 1)]]
+    times = np.arange(4.0)
+    assert drum_pairs.left_as(times, [(3.5, 0)], records.__getitem__) == ["right"]
+    assert drum_pairs.left_as(times, [(3.5, 0)], records.__getitem__, memory=2.0) == ["single"]
+    assert drum_pairs.left_as(times, [(1.0, 0), (3.5, 4)], records.__getitem__) == [
+        "left",
+        "single",
+    ]
+    three = [[(0, 1, 1), (0, 2, -1), (3, 0, -1)]]
+    assert drum_pairs.left_as(times[:1], [(0.5, 0)], three.__getitem__) == ["left"]
 
 
 def test_a_pair_is_held_while_it_is_near_and_handed():
