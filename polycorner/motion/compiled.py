@@ -1052,8 +1052,8 @@ def residual(scene, room, first, last, u, out):
 def number_bodies(scene, motion, room, first, last):
     """Give numbers to the bodies of an island; return how many, and the bandwidth.
 
-    They ascend along the substrate.  Contacts couple only bodies that are near, so that the matrix of
-    :func:`solve_band` is a band.  Nothing is numbered (0 is returned) if there is no room for it.
+    They ascend along the substrate.  Contacts couple only bodies that are near, so that the matrix
+    of :func:`solve_band` is a band.  Nothing is numbered (0 is returned) if it has no room.
     """
     k, n, reach = scene.size, ZERO, ZERO
     members, local = room.members, room.local
