@@ -49,7 +49,7 @@ def _bunch(sizes: tuple[float, float, float], duration: float, seed: int, top: f
 
 
 def partitions(
-    sizes: tuple[float, float, float] = LARGER, starts: int = 2, apart: bool = True
+    sizes: tuple[float, float, float] = LARGER, starts: int = 3, apart: bool = True
 ) -> Finding:
     """Check that, from 15 to 30 s, rollers are at smaller positive azimuths than sliders.
 

@@ -35,7 +35,7 @@ VERDICTS = {
     "B8a": Verdict.REFUTED,
     "B8b": Verdict.CORRECTED,
     "B9": Verdict.CORRECTED,
-    "B1a": Verdict.HOLDS_UNDER,
+    "B1a": Verdict.REFUTED,
     "B1b": Verdict.REFUTED,
     "B2c": Verdict.HOLDS_UNDER,
     "B10": Verdict.HOLDS_UNDER,
