@@ -9,22 +9,6 @@ from paper_checks import Verdict, dyads, tilt
 from paper_checks.experiment import EXPERIMENT, PLANE
 from polycorner import SmoothFunction, minimise
 
-VERDICTS = {
-    "T1": Verdict.HOLDS_UNDER,
-    "T2a": Verdict.HOLDS,
-    "T2b": Verdict.CORRECTED,
-    "T4a": Verdict.HOLDS_UNDER,
-}
-
-
-@pytest.mark.parametrize("claim", dyads.CLAIMS, ids=lambda claim: claim.id)
-def test_verdict(claim):
-    assert claim.check().verdict is VERDICTS[claim.id]
-
-
-def test_every_verdict_belongs_to_a_claim():
-    assert [claim.id for claim in dyads.CLAIMS] == list(VERDICTS)
-
 
 def test_other_counts_of_components_are_refuted():
     for components, of in ((1, 5), (2, 7), (2, 4)):

@@ -5,29 +5,6 @@ import pytest
 
 from paper_checks import Verdict, driven, dyads_moving
 
-VERDICTS = {
-    "T3": Verdict.HOLDS,
-    "T5a": Verdict.HOLDS_UNDER,
-    "T5b": Verdict.HOLDS_UNDER,
-    "T6a": Verdict.HOLDS,
-    "T6b": Verdict.HOLDS,
-    "T7": Verdict.HOLDS_UNDER,
-    "T10": Verdict.CORRECTED,
-    "T9a": Verdict.HOLDS_UNDER,
-    "T9b": Verdict.REFUTED,
-    "T4b": Verdict.REFUTED,
-}
-QUICK = [claim for claim in dyads_moving.CLAIMS if not claim.slow]
-
-
-@pytest.mark.parametrize("claim", QUICK, ids=lambda claim: claim.id)
-def test_verdict(claim):
-    assert claim.check().verdict is VERDICTS[claim.id]
-
-
-def test_every_verdict_belongs_to_a_claim():
-    assert [claim.id for claim in dyads_moving.CLAIMS] == list(VERDICTS)
-
 
 def test_rates_are_rises_over_times():
     paths = driven.dyads((("R", 8.0),), 20.0, tilt=0.0)

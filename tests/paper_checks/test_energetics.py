@@ -14,32 +14,6 @@ from hypothesis import strategies as st
 from paper_checks import Verdict, corner, ends, energetics, experiment, grip
 from paper_checks.experiment import EXPERIMENT, PLANE
 
-VERDICTS = {
-    "E1a": Verdict.HOLDS,
-    "E1b": Verdict.HOLDS,
-    "E1c": Verdict.HOLDS,
-    "E2": Verdict.HOLDS,
-    "E3": Verdict.HOLDS,
-    "E4a": Verdict.CORRECTED,
-    "E4b": Verdict.HOLDS,
-    "E5": Verdict.HOLDS,
-    "E6a": Verdict.CORRECTED,
-    "E6b": Verdict.HOLDS,
-    "E7": Verdict.HOLDS_UNDER,
-    "E8": Verdict.CORRECTED,
-    "E9": Verdict.HOLDS_UNDER,
-    "E10": Verdict.HOLDS_UNDER,
-}
-
-
-@pytest.mark.parametrize("claim", energetics.CLAIMS, ids=lambda claim: claim.id)
-def test_verdict(claim):
-    assert claim.check().verdict is VERDICTS[claim.id]
-
-
-def test_every_verdict_belongs_to_a_claim():
-    assert [claim.id for claim in energetics.CLAIMS] == list(VERDICTS)
-
 
 @pytest.mark.parametrize("pair", [EXPERIMENT, PLANE], ids=["drum", "plane"])
 def test_the_definitions_are_those_of_the_library(pair):

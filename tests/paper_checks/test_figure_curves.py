@@ -4,31 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from drawn_curves import lines
 from matplotlib.colors import to_rgb
 
 from paper_checks import figures
 from paper_checks.figures import FIGURES
 from paper_checks.figures import style as look
-
-
-@pytest.fixture(scope="module")
-def drawn():
-    """Return a function that draws a figure once."""
-    kept = {}
-
-    def draw(name):
-        if name not in kept:
-            kept[name] = FIGURES[name].draw()
-        return kept[name]
-
-    return draw
-
-
-def lines(axes, colour):
-    """Return the points of the lines drawn in a colour."""
-    same = [line for line in axes.lines if to_rgb(line.get_color()) == to_rgb(colour)]
-    return [line.get_xydata() for line in same if len(line.get_xydata()) > 2]
-
 
 # -------------------------------------------------------------------------------------- the drum
 

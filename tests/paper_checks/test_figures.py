@@ -28,19 +28,6 @@ NAMES = [
 UNITS = re.compile(r"\((degrees|mm|s|0\.001 degrees|°|any unit of length)\)|/")
 
 
-@pytest.fixture(scope="module")
-def drawn():
-    """Return a function that draws a figure once."""
-    kept = {}
-
-    def draw(name):
-        if name not in kept:
-            kept[name] = FIGURES[name].draw()
-        return kept[name]
-
-    return draw
-
-
 def every(names=NAMES):
     slow = pytest.mark.slow
     return [pytest.param(n, marks=[slow] if FIGURES[n].slow else []) for n in names]

@@ -17,32 +17,6 @@ from paper_checks.experiment import EXPERIMENT, PLANE, rests
 from polycorner import Manifold, Polyhedron, certify, prove
 from polycorner.models import plane_heading_formula
 
-VERDICTS = {
-    "L1": Verdict.HOLDS,
-    "L2a": Verdict.CORRECTED,
-    "L2b": Verdict.HOLDS_UNDER,
-    "L3a": Verdict.HOLDS_UNDER,
-    "L3b": Verdict.HOLDS_UNDER,
-    "L4a": Verdict.HOLDS,
-    "L4b": Verdict.CORRECTED,
-    "L4c": Verdict.HOLDS,
-    "L4d": Verdict.CORRECTED,
-    "L5": Verdict.CORRECTED,
-    "L6": Verdict.HOLDS,
-    "L7a": Verdict.REFUTED,
-    "L7b": Verdict.HOLDS,
-}
-
-
-@pytest.mark.parametrize("claim", minimisation.CLAIMS, ids=lambda claim: claim.id)
-def test_verdict(claim):
-    assert claim.check().verdict is VERDICTS[claim.id]
-
-
-def test_every_verdict_belongs_to_a_claim():
-    assert [claim.id for claim in minimisation.CLAIMS] == list(VERDICTS)
-
-
 # ------------------------------------------------------------------------------------------ lemma
 
 

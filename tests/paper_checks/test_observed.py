@@ -6,62 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from paper_checks import Verdict, bunch, driven, dyad_zigzag, observed, steep
+from paper_checks import Verdict, bunch, driven, dyad_zigzag, steep
 from polycorner.motion.events import Event, EventKind
 from polycorner.studies.drum_dyads import handedness
 from polycorner.studies.drum_pairs import is_dyad
-
-VERDICTS = {
-    "O1": Verdict.HOLDS,
-    "O2": Verdict.HOLDS,
-    "O3a": Verdict.HOLDS_UNDER,
-    "O3b": Verdict.HOLDS_UNDER,
-    "O3c": Verdict.HOLDS_UNDER,
-    "O3d": Verdict.REFUTED,
-    "O4": Verdict.HOLDS_UNDER,
-    "O9": Verdict.HOLDS_UNDER,
-    "O5a": Verdict.REFUTED,
-    "O5b": Verdict.HOLDS_UNDER,
-    "B2a": Verdict.HOLDS,
-    "B2b": Verdict.HOLDS_UNDER,
-    "B3a": Verdict.HOLDS_UNDER,
-    "B3b": Verdict.REFUTED,
-    "B3c": Verdict.REFUTED,
-    "B4a": Verdict.REFUTED,
-    "B4b": Verdict.HOLDS_UNDER,
-    "B4c": Verdict.REFUTED,
-    "B5a": Verdict.HOLDS_UNDER,
-    "B5b": Verdict.REFUTED,
-    "B8a": Verdict.REFUTED,
-    "B8b": Verdict.CORRECTED,
-    "B9": Verdict.CORRECTED,
-    "B1a": Verdict.REFUTED,
-    "B1b": Verdict.REFUTED,
-    "B2c": Verdict.HOLDS_UNDER,
-    "B10": Verdict.HOLDS_UNDER,
-    "B6a": Verdict.HOLDS_UNDER,
-    "B6b": Verdict.HOLDS_UNDER,
-    "B6c": Verdict.REFUTED,
-    "B7a": Verdict.HOLDS_UNDER,
-    "B7b": Verdict.NOT_TESTABLE,
-    "O8": Verdict.HOLDS,
-    "O10": Verdict.HOLDS,
-    "O6a": Verdict.HOLDS,
-    "O6b": Verdict.HOLDS_UNDER,
-    "O7": Verdict.HOLDS,
-    "O12": Verdict.HOLDS,
-    "O13": Verdict.HOLDS,
-}
-QUICK = [claim for claim in observed.CLAIMS if not claim.slow]
-
-
-@pytest.mark.parametrize("claim", QUICK, ids=lambda claim: claim.id)
-def test_verdict(claim):
-    assert claim.check().verdict is VERDICTS[claim.id]
-
-
-def test_every_verdict_belongs_to_a_claim():
-    assert [claim.id for claim in observed.CLAIMS] == list(VERDICTS)
 
 
 def events(*entries):
