@@ -56,9 +56,9 @@ def output_options(command: Command) -> Command:
         type=click.Path(file_okay=False, path_type=Path),
         help="Folder for the figures and the JSON file.",
     )(command)
-    return click.option(
-        "--json", "as_json", is_flag=True, help="Print one JSON object instead of a table."
-    )(command)
+    return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")(
+        command
+    )
 
 
 def patience(words: str) -> AbstractContextManager[object]:
