@@ -7,10 +7,10 @@ import subprocess
 import sys
 import time
 
+import commands
 import numpy as np
 import pytest
 
-from polycorner.cli.main import main
 from polycorner.models.drum import DumbbellDrum
 from polycorner.pictures import movies
 from polycorner.studies import drum_runs
@@ -44,18 +44,11 @@ def own_cache(tmp_path_factory):
 
 
 def run(capsys, *arguments):
-    """Run the command in this process; return its exit code, output and errors."""
-    sys.argv = ["polycorner", "drum", *arguments]
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    captured = capsys.readouterr()
-    return stopped.value.code, captured.out, captured.err
+    return commands.run(capsys, "drum", *arguments)
 
 
 def answer(capsys, *arguments):
-    code, out, err = run(capsys, *arguments, "--json")
-    assert (code, err) == (0, "")
-    return json.loads(out)
+    return commands.answer(capsys, "drum", *arguments)
 
 
 def test_a_single_dumbbell_climbs_with_its_heading(capsys):

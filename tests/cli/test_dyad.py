@@ -7,12 +7,12 @@ import sys
 import tomllib
 from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.cli.main import main
 from polycorner.models import DumbbellPair
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,18 +32,11 @@ FIELDS = {
 
 
 def run(capsys, *arguments):
-    """Run the command in this process; return its exit code, output and errors."""
-    sys.argv = ["polycorner", *arguments]
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    captured = capsys.readouterr()
-    return stopped.value.code, captured.out, captured.err
+    return commands.run(capsys, *arguments)
 
 
 def answer(capsys, *arguments):
-    code, out, err = run(capsys, "dyad", *arguments, "--json")
-    assert (code, err) == (0, "")
-    return json.loads(out)
+    return commands.answer(capsys, "dyad", *arguments)
 
 
 def test_json_has_the_promised_fields(capsys):

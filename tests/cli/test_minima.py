@@ -1,19 +1,13 @@
 """Minima on the command line."""
 
 import json
-import sys
 
+import commands
 import pytest
-
-from polycorner.cli.main import main
 
 
 def run(capsys, *arguments):
-    sys.argv = ["polycorner", "minima", *arguments]
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    captured = capsys.readouterr()
-    return stopped.value.code, captured.out, captured.err
+    return commands.run(capsys, "minima", *arguments)
 
 
 def test_pair_rests_in_three_ways(capsys, tmp_path):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import commands
 import pytest
 import small_catalogue
 
@@ -12,7 +13,6 @@ import paper_checks
 from paper_checks import running
 from paper_checks.figures import FIGURES
 from paper_checks.running import Result, Run
-from polycorner.cli.main import main
 
 ROOT = Path(paper_checks.__file__).parents[1]
 A, B, C = small_catalogue.CLAIMS[:3]
@@ -21,10 +21,7 @@ BROKEN = Result(B, None, "ValueError: no such thing")
 
 
 def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stopped:
-        main(["paper", *arguments])
-    captured = capsys.readouterr()
-    return stopped.value.code, captured.out, captured.err
+    return commands.run(capsys, "paper", *arguments)
 
 
 @pytest.fixture

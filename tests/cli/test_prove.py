@@ -1,26 +1,18 @@
 """Proofs on the command line: what is proved, what fails, and one line for a mistake."""
 
 import json
-import sys
 from decimal import Decimal
 
+import commands
 import pytest
-
-from polycorner.cli.main import main
 
 
 def run(capsys, *arguments):
-    sys.argv = ["polycorner", "prove", *arguments]
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    captured = capsys.readouterr()
-    return stopped.value.code, captured.out, captured.err
+    return commands.run(capsys, "prove", *arguments)
 
 
 def answer(capsys, *arguments):
-    code, out, err = run(capsys, *arguments, "--json")
-    assert (code, err) == (0, "")
-    return json.loads(out)
+    return commands.answer(capsys, "prove", *arguments)
 
 
 def test_corner_is_proved_and_enclosed(capsys):
