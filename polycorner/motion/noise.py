@@ -15,7 +15,7 @@ class Solver:
         Largest residual of a step, relative to the speeds in it; default 1e-8.  A step that
         misses it is counted in ``Effort.unconverged``, with the worst residual.
     sweeps : int, optional
-        Most Gauss-Seidel sweeps in a step; default 2000.
+        Most Gauss-Seidel sweeps over one island of touching bodies; default 2000.
     """
 
     tolerance: float = 1e-8
