@@ -133,7 +133,7 @@ class Motion(NamedTuple):
     press: Field  # (C, 3) their impulses: normal, rubbing
     shove: Field  # (C, 2k) what they do to the coordinates of both
     flags: Field  # (C, 2) sticks, touches
-    counts: Field  # contacts, steps, steps not converged, sweeps, Newton steps, solved islands
+    counts: Field  # contacts, steps, islands not solved, sweeps, Newton steps, islands
     sums: Field  # work of substrate, of forces, of noise, deepest overlap, worst residual, causes
 
 
@@ -1364,20 +1364,17 @@ def augment(scene, motion, room, first, last, n, width, goal, stiff, worst, u, o
     keep(room, first, last, room.p, room.best)
     for _ in range(10):
         keep(room, first, last, room.p, room.hat)
-        for s in range(first, last):
+        for s in range(first, last):  # what presses comes before what it presses on
             b = room.order[s]
             owner = room.press_by[b]
-            room.held[b] = room.weight[b] if owner < 0 else room.p[owner, 0]
             if room.rows[b] == 0:
                 room.held[b] = 0.0
-        for s in range(first, last):
-            b = room.order[s]
-            owner = room.cone[b]
-            if room.rows[b] > 0 and owner >= 0 and room.p[owner, 0] > 0.0:
+                continue
+            room.held[b] = room.weight[b] if owner < 0 else room.p[owner, 0]
+            if room.cone[b] >= 0 and room.p[owner, 0] > 0.0:
                 slip_of(scene, room, b, room.new, u)
                 slip = np.sqrt(u[0] * u[0] + (u[1] * u[1] if room.rows[b] == 2 else 0.0))
-                mu = room.ease[b] * radius_of(scene, room.block_shape[b])
-                room.held[owner] = mu * slip
+                room.held[owner] = room.ease[b] * radius_of(scene, room.block_shape[b]) * slip
         descend(scene, motion, room, first, last, n, width, goal, stiff, u, out)
         rebuild(scene, room, first, last)
         worst = residual(scene, room, first, last, u, out)
@@ -1517,8 +1514,8 @@ def rebuild(scene, room, first, last):
 def iterate(scene, motion, room, first, last, speed, sweeps):
     """Sweep over the blocks, and go on with Newton's method and multipliers; the residual.
 
-    It ends when the residual has reached its goal, when ``sweeps`` are done, or when all three
-    together no longer reduce it to a half.
+    It ends when the residual has reached its goal, when ``sweeps`` are done, or when a round of
+    all three no longer halves it.
     """
     u, out = room.two, room.image
     goal = scene.tolerance * speed
