@@ -141,6 +141,19 @@ def dome() -> System:
     return System(Polyhedron(M, {"dome": gap}), (vx**2 + vy**2) / 2, GRAVITY * y)
 
 
+def bead_in_ring() -> System:
+    """Return a bead that slides without friction or weight inside a ``ring``, in ``x`` and ``y``.
+
+    Once it is on the ring it goes round at the speed it has along it.
+    """
+    import sympy as sp
+
+    M = Manifold.euclidean("x y")
+    (x, y), (vx, vy) = M.symbols, velocities(M)
+    D = Polyhedron(M, {"ring": 1 - sp.sqrt(x**2 + y**2)})
+    return System(D, (vx**2 + vy**2) / 2, sp.Integer(0))
+
+
 def row_of_balls(masses: Sequence[float] = (1.0, 1.0, 1.0), restitution: float = 1.0) -> System:
     """Return balls in a row, on a line without forces: ``x_1 < x_2 < ...``.
 

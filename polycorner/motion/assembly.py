@@ -11,13 +11,22 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
 
 ======================================  =====================================================
 ``bound_i = -e_i J_i v``                contact ``i`` closes in this step and bounces
-``bound_i = -gap_i / h``                otherwise: it may just be reached ([StewartTrinkle]);
-                                        what overlaps is pushed out no faster than
-                                        ``|J_i (v_free - v)|``, what forces do within a step
+``bound_i = -(gap_i + c_i) / h``        otherwise: it may just be reached ([StewartTrinkle]);
+                                        what overlaps is pushed out no faster than what forces
+                                        and curvature do within a step, ``|J_i (v_free - v)|``
+                                        and ``|c_i| / h``
+``c_i = gap_i(q_M + h v)``              what curvature adds to a gap where bodies slide or roll
+``- gap_i - h J_i v``                   along each other, ``h |J_i v| <= 4 |c_i|``; else 0
 ``L_b = h N_b(q_M)``                    known normal force
 ``L_b = lam_i``                         friction on the unilateral contact ``i``
 ``C_b``                                 static set if the contact stuck before, else dynamic
 ======================================  =====================================================
+
+Without ``c`` a bead that circles in a ring would leave it, step by step.  Where velocities change
+much within a step it is not the curvature met: where at ``q_M + h v+``, the next half step if
+nothing more happens, a gap is short of what was promised, ``min(0, gap_i + h bound_i + c_i)``, by
+more than ``BEND``, the step is solved once more with the bound raised by what is missing, a step
+of Newton's method for the gap itself (:func:`bent_shut`).
 
 Slip that reverses within a step was zero within it, and there it is the static set that decides
 whether it starts again: such a step is solved anew with the static set (:func:`turned_back`).
@@ -35,9 +44,10 @@ from numpy.typing import NDArray
 from polycorner.geometry.manifold import Array
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexSet
-from polycorner.motion.system import State, System
+from polycorner.motion.system import OVERLAP, State, System
 
 CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
+BEND = OVERLAP  # scaled depth beyond which no gap may close by its curvature within a step
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,8 @@ class StepProblem:
     v, v_free : (n,) array
     middle : (n,) array
         ``q_M``.
-    gaps, bounds : (m,) array
+    gaps, bounds, bends : (m,) array
+        ``bends`` are the ``c_i``.
     normals : (m, n) array
         Gradients ``J_i`` of the gaps.
     blocks : tuple of FrictionBlock
@@ -86,6 +97,7 @@ class StepProblem:
     gaps: Array
     normals: Array
     bounds: Array
+    bends: Array
     blocks: tuple[FrictionBlock, ...]
 
 
@@ -96,24 +108,33 @@ def assemble(system: System, state: State, dt: float) -> StepProblem:
     v_free = state.v + dt * np.linalg.solve(now.mass, now.force)
     gaps, normals = system.polyhedron.bundle.evaluate(middle, 1)
     normals = normals.reshape(gaps.size, middle.size)
-    closing = gaps + dt * normals @ v_free < 0
-    bounds = _bounds(system, gaps, normals @ state.v, normals @ v_free, closing, dt)
+    before, free = normals @ state.v, normals @ v_free
+    bends = _bends(system, middle + dt * state.v, gaps, dt * before)
+    bounds = _bounds(system, gaps, before, free, bends, dt)
     blocks = _blocks(system, state.sticking, now.slip_matrix, now.drift, dt * now.loads)
-    return StepProblem(now.mass, state.v, v_free, middle, gaps, normals, bounds, blocks)
+    return StepProblem(now.mass, state.v, v_free, middle, gaps, normals, bounds, bends, blocks)
+
+
+def _bends(system: System, ahead: Array, gaps: Array, moved: Array) -> Array:
+    bends = _gaps_at(system, ahead) - gaps - moved
+    along = (np.abs(bends) > CLOSED * length_scale(system)) & (np.abs(moved) <= 4 * np.abs(bends))
+    return np.where(along, bends, 0.0)
+
+
+def _gaps_at(system: System, q: Array) -> Array:
+    values: Array = system.polyhedron.bundle.evaluate(q, 0)[0]
+    return values
 
 
 def _bounds(
-    system: System,
-    gaps: Array,
-    before: Array,
-    free: Array,
-    closing: NDArray[np.bool_],
-    dt: float,
+    system: System, gaps: Array, before: Array, free: Array, bends: Array, dt: float
 ) -> Array:
     e = system.restitutions
-    bounces = closing & (before < 0) & (-e * before > np.abs(free - before))
-    depth = np.where((gaps < 0) & (gaps > -CLOSED * length_scale(system)), 0.0, gaps)
-    limit = np.where(depth < 0, np.abs(free - before), np.inf)
+    closing = (gaps + dt * free < 0) & (before < 0)
+    bounces = closing & (-e * before > np.abs(free - before))
+    reached = gaps + bends
+    depth = np.where((reached < 0) & (reached > -CLOSED * length_scale(system)), 0.0, reached)
+    limit = np.where(depth < 0, np.abs(free - before) + np.abs(bends) / dt, np.inf)
     return np.where(bounces, -e * before, np.minimum(-depth / dt, limit))
 
 
@@ -127,6 +148,19 @@ def turned_back(system: System, problem: StepProblem, velocity: Array) -> StepPr
         blocks.append(replace(block, shape=friction.static) if reverses else block)
         found = found or reverses
     return replace(problem, blocks=tuple(blocks)) if found else None
+
+
+def bent_shut(
+    system: System, problem: StepProblem, velocity: Array, dt: float
+) -> StepProblem | None:
+    """Return the step with higher bounds where gaps close by curvature; nothing if none does."""
+    ahead = _gaps_at(system, problem.middle + dt * velocity)
+    aim = np.minimum(0.0, problem.gaps + dt * problem.bounds + problem.bends)
+    short = ahead < aim - BEND * length_scale(system)
+    if not short.any():
+        return None
+    raised = problem.normals @ velocity + (aim - ahead) / dt
+    return replace(problem, bounds=np.where(short, raised, problem.bounds))
 
 
 def length_scale(system: System) -> float:

@@ -64,6 +64,7 @@ SKIN = 0.4  # of the reach, by which lists of neighbours are wider
 MARGIN = 0.95  # share of friction with which a heap at rest is asked to rest
 SPARE = 0.01  # share of friction that lets a sleeper sleep unasked
 LONGEST = np.int64(50)  # steps for which it does
+BEND = 1e-4  # scaled depth beyond which a gap must not close by its curvature within a step
 SOFT = 1e-6  # relative softness of contacts in Newton steps, so that redundant ones have a solution
 
 
@@ -151,10 +152,16 @@ class Room(NamedTuple):
     load: Field  # (N, F)
     gap: Field  # (N, m)
     normal: Field  # (N, m, k)
+    ahead: Field  # (N, k) where bodies are at the next half step
+    gap_then: Field  # (N, m)
+    normal_then: Field  # (N, m, k)
+    pair_then: Field  # (pair gaps,)
     awake: Field
     asked: Field  # (N,) evaluated in this step
     speed: Field
     pace: Field  # the same, kept to the end of the step
+    error: Field  # (N,) residual of each island
+    shut: Field  # (N,) whether its gaps would close by their curvature
     root: Field
     free: Field  # (N, k)
     new: Field  # (N, k)
@@ -180,7 +187,7 @@ class Room(NamedTuple):
     press_by: Field  # (B,) block that presses, -1
     block_shape: Field
     origin: Field  # (B, 4) where the block comes from, and a mark
-    weight: Field  # (B,) load
+    weight: Field  # (B,) load; of a gap, by how much its curvature closes it
     ease: Field  # (B,) share of the load that is used
     offset: Field  # (B, 2)
     slant: Field  # (B, 2, 2k) Jacobian
@@ -438,20 +445,46 @@ def read_body(scene, motion, room, i, h, time, index):
                 value -= slope * motion.v[i, c]
                 size += abs(slope * motion.v[i, c])
             room.drift[i, r] = value if abs(value) > 1e-14 * size else 0.0
+    own_gaps(scene, room, i, room.qm, room.gap, room.normal)
+
+
+@inner
+def own_gaps(scene, room, i, place, gap, normal):
+    """Evaluate the gaps of a body at its place and their gradients."""
+    work = room.work
+    start, base = work.ctypes.data, scene.numbers.ctypes.data
     for call in range(scene.gap_table.shape[0]):
         address, n, m, r0, w0, p0 = scene.gap_table[call]
         for a in range(n):
-            work[a] = room.qm[i, scene.gap_reads[r0 + a]]
+            work[a] = place[i, scene.gap_reads[r0 + a]]
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
             g = scene.gap_rows[w0 + o]
             if g >= 0:
-                room.gap[i, g] = work[n + o]
-                for c in range(k):
-                    room.normal[i, g, c] = 0.0
+                gap[i, g] = work[n + o]
+                for c in range(scene.size):
+                    normal[i, g, c] = 0.0
                 for a in range(n):
-                    room.normal[i, g, scene.gap_reads[r0 + a]] += work[j0 + o * n + a]
+                    normal[i, g, scene.gap_reads[r0 + a]] += work[j0 + o * n + a]
+
+
+@small
+def pair_gaps(scene, room, a, b, place):
+    """Evaluate the gaps of a pair at its places, behind what they read, and their gradients."""
+    work, n, m = room.work, scene.pair_reads.shape[0], scene.pair_gaps
+    start, base = work.ctypes.data, scene.numbers.ctypes.data
+    for r in range(n):
+        body = a if scene.pair_reads[r, 0] == 0 else b
+        work[r] = place[body, scene.pair_reads[r, 1]]
+    call_kernel(
+        scene.pair_at,
+        start,
+        base + 8 * scene.pair_number,
+        start + 8 * n,
+        start + 8 * (n + m),
+        start,
+    )
 
 
 @inner
@@ -714,19 +747,8 @@ def list_neighbours(scene, motion, room, time):
 def watch_pair(scene, motion, room, a, b, limit, count):
     """Evaluate the gaps of a pair and note the small ones; return how many are noted, or -1."""
     k, work = scene.size, room.work
-    start, base = work.ctypes.data, scene.numbers.ctypes.data
     n, m = scene.pair_reads.shape[0], scene.pair_gaps
-    for r in range(n):
-        body = a if scene.pair_reads[r, 0] == 0 else b
-        work[r] = room.qm[body, scene.pair_reads[r, 1]]
-    call_kernel(
-        scene.pair_at,
-        start,
-        base + 8 * scene.pair_number,
-        start + 8 * n,
-        start + 8 * (n + m),
-        start,
-    )
+    pair_gaps(scene, room, a, b, room.qm)
     for g in range(m):
         if work[n + g] < limit:
             if count == room.near.shape[0]:
@@ -805,15 +827,25 @@ def finish_block(scene, room, b):
 
 
 @inner
-def bound_of(gap, before, free, bounce, h, scale):
+def bend_of(gap, before, then, h, scale):
+    """Return what curvature adds to a gap that bodies slide or roll along; see ``assembly``."""
+    bend = then - gap - h * before
+    if abs(bend) <= CLOSED * scale or abs(h * before) > 4.0 * abs(bend):
+        return 0.0
+    return bend
+
+
+@inner
+def bound_of(gap, before, free, bend, bounce, h, scale):
     """Return the least closing-free speed a contact must leave with; see ``assembly``."""
     if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(free - before):
         return -bounce * before
-    if -CLOSED * scale < gap < 0.0:
+    reached = gap + bend
+    if -CLOSED * scale < reached < 0.0:
         return 0.0
-    if gap < 0.0:  # pushed out no faster than forces push back within a step
-        return min(-gap / h, abs(free - before))
-    return -gap / h
+    if reached < 0.0:  # pushed out no faster than forces and curvature do within a step
+        return min(-reached / h, abs(free - before) + abs(bend) / h)
+    return -reached / h
 
 
 @inner
@@ -833,7 +865,7 @@ def new_block(room, b, k, first, second, rows):
 def body_blocks(scene, motion, room, i, h, count):
     """Append the blocks of a body's own contacts."""
     k, m = scene.size, scene.bounce.size
-    block_of = room.own
+    block_of, looked = room.own, False
     for g in range(m):
         block_of[g] = -1
         before, free = 0.0, 0.0
@@ -845,13 +877,18 @@ def body_blocks(scene, motion, room, i, h, count):
         if not near and not motion.touch[i, g]:
             motion.lam[i, g] = 0.0
             continue
+        if not looked:
+            own_gaps(scene, room, i, room.ahead, room.gap_then, room.normal_then)
+            looked = True
         b = count
         count += 1
         block_of[g] = b
         new_block(room, b, k, i, NONE, ZERO)
         for c in range(k):
             room.slant[b, 0, c] = room.normal[i, g, c]
-        room.offset[b, 0] = -bound_of(gap, before, free, scene.bounce[g], h, scene.scale)
+        bend = bend_of(gap, before, room.gap_then[i, g], h, scene.scale)
+        room.offset[b, 0] = -bound_of(gap, before, free, bend, scene.bounce[g], h, scene.scale)
+        room.weight[b] = -bend
         room.origin[b, 0], room.origin[b, 1], room.origin[b, 2] = 0, i, g
         room.p[b, 0] = motion.lam[i, g]
         finish_block(scene, room, b)
@@ -897,7 +934,9 @@ def pair_blocks(scene, motion, room, slot, h, count):
     for c in range(2 * k):
         room.slant[n, 0, c] = room.near_normal[slot, c]
     gap = room.near_gap[slot]
-    room.offset[n, 0] = -bound_of(gap, before, free, scene.pair_bounce, h, scene.scale)
+    bend = bend_of(gap, before, room.pair_then[g], h, scene.scale)
+    room.offset[n, 0] = -bound_of(gap, before, free, bend, scene.pair_bounce, h, scene.scale)
+    room.weight[n] = -bend
     room.origin[n, 0], room.origin[n, 1], room.origin[n, 2] = 2, slot, g
     room.p[n, 0] = room.near_press[slot, 0]
     finish_block(scene, room, n)
@@ -1772,6 +1811,63 @@ def islands(scene, room, blocks):
 
 
 @small
+def solve_islands(scene, motion, room, blocks, h):
+    """Solve all islands; those in which gaps would close by their curvature once more."""
+    starts = room.size
+    for look in range(2):
+        for i in range(scene.bodies):
+            if starts[i + 1] > starts[i] and (look == 0 or room.shut[i]):
+                room.error[i] = solve_island(scene, motion, room, starts[i], starts[i + 1])
+        if look == 1 or not look_ahead(scene, motion, room, blocks, h):
+            break
+
+
+@small
+def look_ahead(scene, motion, room, blocks, h):
+    """Raise the bounds of gaps that close more than their slopes say; return whether any does.
+
+    See ``assembly.bent_shut``.  Between bodies it is asked only if they move fast enough.
+    """
+    k, u, found = scene.size, room.two, False
+    for i in range(scene.bodies):
+        room.shut[i] = 0
+        speed = 0.0
+        for c in range(k):
+            room.ahead[i, c] = room.qm[i, c] + h * room.new[i, c]
+            still = scene.carried if c == scene.place[0] else 0.0
+            speed += abs(room.new[i, c] * scene.unit[c] - still)
+        room.speed[i] = speed
+    swift = np.sqrt(0.5 * BEND) * scene.scale / h
+    first, second = NONE, NONE
+    for b in range(blocks):
+        if room.rows[b] > 0:
+            continue
+        i, g = room.body[b, 0], room.origin[b, 2]
+        if room.origin[b, 0] == 0:
+            if i != first:
+                own_gaps(scene, room, i, room.ahead, room.gap_then, room.normal_then)
+            first, second = i, NONE
+            gap, then = room.gap[i, g], room.gap_then[i, g]
+        else:
+            j = room.body[b, 1]
+            if room.speed[i] + room.speed[j] <= swift:
+                continue
+            if i != first or j != second:
+                pair_gaps(scene, room, i, j, room.ahead)
+            first, second = i, j
+            gap = room.near_gap[room.origin[b, 1]]
+            then = room.work[scene.pair_reads.shape[0] + g]
+        aim = min(0.0, gap - h * room.offset[b, 0] - room.weight[b])
+        if then < aim - BEND * scene.scale:
+            slip_of(scene, room, b, room.new, u)
+            room.weight[b] = gap + h * (u[0] - room.offset[b, 0]) - then
+            room.offset[b, 0] = (gap - room.weight[b] - aim) / h
+            room.shut[home(room, b)] = 1
+            found = True
+    return found
+
+
+@small
 def account(scene, motion, room, blocks, h):
     """Book the work of this step by cause."""
     k, u = scene.size, room.two
@@ -1947,8 +2043,9 @@ def note(events, numbers, count, kind, i, j, which, time, value):
 @small
 def touch_event(room, motion, b, was, gap, h, time, scale, u, out):
     """Compare a contact with what it was: out is whether it touches, which event, and when."""
-    bounces = room.offset[b, 0] < 0.0 < gap
-    after = u[0] - room.offset[b, 0]
+    closes = room.weight[b] / h
+    bounces = room.offset[b, 0] + closes < 0.0 < gap
+    after = u[0] - room.offset[b, 0] - closes
     touches = gap + h * after <= (100.0 * TOUCH if was else TOUCH) * scale
     out[0], out[1], out[2] = 1.0 if touches else 0.0, -1.0, time + h
     if room.p[b, 0] > 0.0 and bounces and not touches and not was:
@@ -2080,14 +2177,24 @@ def collect(scene, motion, room, h, near):
     """Build the blocks of all bodies that are awake and of all contacts noted; return how many."""
     blocks = ZERO
     for i in range(scene.bodies):
+        for c in range(scene.size):
+            room.ahead[i, c] = room.qm[i, c] + h * motion.v[i, c]
+    for i in range(scene.bodies):
         if motion.alive[i] and room.awake[i]:
             blocks = body_blocks(scene, motion, room, i, h, blocks)
     slots = room.slots
     for s in range(near):  # in the order of their numbers, whatever was met first
         slots[s] = key_of(scene, room, s) * near + s
     heap_sort(slots, near)
+    first, second = NONE, NONE
     for s in range(near):
-        blocks = pair_blocks(scene, motion, room, slots[s] % near, h, blocks)
+        slot = slots[s] % near
+        if room.near[slot, 0] != first or room.near[slot, 1] != second:
+            first, second = room.near[slot, 0], room.near[slot, 1]
+            pair_gaps(scene, room, first, second, room.ahead)
+            for g in range(scene.pair_gaps):
+                room.pair_then[g] = room.work[scene.pair_reads.shape[0] + g]
+        blocks = pair_blocks(scene, motion, room, slot, h, blocks)
     return blocks
 
 
@@ -2112,20 +2219,16 @@ def step_once(scene, motion, room, h, events, numbers, count):
                 return False, count
         blocks = collect(scene, motion, room, h, near)
         islands(scene, room, blocks)
-        starts = room.size
-        missed, worst = 0, 0.0
-        for i in range(N):
-            if starts[i + 1] > starts[i]:
-                far = solve_island(scene, motion, room, starts[i], starts[i + 1])
-                worst = max(worst, far)
-                missed += 1 if far > scene.tolerance else 0
+        solve_islands(scene, motion, room, blocks, h)
         keep_impulses(motion, room, blocks)
         if scene.pair_at == 0 or not gather_pulls(
             scene, motion, room, blocks, h, time + 0.5 * h, index
         ):
             break
-    motion.counts[2] += missed
-    motion.sums[4] = max(motion.sums[4], worst)
+    for i in range(N):
+        if room.size[i + 1] > room.size[i]:
+            motion.sums[4] = max(motion.sums[4], room.error[i])
+            motion.counts[2] += 1 if room.error[i] > scene.tolerance else 0
     account(scene, motion, room, blocks, h)
     count = contact_events(scene, motion, room, blocks, h, time, events, numbers, count)
     keep_sticking(scene, motion, room, blocks)

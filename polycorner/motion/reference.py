@@ -24,7 +24,13 @@ import numpy as np
 
 from polycorner.errors import SolverError
 from polycorner.geometry.manifold import Array
-from polycorner.motion.assembly import FrictionBlock, StepProblem, assemble, turned_back
+from polycorner.motion.assembly import (
+    FrictionBlock,
+    StepProblem,
+    assemble,
+    bent_shut,
+    turned_back,
+)
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.friction import CutDisc, Disc, Ellipse, Interval
 from polycorner.motion.residual import NO_LOAD, compliance, natural_residual, nearest, speed
@@ -92,11 +98,9 @@ def reference_step(system: System, state: State, dt: float) -> State:
     >>> round(float(reference_step(block, block.state([0.0]), 0.1).v[0]), 12)
     0.2057
     """
-    problem = assemble(system, state, dt)
-    v = solve_step(problem).velocity
-    while (turned := turned_back(system, problem, v)) is not None:
-        problem = turned
-        v = solve_step(problem).velocity
+    problem, v = _turned(system, assemble(system, state, dt))
+    if (bent := bent_shut(system, problem, v, dt)) is not None:
+        problem, v = _turned(system, bent)
     whole = STICKING * speed(problem, v)
     slips = [np.linalg.norm(b.matrix @ v + b.drift) for b in problem.blocks]
     sizes = [1 / np.sqrt(compliance(problem, b.matrix)) for b in problem.blocks]
@@ -104,6 +108,15 @@ def reference_step(system: System, state: State, dt: float) -> State:
         [s * size <= whole for s, size in zip(slips, sizes, strict=True)], dtype=bool
     )
     return State(state.time + dt, problem.middle + dt / 2 * v, v, sticking)
+
+
+def _turned(system: System, problem: StepProblem) -> tuple[StepProblem, Array]:
+    """Return a step and its velocity, with static sets where slip reversed."""
+    v = solve_step(problem).velocity
+    while (turned := turned_back(system, problem, v)) is not None:
+        problem = turned
+        v = solve_step(problem).velocity
+    return problem, v
 
 
 def solve_step(problem: StepProblem, rounds: int = ROUNDS) -> StepSolution:

@@ -17,7 +17,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 if TYPE_CHECKING:
     import sympy
 
-OVERLAP = 1e-9  # scaled depth up to which a start counts as touching
+OVERLAP = 1e-4  # scaled depth up to which a start counts as touching: what a step may leave
 
 
 def velocities(manifold: Manifold) -> "tuple[sympy.Symbol, ...]":
@@ -258,7 +258,8 @@ class System:
     def check_placement(self, q: Array) -> None:
         """Refuse a placement where a contact overlaps, naming the worst."""
         gaps = self.polyhedron.values(q)
-        if gaps.size and (worst := int(np.argmin(gaps))) is not None and gaps[worst] < -OVERLAP:
+        deep = -OVERLAP * min(self.manifold.scales)
+        if gaps.size and (worst := int(np.argmin(gaps))) is not None and gaps[worst] < deep:
             msg = (
                 f"q: expected a placement without overlap; contact {self.contacts[worst]!r} "
                 f"overlaps by {-gaps[worst]:.6g}"

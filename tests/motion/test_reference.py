@@ -28,7 +28,7 @@ def step(mass, v_free, blocks=(), normals=(), bounds=()):
     bounds = np.array(bounds, dtype=float)
     normals = np.array(normals, dtype=float).reshape(len(bounds), len(v))
     mass = np.array(mass, dtype=float)
-    return StepProblem(mass, v, v, 0 * v, 0 * bounds, normals, bounds, tuple(blocks))
+    return StepProblem(mass, v, v, 0 * v, 0 * bounds, normals, bounds, 0 * bounds, tuple(blocks))
 
 
 def block(matrix, shape, load=0.0, drift=None, owner=-1):

@@ -402,6 +402,37 @@ def test_a_pendulum_loses_height_at_a_wall():
     assert between(observed_order(loss, 8e-3), FIRST)
 
 
+def test_a_bead_goes_round_in_a_ring():
+    """Only curvature presses it, and nothing pushes it back: what it strayed would add up."""
+    ring = scenes.bead_in_ring()
+    state = ring.state([0.0, -1.0], [1.0, 0.0])
+
+    def lag(dt):
+        (x, y), steps = end(ring, state, 1.5 * math.pi, dt).q[-1, 0], round(1.5 * math.pi / dt)
+        return math.remainder(math.atan2(x, -y) - steps * dt, math.tau)
+
+    def strayed(dt):
+        return end(ring, state, 1.5 * math.pi, dt).max_penetration
+
+    assert between(observed_order(lag, 1e-2), SECOND)
+    assert observed_order(strayed, 1e-2) > 1.9
+    for dt in (1e-2, 1e-3):
+        path = simulate(ring, state, 20.0, dt)
+        assert path.max_penetration < dt**2 / 2  # how far the tangent leads outside in one step
+        assert path.kinetic[-1] == pytest.approx(0.5, abs=dt**2)
+
+
+@pytest.mark.parametrize("across", [0.3, 0.6, 0.9])
+def test_a_bead_that_hits_the_ring_goes_on_along_it(across):
+    """The curvature met after an impact is not that before it."""
+    ring = scenes.bead_in_ring()
+    state = ring.state([across, 0.0], [0.0, 1.0])
+    for dt in (5e-2, 1e-2):
+        path = simulate(ring, state, 6.0, dt)
+        assert path.max_penetration < 2e-4 + 2 * dt**3
+        assert math.sqrt(2 * path.kinetic[-1]) == pytest.approx(across, abs=dt)
+
+
 def test_a_point_leaves_a_smooth_dome_at_two_thirds_of_its_height():
     dome, angle = scenes.dome(), 0.3
     state = dome.state([math.sin(angle), math.cos(angle)])
