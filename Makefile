@@ -3,7 +3,7 @@
 PYTEST := .venv/bin/python -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad paper test thorough lint format types imports docs bench constraints clean
+.PHONY: help env env-pip dyad paper test thorough lint format types imports docs links bench constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -65,6 +65,9 @@ imports: .venv/.dev ## which folder and which file may import which
 
 docs: .venv/.dev ## the documentation, in docs/_build/html
 	@.venv/bin/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+
+links: .venv/.dev ## external links of the documentation (needs the network)
+	@.venv/bin/sphinx-build -q -b linkcheck -D plot_gallery=0 docs docs/_build/links
 
 bench: .venv/.bench ## side-by-side runs against other tools
 	@set -e; for file in $(wildcard benchmarks/bench_*.py); do \

@@ -1,11 +1,15 @@
-"""The heading of a dyad: the paper's curve, the computed ones, and where they agree.
+"""
+The heading of a dyad
+=====================
+
+The heading of a dyad: the paper's curve, the computed ones, and where they agree.
 
 The paper gives ``theta_s = +-arctan(r/l)`` for the heading at which a nested pair of dumbbells
 comes to rest.  Here the minimiser is computed for several rod radii and both chiralities, in the
 drum and in the plane it develops into, and compared with the closed form of the plane,
 ``tan 2 theta_s = 2 D p / (D^2 + l^2 - p^2)``, ``p = r + t``, ``D = l - sqrt(4 r^2 - p^2)``.
 
-Run it to draw the figure: ``python examples/ex01_heading.py [FILE.png]``.
+Run it to draw the figure: ``python examples/ex01_heading.py [FOLDER]``.
 """
 
 import math
@@ -54,11 +58,11 @@ def order_in_curvature() -> float:
     return float(np.polyfit(np.log(1 / radii), np.log(differences), 1)[0])
 
 
-def draw(path: Path) -> None:
+def draw(path: Path) -> Path:
     """Draw both curves of the paper and the computed ones for several rod radii."""
     from polycorner.pictures.plots import draw_heading, save
 
-    save(draw_heading(PAIR, LENGTHS.tolist(), RODS), path)
+    return save(draw_heading(PAIR, LENGTHS.tolist(), RODS), path)
 
 
 if __name__ == "__main__":
@@ -69,6 +73,5 @@ if __name__ == "__main__":
     for rod in RODS:
         headings, rests = heading_curve(replace(PAIR, rod_radius=rod), [PAIR.length])
         print(f"t = {rod:3} mm  {headings[0]:.6f} degrees, minimum: {bool(rests[0])}")
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex01_heading.png")
-    draw(target)
-    print(f"wrote {target}")
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    print(f"wrote {draw(folder / 'ex01_heading.png')}")

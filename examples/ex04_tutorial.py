@@ -1,4 +1,8 @@
-"""A region that is locally convex but not convex: its corners and sides, and two places of rest.
+"""
+A region that is locally convex
+===============================
+
+A region that is locally convex but not convex: its corners and sides, and two places of rest.
 
 Seven segments and arcs bound the region; three of the arcs bulge into it.  Walking along them
 finds seven corners, seven edges and one face.  At each corner two functions vanish with
@@ -7,7 +11,7 @@ local convexity.  Yet a segment between two points of an inward arc leaves the r
 near they are, and the height ``y`` is a local minimum at A as well as at B: on a convex region
 a linear energy has no local minimum above the least.
 
-Run it to draw the figure: ``python examples/ex04_tutorial.py [FILE.png]``.
+Run it to draw the figure: ``python examples/ex04_tutorial.py [FOLDER]``.
 """
 
 import sys
@@ -50,7 +54,7 @@ def letter(corner: Corner) -> str:
     return name
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, path: Path) -> Path:
     """Draw the region with the names of its corners and sides."""
     from polycorner.pictures.plots import save
     from polycorner.pictures.regions import draw_region
@@ -61,7 +65,7 @@ def draw(result: Result, path: Path) -> None:
         corners=[(name, corner.point) for name, corner in result.corners.items()],
         edges=list(REGION.sides().items()),
     )
-    save(figure, path)
+    return save(figure, path)
 
 
 if __name__ == "__main__":
@@ -75,6 +79,5 @@ if __name__ == "__main__":
             print(f"   the height rests here: {rest.verdict.value}")
     depth = REGION.polyhedron.implicit(result.middle)
     print(f"the middle of a short chord of AB is outside the region: f = {depth:.1e}")
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex04_tutorial.png")
-    draw(result, target)
-    print(f"wrote {target}")
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    print(f"wrote {draw(result, folder / 'ex04_tutorial.png')}")

@@ -1,4 +1,8 @@
-"""The solid of forbidden relative placements of two dumbbells, with its edges and corners.
+"""
+The solid of forbidden placements
+=================================
+
+The solid of forbidden relative placements of two dumbbells, with its edges and corners.
 
 In the plane two dumbbells overlap at a relative placement ``(x, y, delta)`` exactly when it lies in
 a parallelogram with the sides of both, widened by ``r + t``, or in a disc of radius ``2 r`` about
@@ -6,7 +10,7 @@ one of its corners.  So the solid's edges (two contacts) are where discs meet wi
 every relative heading, and for parallel dumbbells the lines and arcs between its corners: three
 contacts at ``Delta``, four at ``E``.  Edges and corners point inwards: outside is what is allowed.
 
-Run it to draw the solid: ``python examples/ex05_solid.py [FILE.png]``, with a GLB beside it.
+Run it to draw the solid: ``python examples/ex05_solid.py [FOLDER]``, with a GLB beside it.
 """
 
 import math
@@ -28,12 +32,16 @@ REACH = math.sqrt(4 * PAIR.ball_radius**2 - P**2)  # along a side, from a corner
 
 @dataclass(frozen=True)
 class Result:
-    """Volume in mm^2 rad, topology, and how far the edges are from touching twice, in mm."""
+    """Volume in mm^2 rad, topology, and errors in mm.
+
+    Those of the edges in closed form, and of the corners in the mesh.
+    """
 
     volume: float
     euler_characteristic: int
     allowed_components: int
     edge_error: float
+    corner_error: float
 
 
 def main(resolution: int = 48) -> Result:
@@ -41,10 +49,11 @@ def main(resolution: int = 48) -> Result:
     points = np.concatenate([points for _, points in edges()])
     gaps = np.sort(PAIR.polyhedron.values(relative_placements(PAIR, points)), axis=-1)
     return Result(
-        volume=solid.volume,
+        volume=solid.curved_volume,
         euler_characteristic=solid.euler_characteristic,
         allowed_components=components_of_complement(solid),
         edge_error=float(abs(gaps[:, :2]).max()),
+        corner_error=solid.corner_error(corners()[0], (1.0, 1.0, PAIR.length / 2)),
     )
 
 
@@ -79,19 +88,19 @@ def corners() -> tuple[np.ndarray, list[str]]:
     return np.array(places), ["$E$", "$E$", "$\\Delta$", "$\\Delta$"] * 2
 
 
-def draw(path: Path, resolution: int = 128) -> None:
+def draw(path: Path, resolution: int = 128) -> Path:
     """Draw the solid over half a turn, and write it as a GLB with ``l/2`` mm to a radian."""
     from polycorner.pictures.plots import save
 
     solid = forbidden_solid(PAIR, resolution, period=math.pi)
     points, names = corners()
-    save(draw_solid(solid.mesh, edges(), points, names, caps=solid.caps), path)
+    drawn = save(draw_solid(solid.mesh, edges(), points, names, caps=solid.caps), path)
     scale = (1.0, 1.0, PAIR.length / 2)
     write_mesh(solid.mesh, path.with_suffix(".glb"), curves=edges(), points=points, scale=scale)
+    return drawn
 
 
 if __name__ == "__main__":
     print(main())
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex05_solid.png")
-    draw(target)
-    print(f"wrote {target}")
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    print(f"wrote {draw(folder / 'ex05_solid.png')}")

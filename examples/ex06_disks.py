@@ -1,4 +1,8 @@
-"""Disks on a torus: every radius at which the space of their configurations changes.
+"""
+Disks on a torus
+================
+
+Disks on a torus: every radius at which the space of their configurations changes.
 
 Two and three equal disks lie on the square and on the hexagonal torus.  Their largest common
 radius is critical where the contacts carry a stress in equilibrium; the index counts the ways in
@@ -8,7 +12,7 @@ On the hexagonal torus all critical configurations of three disks are isolated. 
 labelled copies modulo translations, ``(-1)^index`` adds up to the Euler characteristic of the
 space of three distinct points, which is 2.
 
-Run it to draw a figure of four disks: ``python examples/ex06_disks.py [FILE.png]``.
+Run it to draw a figure of four disks: ``python examples/ex06_disks.py [FOLDER]``.
 """
 
 import sys
@@ -32,13 +36,13 @@ def main() -> dict[tuple[int, str], list[tuple[float, int]]]:
     }
 
 
-def draw(path: Path) -> None:
+def draw(path: Path) -> Path:
     """Draw the critical configurations of four disks on the hexagonal torus."""
     from polycorner.pictures.plots import save
     from polycorner.pictures.torus import draw_critical
 
     model = TorusDisks(4, "hexagonal")
-    save(draw_critical(model, model.critical(np.random.default_rng(0))), path)
+    return save(draw_critical(model, model.critical(np.random.default_rng(0))), path)
 
 
 if __name__ == "__main__":
@@ -49,6 +53,5 @@ if __name__ == "__main__":
         if (count, lattice) == (3, "hexagonal"):
             total = sum((-1) ** k * copies for (_, k), copies in zip(found, COPIES, strict=True))
             print(f"    signed count of labelled copies: {total}")
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex06_disks.png")
-    draw(target)
-    print(f"wrote {target}")
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    print(f"wrote {draw(folder / 'ex06_disks.png')}")

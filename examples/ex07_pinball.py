@@ -1,4 +1,8 @@
-"""A ball on a board with pins, wedges and cups: where it rests, and how it is held there.
+"""
+A ball among pins and cups
+==========================
+
+A ball on a board with pins, wedges and cups: where it rests, and how it is held there.
 
 Balls are let go all over the board; each comes to rest at a certified minimum of its height.
 The kind of entrapment in each direction is computed: two half-V in a pocket, half-V and U in a
@@ -6,7 +10,7 @@ cup, half-V and half-U in a cup that is cut in half by a wall at its lowest poin
 on a ledge.  Corners of wedges and rims of cups are locally concave: the region is a union there,
 and each piece shows a way down, so that no ball rests on them.
 
-Run it to draw the figure: ``python examples/ex07_pinball.py [FILE.png]``.
+Run it to draw the figure: ``python examples/ex07_pinball.py [FOLDER]``.
 """
 
 import sys
@@ -63,7 +67,7 @@ def held_as(rest: Certificate) -> str:
     return " + ".join(f"{n} {kind}" if n > 1 else kind for kind, n in counts.items() if n)
 
 
-def draw(result: Result, path: Path) -> None:
+def draw(result: Result, path: Path) -> Path:
     """Draw the board, its corners, and every ball where it rests, coloured by how it is held."""
     from polycorner.pictures.plots import save
     from polycorner.pictures.regions import draw_region
@@ -75,7 +79,7 @@ def draw(result: Result, path: Path) -> None:
         corners=[("", c.point) for c in result.corners],
         rests=balls,
     )
-    save(figure, path)
+    return save(figure, path)
 
 
 if __name__ == "__main__":
@@ -86,6 +90,5 @@ if __name__ == "__main__":
         print(f"{len(group):3} balls on {name:22} {held_as(first):17} {first.verdict.value}")
     verdicts = {c.verdict.value for c in result.concave}
     print(f"{len(result.concave)} concave corners: {', '.join(verdicts)}")
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else "out/ex07_pinball.png")
-    draw(result, target)
-    print(f"wrote {target}")
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+    print(f"wrote {draw(result, folder / 'ex07_pinball.png')}")

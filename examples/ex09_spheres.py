@@ -1,4 +1,8 @@
-"""Six hard spheres that stick: two rigid clusters, and the motions between them.
+"""
+Six sticky spheres
+==================
+
+Six hard spheres that stick: two rigid clusters, and the motions between them.
 
 A rigid cluster is a corner of the polyhedron of all placements, modulo congruence and relabelling.
 Breaking one contact opens a motion with one degree of freedom, an edge, that goes on until a new

@@ -1,4 +1,8 @@
-"""How thick the rods of a dyad may be, and how well its heading is known.
+"""
+How thick rods may be
+=====================
+
+How thick the rods of a dyad may be, and how well its heading is known.
 
 A nested pair rests in the corner of three contacts only while its rods are thin enough.  The
 critical thickness is found in three ways: by Newton's method on the equations of the corner with

@@ -1,4 +1,8 @@
-"""Why a dumbbell climbs a tilted drum like a boat tacking against the wind: the keel effect.
+"""
+The keel of a dumbbell
+======================
+
+Why a dumbbell climbs a tilted drum like a boat tacking against the wind: the keel effect.
 
 A dumbbell rolls more easily than it slides.  Friction holds it while the force along the wall, over
 the force onto the wall, lies in a disc that is cut by a strip.  The turning drum carries it east

@@ -1,4 +1,8 @@
-"""A bouncing ball comes to rest after infinitely many bounces, in a finite time.
+"""
+A bouncing ball
+===============
+
+A bouncing ball comes to rest after infinitely many bounces, in a finite time.
 
 Dropped from the height 1, the ball lands after ``t = sqrt(2 h / g)`` and comes to rest after
 ``t (1 + e) / (1 - e)``.  Time stepping with impulses does not stop for single bounces: those
@@ -96,7 +100,7 @@ def draw(result: Result, path: Path) -> Path:
     labels = ("kinetic", "potential", "lost in impacts")
     colours = ("#E69F00", "#56B4E9", "0.8")
     below.stackplot(motion.times, *(s / unit for s in shares), labels=labels, colors=colours)
-    above.set(ylabel="height", title="at rest after infinitely many bounces")
+    above.set(ylabel="height (m)", title="at rest after infinitely many bounces")
     below.set(ylabel="energy", xlabel="time (s)", ylim=(0, 1.02))
     below.legend(loc="center right")
     return save(figure, path)

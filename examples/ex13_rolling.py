@@ -1,4 +1,8 @@
-"""A ball that is pushed slides, then rolls, then stops; on an incline it stays, rolls or slips.
+"""
+Sliding, rolling, sticking
+==========================
+
+A ball that is pushed slides, then rolls, then stops; on an incline it stays, rolls or slips.
 
 Sliding friction acts on the slip ``v - r w`` of the lowest point, rolling resistance on the spin:
 two contacts with sets of their own, known load.  Without resistance the ball ends its slide at

@@ -1,4 +1,8 @@
-"""Several contacts at once: balls in a row, a block that rocks, a stack and a table that rest.
+"""
+Impacts, and piles at rest
+==========================
+
+Several contacts at once: balls in a row, a block that rocks, a stack and a table that rest.
 
 - Three equal balls: if the last two touch, Newton's law in Moreau's form sends ``(1, 0, 0)`` to
   ``(-1, 2, 2) / 3``; if they are apart, however little, to ``(0, 0, 1)``.  Both conserve momentum

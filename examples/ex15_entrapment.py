@@ -1,4 +1,8 @@
-"""How U, half-U and half-V wells hold a mass, and which of them hold a dyad.
+"""
+Three kinds of wells
+====================
+
+How U, half-U and half-V wells hold a mass, and which of them hold a dyad.
 
 The paper orders them by strength.  Here masses are shaken by the same noise in wells of the same
 rim and depth.  With little drag and walls that absorb, the order is the paper's: half-V holds
@@ -12,7 +16,8 @@ The dyad's corner is held by half-V wells in the three directions that open a co
 wells in two.  Near the corner the former are the stronger ones; beyond about half a millimetre the
 U wells have overtaken the contact between the balls.
 
-Run it to draw the figure, which takes minutes: ``python examples/ex15_entrapment.py [FOLDER]``.
+Run it to draw the figure, which takes about a minute:
+``python examples/ex15_entrapment.py [FOLDER]``.
 """
 
 import sys
@@ -72,7 +77,7 @@ def times(wells: Sequence[Well]) -> list[float]:
     return [mean_escape_time(well, kick_of(well, 1.0), cells=40) for well in wells]
 
 
-def draw(path: Path, count: int = 300) -> Path:
+def draw(path: Path, count: int = 100) -> Path:
     """Draw wells, paths, times to escape, capture, and the wells of the dyad."""
     from polycorner.pictures.plots import save
     from polycorner.pictures.wells import draw_wells

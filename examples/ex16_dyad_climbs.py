@@ -1,4 +1,8 @@
-"""Two dumbbells nested in each other climb a tilted drum, or descend: it depends on the hand.
+"""
+A dyad climbs
+=============
+
+Two dumbbells nested in each other climb a tilted drum, or descend: it depends on the hand.
 
 A single dumbbell begins to roll where the region of rest ends, derived on paper, and climbs at
 ``omega rho tan(theta)``.  A nested pair does the same, and cannot lose its heading as easily: a

@@ -16,8 +16,8 @@ from matplotlib.lines import Line2D
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from paper_checks.figures.pairs import LETTERS, PAIR, atlas
-from polycorner.pictures.meshes import Isosurface
 from polycorner.pictures.pair_solid import relative_corners, relative_curves
+from polycorner.pictures.sharp import SharpSurface
 from polycorner.pictures.solid_view import View, place_solid
 from polycorner.pictures.solids import forbidden_solid
 from polycorner.polyhedra.tracing import traced
@@ -44,7 +44,7 @@ def motion(contacts: tuple[str, ...]) -> str:
 
 
 @cache
-def solid() -> Isosurface:
+def solid() -> SharpSurface:
     """Return the overlapping relative placements over half a turn of the relative heading."""
     return forbidden_solid(PAIR, RESOLUTION, period=math.pi)
 
@@ -127,9 +127,10 @@ def _caption() -> str:
         "leave them that keep two contacts; dumbbell A (grey) stands still, B is drawn at the "
         "corner and, paler, at two later instants. (c) Relative placements of B as seen from A, "
         "(x, y) in mm and relative heading, over half a turn because the balls of a dumbbell are "
-        f"alike: inside the solid, of volume {surface.volume:.0f} mm² rad, the dumbbells overlap; "
-        f"outside is the polyhedron. On the surface, its {len(names)} corners and the motions "
-        "that join them, in the colours of (a) and (b); thin and dashed is what the solid hides. "
+        f"alike: inside the solid, of volume {surface.curved_volume:.0f} mm² rad, the dumbbells "
+        f"overlap; outside is the polyhedron. On the surface, its {len(names)} corners and the "
+        "motions that join them, in the colours of (a) and (b); thin and dashed is what the solid "
+        "hides. "
         f"With all balls labelled there are {len(found.corners)} corners, {len(found.edges)} "
         f"edges and {len(found.faces)} faces."
     )

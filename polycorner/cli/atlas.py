@@ -8,13 +8,16 @@ from typing import Any
 import click
 
 from polycorner.cli.common import (
-    Command,
     chosen_pair,
     fail,
+    given,
     output_options,
-    pair_options,
+    pair_settings,
     parameters,
+    seed_option,
+    settings_option,
 )
+from polycorner.cli.manner import Command
 from polycorner.cli.report import keys
 from polycorner.cli.search import Search
 
@@ -23,14 +26,19 @@ STARTS = 60
 UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
 # Corners above which a picture is clearer without their numbers.
 CROWDED = 12
-EPILOG = """\b
-Examples:
-  polycorner atlas dyad --plane --json
-  polycorner atlas spheres --count 8
-  polycorner atlas tutorial --out out
+KEPT = """
 Ctrl-C ends a search, keeps it and reports what was found (exit code 130);
 the same command with --resume goes on from there.
 """
+
+
+def examples(*lines: str) -> str:
+    """Return the end of a help text: examples of how a model is called."""
+    shown = "\n".join(f"  polycorner atlas {line}" for line in lines)
+    return f"\b\nExamples:\n{shown}\n"
+
+
+EPILOG = examples("dyad --plane --json", "spheres --count 8", "tutorial --out out") + KEPT
 
 
 @click.group(epilog=EPILOG, no_args_is_help=True)
@@ -40,30 +48,31 @@ def atlas() -> None:
 
 def search_options(command: Command) -> Command:
     """Add ``--seed``, ``--budget`` and ``--resume``, and what every answer is written with."""
+    command = output_options(command)
     for option in (
         click.option("--resume", is_flag=True, help="Go on with the search that was interrupted."),
         click.option("--budget", type=int, default=100_000, help="Edges to walk at most. [100000]"),
-        click.option("--seed", type=int, default=0, help="Seed of the random directions. [0]"),
+        seed_option("the random directions"),
     ):
         command = option(command)
-    return output_options(command)
+    return command
 
 
-@atlas.command()
-@pair_options
+@atlas.command(epilog=examples("dyad --plane --json", "dyad --heading 5 --out out") + KEPT)
+@pair_settings
 @click.option("--plane", is_flag=True, help="The developed plane: the same as --drum inf.")
 @click.option("--heading", type=float, help="Mean heading in the drum, degrees. [0]")
 @search_options
 def dyad(
-    config: Path | None, plane: bool, heading: float | None, as_json: bool, out: Path | None,
-    seed: int, budget: int, resume: bool, **options: float | None,
+    plane: bool, heading: float | None, as_json: bool, out: Path | None, seed: int, budget: int,
+    resume: bool, **options: float | None,
 ) -> None:  # fmt: skip
     """Walk through the placements of two dumbbells: corners, and the motions that join them."""
-    if plane and options["drum"] is not None:
+    if given("plane") and given("drum"):
         fail(f"--plane: expected no --drum beside it; got {options['drum']:g}")
     if plane:
         options["drum"] = math.inf
-    pair = chosen_pair(config, options)
+    pair = chosen_pair(None, options)
     if heading is not None and (pair.is_plane or not math.isfinite(heading)):
         fail(f"--heading: expected an angle in degrees, of a pair in a drum; got {heading:g}")
     degrees = heading or 0.0
@@ -101,7 +110,8 @@ def dyad(
     search.finish(answer, as_json=as_json, draw=draw)
 
 
-@atlas.command()
+@atlas.command(epilog=examples("spheres --count 7", "spheres --count 8 --out out") + KEPT)
+@settings_option
 @click.option("--count", type=int, default=6, help="Number of spheres. [6]")
 @search_options
 def spheres(
@@ -138,7 +148,8 @@ def spheres(
     search.finish(answer, as_json=as_json, draw=draw)
 
 
-@atlas.command()
+@atlas.command(epilog=examples("tutorial", "tutorial --out out") + KEPT)
+@settings_option
 @search_options
 def tutorial(as_json: bool, out: Path | None, seed: int, budget: int, resume: bool) -> None:
     """Walk around a planar region with seven corners, locally convex but not convex."""
@@ -147,7 +158,8 @@ def tutorial(as_json: bool, out: Path | None, seed: int, budget: int, resume: bo
     _planar("tutorial", Tutorial(), as_json, out, seed, budget, resume)
 
 
-@atlas.command()
+@atlas.command(epilog=examples("pinball --seed 1", "pinball --json --out out") + KEPT)
+@settings_option
 @search_options
 def pinball(as_json: bool, out: Path | None, seed: int, budget: int, resume: bool) -> None:
     """Walk around a board with pins and wedges: corners that trap and corners that split."""
@@ -156,12 +168,13 @@ def pinball(as_json: bool, out: Path | None, seed: int, budget: int, resume: boo
     _planar("pinball", Pinball(), as_json, out, seed, budget, resume)
 
 
-@atlas.command()
+@atlas.command(epilog=examples("disks --count 4", "disks --count 2 --torus hexagonal --json"))
+@settings_option
 @click.option("--count", type=int, default=3, help="Number of disks. [3]")
 @click.option(
     "--torus", type=click.Choice(["square", "hexagonal"]), default="square", help="[square]"
 )
-@click.option("--seed", type=int, default=0, help="Seed of the random starts. [0]")
+@seed_option("the random starts")
 @output_options
 def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) -> None:
     """List the critical largest common radii of hard disks on a flat torus."""

@@ -1,13 +1,23 @@
-"""What subcommands share: options of the pair, one line for a mistake, JSON, patience."""
+"""What subcommands share: options, files of settings, one line for a mistake, JSON, files."""
 
 import sys
 import tomllib
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+
+from polycorner.cli.manner import (
+    Command,
+    manner,
+    remark,
+    shows_progress,
+    tell,
+    timed,
+)
+from polycorner.errors import nearest
 
 if TYPE_CHECKING:
     from polycorner.models import DumbbellPair
@@ -27,13 +37,21 @@ HELP = {
     "drum": "Radius of the drum, mm; inf is the plane.",
     "rod_weight": "Weight of a rod, in weights of a ball.",
 }
-
-Command = TypeVar("Command", bound=Callable[..., Any])
+# What is about one call, not about what is computed, has no place in a file.
+NO_SETTINGS = frozenset({"config", "help", "json", "out", "quiet", "resume", "verbose"})
 
 
 def pair_options(command: Command) -> Command:
     """Add the options that describe a pair of dumbbells, and ``--config``."""
-    command = config_option(command)
+    return _pair_numbers(config_option(command))
+
+
+def pair_settings(command: Command) -> Command:
+    """Add the options of a pair, and a ``--config`` that may hold every option."""
+    return _pair_numbers(settings_option(command))
+
+
+def _pair_numbers(command: Command) -> Command:
     for name, _, default in reversed(PARAMETERS):
         flag = f"--{name.replace('_', '-')}"
         command = click.option(flag, type=float, help=f"{HELP[name]} [{default:g}]")(command)
@@ -41,12 +59,39 @@ def pair_options(command: Command) -> Command:
 
 
 def config_option(command: Command) -> Command:
-    """Add ``--config``."""
+    """Add ``--config``, a file that the command reads itself."""
     return click.option(
         "--config",
         type=click.Path(path_type=Path),
         help="TOML file with these names as keys; options override it.",
     )(command)
+
+
+def settings_option(command: Command) -> Command:
+    """Add ``--config``, a file whose keys are the command's options, taken where none is given.
+
+    The command itself gets no argument for it.
+    """
+    return click.option(
+        "--config",
+        type=click.Path(path_type=Path),
+        is_eager=True,
+        expose_value=False,
+        callback=_settle,
+        help="TOML file with these names as keys; options override it.",
+    )(command)
+
+
+def seed_option(of: str) -> Callable[[Command], Command]:
+    """Return what adds ``--seed``, a whole number not below 0."""
+    return click.option("--seed", type=int, default=0, callback=_seed, help=f"Seed of {of}. [0]")
+
+
+def _seed(context: click.Context, parameter: click.Parameter, value: int) -> int:
+    del context, parameter
+    if value < 0:
+        fail(f"--seed: expected a whole number not below 0; got {value}")
+    return value
 
 
 def output_options(command: Command) -> Command:
@@ -61,13 +106,23 @@ def output_options(command: Command) -> Command:
     )
 
 
-def patience(words: str) -> AbstractContextManager[object]:
-    """Show on a terminal that something is going on."""
-    if not sys.stderr.isatty():
-        return nullcontext()
-    from rich.console import Console
+def given(name: str) -> bool:
+    """Whether an option of the command that runs stands on the command line itself."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is click.core.ParameterSource.COMMANDLINE
 
-    return Console(stderr=True).status(words)
+
+@contextmanager
+def patience(words: str) -> Iterator[None]:
+    """Show on a terminal that something is going on; with ``--verbose`` also how long it took."""
+    with timed(words):
+        if manner().verbose or not shows_progress():
+            yield
+            return
+        from rich.console import Console
+
+        with Console(stderr=True).status(words):
+            yield
 
 
 def fail(message: str) -> NoReturn:
@@ -75,39 +130,93 @@ def fail(message: str) -> NoReturn:
     raise click.UsageError(message)
 
 
-def _merged(config: Path | None, options: dict[str, float | None]) -> dict[str, Any]:
-    values: dict[str, Any] = {name: default for name, _, default in PARAMETERS}
-    values |= _read(config) if config is not None else {}
-    return values | {name: value for name, value in options.items() if value is not None}
-
-
 def toml_table(config: Path) -> dict[str, Any]:
     """Return what is in the file of ``--config``."""
     try:
         with config.open("rb") as file:
-            return tomllib.load(file)
+            table = tomllib.load(file)
     except OSError as error:
         fail(f"--config: {config} cannot be read ({error.strerror or error})")
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         fail(f"--config: {config} is no TOML file: {error}")
+    tell(f"read {config}: {', '.join(table) or 'nothing in it'}")
+    return table
 
 
-def _read(config: Path) -> dict[str, Any]:
-    known = {name for name, _, _ in PARAMETERS}
-    renamed = {key.replace("-", "_"): value for key, value in toml_table(config).items()}
-    unknown = sorted(set(renamed) - known)
-    if unknown:
-        expected = ", ".join(name for name, _, _ in PARAMETERS)
-        fail(f"--config: {config}: expected {expected}; got {', '.join(unknown)}")
-    for name, value in renamed.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            fail(f"--config: {config}: {name}: expected a number; got {value!r}")
+def checked_keys(table: Mapping[str, Any], expected: Iterable[str], where: str) -> dict[str, Any]:
+    """Return a table with its keys as they are expected, ``-`` and ``_`` being the same.
+
+    Parameters
+    ----------
+    table : mapping from str
+        What was read.
+    expected : iterable of str
+        The keys there may be, with underscores.
+    where : str
+        What an error begins with, such as ``"--config: run.toml"``.
+
+    Raises
+    ------
+    click.UsageError
+        Naming the first key that is none of these, and the one that may be meant.
+    """
+    known = list(expected)
+    renamed = {key.replace("-", "_"): value for key, value in table.items()}
+    for key in renamed:
+        if key not in known:
+            fail(f"{where}: expected one of {', '.join(known)}; got {nearest(key, known)}")
     return renamed
+
+
+def _settle(context: click.Context, parameter: click.Parameter, config: Path | None) -> None:
+    """Take what a file says for what the command line does not."""
+    del parameter
+    if config is None or context.resilient_parsing:
+        return
+    options = {_key(o): o for o in context.command.params if isinstance(o, click.Option)}
+    known = {key: option for key, option in options.items() if key not in NO_SETTINGS}
+    where = f"--config: {config}"
+    read = checked_keys(toml_table(config), known, where)
+    context.default_map = {
+        known[key].name: _setting(known[key], value, f"{where}: {key}", context)
+        for key, value in read.items()
+    }
+
+
+def _key(option: click.Option) -> str:
+    """Return an option as a key: its long name without dashes at its beginning."""
+    return max(option.opts, key=len).lstrip("-").replace("-", "_")
+
+
+def _setting(option: click.Option, value: Any, where: str, context: click.Context) -> Any:
+    if option.multiple:
+        every = value if isinstance(value, list) else [value]
+        return tuple(_single(option, each, where, context) for each in every)
+    return _single(option, value, where, context)
+
+
+def _single(option: click.Option, value: Any, where: str, context: click.Context) -> Any:
+    kinds: tuple[tuple[Any, Any, str], ...] = (
+        (click.types.BoolParamType, bool, "true or false"),
+        (click.types.IntParamType, int, "a whole number"),
+        (click.types.FloatParamType, int | float, "a number"),
+        (click.ParamType, str, "a text in quotes"),
+    )
+    _, kind, words = next(row for row in kinds if isinstance(option.type, row[0]))
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        fail(f"{where}: expected {words}; got {value!r}")
+    try:
+        return option.type.convert(value, option, context)
+    except click.BadParameter as error:
+        fail(f"{where}: {error.message}")
 
 
 def chosen_pair(config: Path | None, options: dict[str, float | None]) -> "DumbbellPair":
     """Return the pair that the options, over the file, over the defaults, describe."""
-    values = _merged(config, options)
+    values: dict[str, Any] = {name: default for name, _, default in PARAMETERS}
+    values |= _read(config) if config is not None else {}
+    values |= {name: value for name, value in options.items() if value is not None}
+    tell("pair: " + ", ".join(f"{name} = {value:g}" for name, value in values.items()))
     from polycorner.models import DumbbellPair
 
     try:
@@ -119,6 +228,22 @@ def chosen_pair(config: Path | None, options: dict[str, float | None]) -> "Dumbb
                 message = f"--{name.replace('_', '-')}" + message.removeprefix(field)
                 break
         fail(message)
+
+
+def _read(config: Path) -> dict[str, Any]:
+    where = f"--config: {config}"
+    read = checked_keys(toml_table(config), [name for name, _, _ in PARAMETERS], where)
+    for name, value in read.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            fail(f"{where}: {name}: expected a number; got {value!r}")
+    return read
+
+
+def parameters(pair: "DumbbellPair") -> dict[str, Any]:
+    """Return the parameters of a pair under the names of the options."""
+    values: dict[str, Any] = {name: getattr(pair, field) for name, field, _ in PARAMETERS}
+    values["drum"] = "inf" if pair.is_plane else pair.drum_radius
+    return values
 
 
 def json_text(answer: dict[str, Any] | list[Any]) -> str:
@@ -139,19 +264,33 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def prepare(out: Path | None) -> None:
+    """Make the folder of ``--out`` before the work, so that nothing is computed in vain."""
+    if out is not None:
+        with writing(out):
+            out.mkdir(parents=True, exist_ok=True)
+
+
+@contextmanager
+def writing(path: Path, option: str = "--out") -> Iterator[None]:
+    """End the command with one line where a file, or a folder, cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        fail(f"{option}: {path} cannot be written ({error.strerror or error})")
+
+
 def write_answer(answer: dict[str, Any], out: Path, name: str) -> Path:
     """Write an answer as JSON into the folder of ``--out`` and return the file."""
     file = out / name
-    try:
-        out.mkdir(parents=True, exist_ok=True)
+    prepare(out)
+    with writing(out):
         file.write_text(json_text(answer) + "\n", encoding="utf-8")
-    except OSError as error:
-        fail(f"--out: {out} cannot be written ({error.strerror})")
     return file
 
 
 def deliver(
-    answer: dict[str, Any],
+    answer: dict[str, Any] | list[Any],
     show: Callable[[], object],
     written: Iterable[Path] = (),
     *,
@@ -160,14 +299,16 @@ def deliver(
     """Print an answer as JSON, or as ``show`` does and with the files that were written."""
     if as_json:
         click.echo(json_text(answer))
-        return
-    show()
+    else:
+        show()
     for path in written:
-        click.echo(f"wrote {path}")
+        if as_json:
+            tell(f"wrote {path}")
+        elif not manner().quiet:
+            click.echo(f"wrote {path}")
 
 
-def parameters(pair: "DumbbellPair") -> dict[str, Any]:
-    """Return the parameters of a pair under the names of the options."""
-    values: dict[str, Any] = {name: getattr(pair, field) for name, field, _ in PARAMETERS}
-    values["drum"] = "inf" if pair.is_plane else pair.drum_radius
-    return values
+def unfinished(kept: Path) -> None:
+    """Say where unfinished work is kept."""
+    sys.stdout.flush()
+    remark(f"unfinished, kept in {kept}; --resume goes on")

@@ -1,7 +1,6 @@
 """``polycorner drum``: dumbbells in motion in a slowly rotating, tilted drum."""
 
 import math
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,9 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import deliver, fail, output_options, write_answer
+from polycorner.cli.common import (
+    deliver,
+    fail,
+    output_options,
+    prepare,
+    unfinished,
+    write_answer,
+    writing,
+)
 from polycorner.cli.drum_options import drum_options, merged
 from polycorner.cli.drum_report import drum_answer, print_drum
+from polycorner.cli.manner import shows_progress, timed
 
 if TYPE_CHECKING:
     from polycorner.models.drum import DumbbellDrum
@@ -75,11 +83,7 @@ def drum(
     """Simulate dumbbells in a slowly rotating, tilted drum: zigzags, keel effect, dyads."""
     values = merged(config, options)
     film = _film(movie, out)
-    if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            fail(f"--out: {out} cannot be written ({error.strerror})")
+    prepare(out)
     with _named_options():
         model, noise, q = _described(values)
         folder = _folder(model, q, values, noise, out)
@@ -201,25 +205,23 @@ def _run(
 ) -> "DrumRun":  # fmt: skip
     from polycorner.studies.drum_runs import Saving, run
 
-    try:
-        with _bar("simulated", values["duration"], "s") as progress:
-            return run(
-                model,
-                q,
-                values["duration"],
-                dt=values["dt"],
-                noise=noise,
-                saving=Saving(folder, resume=resume),
-                progress=progress,
-            )
-    except OSError as error:
-        fail(f"--out: {folder} cannot be written ({error.strerror})")
+    seconds = values["duration"]
+    with writing(folder), timed("simulating"), _bar("simulated", seconds, "s") as progress:
+        return run(
+            model,
+            q,
+            seconds,
+            dt=values["dt"],
+            noise=noise,
+            saving=Saving(folder, resume=resume),
+            progress=progress,
+        )
 
 
 @contextmanager
 def _bar(words: str, total: float, unit: str) -> "Iterator[Callable[[float], None] | None]":
     """Show a bar with the time left on a terminal, nothing in a pipe."""
-    if not sys.stderr.isatty():
+    if not shows_progress():
         yield None
         return
     from rich.console import Console
@@ -265,7 +267,7 @@ def _finish(
         written.append(_write_film(run, film))
     deliver(answer, lambda: print_drum(answer), written, as_json=as_json)
     if not run.finished:
-        click.echo(f"polycorner: unfinished, kept in {folder}; --resume goes on", err=True)
+        unfinished(folder)
         raise click.exceptions.Exit(130)
     from polycorner.studies.drum_checkpoints import Checkpoint
 
@@ -277,23 +279,18 @@ def _write(run: "DrumRun", answer: dict[str, Any], out: Path) -> list[Path]:
     from polycorner.pictures import plots
     from polycorner.studies.drum_files import save_run
 
-    try:
+    with writing(out), timed("drawing and writing"):
         return [
             write_answer(answer, out, "drum.json"),
             save_run(run, out / "trajectory.nc"),
             plots.save(pictures.draw_history(run), out / "history.png"),
             plots.save(pictures.draw_drum(run), out / "drum.png"),
         ]
-    except OSError as error:
-        fail(f"--out: {out} cannot be written ({error.strerror})")
 
 
 def _write_film(run: "DrumRun", film: Path) -> Path:
     from polycorner.pictures.movies import write_movie
 
-    try:
-        with _bar("movie", 1.0, "") as progress:
-            told = None if progress is None else lambda done, count: progress(done / count)
-            return write_movie(run, film, progress=told)
-    except OSError as error:
-        fail(f"--movie: {film} cannot be written ({error.strerror})")
+    with writing(film, "--movie"), timed("filming"), _bar("movie", 1.0, "") as progress:
+        told = None if progress is None else lambda done, count: progress(done / count)
+        return write_movie(run, film, progress=told)

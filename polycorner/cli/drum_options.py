@@ -6,7 +6,8 @@ from typing import Any
 
 import click
 
-from polycorner.cli.common import Command, config_option, fail, toml_table
+from polycorner.cli.common import checked_keys, config_option, fail, toml_table
+from polycorner.cli.manner import Command
 
 
 @dataclass(frozen=True)
@@ -93,14 +94,12 @@ def merged(config: Path | None, options: dict[str, Any]) -> dict[str, Any]:
 def _read(config: Path) -> dict[str, Any]:
     known = {option.name: option for option in OPTIONS}
     read: dict[str, Any] = {}
-    for key, value in toml_table(config).items():
-        name = key.replace("-", "_")
-        if name not in known:
-            fail(f"--config: {config}: expected one of {', '.join(known)}; got {key}")
+    where = f"--config: {config}"
+    for name, value in checked_keys(toml_table(config), known, where).items():
         try:
             read[name] = _checked(known[name], value)
         except ValueError as error:
-            fail(f"--config: {config}: {key}: expected {error}; got {value!r}")
+            fail(f"{where}: {name}: expected {error}; got {value!r}")
     return read
 
 

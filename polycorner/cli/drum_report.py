@@ -1,9 +1,10 @@
 """What ``polycorner drum`` answers: one JSON object, or a table."""
 
 import math
-import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
+
+from polycorner.cli.manner import console
 
 if TYPE_CHECKING:
     from polycorner.studies.drum_runs import DrumRun
@@ -54,14 +55,12 @@ def _upright(degrees: float) -> float:
 def print_drum(answer: dict[str, Any]) -> None:
     """Print an answer as a table for people."""
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_header=False)
     for name, value in _rows(answer):
         table.add_row(name, value)
-    console.print(table)
+    console().print(table)
 
 
 def _rows(answer: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -1,6 +1,5 @@
 """``polycorner dyad``: the minima of a pair of dumbbells, certified."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +9,14 @@ from polycorner.cli.common import (
     chosen_pair,
     deliver,
     output_options,
-    pair_options,
+    pair_settings,
     parameters,
     patience,
+    prepare,
     write_answer,
+    writing,
 )
+from polycorner.cli.manner import console
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,11 +34,12 @@ Examples:
 
 
 @click.command(epilog=EPILOG)
-@pair_options
+@pair_settings
 @output_options
-def dyad(config: Path | None, as_json: bool, out: Path | None, **options: float | None) -> None:
+def dyad(as_json: bool, out: Path | None, **options: float | None) -> None:
     """Find delta_R, delta_L and G of two dumbbells in a drum, and certify them."""
-    pair = chosen_pair(config, options)
+    pair = chosen_pair(None, options)
+    prepare(out)
     with patience(WORDS):
         from polycorner.studies import dyad_minima
 
@@ -99,30 +102,30 @@ def _write(
     from polycorner.pictures import plots
 
     written = [write_answer(answer, out, "dyad.json")]
-    written += [plots.save(plots.draw_pair(e), out / f"{e.name}.png") for e in entries]
+    with writing(out):
+        written += [plots.save(plots.draw_pair(e), out / f"{e.name}.png") for e in entries]
     longest = 2 * (pair.drum_radius - pair.ball_radius)
     lengths = np.linspace(2 * pair.ball_radius, min(10 * pair.ball_radius, longest), 49)
     rods = sorted({0.25 * pair.ball_radius, pair.rod_radius, 0.8 * pair.ball_radius})
     figure = plots.draw_heading(pair, lengths.tolist(), rods)
-    return [*written, plots.save(figure, out / "heading.png")]
+    with writing(out):
+        return [*written, plots.save(figure, out / "heading.png")]
 
 
 def _print_tables(
     pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]", answer: dict[str, Any]
 ) -> None:
-    from rich.console import Console
-
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    terminal = console()
     where = "the developed plane" if pair.is_plane else f"a drum of radius {pair.drum_radius:g} mm"
-    console.print(
+    terminal.print(
         f"Two dumbbells (l = {pair.length:g}, r = {pair.ball_radius:g}, "
         f"t = {pair.rod_radius:g} mm) in {where}"
     )
-    console.print(_table(entries))
+    terminal.print(_table(entries))
     for entry in entries:
-        console.print(f"{entry.name}: {entry.certificate.verdict.value}")
+        terminal.print(f"{entry.name}: {entry.certificate.verdict.value}")
     computed = abs(entries[0].headings[0])
-    console.print(
+    terminal.print(
         f"heading: computed {computed:.6f} deg, plane {answer['plane_heading_deg']:.6f} deg, "
         f"paper's arctan(r/l) {answer['paper_heading_deg']:.6f} deg"
     )

@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from polycorner.cli.common import (
-    Command,
     chosen_pair,
     deliver,
     fail,
     output_options,
-    pair_options,
+    pair_settings,
     parameters,
     patience,
+    prepare,
+    seed_option,
+    settings_option,
     write_answer,
 )
+from polycorner.cli.manner import Command, console
 
 if TYPE_CHECKING:
     from polycorner.minima.certificate import Certificate
@@ -25,8 +28,17 @@ if TYPE_CHECKING:
 EPILOG = """\b
 Examples:
   polycorner minima dyad
-  polycorner minima dyad --rod 0.3 --starts 5000 --json
   polycorner minima pinball
+"""
+DYAD = """\b
+Examples:
+  polycorner minima dyad --starts 300
+  polycorner minima dyad --rod 0.3 --starts 5000 --json
+"""
+PINBALL = """\b
+Examples:
+  polycorner minima pinball
+  polycorner minima pinball --starts 200 --seed 1 --json
 """
 WORDS = "falling (the first run on a machine compiles for about 20 seconds)"
 
@@ -38,23 +50,17 @@ def minima() -> None:
 
 def fall_options(command: Command) -> Command:
     """Add ``--starts`` and ``--seed``, and what every answer is written with."""
-    command = click.option("--seed", type=int, default=0, help="Seed of the starts. [0]")(command)
-    command = click.option("--starts", type=int, default=1000, help="How many fall. [1000]")(
-        command
-    )
-    return output_options(command)
+    starts = click.option("--starts", type=int, default=1000, help="How many fall. [1000]")
+    return starts(seed_option("the starts")(output_options(command)))
 
 
-@minima.command()
-@pair_options
+@minima.command(epilog=DYAD)
+@pair_settings
 @fall_options
-def dyad(
-    config: Path | None, starts: int, seed: int, as_json: bool, out: Path | None,
-    **options: float | None,
-) -> None:  # fmt: skip
+def dyad(starts: int, seed: int, as_json: bool, out: Path | None, **options: float | None) -> None:
     """Find where two dumbbells rest, up to shifts and relabelling."""
-    pair = chosen_pair(config, options)
-    _check(starts, seed)
+    pair = chosen_pair(None, options)
+    _check(starts, out)
     with patience(WORDS):
         from polycorner.studies.pair_minima import kind_of, pair_minima
 
@@ -62,11 +68,12 @@ def dyad(
     _report("dyad", parameters(pair), found, kind_of, as_json=as_json, out=out)
 
 
-@minima.command()
+@minima.command(epilog=PINBALL)
+@settings_option
 @fall_options
 def pinball(starts: int, seed: int, as_json: bool, out: Path | None) -> None:
     """Find where balls rest on a board with pins, wedges and cups."""
-    _check(starts, seed)
+    _check(starts, out)
     with patience(WORDS):
         import numpy as np
 
@@ -79,11 +86,10 @@ def pinball(starts: int, seed: int, as_json: bool, out: Path | None) -> None:
     _report("pinball", {}, found, lambda c: " ".join(c.active), as_json=as_json, out=out)
 
 
-def _check(starts: int, seed: int) -> None:
+def _check(starts: int, out: Path | None) -> None:
     if starts < 1:
         fail(f"--starts: expected a positive whole number; got {starts}")
-    if seed < 0:
-        fail(f"--seed: expected a whole number not below 0; got {seed}")
+    prepare(out)
 
 
 def _report(
@@ -121,13 +127,10 @@ def _report(
 
 
 def _print(answer: dict[str, Any]) -> None:
-    import sys
-
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    terminal = console()
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title in ("minimum", "energy", "starts", "active", "(p, q, r)"):
         table.add_column(title)
@@ -135,7 +138,7 @@ def _print(answer: dict[str, Any]) -> None:
         signature = "({}, {}, {})".format(*row["signature"])
         active = " ".join(row["active"]) or "none"
         table.add_row(row["name"], f"{row['energy']:.9f}", str(row["count"]), active, signature)
-    console.print(table)
+    terminal.print(table)
     for verdict, count in answer["elsewhere"].items():
-        console.print(f"{count} starts ended elsewhere: {verdict}")
-    console.print(answer["completeness"])
+        terminal.print(f"{count} starts ended elsewhere: {verdict}")
+    terminal.print(answer["completeness"])

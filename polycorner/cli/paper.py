@@ -1,6 +1,5 @@
 """``polycorner paper``: the statements of the paper, checked one by one."""
 
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,7 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from polycorner.cli.common import fail, json_text, output_options
+from polycorner.cli.common import (
+    deliver,
+    fail,
+    json_text,
+    output_options,
+    patience,
+    prepare,
+    settings_option,
+    writing,
+)
+from polycorner.cli.manner import manner, shows_progress, timed
 
 if TYPE_CHECKING:
     from paper_checks.running import Progress, Run
@@ -20,8 +29,8 @@ Examples:
   polycorner paper --section 6 --section C --json
   polycorner paper --slow --out out
   polycorner paper figures heading solid --out out
-Exit status: 0 when every check ran, whatever it found; 1 when a check broke.
-Ctrl-C keeps what was found and says what was not run (exit status 130).
+Exit code 0 when every check ran, whatever it found; 1 when a check broke.
+Ctrl-C keeps what was found and says what was not run (exit code 130).
 `python -m paper_checks` is the same command.
 """
 FIGURES = "figures"
@@ -37,46 +46,36 @@ FIGURES = "figures"
 @click.option(
     "--workers", type=click.IntRange(1, 64), default=2, show_default=True, help="Processes."
 )
-@click.option("--quiet", is_flag=True, help="Print the counts alone, and no progress.")
+@settings_option
 @output_options
 def paper(
-    words: tuple[str, ...], sections: tuple[str, ...], slow: bool, workers: int, quiet: bool,
-    as_json: bool, out: Path | None,
+    words: tuple[str, ...], sections: tuple[str, ...], slow: bool, workers: int, as_json: bool,
+    out: Path | None,
 ) -> None:  # fmt: skip
     """Check the statements of the paper, or draw its figures anew.
 
     Without arguments every claim is checked that does not take long; the folder of --out gets a
-    report to read, report.html, and report.json.
+    report to read, report.html, and report.json.  With --quiet the table is the counts alone.
     """
-    if out is not None:
-        _prepare(out)
+    prepare(out)
     if words[:1] == (FIGURES,):
-        _draw(words[1:], out, sections, slow=slow, as_json=as_json, quiet=quiet)
+        _draw(words[1:], out, sections, slow=slow, as_json=as_json)
         return
-    run = _checked(words, sections, slow=slow, workers=workers, quiet=quiet)
+    run = _checked(words, sections, slow=slow, workers=workers)
     from paper_checks import table
     from paper_checks.records import records
 
-    if as_json:
-        click.echo(json_text(records(run)))
-    else:
-        table.print_run(run, quiet=quiet)
-    problems = table.problems(run)
-    if out is not None:
-        written, undrawn = _write(run, out, slow=slow, quiet=quiet)
-        problems += undrawn
-        if not (as_json or quiet):
-            for path in written:
-                click.echo(f"wrote {path}")
+    written, undrawn = _write(run, out, slow=slow) if out is not None else ([], [])
+    shown = records(run)
+    deliver(shown, lambda: table.print_run(run, quiet=manner().quiet), written, as_json=as_json)
+    problems = [*table.problems(run), *undrawn]
     for problem in problems:
         click.echo(f"polycorner: {problem}", err=True)
     if run.missed or problems:
         raise click.exceptions.Exit(130 if run.missed else 1)
 
 
-def _checked(
-    ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers: int, quiet: bool
-) -> "Run":
+def _checked(ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers: int) -> "Run":
     from dataclasses import replace
 
     from paper_checks import CLAIMS
@@ -87,15 +86,16 @@ def _checked(
     except ValueError as error:
         message = str(error)
         fail(f"--{message}" if message.startswith("section") else message)
-    with _bar("checked", len(claims), quiet=quiet) as progress:
+    with _bar("checked", len(claims)) as progress:
         return replace(run(claims, workers=workers, progress=progress), slow=left_out)
 
 
 @contextmanager
-def _bar(words: str, total: int, *, quiet: bool) -> "Iterator[Progress | None]":
+def _bar(words: str, total: int) -> "Iterator[Progress | None]":
     """Show on a terminal how many are done and which are being worked on."""
-    if quiet or not sys.stderr.isatty():
-        yield None
+    if not shows_progress():
+        with timed(f"{total} to be {words}"):
+            yield None
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -114,39 +114,29 @@ def _bar(words: str, total: int, *, quiet: bool) -> "Iterator[Progress | None]":
 # ----------------------------------------------------------------------------------------- files
 
 
-def _prepare(out: Path) -> None:
-    """Make the folder before the work, so that nothing is computed in vain."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        fail(f"--out: {out} cannot be written ({error.strerror})")
-
-
-def _write(run: "Run", out: Path, *, slow: bool, quiet: bool) -> tuple[list[Path], list[str]]:
+def _write(run: "Run", out: Path, *, slow: bool) -> tuple[list[Path], list[str]]:
     """Write the report and return its files, and why figures of it could not be drawn."""
     from paper_checks.embedding import embedded_figures
     from paper_checks.records import markdown, records
     from paper_checks.report import html_report
 
-    with _telling("drawing the figures", quiet=quiet):
+    with patience("drawing the figures"):
         figures = embedded_figures(run, slow=slow)
     texts = {
         "report.html": html_report(run, figures),
         "report.json": json_text(records(run)) + "\n",
         "report.md": markdown(run),
     }
-    try:
+    with writing(out):
         for name, text in texts.items():
             (out / name).write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail(f"--out: {out} cannot be written ({error.strerror})")
     problems = [f"figure {f.name}: {f.problem}" for f in figures.values() if f.problem]
     return [out / name for name in texts], problems
 
 
 def _draw(
     names: tuple[str, ...], out: Path | None, sections: Sequence[str],
-    *, slow: bool, as_json: bool, quiet: bool,
+    *, slow: bool, as_json: bool,
 ) -> None:  # fmt: skip
     from paper_checks.figures import FIGURES as KNOWN
     from paper_checks.figures import write
@@ -160,7 +150,7 @@ def _draw(
             fail(f"figures: expected {', '.join(KNOWN)}; got {name!r}")
     drawn: list[str] = []
     total = len(names or [f for f in KNOWN.values() if slow or not f.slow])
-    with _bar("drawn", total, quiet=quiet) as told:
+    with writing(out), _bar("drawn", total) as told:
 
         def progress(name: str) -> None:
             drawn.append(name)
@@ -168,19 +158,4 @@ def _draw(
                 told(len(drawn), [])
 
         written = write(out, names or None, slow=slow, progress=progress)
-    if as_json:
-        click.echo(json_text([str(path) for path in written]))
-    elif not quiet:
-        for path in written:
-            click.echo(f"wrote {path}")
-
-
-@contextmanager
-def _telling(words: str, *, quiet: bool) -> Iterator[None]:
-    from polycorner.cli.common import patience
-
-    if quiet:
-        yield
-    else:
-        with patience(words):
-            yield
+    deliver([str(path) for path in written], lambda: None, written, as_json=as_json)

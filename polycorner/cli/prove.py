@@ -1,6 +1,5 @@
 """``polycorner prove``: a place of rest of the pair, proved in interval arithmetic."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +10,12 @@ from polycorner.cli.common import (
     deliver,
     fail,
     output_options,
-    pair_options,
+    pair_settings,
     parameters,
     patience,
+    prepare,
     write_answer,
+    writing,
 )
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ UNITS = {"l": "length l (mm)", "t": "rod radius t (mm)"}
 
 
 @click.command(epilog=EPILOG)
-@pair_options
+@pair_settings
 @click.option("--digits", type=int, default=30, help="Significant digits, 1 to 10000. [30]")
 @click.option(
     "--box",
@@ -50,12 +51,13 @@ UNITS = {"l": "length l (mm)", "t": "rod radius t (mm)"}
 )
 @output_options
 def prove(
-    config: Path | None, digits: int, boxes: tuple[str, ...], minimum: str,
-    as_json: bool, out: Path | None, **options: float | None,
+    digits: int, boxes: tuple[str, ...], minimum: str, as_json: bool, out: Path | None,
+    **options: float | None,
 ) -> None:  # fmt: skip
     """Prove that a place of rest is a local minimum, and enclose it."""
-    pair = chosen_pair(config, options)
+    pair = chosen_pair(None, options)
     region = _region(boxes)
+    prepare(out)
     with patience(WORDS):
         from polycorner.minima.proof import prove as established
         from polycorner.studies import dyad_minima
@@ -71,9 +73,8 @@ def prove(
             "box": {name: list(sides) for name, sides in region.items()},
             **_answer(proof),
         }
-    if out is not None:
-        _write(proof, answer, out)
-    deliver(answer, lambda: _print(answer, proof), as_json=as_json)
+    written = _write(proof, answer, out) if out is not None else []
+    deliver(answer, lambda: _print(answer, proof), written, as_json=as_json)
 
 
 def _print(answer: dict[str, Any], proof: "Proof") -> None:
@@ -122,11 +123,11 @@ def _answer(proof: "Proof") -> dict[str, Any]:
     }
 
 
-def _write(proof: "Proof", answer: dict[str, Any], out: Path) -> None:
+def _write(proof: "Proof", answer: dict[str, Any], out: Path) -> list[Path]:
     written = [write_answer(answer, out, "proof.json")]
     if proof.cells:
         from polycorner.pictures import cells, plots
 
-        written.append(plots.save(cells.draw_cells(proof, UNITS), out / "cells.png"))
-    for path in written:
-        print(f"wrote {path}", file=sys.stderr)
+        with writing(out):
+            written.append(plots.save(cells.draw_cells(proof, UNITS), out / "cells.png"))
+    return written

@@ -1,7 +1,8 @@
 """An atlas as a table in the terminal."""
 
-import sys
 from typing import TYPE_CHECKING, Any
+
+from polycorner.cli.manner import console
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -22,13 +23,10 @@ def keys(counts: dict[int, int]) -> dict[str, int]:
 
 def print_answer(answer: dict[str, Any]) -> None:
     """Print an answer as a table for people."""
-    from rich.console import Console
-
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
     if "critical" in answer:
-        console.print(_critical(answer))
+        console().print(_critical(answer))
     else:
-        _print_atlas(console, answer)
+        _print_atlas(console(), answer)
 
 
 def _critical(answer: dict[str, Any]) -> "Table":
@@ -43,22 +41,22 @@ def _critical(answer: dict[str, Any]) -> "Table":
     return table
 
 
-def _print_atlas(console: "Console", answer: dict[str, Any]) -> None:
+def _print_atlas(terminal: "Console", answer: dict[str, Any]) -> None:
     for key, words in COUNTS.items():
         if key in answer:
             counts = ", ".join(f"{n} of dimension {d}" for d, n in answer[key].items())
-            console.print(f"{words}: {counts}")
+            terminal.print(f"{words}: {counts}")
     if "singular_count" in answer:
-        console.print(
+        terminal.print(
             f"{answer['corners_count']} rigid clusters ({answer['singular_count']} singular), "
             f"{answer['edges_count']} one-dimensional motions"
         )
     if answer["corners"]:
-        console.print(_corners(answer))
-    console.print(f"Euler characteristic: {answer['euler_characteristic']}")
-    console.print(f"complete: {answer['complete']}")
+        terminal.print(_corners(answer))
+    terminal.print(f"Euler characteristic: {answer['euler_characteristic']}")
+    terminal.print(f"complete: {answer['complete']}")
     for note in answer["notes"]:
-        console.print(f"note: {note}")
+        terminal.print(f"note: {note}")
 
 
 def _corners(answer: dict[str, Any]) -> "Table":

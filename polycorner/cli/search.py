@@ -1,7 +1,6 @@
 """One search for an atlas: progress, saving, going on, and the answer."""
 
 import hashlib
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import deliver, fail, write_answer
+from polycorner.cli.common import deliver, fail, prepare, unfinished, write_answer, writing
+from polycorner.cli.manner import shows_progress, timed
 from polycorner.cli.report import keys, print_answer
 
 if TYPE_CHECKING:
@@ -29,17 +29,11 @@ class Search:
     def __init__(
         self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int
     ) -> None:
-        if seed < 0:
-            fail(f"--seed: expected a whole number not below 0; got {seed}")
         if budget < 1:
             fail(f"--budget: expected a positive number of edges; got {budget}")
         self.model, self.parameters, self.out = model, chosen, out
         self.seed, self.budget = seed, budget
-        if out is not None:
-            try:
-                out.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                fail(f"--out: {out} cannot be written ({error.strerror})")
+        prepare(out)
         self.finished, self.interrupted, self.drawn = True, False, True
 
     @property
@@ -113,7 +107,12 @@ class Search:
     @contextmanager
     def patience(self) -> "Iterator[Progress | None]":
         """Show a bar with rate and estimate on a terminal, nothing in a pipe."""
-        if not sys.stderr.isatty():
+        with timed(f"searching {self.model}"), self._bar() as progress:
+            yield progress
+
+    @contextmanager
+    def _bar(self) -> "Iterator[Progress | None]":
+        if not shows_progress():
             yield None
             return
         from rich.console import Console
@@ -204,9 +203,10 @@ class Search:
         written = []
         if self.out is not None:
             file = write_answer(answer, self.out, "atlas.json")
-            written = [file, *(draw(self.out) if draw is not None and self.drawn else [])]
+            with writing(self.out), timed("drawing"):
+                written = [file, *(draw(self.out) if draw is not None and self.drawn else [])]
         deliver(answer, lambda: print_answer(answer), written, as_json=as_json)
         if not self.finished:
-            click.echo(f"polycorner: unfinished, kept in {self.state}; --resume goes on", err=True)
+            unfinished(self.state)
         if self.interrupted:
             raise click.exceptions.Exit(130)

@@ -29,6 +29,7 @@ from polycorner.polyhedra.strata import (
     distances,
     stratum_at,
 )
+from polycorner.tables import Printed, Sheet
 
 if TYPE_CHECKING:
     from polycorner.minima.problem import Energy
@@ -80,7 +81,7 @@ class Condition:
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Printed):
     """A point, and the evidence for or against its being a local minimum.
 
     Everything but the point is computed when asked for, from the problem the certificate keeps.
@@ -270,11 +271,38 @@ class Certificate:
         limit = self.tolerance if tolerance is None else tolerance
         return self.is_minimum and self.residuals().worst <= limit
 
-    def __str__(self) -> str:
-        """Return the certificate as a readable table."""
-        from polycorner.minima.report import certificate_text
+    def explain(self, *, unit: str | None = None) -> str:
+        """Say in a few sentences why the point is, or is not, a local minimum.
 
-        return certificate_text(self)
+        Parameters
+        ----------
+        unit : str, optional
+            Unit of the inequalities, such as ``"mm"``, for the rates that are told.
+
+        Examples
+        --------
+        >>> from polycorner import Manifold, Polyhedron
+        >>> M = Manifold.euclidean("x y")
+        >>> x, y = M.symbols
+        >>> D = Polyhedron(M, {"floor": y, "wall": x})
+        >>> print(certify(D, 2 * y - 3 * x, [0.0, 0.0]).explain(unit="mm").splitlines()[2])
+        Leaving wall, all others kept as they are, lowers the energy at the rate 3 per mm:
+        its multiplier is negative.
+        """
+        from polycorner.minima.explanation import explanation
+
+        return explanation(self, unit)
+
+    def __repr__(self) -> str:
+        """Return the verdict, the point, the energy and the active functions in one line."""
+        from polycorner.minima.report import certificate_line
+
+        return certificate_line(self)
+
+    def _sheet(self) -> Sheet:
+        from polycorner.minima.report import certificate_sheet
+
+        return certificate_sheet(self)
 
 
 def certify(

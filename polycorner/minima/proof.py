@@ -50,6 +50,7 @@ from polycorner.minima.proof_arguments import (
     check_whole,
 )
 from polycorner.minima.symmetry import declared
+from polycorner.tables import Printed, Sheet
 
 if TYPE_CHECKING:
     import sympy
@@ -64,7 +65,7 @@ BOX_DIGITS = 3  # more than those of the enclosures, for the box that contains t
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
+class Proof(Printed):
     """What interval arithmetic says about a certificate; see the module for the theorem.
 
     Attributes
@@ -166,11 +167,16 @@ class Proof:
         digits = min(self.digits, DOUBLE_DIGITS) if self.cells else self.digits
         return decimals(min(found), max(found), digits)
 
-    def __str__(self) -> str:
-        """Return the proof as a readable table."""
-        from polycorner.minima.proof_report import proof_text
+    def __repr__(self) -> str:
+        """Return whether it is proved, and which conditions are not."""
+        from polycorner.minima.proof_report import proof_line
 
-        return proof_text(self)
+        return proof_line(self)
+
+    def _sheet(self) -> Sheet:
+        from polycorner.minima.proof_report import proof_sheet
+
+        return proof_sheet(self)
 
 
 def prove(

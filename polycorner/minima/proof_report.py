@@ -1,34 +1,64 @@
-"""Proofs as readable text."""
+"""Proofs as tables."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from polycorner.tables import Sheet, Table, facts, titled, units
+
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from polycorner.minima.proof import Proof
+    from polycorner.minima.proof_arguments import Interval
 
 MOST_CELLS = 5
 
 
-def proof_text(p: "Proof") -> str:
-    """Return a proof as a table of its conditions and enclosures."""
+def proof_line(p: "Proof") -> str:
+    """Return a proof in one line."""
+    left = ", ".join(f"{name} {status}" for name, status in p.conditions.items())
+    return "Proof(proved)" if p.proved else f"Proof(not proved: {left})"
+
+
+def proof_sheet(p: "Proof") -> Sheet:
+    """Return a proof as tables of its conditions and its enclosures."""
     modulo = f", modulo {'; '.join(p.symmetry)}" if p.symmetry else ""
     verdict = f"strict local minimum{modulo}: proved" if p.proved else "not proved"
-    rows = [("verdict", verdict), ("active", ", ".join(p.active) or "none")]
-    for name, status in p.conditions.items():
-        rows.append((name, f"{status}: {p.reasons[name]}"))
-    if p.parameters:
-        rows += _parameters(p)
-    rows += [(name, f"[{lower}, {upper}]") for name, (lower, upper) in p.enclosures.items()]
-    width = max(len(name) for name, _ in rows)
-    return "\n".join(f"{name:<{width}}  {text}" for name, text in rows)
+    conditions = [(name, f"{status}: {p.reasons[name]}") for name, status in p.conditions.items()]
+    return Sheet(
+        "Proof",
+        (
+            facts(
+                (
+                    ("verdict", verdict),
+                    ("active", ", ".join(p.active) or "none"),
+                    *conditions,
+                    *_parameters(p),
+                )
+            ),
+            Table(("enclosed", "lower bound", "upper bound"), tuple(_enclosures(p)), (1, 2)),
+            units(p.certificate.problem.polyhedron.manifold.periods) if p.enclosures else "",
+        ),
+    )
 
 
-def _parameters(p: "Proof") -> list[tuple[str, str]]:
-    sides = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in p.parameters.items())
+def _enclosures(p: "Proof") -> Iterator[tuple[str, str, str]]:
+    manifold = p.certificate.problem.polyhedron.manifold
+    periods = dict(zip(manifold.names, manifold.periods, strict=True))
+    for name, (lower, upper) in p.enclosures.items():
+        yield titled(name, periods.get(name, float("inf"))), lower, upper
+
+
+def _parameters(p: "Proof") -> Iterator[tuple[str, str]]:
+    if not p.parameters:
+        return
     share = f"{100 * p.proved_fraction:.6g} % proved in {len(p.cells)} cells"
-    rows = [("parameters", f"{sides}: {share}")]
+    yield "parameters", f"{_sides(p.parameters)}: {share}"
     for cell in p.undecided[:MOST_CELLS]:
-        where = ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in cell.parameters.items())
-        rows.append(("undecided", f"{where}: {cell.reason}"))
+        yield "undecided", f"{_sides(cell.parameters)}: {cell.reason}"
     if len(p.undecided) > MOST_CELLS:
-        rows.append(("undecided", f"and {len(p.undecided) - MOST_CELLS} more cells"))
-    return rows
+        yield "undecided", f"and {len(p.undecided) - MOST_CELLS} more cells"
+
+
+def _sides(box: "Mapping[str, Interval]") -> str:
+    return ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in box.items())

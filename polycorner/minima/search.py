@@ -20,6 +20,7 @@ from polycorner.minima.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.tables import Printed, Sheet
 
 if TYPE_CHECKING:
     from polycorner.minima.problem import Energy
@@ -34,7 +35,7 @@ CHECKED = 3  # starts at which a symmetry is checked
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Minima(Sequence[Certificate]):
+class Minima(Printed, Sequence[Certificate]):
     """The minima that a search found, as a sequence of certificates, the lowest first.
 
     Attributes
@@ -92,15 +93,10 @@ class Minima(Sequence[Certificate]):
         dots = ", ..." if len(self) > 5 else ""
         return f"Minima({len(self)} from {self.fallen} starts; energies {energies}{dots})"
 
-    def __str__(self) -> str:
-        """Return a table of the minima, and what is said of completeness."""
-        rows = [("energy", "starts", "(p, q, r)", "verdict", "active")]
-        for c, count in zip(self, self.counts, strict=True):
-            active = " ".join(c.active) or "-"
-            rows.append((f"{c.energy:.9g}", str(count), str(c.signature()), c.verdict.name, active))
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-        return "\n".join([*lines, self.completeness])
+    def _sheet(self) -> Sheet:
+        from polycorner.minima.report import minima_sheet
+
+        return minima_sheet(self)
 
 
 def minima(

@@ -32,6 +32,7 @@ from polycorner.minima.parametric import (
 )
 from polycorner.minima.verdicts import Verdict
 from polycorner.polyhedra.strata import local_pieces
+from polycorner.tables import Printed, Sheet
 
 if TYPE_CHECKING:
     import sympy
@@ -44,7 +45,7 @@ CLOSE = 1e-8  # a relative step from which the next one of Newton's method is th
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(Printed):
     """Derivatives of a point of rest by ``p`` parameters; see :func:`sensitivity`.
 
     Attributes
@@ -138,16 +139,15 @@ class Sensitivity:
             msg = f"{argument}: expected names among {listed}; got {', '.join(unknown)}"
             raise ValueError(msg)
 
-    def __str__(self) -> str:
-        """Return the derivatives as a table, a column for each parameter."""
-        coordinates = self.certificate.problem.polyhedron.manifold.names
-        rows = dict(zip(coordinates, self.point, strict=True)) | {"energy": self.energy}
-        rows |= {f"multiplier {name}": row for name, row in self.multipliers.items()}
-        width = max(len(name) for name in rows)
-        lines = [" " * width + "".join(f"  {'d/d ' + name:>16}" for name in self.rates)]
-        for name, row in rows.items():
-            lines.append(f"{name:<{width}}" + "".join(f"  {x:16.6g}" for x in row))
-        return "\n".join(lines)
+    def __repr__(self) -> str:
+        """Return what moves, and with which parameters."""
+        coordinates = ", ".join(self.certificate.problem.polyhedron.manifold.names)
+        return f"Sensitivity(of {coordinates} by {', '.join(self.rates)})"
+
+    def _sheet(self) -> Sheet:
+        from polycorner.minima.report import sensitivity_sheet
+
+        return sensitivity_sheet(self)
 
 
 def sensitivity(

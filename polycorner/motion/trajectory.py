@@ -1,6 +1,6 @@
 """A motion as it was recorded: states, contacts, energies, and where the energy went."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,17 +10,19 @@ from numpy.typing import NDArray
 from polycorner.geometry.manifold import Array
 from polycorner.motion.engine import Effort
 from polycorner.motion.events import Event, EventKind
+from polycorner.tables import Printed, Sheet, Table, facts, listed, number, titled
 
 if TYPE_CHECKING:
     from polycorner.motion.scene import Herd
     from polycorner.motion.system import System
     from polycorner.polyhedra.strata import Stratum
 
+ANGLES = "Angles are in radians, times in s, all else in the units of the system."
 Touch = tuple[tuple[int, ...], str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(Printed):
     """A motion, recorded at ``T`` instants and at every event between them.
 
     Attributes
@@ -68,6 +70,16 @@ class Trajectory:
     def __len__(self) -> int:
         """Return the number of recorded instants."""
         return len(self.times)
+
+    def __repr__(self) -> str:
+        """Return what was recorded, in one line."""
+        bodies = f"{self.q.shape[1]} {'body' if self.q.shape[1] == 1 else 'bodies'}"
+        span = f"{self.times[0]:g} to {self.times[-1]:g} s in {len(self)} instants"
+        return f"Trajectory({bodies}; {span}; {len(self.events)} events)"
+
+    def _sheet(self) -> Sheet:
+        tables = (_energies(self), _events(self), _last(self))
+        return Sheet("Trajectory", (facts(_summary(self)), *tables, ANGLES))
 
     @property
     def converged(self) -> bool:
@@ -120,3 +132,47 @@ class Trajectory:
             msg = f"time: expected one from {self.times[0]:g} to {self.times[-1]:g}; got {time:g}"
             raise ValueError(msg)
         return int(np.searchsorted(self.times, time, side="right")) - 1
+
+
+def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
+    effort = path.effort
+    yield "bodies", f"{path.q.shape[1]}, of {path.q.shape[2]} coordinates"
+    yield "time", f"{path.times[0]:g} s to {path.times[-1]:g} s, in {len(path)} instants"
+    yield "step", f"{path.dt:g} s"
+    solved = "all solved" if path.converged else f"{effort.unconverged} islands not solved"
+    yield "steps", f"{effort.steps}, {solved}; worst residual {effort.residual:.1e}"
+    yield "deepest overlap", f"{number(path.max_penetration, 3)} (unit of the gaps)"
+    yield "energy audit", f"{number(path.audit, 3)} of the energy that was moved"
+    present = path.present[-1]
+    at_rest = int((path.rests[-1] & present).sum())
+    yield "at the end", f"{int(present.sum())} present, {at_rest} of them at rest"
+
+
+def _energies(path: Trajectory) -> Table:
+    rows = [("kinetic", *_ends(path.kinetic)), ("potential", *_ends(path.potential))]
+    rows += [(f"dissipated by {cause}", *_ends(lost)) for cause, lost in path.dissipated.items()]
+    rows += [(f"work of {cause}", *_ends(done)) for cause, done in path.work.items()]
+    return Table(("energy", "at first", "at last"), tuple(rows), (1, 2))
+
+
+def _ends(values: Array) -> tuple[str, str]:
+    return number(values[0], 6), number(values[-1], 6)
+
+
+def _events(path: Trajectory) -> Table:
+    counts = [(kind.sentence, len(path.of_kind(kind))) for kind in EventKind]
+    rows = tuple((words, str(count)) for words, count in counts if count)
+    return Table(("event", "times"), rows, (1,))
+
+
+def _last(path: Trajectory) -> Table:
+    from polycorner.motion.system import System
+
+    if isinstance(path.system, System):
+        manifold = path.system.manifold
+        titles = list(map(titled, manifold.names, manifold.periods))
+    else:
+        titles = list(path.system.body.formulation.coordinates)
+    rows = ((str(k), *(number(x, 6) for x in q)) for k, q in enumerate(path.q[-1]))
+    columns = tuple(range(len(titles) + 1))
+    return listed("Placement at last", ("body", *titles), rows, path.q.shape[1], columns)

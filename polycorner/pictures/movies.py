@@ -5,6 +5,8 @@ import os
 from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
+from subprocess import PIPE, Popen
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ Picture = NDArray[np.uint8]
 FRAMES = 300  # at most
 RATE = 20  # frames per second
 DOTS = 110  # per inch
+QUALITY = 15  # of H.264: constant rate factor, lower is better
 SUFFIXES = (".mp4", ".gif")
 
 
@@ -82,6 +85,8 @@ def write_movie(
     ------
     ValueError
         See :func:`check_movie`.
+    OSError
+        If the file cannot be written, as on a full disk; nothing is left of it then.
     """
     check_movie(path)
     target = Path(path)
@@ -124,19 +129,35 @@ def _pictures(view: DrumView, numbers: list[int]) -> Iterator[Picture]:
 
 
 def _write_mp4(pictures: Iterator[Picture], path: Path, rate: int) -> None:
+    """Write an MP4 file through ffmpeg, which is asked whether all went well."""
     import imageio_ffmpeg
 
     first = next(pictures)
-    size = (first.shape[1], first.shape[0])
-    writer = imageio_ffmpeg.write_frames(
-        str(path), size, fps=rate, macro_block_size=2, quality=7, ffmpeg_log_level="error"
-    )
-    writer.send(None)
-    try:
-        for picture in chain([first], pictures):
-            writer.send(np.ascontiguousarray(picture))
-    finally:
-        writer.close()
+    size = f"{first.shape[1]}x{first.shape[0]}"
+    raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(rate), "-i", "-")
+    coded = ("-an", "-c:v", "libx264", "-crf", str(QUALITY), "-pix_fmt", "yuv420p")
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", *raw, *coded, str(path)]
+    with TemporaryFile() as said, Popen(command, stdin=PIPE, stderr=said) as encoder:
+        pipe: Any = encoder.stdin
+        try:
+            for picture in chain([first], pictures):
+                pipe.write(np.ascontiguousarray(picture))
+            pipe.close()
+            encoder.wait()
+        except BrokenPipeError:
+            encoder.wait()  # it gave up: what it said tells why
+        except BaseException:
+            encoder.kill()
+            raise
+        if encoder.returncode:
+            said.seek(0)
+            raise OSError(_reason(said.read().decode(errors="replace")))
+
+
+def _reason(said: str) -> str:
+    """Return the last line of what ffmpeg said, without the part that said it."""
+    lines = said.strip().splitlines() or ["ffmpeg stopped without a word"]
+    return lines[-1].rpartition("] ")[2]
 
 
 def _write_gif(pictures: Iterator[Picture], path: Path, rate: int) -> None:

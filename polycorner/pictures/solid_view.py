@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.geometry.manifold import Array
 
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 # Red, green and blue of the solid and of the faces at which it is cut.
 _SOLID, _CUT = (0.80, 0.84, 0.88), (0.97, 0.94, 0.86)
@@ -69,7 +70,8 @@ def draw_solid(
     Parameters
     ----------
     mesh : trimesh.Trimesh
-        Anything with ``vertices (V, 3)`` and outward ``faces (F, 3)``.
+        Anything with ``vertices (V, 3)`` and outward ``faces (F, 3)``; shading is sharp between
+        smooth parts, given as ``face_attributes["part"]`` ``(F,)``.
     curves : sequence of (label, (k, 3) array), optional
         Polylines, broken at rows of NaN; those with the same label share colour and key.
     points : (m, 3) array_like, optional
@@ -131,7 +133,7 @@ def place_solid(
     box = _Box(mesh, view or View())
     depth = _Depth(mesh, box)
     _frame(axes, box, names)
-    _draw_faces(axes, mesh, caps, box)
+    _draw_faces(axes, mesh, np.zeros(len(mesh.faces), bool) if caps is None else caps, box)
     _draw_curves(axes, curves, palette, box, depth)
     places = np.array([point for _, point in marks], dtype=np.float64).reshape(-1, 3)
     _draw_points(axes, places, [label for label, _ in marks], box, depth)
@@ -142,7 +144,7 @@ def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
 
     Points may lie behind the mesh by 2.5 times the median side of a face (at most 0.05 of the
     longer horizontal side of the box), since the inverted edges of the true surface lie beneath
-    the mesh.  Rows of NaN are not visible.
+    it; by one side where the mesh has parts, and so edges.  Rows of NaN are not visible.
     """
     return _Depth(mesh, _Box(mesh, view)).sees(np.asarray(points, dtype=np.float64))
 
@@ -178,8 +180,9 @@ class _Depth:
         self.box = box
         corners = box.seen(np.asarray(mesh.vertices))[np.asarray(mesh.faces)]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
-        self.slack = min(2.5 * float(np.median(sides)), 0.05)
-        self.pixel = self.slack / 6
+        sharp = _parts(mesh) is not None
+        self.slack = min((1.0 if sharp else 2.5) * float(np.median(sides)), 0.05)
+        self.pixel = self.slack / (3 if sharp else 6)
         # Large faces need many samples, small ones few; pixels at the border stay empty.
         counts = np.ceil(1.5 * sides.max(axis=1) / self.pixel).astype(int)
         self.low = corners[..., :2].min(axis=(0, 1)) - 1.5 * self.pixel
@@ -189,6 +192,10 @@ class _Depth:
             samples = np.einsum("sk,fki->fsi", _barycentric(count), corners[counts == count])
             flat = samples.reshape(-1, 3)
             np.maximum.at(self.nearest, self._pixels(flat), flat[:, 2])
+        if sharp:  # beside an inverted edge, what is steep and near does not hide it
+            from scipy.ndimage import minimum_filter
+
+            self.nearest = minimum_filter(self.nearest, 3)
 
     def _pixels(self, seen: Array) -> tuple[Any, Any]:
         place = np.floor((seen[:, :2] - self.low) / self.pixel)
@@ -225,16 +232,19 @@ def _frame(axes: Any, box: _Box, names: Sequence[str]) -> None:
     axes.grid(visible=False)
 
 
-def _draw_faces(axes: Any, mesh: Faces, caps: Mask | None, box: _Box) -> None:
+def _draw_faces(axes: Any, mesh: Faces, cut: Mask, box: _Box) -> None:
     faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
-    cut = np.zeros(len(faces), dtype=bool) if caps is None else np.asarray(caps)
-    # A cap shares no vertex with what it cuts: its rim is sharp.
-    normals = _smooth_normals(box.seen(vertices)[faces], faces + len(vertices) * cut[:, None])
+    # A cap shares no vertex with what it cuts, nor a part with another: rims and edges are sharp.
+    smooth = np.zeros(len(cut)) if (parts := _parts(mesh)) is None else parts
+    piece = np.unique(np.stack([cut, smooth], axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    own = np.unique(faces + len(vertices) * piece[:, None], return_inverse=True)[1]
+    corners = box.seen(vertices)[faces]
+    normals = _smooth_normals(corners, own.reshape(faces.shape))
     lights = np.array([_KEY_LIGHT, _FILL_LIGHT])
     directions = lights / np.linalg.norm(lights, axis=1)[:, None]
     shade = 0.5 + np.clip(normals @ directions.T, 0, 1) @ np.array([0.4, 0.2])
     colours = np.clip(shade[:, None] * np.where(cut[:, None], _CUT, _SOLID), 0, 1)
-    front = normals[:, 2] > -0.2
+    front = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] > 0
     drawn = (vertices * box.factors)[faces[front]]
     shown = colours[front]
     surface = Poly3DCollection(drawn, facecolors=shown, edgecolors=shown, linewidths=0.3, zorder=1)
@@ -242,7 +252,12 @@ def _draw_faces(axes: Any, mesh: Faces, caps: Mask | None, box: _Box) -> None:
     axes.add_collection3d(surface)
 
 
-def _smooth_normals(corners: Array, faces: NDArray[np.int64]) -> Array:
+def _parts(mesh: Faces) -> Indices | None:
+    found: Indices | None = getattr(mesh, "face_attributes", {}).get("part")
+    return found
+
+
+def _smooth_normals(corners: Array, faces: Indices) -> Array:
     """Return unit normals of faces, averaged with those of neighbours that are nearly parallel.
 
     Faces of marching cubes are of very different sizes; each is shaded like its surroundings.
@@ -250,7 +265,7 @@ def _smooth_normals(corners: Array, faces: NDArray[np.int64]) -> Array:
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sizes = np.maximum(np.linalg.norm(areas, axis=1), np.finfo(np.float64).tiny)[:, None]
     normals = np.asarray(areas / sizes)
-    for _ in range(2):
+    for _ in range(4):
         total = np.zeros((faces.max() + 1, 3))
         for k in range(3):
             np.add.at(total, faces[:, k], sizes * normals)
@@ -285,12 +300,9 @@ def _draw_curves(
 
 
 def _settled(seen: Mask) -> Mask:
-    """Return visibility along a curve by the majority of a tenth of it, of five points at least.
-
-    Inverted edges lie a little beneath the mesh, where it flickers.
-    """
+    """Return visibility along a curve by the majority of a tenth of it, of five points at least."""
     side = max(2, len(seen) // 20)
-    padded = np.pad(seen.astype(int), side, mode="edge")
+    padded = np.pad(seen.astype(int), side, mode="reflect")
     return np.asarray(np.convolve(padded, np.ones(2 * side + 1), mode="valid") > side)
 
 

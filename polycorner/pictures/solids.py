@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from polycorner.geometry.manifold import Array
 from polycorner.models.dumbbells import DumbbellPair
-from polycorner.pictures.meshes import FEWEST_CELLS, Function, Isosurface, isosurface
+from polycorner.pictures.grids import FEWEST_CELLS, Function
+from polycorner.pictures.sharp import SharpSurface, sharp_surface
+from polycorner.pictures.sharp_strata import Gaps
 
 
 def relative_placements(
@@ -94,6 +96,23 @@ def relative_gap(pair: DumbbellPair, *, mean_heading: float | None = None) -> Fu
     return gap
 
 
+def relative_gaps(pair: DumbbellPair, *, mean_heading: float | None = None) -> Gaps:
+    """Return the nine gaps (mm) as a function of relative placements ``(N, 3)`` and an order.
+
+    It returns the values ``(N, 9)`` and, for order 1, the gradients ``(N, 9, 3)`` by
+    ``(x, y, delta)``.
+    """
+    origin = relative_placements(pair, np.zeros(3), mean_heading=mean_heading)
+    turn = relative_placements(pair, np.eye(3), mean_heading=mean_heading) - origin
+
+    def gaps(points: Array, order: int) -> tuple[Array, ...]:
+        q = relative_placements(pair, points, mean_heading=mean_heading)
+        values, *gradients = pair.polyhedron.evaluate(q, order)
+        return values, *(gradient @ turn.T for gradient in gradients)  # q depends linearly on them
+
+    return gaps
+
+
 def forbidden_solid(
     pair: DumbbellPair,
     resolution: int | Sequence[int] = 96,
@@ -101,12 +120,17 @@ def forbidden_solid(
     period: float = math.tau,
     start: float | None = None,
     mean_heading: float | None = None,
-) -> Isosurface:
+) -> SharpSurface:
     """Return the solid of relative placements ``(x, y, delta)`` at which two dumbbells overlap.
 
-    Its volume is in mm^2 rad.  In the plane it is all that is forbidden up to congruence; in a drum
-    it is a section at fixed mean heading, where moving both dumbbells along or around the drum
-    changes nothing.  If the dumbbells can reach around the drum, the azimuth is a periodic axis.
+    Faces are single contacts, mesh edges follow the curves of two contacts, and corners, where
+    three and more contacts close, are vertices
+    (:func:`~polycorner.pictures.sharp.sharp_surface`); labels are positions in
+    ``pair.polyhedron.names``.  Its volume is in mm^2 rad.
+
+    In the plane it is all that is forbidden up to congruence; in a drum it is a section at fixed
+    mean heading, where moving both dumbbells along or around the drum changes nothing.  If the
+    dumbbells can reach around the drum, the azimuth is a periodic axis.
 
     Parameters
     ----------
@@ -139,11 +163,11 @@ def forbidden_solid(
     if isinstance(resolution, int | np.integer):
         turn = max(FEWEST_CELLS, resolution // 2) if half else resolution
         resolution = (resolution, resolution, turn)
-    gap = relative_gap(pair, mean_heading=mean_heading)
+    gaps = relative_gaps(pair, mean_heading=mean_heading)
     along = 1.02 * (pair.length + 2 * pair.ball_radius)
     across, around = _lateral_reach(pair)
     bounds = ((-across, across), (-along, along), (low, low + period))
-    return isosurface(gap, bounds, resolution, (around, False, True))
+    return sharp_surface(gaps, bounds, resolution, (around, False, True))
 
 
 def _lateral_reach(pair: DumbbellPair) -> tuple[float, bool]:

@@ -1,6 +1,6 @@
 """The atlas of a polyhedron: its corners, edges and faces, and how they hang together."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -10,6 +10,7 @@ from polycorner.geometry.manifold import Array
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.polyhedra.walks import End
+from polycorner.tables import Printed, Sheet, Table, facts, listed, names, number, titled, units
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -131,7 +132,7 @@ class Face:
 
 
 @dataclass(frozen=True)
-class Skeleton:
+class Skeleton(Printed):
     """Corners, edges and faces of a polyhedron modulo its symmetry; see :func:`skeleton`.
 
     Attributes
@@ -169,6 +170,14 @@ class Skeleton:
         counts = f"{len(self.corners)} corners, {len(self.edges)} edges, {len(self.faces)} faces"
         return f"Skeleton({counts}; {self.complete.value})"
 
+    def _sheet(self) -> Sheet:
+        notes = (f"Note: {note}" for note in self.notes)
+        tables = (_corner_table(self), _edge_table(self), _face_table(self))
+        return Sheet(
+            "Skeleton",
+            (facts(_counts(self)), *tables, *notes, units(self.polyhedron.manifold.periods)),
+        )
+
     @property
     def euler_characteristic(self) -> int | None:
         """Corners minus edges plus the Euler characteristics of the faces.
@@ -201,3 +210,67 @@ class Skeleton:
             if None not in edge.ends:
                 graph.add_edge(*edge.ends, active=edge.active, length=edge.length, position=k)
         return graph
+
+
+MOST_COORDINATES = 6  # of a corner, in a row of its table
+
+
+def _counts(found: Skeleton) -> Iterator[tuple[str, str]]:
+    yield "corners", str(len(found.corners))
+    yield "edges", str(len(found.edges))
+    yield "faces", str(len(found.faces))
+    counts = (f"{n} of dimension {d}" for d, n in sorted(found.components.items()))
+    yield "components", ", ".join(counts) or "none"
+    if found.euler_characteristic is not None:
+        yield "Euler characteristic", str(found.euler_characteristic)
+    yield "complete", found.complete.value
+
+
+def _corner_table(found: Skeleton) -> Table:
+    manifold = found.polyhedron.manifold
+    shown = manifold.dimension if manifold.dimension <= MOST_COORDINATES else 0
+    rows = (
+        (
+            str(k),
+            names(corner.active),
+            str(corner.rank),
+            corner.local_type.name + (", singular" if corner.singular else ""),
+            *(number(x, 6) for x in corner.point[:shown]),
+        )
+        for k, corner in enumerate(found.corners)
+    )
+    coordinates = map(titled, manifold.names[:shown], manifold.periods)
+    head = ("corner", "active", "rank", "type", *coordinates)
+    return listed("Corners", head, rows, len(found.corners), (0, 2, *range(4, len(head))))
+
+
+def _edge_table(found: Skeleton) -> Table:
+    rows = (
+        (
+            str(k),
+            names(edge.active),
+            *(kind.name.lower() if at is None else str(at) for at, kind in _ends(edge)),
+            number(edge.length, 6),
+        )
+        for k, edge in enumerate(found.edges)
+    )
+    head = ("edge", "active", "from", "to", "length (scale units)")
+    return listed("Edges", head, rows, len(found.edges), (0, 4))
+
+
+def _ends(edge: Edge) -> Iterator[tuple[int | None, End]]:
+    yield from zip(edge.ends, edge.kinds, strict=True)
+
+
+def _face_table(found: Skeleton) -> Table:
+    rows = (
+        (
+            str(k),
+            names(face.active) or "-",
+            "; ".join(" ".join(map(str, curve)) for curve in face.boundary),
+            "yes" if face.closed else "no",
+        )
+        for k, face in enumerate(found.faces)
+    )
+    head = ("face", "active", "edges around it", "closed")
+    return listed("Faces", head, rows, len(found.faces), (0,))

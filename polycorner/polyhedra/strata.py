@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from polycorner.geometry.manifold import Array
 from polycorner.polyhedra.cones import inward_direction, rank
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+from polycorner.tables import Printed, Sheet, facts, names
 
 TOLERANCE = 1e-8
 RANK_TOLERANCE = 1e-6
@@ -27,7 +28,7 @@ class LocalType(Enum):
 
 
 @dataclass(frozen=True)
-class Stratum:
+class Stratum(Printed):
     """The face of a polyhedron that a point lies on.
 
     Attributes
@@ -57,6 +58,24 @@ class Stratum:
     def chirality(self) -> str | None:
         """The model's ``chirality`` annotation, or None."""
         return self.annotations.get("chirality")
+
+    def __repr__(self) -> str:
+        """Return active functions, dimension and type in one line."""
+        active = names(self.active, 40) or "nothing"
+        return f"Stratum({self.local_type.name} of dimension {self.dimension}; on {active})"
+
+    def _sheet(self) -> Sheet:
+        pieces = "; ".join(", ".join(piece) for piece in self.pieces)
+        several = len(self.pieces) > 1
+        rows = [
+            ("local type", f"{self.local_type.name}: {self.local_type.value}"),
+            ("dimension", str(self.dimension)),
+            ("rank", str(self.rank)),
+            ("active", ", ".join(self.active) or "none"),
+            *([("branches", pieces)] if several else []),
+            *((name, value or "none") for name, value in self.annotations.items()),
+        ]
+        return Sheet("Stratum", (facts(rows),))
 
 
 def stratum_at(

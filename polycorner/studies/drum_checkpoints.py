@@ -9,16 +9,16 @@ import contextlib
 import hashlib
 import os
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from polycorner.motion.engine import Engine
-from polycorner.motion.events import Event, EventKind
 from polycorner.motion.recorder import Recorder
-from polycorner.motion.trajectory import Touch
+from polycorner.studies.motion_files import event_table, read_events, read_touches, touch_table
+from polycorner.studies.sealed import write_whole
 
 FORMAT = 1
 STATE = "state.npz"
@@ -28,78 +28,6 @@ ENGINE = "engine."
 def contact_names(engine: Engine) -> tuple[str, ...]:
     """Return the names of all contacts that can occur; files have numbers instead."""
     return (*engine.herd.body.contacts, *engine.pair_contacts)
-
-
-def touch_table(touching: Sequence[Sequence[Touch]], names: Sequence[str]) -> dict[str, Any]:
-    """Return contacts as columns: instant, bodies (-1: none), contact, force."""
-    rows = [
-        (index, bodies[0], bodies[1] if len(bodies) > 1 else -1, names.index(contact), force)
-        for index, touches in enumerate(touching)
-        for bodies, contact, force in touches
-    ]
-    whole = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 4)
-    return {"touch": whole, "touch_force": np.array([row[4] for row in rows], dtype=np.float64)}
-
-
-def read_touches(table: Any, names: Sequence[str], count: int) -> list[tuple[Touch, ...]]:
-    """Return contacts by instant from :func:`touch_table`."""
-    found: list[list[Touch]] = [[] for _ in range(count)]
-    for (index, i, j, which), force in zip(
-        table["touch"].tolist(), table["touch_force"].tolist(), strict=True
-    ):
-        found[index].append(((i,) if j < 0 else (i, j), names[which], force))
-    return [tuple(touches) for touches in found]
-
-
-def event_table(events: Iterable[Event], names: Sequence[str]) -> dict[str, Any]:
-    """Return events as columns: kind, bodies (-1: none), contact (-1: none); time, impulse."""
-    listed = list(events)
-    whole = [
-        (
-            int(event.kind),
-            event.bodies[0],
-            event.bodies[1] if len(event.bodies) > 1 else -1,
-            names.index(event.contact) if event.contact else -1,
-        )
-        for event in listed
-    ]
-    numbers = [(event.time, event.impulse) for event in listed]
-    return {
-        "event": np.array(whole, dtype=np.int64).reshape(-1, 4),
-        "event_numbers": np.array(numbers, dtype=np.float64).reshape(-1, 2),
-    }
-
-
-def read_events(table: Any, names: Sequence[str]) -> list[Event]:
-    """Return events from :func:`event_table`."""
-    return [
-        Event(time, EventKind(kind), (i,) if j < 0 else (i, j), "" if at < 0 else names[at], value)
-        for (kind, i, j, at), (time, value) in zip(
-            table["event"].tolist(), table["event_numbers"].tolist(), strict=True
-        )
-    ]
-
-
-def write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write(path)`` write a file that then appears under its name whole, and durably."""
-    part = path.with_name(f"{path.stem}-{os.getpid()}.part{path.suffix}")
-    try:
-        write(part)
-        _synchronise(part)
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-    if os.name == "posix":  # elsewhere folders cannot be synchronised
-        _synchronise(path.parent)
-
-
-def _synchronise(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _write_arrays(path: Path, arrays: dict[str, Any]) -> None:
@@ -180,20 +108,24 @@ class Checkpoint:
         Raises
         ------
         ValueError
-            If nothing was saved, if it was saved with other parameters, or if files are damaged.
+            If nothing was saved, if it was saved with other parameters or by a newer version, or if
+            files are damaged.
         """
         if not self.exists:
             msg = f"checkpoint: expected an unfinished run in {self.folder}; got none"
             raise ValueError(msg)
         try:
             state = _read_arrays(self.folder / STATE)
-            strange = int(state["format"]) != FORMAT
-            other = strange or str(state["key"]) != self.key
-            if not other:
+            written = int(state["format"])
+            other = str(state["key"]) != self.key
+            if written == FORMAT and not other:
                 self._fill(recorder, state)
         except (KeyError, IndexError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
             msg = f"checkpoint: expected an unfinished run; {self.folder} is damaged ({error})"
             raise ValueError(msg) from error
+        if written != FORMAT:
+            msg = f"checkpoint: expected version {FORMAT}; {self.folder} has version {written}"
+            raise ValueError(msg)
         if other:
             msg = f"checkpoint: expected the parameters of the run in {self.folder}; got others"
             raise ValueError(msg)

@@ -2,32 +2,32 @@
 
 import json
 import os
-import platform
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner import __version__
 from polycorner.models.drum import COORDINATES, DumbbellDrum
-from polycorner.motion.engine import Effort
-from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
-from polycorner.motion.trajectory import Trajectory
-from polycorner.studies.drum_checkpoints import (
-    event_table,
-    read_events,
-    read_touches,
-    touch_table,
-    write_whole,
-)
 from polycorner.studies.drum_runs import DrumRun
+from polycorner.studies.motion_checks import motion_fault
+from polycorner.studies.motion_files import (
+    MotionUnits,
+    column,
+    load_dataset,
+    motion_attributes,
+    motion_coordinates,
+    motion_data,
+    read_motion,
+    save_dataset,
+)
+from polycorner.studies.sealed import Kind
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FORMAT = 1
+KIND = Kind("a run", "save_run", "polycorner_drum_run", schema=2, unsealed=1)
 UNITS = {
     "length": "mm",
     "ball_radius": "mm",
@@ -50,8 +50,7 @@ PLACES = (
     ("theta", "rad", "heading, not wrapped"),
     ("psi", "rad", "spin about its own axis"),
 )
-ENERGY = "nJ"  # g mm^2/s^2
-EFFORT = tuple(field.name for field in fields(Effort))
+MOTION = MotionUnits(energy="nJ", force="uN", impulse="g mm/s")  # nJ = g mm^2/s^2
 
 
 def dataset(run: DrumRun) -> "xr.Dataset":
@@ -61,48 +60,11 @@ def dataset(run: DrumRun) -> "xr.Dataset":
     path, names = run.trajectory, _contacts(run)
     data: dict[str, Any] = {}
     for k, (name, unit, words) in enumerate(PLACES):
-        data[name] = _column(("time", "body"), path.q[..., k], unit, words)
-        speed = _column(("time", "body"), path.v[..., k], f"{unit}/s", f"velocity of {name}")
+        data[name] = column(("time", "body"), path.q[..., k], unit, words)
+        speed = column(("time", "body"), path.v[..., k], f"{unit}/s", f"velocity of {name}")
         data[f"{name}_dot"] = speed
-    data["rests"] = _column(("time", "body"), path.rests.astype(np.int8), "1", "rests on the drum")
-    data["present"] = _column(("time", "body"), path.present.astype(np.int8), "1", "has not left")
-    for name, values in (("kinetic", path.kinetic), ("potential", path.potential)):
-        data[name] = _column(("time",), values, ENERGY, f"{name} energy of those present")
-    for name, causes in (("dissipated", path.dissipated), ("work", path.work)):
-        values = np.stack(list(causes.values()), axis=1)
-        data[name] = _column(("time", f"{name}_by"), values, ENERGY, f"{name} until then")
-    data |= _listed(run, names)
-    coordinates = {
-        "time": _column(("time",), path.times, "s", "time"),
-        "body": np.arange(path.q.shape[1]),
-        "dissipated_by": list(path.dissipated),
-        "work_by": list(path.work),
-    }
-    return xr.Dataset(data, coordinates, _attributes(run, names))
-
-
-def _column(dimensions: tuple[str, ...], values: Any, unit: str, words: str) -> Any:
-    return dimensions, values, {"units": unit, "long_name": words}
-
-
-def _listed(run: DrumRun, names: list[str]) -> dict[str, Any]:
-    touches = touch_table(run.trajectory.touching, names)
-    events = event_table(run.trajectory.events, names)
-    data: dict[str, Any] = {}
-    for k, name in enumerate(("instant", "body_1", "body_2", "contact")):
-        words = f"contacts that touch: {name}, counted from 0 (-1: none)"
-        data[f"touch_{name}"] = _column(("touch",), touches["touch"][:, k], "1", words)
-    data["touch_force"] = _column(("touch",), touches["touch_force"], "uN", "force that presses")
-    meanings = " ".join(kind.name.lower() for kind in EventKind)
-    kinds = {"flag_values": [int(kind) for kind in EventKind], "flag_meanings": meanings}
-    for k, name in enumerate(("kind", "body_1", "body_2", "contact")):
-        words = f"events: {name}, counted from 0 (-1: none)"
-        dimensions, values, about = _column(("event",), events["event"][:, k], "1", words)
-        data[f"event_{name}"] = (dimensions, values, about | (kinds if k == 0 else {}))
-    for k, (name, unit) in enumerate((("time", "s"), ("impulse", "g mm/s"))):
-        words = f"{name} of events"
-        data[f"event_{name}"] = _column(("event",), events["event_numbers"][:, k], unit, words)
-    return data
+    data |= motion_data(path, names, MOTION)
+    return xr.Dataset(data, motion_coordinates(path, MOTION), _attributes(run, names))
 
 
 def _contacts(run: DrumRun) -> list[str]:
@@ -112,75 +74,54 @@ def _contacts(run: DrumRun) -> list[str]:
 
 
 def _attributes(run: DrumRun, names: list[str]) -> dict[str, Any]:
-    path = run.trajectory
     values: dict[str, Any] = {
         "title": "Dumbbells in a slowly rotating, tilted drum",
-        "Conventions": "CF-1.11",
-        "polycorner_drum_run": FORMAT,
-        "polycorner_version": __version__,
-        "numpy_version": np.__version__,
-        "python_version": platform.python_version(),
+        KIND.key: np.int64(KIND.schema),
+        **motion_attributes(run.trajectory, names),
     }
     for name, unit in UNITS.items():
         value = getattr(run.drum, name)
-        if isinstance(value, bool | int):
-            values[name] = np.int64(value)
-        else:
-            values[name] = np.array(value, dtype=np.float64)
+        whole = isinstance(value, bool | int)
+        values[name] = np.int64(value) if whole else np.array(value, dtype=np.float64)
         values[f"{name}_units"] = unit
-    values |= {
+    return values | {
         "seed": np.int64(run.noise.seed),
         "noise_chatter": float(run.noise.chatter),
         "noise_correlation_time": float(run.noise.correlation_time),
         "noise_kicks": json.dumps(dict(run.noise.kicks)),
-        "dt": path.dt,
         "duration": run.duration,
         "every": np.int64(run.every),
         "steps_per_second": run.steps_per_second,
-        "max_penetration": path.max_penetration,
-        "contacts": " ".join(names),
     }
-    return values | {f"effort_{name}": getattr(path.effort, name) for name in EFFORT}
 
 
 def save_run(run: DrumRun, path: str | os.PathLike[str]) -> Path:
-    """Write a run as NetCDF; the file appears whole or not at all."""
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    content = dataset(run)
-    packed = {"zlib": True, "complevel": 4}
-    encoding = {name: packed for name in content.data_vars if content[name].size > 1}
+    """Write a run as NetCDF; the file appears whole or not at all.
 
-    def write(part: Path) -> None:
-        content.to_netcdf(part, engine="h5netcdf", encoding=encoding)
-
-    write_whole(target, write)
-    return target
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    return save_dataset(KIND, path, dataset(run))
 
 
 def load_run(path: str | os.PathLike[str]) -> DrumRun:
     """Read a run that :func:`save_run` wrote.
 
+    Energies are computed again from places and velocities, and overlaps at all recorded instants;
+    see :func:`~polycorner.studies.motion_checks.motion_fault`.  Files of version 1 have no digest:
+    of these a changed number may go unnoticed where nothing else depends on it.
+
     Raises
     ------
     ValueError
-        If the file is something else or damaged.
+        If the file is something else, was changed, or says what is not computed from it.
     """
-    import xarray as xr
-
-    try:
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
-            content = file.load()
-        known = content.attrs.get("polycorner_drum_run") == FORMAT
-        if known:
-            return _read(content)
-    except FileNotFoundError:
-        raise
-    except (AttributeError, KeyError, IndexError, OSError, TypeError, ValueError) as error:
-        msg = f"path: expected a run that save_run wrote; {path} is damaged ({error})"
-        raise ValueError(msg) from error
-    msg = f"path: expected a run that save_run wrote; {path} is something else"
-    raise ValueError(msg)
+    run: DrumRun = load_dataset(KIND, path, _read)
+    if fault := motion_fault(run.trajectory):
+        raise KIND.refusal(path, f"is not what is computed here: {fault}")
+    return run
 
 
 def _read(content: "xr.Dataset") -> DrumRun:
@@ -199,43 +140,7 @@ def _read(content: "xr.Dataset") -> DrumRun:
     chatter, hold = float(at["noise_chatter"]), float(at["noise_correlation_time"])
     noise = Noise(chatter=chatter, correlation_time=hold, kicks=kicks, seed=seed)
     rate = float(at["steps_per_second"])
-    path = _trajectory(content, drum)
+    q = np.stack([content[name].values for name in COORDINATES], axis=-1)
+    v = np.stack([content[f"{name}_dot"].values for name in COORDINATES], axis=-1)
+    path = read_motion(content, drum.herd, q, v)
     return DrumRun(drum, noise, path, float(at["duration"]), int(at["every"]), rate)
-
-
-def _trajectory(content: "xr.Dataset", drum: DumbbellDrum) -> Trajectory:
-    at, names = content.attrs, str(content.attrs["contacts"]).split()
-
-    def of(name: str) -> Any:
-        return np.array(content[name].values)
-
-    def by(name: str) -> dict[str, Any]:
-        causes = [str(cause) for cause in of(f"{name}_by")]
-        return {cause: of(name)[:, k] for k, cause in enumerate(causes)}
-
-    def table(kind: str, first: str) -> Any:
-        columns = [of(f"{kind}_{name}") for name in (first, "body_1", "body_2", "contact")]
-        return np.stack(columns, axis=1).astype(np.int64)
-
-    touches = {"touch": table("touch", "instant"), "touch_force": of("touch_force")}
-    numbers = np.stack([of("event_time"), of("event_impulse")], axis=1)
-    whole = {name: int(at[f"effort_{name}"]) for name in EFFORT if name != "residual"}
-    return Trajectory(
-        system=drum.herd,
-        dt=float(at["dt"]),
-        times=of("time"),
-        q=np.stack([of(name) for name in COORDINATES], axis=-1),
-        v=np.stack([of(f"{name}_dot") for name in COORDINATES], axis=-1),
-        rests=of("rests") != 0,
-        present=of("present") != 0,
-        touching=tuple(read_touches(touches, names, len(content["time"]))),
-        kinetic=of("kinetic"),
-        potential=of("potential"),
-        dissipated=by("dissipated"),
-        work=by("work"),
-        events=tuple(
-            read_events({"event": table("event", "kind"), "event_numbers": numbers}, names)
-        ),
-        max_penetration=float(at["max_penetration"]),
-        effort=Effort(**whole, residual=float(at["effort_residual"])),
-    )

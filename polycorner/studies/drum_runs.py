@@ -1,11 +1,9 @@
 """Long runs of dumbbells in the drum, which can be stopped, killed, and gone on with."""
 
 import math
-import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from numbers import Real
 from os import PathLike
@@ -20,6 +18,7 @@ from polycorner.models.drum import DumbbellDrum
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulate import whole_stride
 from polycorner.studies.drum_checkpoints import Checkpoint
+from polycorner.studies.interrupts import first_interrupt
 
 if TYPE_CHECKING:
     from polycorner.motion.trajectory import Trajectory
@@ -168,8 +167,9 @@ def _follow(
     engine = recorder.engine
     saved = engine.steps
     counted, spent, warm = 0, 0.0, False
-    with _asked_to_stop() as stop:
-        while engine.steps < steps and not stop():
+    asked = threading.Event()
+    with first_interrupt(asked.set):
+        while engine.steps < steps and not asked.is_set():
             before, clock = engine.steps, time.perf_counter()
             recorder.advance(min(stride, steps - before))
             if warm:
@@ -205,27 +205,3 @@ def parameters(
         "kicks": sorted(noise.kicks.items()),
         "seed": noise.seed,
     }
-
-
-@contextmanager
-def _asked_to_stop() -> Iterator[Callable[[], bool]]:
-    """Turn the first Ctrl-C into an answer to a question; the second one is as it was.
-
-    Elsewhere than in the main thread, and where Ctrl-C does not interrupt, nothing is changed.
-    """
-    asked = threading.Event()
-    usual = signal.getsignal(signal.SIGINT)
-    main = threading.current_thread() is threading.main_thread()
-    if not main or usual is not signal.default_int_handler:
-        yield asked.is_set
-        return
-
-    def first(_number: int, _frame: object) -> None:
-        asked.set()
-        signal.signal(signal.SIGINT, usual)
-
-    signal.signal(signal.SIGINT, first)
-    try:
-        yield asked.is_set
-    finally:
-        signal.signal(signal.SIGINT, usual)

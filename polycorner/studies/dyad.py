@@ -83,12 +83,13 @@ def dyad_minima(pair: DumbbellPair) -> tuple[DyadMinimum, ...]:
     rods: a multiplier is negative), the point is still found, on its face, and its certificate
     says that it is no minimum.
     """
-    corners = [_corner(pair, chirality) for chirality in ("R", "L")]
+    corners = [dyad_corner(pair, chirality) for chirality in ("R", "L")]
     ends = minimise(pair.polyhedron, pair.energy, pair.end_to_end())
     return (*corners, DyadMinimum("G", pair, ends))
 
 
-def _corner(pair: DumbbellPair, chirality: Chirality) -> DyadMinimum:
+def dyad_corner(pair: DumbbellPair, chirality: Chirality) -> DyadMinimum:
+    """Return ``delta_R`` or ``delta_L``: the corner of three contacts, whether minimum or not."""
     found = minimise(pair.polyhedron, pair.energy, pair.nested(chirality))
     if set(found.active) != set(CORNER):
         start = pair.nested(chirality, clearance=0.0)
@@ -105,7 +106,7 @@ def heading_curve(
     pair: DumbbellPair, lengths: Iterable[float], chirality: Chirality = "R"
 ) -> tuple[Array, Array]:
     """Return the dyad's heading in degrees at each length, and whether it is a minimum there."""
-    entries = [_corner(replace(pair, length=float(length)), chirality) for length in lengths]
+    entries = [dyad_corner(replace(pair, length=float(length)), chirality) for length in lengths]
     headings = np.array([entry.headings[0] for entry in entries])
     return headings, np.array([entry.certificate.is_minimum for entry in entries])
 

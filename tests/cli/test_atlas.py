@@ -302,7 +302,7 @@ FILES = {
     ("tutorial",): {"tutorial.png"},
     ("spheres", "--count", "5"): {"clusters.png"},
     ("disks", "--count", "2"): {"critical.png"},
-    ("dyad", "--plane"): {"atlas.png", "motions.png", "solid.png", "solid.glb"},
+    ("dyad", "--plane"): {"atlas.png", "motions.png", "solid.png", "solid.glb", "solid.json"},
 }
 
 

@@ -107,7 +107,8 @@ def test_more_digits_lie_inside_fewer(corner):
 
 def test_a_proof_reads_as_a_table(corner):
     text = str(prove(corner, digits=12))
-    assert text.startswith("verdict")
+    assert text.startswith("Proof\nverdict")
+    assert "theta1 (rad)" in text
     assert "strict local minimum, modulo d/deta1 + d/deta2: proved" in text
     assert "multiplier A2B1" in text
     M = Manifold.euclidean("x y")

@@ -201,10 +201,11 @@ def test_the_shortest_derivative_is_orthogonal_to_free_directions():
 
 
 def test_table_names_everything_that_moves():
-    text = str(sensitivity(corner(PAIR), SIZES))
-    for word in ("d/d drum_radius", "theta1", "energy", "multiplier A2b"):
-        assert word in text
-    assert len(text.splitlines()) == 1 + 6 + 1 + 3
+    table, units = str(sensitivity(corner(PAIR), SIZES)).split("\n\n")
+    for word in ("d/d drum_radius", "theta1 (rad)", "eta1 ", "energy", "multiplier A2b"):
+        assert word in table
+    assert len(table.splitlines()) == 2 + 6 + 1 + 3
+    assert "radians" in units
 
 
 # ------------------------------------------------------------------------------------ refusals

@@ -287,7 +287,7 @@ def test_wrong_use_is_named(changes, error, message):
 def test_values_are_asked_for_in_slabs(monkeypatch):
     """No call sees more points than a slab holds, and slabs make no difference."""
     whole = isosurface(ball, EVERYWHERE, 20)
-    monkeypatch.setattr("polycorner.pictures.meshes.SLAB", 1000)
+    monkeypatch.setattr("polycorner.pictures.grids.SLAB", 1000)
     sizes = []
 
     def counted(p):
@@ -312,8 +312,11 @@ def test_a_scene_comes_back_from_a_glb(tmp_path):
     curves = [("whole", circle), ("broken", broken), ("nothing", broken[[20]])]
     path = tmp_path / "new" / "ring.glb"
     points = [(0, 0, 1), (0, 1, 0)]
-    assert write_mesh(mesh, path, curves=curves, points=points, scale=(1, 1, 2)) == path
+    facts = {"volume": 1.5, "closed": True}
+    options = {"curves": curves, "points": points, "scale": (1, 1, 2), "facts": facts}
+    assert write_mesh(mesh, path, **options) == path
     scene = trimesh.load_scene(path)
+    assert {key: scene.metadata[key] for key in facts} == facts
     assert set(scene.geometry) == {
         "solid",
         "whole 1",
@@ -342,6 +345,7 @@ def test_a_mesh_comes_back_from_a_ply(tmp_path):
         ("ball.stl", {}, "path: expected a name ending in .glb or .ply; got ball.stl"),
         ("ball.ply", {"points": [(0, 0, 0)]}, "path: expected a name ending in .glb for curves"),
         ("ball.ply", {"curves": [("c", np.eye(3))]}, "path: expected a name ending in .glb"),
+        ("ball.ply", {"facts": {"volume": 1.0}}, "path: expected a name ending in .glb for curves"),
     ],
 )
 def test_files_that_cannot_be_written(name, options, message, tmp_path):

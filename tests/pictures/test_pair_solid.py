@@ -1,12 +1,19 @@
 """The atlas drawn over the solid: its curves lie on the solid's surface, and both agree."""
 
+import json
 import math
 
 import numpy as np
 import pytest
+import trimesh
 
 from polycorner.models import DumbbellPair
-from polycorner.pictures.pair_solid import relative_corners, relative_curves, write_solid
+from polycorner.pictures.pair_solid import (
+    relative_corners,
+    relative_curves,
+    solid_facts,
+    write_solid,
+)
 from polycorner.pictures.solids import (
     forbidden_solid,
     relative_coordinates,
@@ -56,6 +63,19 @@ def test_every_edge_is_there_once(atlas):
         assert 2 * len(corners) == len(atlas.skeleton.corners)
 
 
+def test_edges_that_leave_the_period_reach_its_end(atlas):
+    """Each comes in again at the other end; in the plane moved by half a turn about A."""
+    half = period(atlas) / 2
+    ends = np.array([line[k] for _, line in relative_curves(atlas, 2 * half) for k in (0, -1)])
+    corners, _ = relative_corners(atlas, 2 * half)
+    loose = np.linalg.norm(ends[:, None] - corners, axis=-1).min(axis=1) > 1e-6
+    np.testing.assert_allclose(abs(ends[loose, 2]), half, atol=1e-12)
+    if atlas.heading is None:
+        assert loose.sum() == 2 * len(corners)
+        low, high = (ends[loose & (s * ends[:, 2] > 0)][:, :2] for s in (-1, 1))
+        assert np.linalg.norm(low[:, None] - high, axis=-1).min(axis=1).max() < 1e-9
+
+
 def test_edges_are_named_as_asked(atlas):
     names = {name for name, _ in relative_curves(atlas, period(atlas), "+".join)}
     assert names <= {"+".join(edge.active) for edge in atlas.skeleton.edges}
@@ -90,6 +110,30 @@ def test_relative_placements_come_back(atlas):
 
 def test_files(atlas, tmp_path):
     written = write_solid(atlas, tmp_path, resolution=24)
-    assert [path.name for path in written] == ["solid.png", "solid.glb"]
+    assert [path.name for path in written] == ["solid.png", "solid.glb", "solid.json"]
     assert written[0].read_bytes().startswith(b"\x89PNG")
     assert written[1].read_bytes().startswith(b"glTF")
+    facts = json.loads(written[2].read_text())
+    scene = trimesh.load_scene(written[1])
+    assert facts == {key: scene.metadata[key] for key in facts}
+    stretched = atlas.pair.length / 2
+    assert scene.geometry["solid"].volume == pytest.approx(stretched * facts["volume"], rel=1e-5)
+    assert len(scene.geometry["solid"].faces) == facts["faces"]
+    assert facts["corners"] == len(scene.geometry["points"].vertices)
+    assert facts["watertight"] is True
+    assert facts["unresolved"] == 0
+
+
+def test_the_mesh_has_the_corners_of_the_atlas(atlas):
+    """Found by walking along edges there, by marching through a grid here."""
+    solid = forbidden_solid(atlas.pair, 40, period=period(atlas), mean_heading=atlas.heading)
+    facts = solid_facts(solid, atlas)
+    assert facts.corner_error < 1e-9
+    assert facts.surface_error > 1e-4
+    corners, _ = relative_corners(atlas, period(atlas))
+    seam = abs(abs(corners[:, 2]) - period(atlas) / 2) < 1e-9
+    inner = abs(abs(solid.corners[:, 2]) - period(atlas) / 2) > 1e-9
+    assert inner.sum() == (~seam).sum()
+    contacts = {names for edge in atlas.skeleton.edges for names in edge.active}
+    used = {atlas.pair.polyhedron.names[k] for k in np.unique(solid.labels[solid.labels >= 0])}
+    assert used == contacts

@@ -20,7 +20,7 @@ from polycorner.models.dumbbell_formulas import CONTACTS
 from polycorner.models.dumbbells import DumbbellPair
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise
-from polycorner.studies import drum_checkpoints, drum_pairs, drum_starts
+from polycorner.studies import drum_checkpoints, drum_pairs, drum_starts, sealed
 from polycorner.studies.drum_files import dataset, load_run, save_run
 from polycorner.studies.drum_pairs import Sizes
 from polycorner.studies.drum_runs import Saving, run
@@ -390,7 +390,7 @@ class Killed(BaseException):
 @pytest.mark.parametrize("moment", range(1, 30, 3))
 def test_a_run_killed_while_a_file_is_written_goes_on(whole, tmp_path, monkeypatch, moment):
     """Every saving synchronises two files and their folder twice; the run dies at one of these."""
-    usual, seen = drum_checkpoints._synchronise, itertools.count(1)
+    usual, seen = sealed._synchronise, itertools.count(1)
 
     def dying(path):
         if next(seen) == moment:
@@ -399,7 +399,7 @@ def test_a_run_killed_while_a_file_is_written_goes_on(whole, tmp_path, monkeypat
 
     saving = Saving(tmp_path / "state", 60)
     with monkeypatch.context() as patch:
-        patch.setattr(drum_checkpoints, "_synchronise", dying)
+        patch.setattr(sealed, "_synchronise", dying)
         patch.setattr("pathlib.Path.unlink", lambda *_, **__: None)  # nor does it tidy up
         with pytest.raises(Killed):
             followed(saving=saving)

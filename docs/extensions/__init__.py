@@ -1,0 +1,1 @@
+"""What the site needs beside Sphinx: formulas, the gallery's pictures, a look at every link."""

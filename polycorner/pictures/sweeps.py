@@ -1,0 +1,139 @@
+"""Figures of parameter studies: one parameter across, a curve for each value of another."""
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from polycorner.geometry.manifold import Array
+from polycorner.pictures.plots import SHADES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_CURVES = 12  # of many values of the second parameter, so many are drawn
+
+
+def draw_study(study: str, found: "xr.Dataset") -> Figure | None:
+    """Draw a study that ships; None if it has no figure or more than two axes of several values."""
+    draw = DRAWN.get(study)
+    try:
+        across, others = _axes(found)
+    except ValueError:
+        return None
+    return None if draw is None else draw(found.squeeze(), across, others)
+
+
+def _axes(found: "xr.Dataset") -> tuple[str, str | None]:
+    """Return the axis with most values, and the other one that has several."""
+    several = [name for name in found["status"].dims if found.sizes[name] > 1]
+    numbers = [name for name in several if found[name].dtype.kind in "iuf"]
+    if not numbers or len(several) > 2:
+        msg = f"found: expected one or two axes of several values; got {len(several)}"
+        raise ValueError(msg)
+    across = max(numbers, key=lambda name: found.sizes[name])
+    return str(across), next((str(name) for name in several if name != across), None)
+
+
+def _curves(
+    found: "xr.Dataset", others: str | None
+) -> "Iterator[tuple[str, str | None, xr.Dataset]]":
+    """Yield colour, label and results for the values of the second axis."""
+    if others is None:
+        yield SHADES[1], None, found
+        return
+    count = found.sizes[others]
+    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int))
+    unit = found[others].attrs.get("units", "")
+    for colour, k in zip(cycle(SHADES), chosen, strict=False):
+        value = found[others].values[k]
+        text = f"{value:g}" if found[others].dtype.kind in "iuf" else str(value)
+        yield colour, f"{_words(others)} {text}{_after(unit)}", found.isel({others: k})
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _after(unit: str) -> str:
+    return {"deg": "°", "1": "", "": ""}.get(unit, f" {unit}")
+
+
+def _axis_label(found: "xr.Dataset", name: str) -> str:
+    unit = found[name].attrs.get("units", "")
+    shown = {"deg": "degrees", "1": "", "": ""}.get(unit, unit)
+    return _words(name) + (f" ({shown})" if shown else "")
+
+
+def _panels(title: str, ratio: tuple[float, float] = (1, 1)) -> tuple[Figure, Axes, Axes]:
+    figure = Figure(figsize=(12, 5), layout="constrained")
+    first, second = figure.subplots(1, 2, width_ratios=ratio)
+    figure.suptitle(title)
+    return figure, first, second
+
+
+def draw_heading_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
+    """Draw the heading of the corner and the smallest of its multipliers.
+
+    Full where the corner is a certified minimum, dotted where it is not; the paper's
+    ``arctan(r/l)`` is dashed.
+    """
+    figure, first, second = _panels("Heading of a dyad at its corner, certified")
+    x = found[across].values
+    papers: list[Array] = []
+    for colour, label, curve in _curves(found, others):
+        rests = curve["minimum"].values == 1
+        multipliers = [curve[n].values for n in curve.data_vars if "multiplier" in str(n)]
+        for axes, y in ((first, curve["heading"].values), (second, np.min(multipliers, axis=0))):
+            axes.plot(x, np.where(rests, y, np.nan), ".-", ms=4, color=colour, label=label)
+            axes.plot(x, np.where(_beside(rests), y, np.nan), ":", color=colour)
+        paper = curve["paper_heading"].values
+        if not any(np.allclose(paper, p, equal_nan=True) for p in papers):
+            papers.append(paper)
+    for k, paper in enumerate(papers):
+        first.plot(x, paper, "k--", lw=1.2, label=None if k else "paper, arctan(r/l)")
+    if (found["minimum"] == 0).any():
+        first.plot([], [], ":", color="0.4", label="corner is no minimum")
+    first.set(ylabel="heading (degrees)", xlabel=_axis_label(found, across))
+    second.axhline(0, color="0.8", lw=0.8, zorder=0)
+    second.set(ylabel="smallest multiplier, dE/dgap", xlabel=_axis_label(found, across))
+    first.legend(fontsize=9, frameon=False)
+    return figure
+
+
+def _beside(rests: Any) -> Any:
+    """Return where a curve is no minimum, with a neighbour each so that the parts meet."""
+    away = ~rests
+    near = away.copy()
+    near[1:] |= away[:-1]
+    near[:-1] |= away[1:]
+    return near
+
+
+def draw_climbing_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
+    """Draw climb rates and headings with twice their standard errors; the law is dotted."""
+    figure, first, second = _panels("Nested pairs driven by a turning drum")
+    x = found[across].values
+    width = float(np.ptp(x)) / max(1, len(x) - 1)
+    curves = list(_curves(found, others))
+    for k, (colour, label, curve) in enumerate(curves):
+        beside = x + 0.04 * width * (k - (len(curves) - 1) / 2)  # so that bars do not hide bars
+        for axes, name in ((first, "climb_rate"), (second, "heading")):
+            y, bar = curve[name].values, 2 * curve[f"{name}_error"].values
+            axes.errorbar(beside, y, yerr=bar, fmt="o-", ms=4, capsize=3, color=colour, label=label)
+        first.plot(beside, curve["law"].values, ":", color=colour)
+    first.plot([], [], ":", color="0.4", label="ω ρ tan(heading)")
+    first.axhline(0, color="0.8", lw=0.8, zorder=0)
+    first.set(ylabel="climb rate (mm/s)", xlabel=_axis_label(found, across))
+    second.set(ylabel="heading (degrees)", xlabel=_axis_label(found, across))
+    first.legend(fontsize=9, frameon=False)
+    return figure
+
+
+DRAWN: Mapping[str, Callable[["xr.Dataset", str, str | None], Figure]] = {
+    "heading": draw_heading_sweep,
+    "climbing": draw_climbing_sweep,
+}

@@ -1,0 +1,29 @@
+"""Ctrl-C as a wish to stop: what is under way is finished and kept."""
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def first_interrupt(noted: Callable[[], object]) -> Iterator[None]:
+    """Call ``noted`` at the first Ctrl-C; the second one is as it was.
+
+    Elsewhere than in the main thread, and where Ctrl-C does not interrupt, nothing is changed.
+    """
+    usual = signal.getsignal(signal.SIGINT)
+    main = threading.current_thread() is threading.main_thread()
+    if not main or usual is not signal.default_int_handler:
+        yield
+        return
+
+    def first(_number: int, _frame: object) -> None:
+        noted()
+        signal.signal(signal.SIGINT, usual)
+
+    signal.signal(signal.SIGINT, first)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

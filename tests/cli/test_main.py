@@ -1,0 +1,317 @@
+"""What holds for every subcommand: help, JSON, quiet and verbose, files of settings, exit codes."""
+
+import errno
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import commands
+import pytest
+
+from polycorner.cli import main as entry
+from polycorner.cli.main import EXIT_CODES, cli
+
+ROOT = Path(entry.__file__).parents[2]
+# Arguments with which a command answers soon.
+QUICK = {
+    "dyad": ("--drum", "inf"),
+    "atlas dyad": ("--plane", "--budget", "1"),
+    "atlas spheres": ("--count", "5"),
+    "atlas tutorial": (),
+    "atlas pinball": ("--budget", "1"),
+    "atlas disks": ("--count", "2"),
+    "prove": ("--drum", "inf"),
+    "minima dyad": ("--starts", "5"),
+    "minima pinball": ("--starts", "5"),
+    "drum": ("--duration", "0.1", "--dt", "0.005"),
+    "paper": ("G4",),
+}
+ELSEWHERE = {"completion", "sweep", "view"}  # what these print is tested in files of their own
+NO_SEED = {"dyad", "prove", "paper"}  # nothing random in them
+
+
+def walk(command, *names):
+    """Yield every command below one as ``(names, command)``, groups too."""
+    yield names, command
+    if isinstance(command, click.Group):
+        for name, below in command.commands.items():
+            yield from walk(below, *names, name)
+
+
+EVERY = dict(walk(cli))
+LEAVES = {
+    " ".join(names): command
+    for names, command in EVERY.items()
+    if not isinstance(command, click.Group)
+}
+every_leaf = pytest.mark.parametrize("name", LEAVES)
+every_answer = pytest.mark.parametrize("name", QUICK)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_cache(tmp_path_factory):
+    """Keep unfinished searches away from the user's; kernels are compiled anew."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+def run(capsys, name, *arguments):
+    return commands.run(capsys, *name.split(), *arguments)
+
+
+def options(command):
+    return {option: p for p in command.params for option in p.opts if option.startswith("--")}
+
+
+def test_every_subcommand_is_looked_at():
+    told = set(QUICK) | {name for name in LEAVES if name.split()[0] in ELSEWHERE}
+    assert told == set(LEAVES)
+
+
+# -------------------------------------------------------------------------------- help
+
+
+@pytest.mark.parametrize("names", EVERY, ids=" ".join)
+def test_help_has_examples_and_they_are_right(capsys, monkeypatch, names):
+    code, out, err = commands.run(capsys, *names, "--help")
+    assert (code, err) == (0, "")
+    assert "Examples:" in out
+    lines = re.findall(r"polycorner ([^|>)\n]+)", out.partition("Examples:")[2])
+    calls = [line.split() for line in lines if line.split()[0] in cli.commands]
+    assert calls
+    monkeypatch.chdir(ROOT)
+    for words in calls:
+        command, below = cli, list(words)
+        while isinstance(command, click.Group):
+            command = command.commands[below.pop(0)]
+        try:
+            command.make_context("polycorner", below).close()
+        except click.exceptions.Exit:
+            assert "--help" in words
+
+
+@every_leaf
+def test_every_command_has_the_common_options(name):
+    present = options(LEAVES[name])
+    assert {"--quiet", "--verbose"} <= set(present)
+    if name in QUICK:
+        assert {"--json", "--out", "--config"} <= set(present)
+        assert ("--seed" in present) == (name not in NO_SEED)
+
+
+@every_leaf
+def test_every_option_is_described(name):
+    assert all(p.help for p in options(LEAVES[name]).values())
+
+
+# ----------------------------------------------------------------------------- answers
+
+
+@every_answer
+def test_answers_are_json_and_quiet_says_nothing_else(capsys, name):
+    code, out, err = run(capsys, name, *QUICK[name], "--json", "--quiet")
+    assert (code, err) == (0, "")
+    assert json.loads(out)
+
+
+@every_answer
+def test_verbose_tells_versions_times_and_the_exit_code(capsys, name):
+    code, out, err = run(capsys, name, *QUICK[name], "--json", "--verbose")
+    assert code == 0
+    assert json.loads(out)
+    lines = err.splitlines()
+    assert all(line.startswith("polycorner: ") for line in lines)
+    assert "Python 3" in lines[0]
+    assert re.search(r": \d+\.\d\d s$", "\n".join(lines[1:-1]), re.MULTILINE)
+    assert re.fullmatch(r"polycorner: exit code 0 after \d+\.\d\d s", lines[-1])
+
+
+@pytest.mark.parametrize("name", ["atlas tutorial", "minima pinball", "prove"])
+def test_files_are_named_unless_quiet(capsys, tmp_path, name):
+    chosen = (*QUICK[name], "--out", str(tmp_path))
+    code, out, err = run(capsys, name, *chosen)
+    assert (code, err) == (0, "")
+    assert f"wrote {tmp_path}" in out
+    code, less, err = run(capsys, name, *chosen, "--quiet")
+    assert (code, err) == (0, "")
+    assert "wrote" not in less
+    code, out, err = run(capsys, name, *chosen, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)
+
+
+def test_quiet_and_verbose_are_understood_before_the_subcommand(capsys):
+    assert run(capsys, "--verbose", "completion", "fish")[2].count("\n") == 2
+    assert run(capsys, "--quiet", "atlas", "--quiet", "pinball", "--budget", "1")[2] == ""
+
+
+def test_unfinished_work_is_told_of_unless_quiet(capsys):
+    assert "--resume goes on" in run(capsys, "atlas pinball", "--budget", "1")[2]
+    assert run(capsys, "atlas pinball", "--budget", "1", "--quiet")[2] == ""
+
+
+# ---------------------------------------------------------------------------- mistakes
+
+
+def one_line(code, out, err):
+    assert (code, out) == (2, "")
+    assert err.startswith("polycorner: ")
+    assert err.count("\n") == 1
+    return err
+
+
+@every_leaf
+def test_a_misspelt_option_is_refused_and_the_right_one_suggested(capsys, name):
+    first = ("bash",) if name == "completion" else ()
+    assert "'--verbose'" in one_line(*run(capsys, name, *first, "--verbos"))
+    one_line(*run(capsys, name, *first, "--no-such-option"))
+    one_line(*run(capsys, name, *first, "--quiet", "--verbose"))
+
+
+@pytest.mark.parametrize(("words", "meant"), [("dyda", "dyad"), ("atlas sphere", "spheres")])
+def test_a_misspelt_subcommand_is_refused_and_the_right_one_suggested(capsys, words, meant):
+    assert f"'{meant}'" in one_line(*run(capsys, words))
+
+
+SETTLED = [name for name in QUICK if "--config" in options(LEAVES[name])]
+KINDS = {
+    click.types.IntParamType: ("1.5", "a whole number"),
+    click.types.FloatParamType: ("'three'", "a number"),
+    click.types.BoolParamType: ("1", "true or false"),
+    click.Choice: ("3", ""),
+}
+
+
+def settings_of(name):
+    """Return the keys a file may hold, and their options."""
+    about_the_call = {"config", "json", "out", "quiet", "verbose", "resume", "help", "movie"}
+    found = {word[2:].replace("-", "_"): p for word, p in options(LEAVES[name]).items()}
+    return {key: p for key, p in found.items() if key not in about_the_call}
+
+
+@pytest.mark.parametrize("name", SETTLED)
+def test_a_misspelt_key_is_refused_and_the_right_one_suggested(capsys, tmp_path, name):
+    file = tmp_path / "run.toml"
+    for key in settings_of(name):
+        if len(key) < 4:
+            continue
+        wrong = key[:-2] + key[-1] + key[-2]
+        if wrong in settings_of(name):
+            continue
+        file.write_text(f"{wrong} = 1\n")
+        err = one_line(*run(capsys, name, "--config", str(file)))
+        assert err.startswith(f"polycorner: --config: {file}: expected one of ")
+        assert err.endswith(f"; got {wrong} (did you mean {key}?)\n")
+    file.write_text("zzz = 1\n")
+    assert "did you mean" not in one_line(*run(capsys, name, "--config", str(file)))
+
+
+@pytest.mark.parametrize("name", SETTLED)
+def test_a_value_of_another_kind_is_refused_by_its_key(capsys, tmp_path, name):
+    file = tmp_path / "run.toml"
+    for key, option in settings_of(name).items():
+        kind = next((k for k in KINDS if isinstance(option.type, k)), None)
+        if kind is None or option.nargs > 1:
+            continue
+        written, expected = KINDS[kind]
+        file.write_text(f"{key} = {written}\n")
+        err = one_line(*run(capsys, name, "--config", str(file)))
+        assert err.startswith(f"polycorner: --config: {file}: {key}: ")
+        assert expected in err
+
+
+def test_a_file_stands_for_options_and_options_override_it(capsys, tmp_path):
+    file = tmp_path / "run.toml"
+    file.write_text('count = 2\ntorus = "hexagonal"\nseed = 3\n')
+    read = run(capsys, "atlas disks", "--config", str(file), "--json")
+    assert read == run(
+        capsys, "atlas disks", "--count", "2", "--torus", "hexagonal", "--seed", "3", "--json"
+    )
+    over = json.loads(
+        run(capsys, "atlas disks", "--config", str(file), "--torus", "square", "--json")[1]
+    )
+    assert over["parameters"] == {"count": 2, "torus": "square"}
+
+
+def test_a_file_may_hold_flags_lists_and_dashes(capsys, tmp_path):
+    file = tmp_path / "run.toml"
+    file.write_text('box = ["t=1.49:1.51", "l=16:16.01"]\nrod-weight = 0\ndigits = 5\n')
+    found = json.loads(run(capsys, "prove", "--config", str(file), "--json")[1])
+    assert found["box"] == {"t": [1.49, 1.51], "l": [16.0, 16.01]}
+    file.write_text("plane = true\ndrum = 80\nbudget = 1\n")
+    found = json.loads(run(capsys, "atlas dyad", "--config", str(file), "--json", "-q")[1])
+    assert found["parameters"]["drum"] == "inf"
+    one_line(*run(capsys, "atlas dyad", "--plane", "--drum", "80"))
+
+
+# -------------------------------------------------------------------------- exit codes
+
+
+def test_exit_codes_are_documented_in_one_way(capsys):
+    _, shown, _ = commands.run(capsys, "--help")
+    page = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+    doc = entry.__doc__.replace("``", "")
+    for code, words in EXIT_CODES.items():
+        for text, sign in ((shown, ""), (doc, ""), (page.replace("`", ""), r"\|")):
+            assert re.search(rf"{code} +{sign} *{re.escape(words)}", text), (code, words)
+
+
+def broken(*_):
+    message = "a wheel\n  came off"
+    raise RuntimeError(message)
+
+
+def test_an_unexpected_error_is_one_sentence_and_verbose_shows_where(capsys, monkeypatch):
+    monkeypatch.setattr("polycorner.cli.dyad.chosen_pair", broken)
+    code, out, err = run(capsys, "dyad")
+    assert (code, out, err.count("\n")) == (70, "", 1)
+    assert "unexpected RuntimeError: a wheel came off" in err
+    assert "--verbose" in err
+    code, out, err = run(capsys, "dyad", "--verbose")
+    assert (code, out) == (70, "")
+    assert "Traceback" in err
+    assert "in broken" in err
+
+
+@pytest.mark.parametrize("name", ["atlas tutorial", "minima pinball", "dyad"])
+def test_a_full_disk_is_one_sentence(capsys, monkeypatch, tmp_path, name):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    err = one_line(*run(capsys, name, *QUICK[name], "--out", str(tmp_path)))
+    assert err.startswith("polycorner: --out: ")
+    assert os.strerror(errno.ENOSPC) in err
+
+
+def process(*words, **streams):
+    command = [sys.executable, "-W", "error", "-m", "polycorner", *words]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT, **streams)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full here")
+@pytest.mark.parametrize("words", [("--help",), ("atlas", "disks", "--count", "2")])
+def test_standard_output_that_is_full_is_one_sentence(words):
+    with Path("/dev/full").open("w") as full:
+        started = process(*words, stdout=full)
+        _, err = started.communicate()
+    assert started.returncode == 74
+    assert err == (
+        "polycorner: standard output cannot be read or written (No space left on device)\n"
+    )
+
+
+@pytest.mark.parametrize("words", [("--help",), ("atlas", "disks", "--count", "2")])
+@pytest.mark.parametrize("form", ["--json", "--quiet"])
+def test_a_reader_that_goes_away_ends_it_silently(words, form):
+    arguments = words if words == ("--help",) else (*words, form)
+    started = process(*arguments, stdout=subprocess.PIPE)
+    started.stdout.close()
+    assert started.stderr.read() == ""
+    assert started.wait() == 141
+    started.stderr.close()

@@ -1,0 +1,63 @@
+"""Figures of parameter studies: what is drawn is what was computed."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from polycorner.pictures.sweeps import draw_study
+from polycorner.studies.sweep_studies import heading
+from polycorner.studies.sweeps import sweep
+
+RODS = [1.5, 2.9]
+
+
+@pytest.fixture(scope="module")
+def headings():
+    grid = {"length": (np.linspace(8, 32, 7), "mm"), "rod_radius": (RODS, "mm")}
+    return sweep(heading, grid)
+
+
+def test_heading_curves_are_the_datas(headings):
+    figure = draw_study("heading", headings)
+    FigureCanvasAgg(figure).draw()
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    for k, rod in enumerate(RODS):
+        line = lines[f"rod radius {rod:g} mm"]
+        rests = headings["minimum"].values[:, k] == 1
+        expected = np.where(rests, headings["heading"].values[:, k], np.nan)
+        np.testing.assert_array_equal(line.get_ydata(), expected)
+    paper = lines["paper, arctan(r/l)"].get_ydata()
+    np.testing.assert_allclose(paper[1:], np.degrees(np.arctan(3 / headings["length"].values))[1:])
+    assert figure.axes[0].get_xlabel() == "length (mm)"
+
+
+def test_one_axis_and_a_second_of_one_value_are_drawn_too(headings):
+    figure = draw_study("heading", headings.isel(rod_radius=[0]))
+    FigureCanvasAgg(figure).draw()
+    assert len(figure.axes[0].lines[0].get_xdata()) == 7
+
+
+def test_climb_rates_have_bars_of_two_standard_errors():
+    shape, names = (3, 2), ("noise", "tilt")
+    rng = np.random.default_rng(1)
+    columns = ("climb_rate", "climb_rate_error", "heading", "heading_error", "law")
+    data = {name: (names, rng.uniform(size=shape)) for name in columns}
+    data["status"] = (names, np.ones(shape, dtype=np.int8))
+    coordinates = {"noise": [0.1, 0.2, 0.3], "tilt": ("tilt", [0.0, 7.0], {"units": "deg"})}
+    found = xr.Dataset(data, coordinates)
+    figure = draw_study("climbing", found)
+    FigureCanvasAgg(figure).draw()
+    first = figure.axes[0].containers
+    assert [one.get_label() for one in first] == ["tilt 0°", "tilt 7°"]
+    for k, one in enumerate(first):
+        points, _, (bars,) = one
+        np.testing.assert_array_equal(points.get_ydata(), found["climb_rate"].values[:, k])
+        spans = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
+        np.testing.assert_allclose(spans, 4 * found["climb_rate_error"].values[:, k])
+
+
+def test_other_studies_and_more_axes_have_no_figure(headings):
+    assert draw_study("mine:own", headings) is None
+    assert draw_study("heading", headings.expand_dims(drum_radius=[50.0, 125.0])) is None
+    assert draw_study("heading", headings.isel(length=[0], rod_radius=[0])) is None
