@@ -1,6 +1,7 @@
 """Sphinx configuration: `make docs` builds the site, with warnings as errors and no network."""
 
 import sys
+import warnings
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
@@ -8,6 +9,9 @@ from numpydoc.xref import DEFAULT_LINKS
 
 import polycorner.models
 import polycorner.studies
+
+# The gallery's workers are replaced when their memory has grown, which is as well.
+warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # for the folder `extensions`

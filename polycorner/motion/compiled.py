@@ -448,7 +448,7 @@ def read_body(scene, motion, room, i, h, time, index):
     own_gaps(scene, room, i, room.qm, room.gap, room.normal)
 
 
-@inner
+@small
 def own_gaps(scene, room, i, place, gap, normal):
     """Evaluate the gaps of a body at its place and their gradients."""
     work = room.work
@@ -797,7 +797,7 @@ def watch(scene, motion, room, h, count):
 # ----------------------------------------------------------------------------------------- blocks
 
 
-@inner
+@small
 def finish_block(scene, room, b):
     """Compute ``M^-1 J'`` and the block's own stiffness, and take its impulse into account."""
     k = scene.size
@@ -848,7 +848,7 @@ def bound_of(gap, before, free, bend, bounce, h, scale):
     return -reached / h
 
 
-@inner
+@small
 def new_block(room, b, k, first, second, rows):
     """Start a block with a Jacobian of zeros."""
     room.body[b, 0], room.body[b, 1], room.rows[b] = first, second, rows
@@ -1065,7 +1065,7 @@ def relax(scene, room, b, u, out):
     return far
 
 
-@inner
+@small
 def residual(scene, room, first, last, u, out):
     """Return the largest distance of a block from its law, as a speed."""
     worst = 0.0
