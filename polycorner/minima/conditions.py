@@ -130,7 +130,8 @@ class Curvature:
     vectors : (n, k) array
         Their orthonormal eigenvectors, in scaled coordinates.
     least : float
-        Least value of the form on unit vectors of the critical cone; ``inf`` when the cone is 0.
+        Least value of the form on unit vectors of the critical cone, ``inf`` when the cone is 0.
+        Where the form is positive on the whole tangent space, the least there: a lower bound.
     flat : (n, r) array
         Unit directions of the cone in which the form vanishes, or very nearly.
     decided : bool
