@@ -30,6 +30,7 @@ from polycorner.pictures.scene_bodies import box_of, sizes_of
 from polycorner.pictures.scene_film import Film
 from polycorner.pictures.scenes import atlas_scene, glb, library
 from polycorner.studies.pair_atlas import PairAtlas
+from polycorner.studies.sealed import put
 
 END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # what follows is trimesh's own page
 KEYS = " Space plays, ← and → step, Home and End go to the ends."
@@ -67,19 +68,16 @@ def _hands(atlas: PairAtlas) -> list[str]:
 
 
 def write_page(page: str, path: Path) -> Path:
-    """Write a page as ``.html`` and return the path; folders are made.
+    """Write a page as ``.html``, whole or not at all, and return the path; folders are made.
 
     Raises
     ------
     ValueError
         For another suffix.
+    OSError
+        If it cannot be written.
     """
-    if path.suffix.lower() != ".html":
-        msg = f"path: expected a name ending in .html; got {path.name}"
-        raise ValueError(msg)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page, encoding="utf-8", newline="\n")
-    return path
+    return put(path, page.encode(), suffix=".html")
 
 
 # ----------------------------------------------------------------------------------- the scripts

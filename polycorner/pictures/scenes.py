@@ -32,6 +32,7 @@ from polycorner.pictures.scene_bodies import (
 from polycorner.pictures.solids import forbidden_solid
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.studies.pair_atlas import PairAtlas
+from polycorner.studies.sealed import put
 
 if TYPE_CHECKING:
     import trimesh
@@ -167,19 +168,16 @@ def glb(scene: "trimesh.Scene") -> bytes:
 
 
 def write_scene(scene: "trimesh.Scene", path: Path) -> Path:
-    """Write a scene as ``.glb`` and return the path; folders are made.
+    """Write a scene as ``.glb``, whole or not at all, and return the path; folders are made.
 
     Raises
     ------
     ValueError
         For another suffix.
+    OSError
+        If it cannot be written.
     """
-    if path.suffix.lower() != ".glb":
-        msg = f"path: expected a name ending in .glb; got {path.name}"
-        raise ValueError(msg)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(glb(scene))
-    return path
+    return put(path, glb(scene), suffix=".glb")
 
 
 # ------------------------------------------------------------------------------------- materials

@@ -118,15 +118,20 @@ def _synchronise(path: Path) -> None:
         os.close(handle)
 
 
-def put(path: str | os.PathLike[str], content: bytes) -> Path:
+def put(path: str | os.PathLike[str], content: bytes, *, suffix: str = "") -> Path:
     """Write bytes whole or not at all, making the folder if need be.
 
     Raises
     ------
+    ValueError
+        If the name must end in a suffix and does not.
     OSError
         Of the kind that the system reported, such as a full disk, saying so in a sentence.
     """
     target = Path(path)
+    if suffix and target.suffix.lower() != suffix:
+        msg = f"path: expected a name ending in {suffix}; got {target.name}"
+        raise ValueError(msg)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, lambda part: part.write_bytes(content))
