@@ -4,6 +4,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -123,6 +124,49 @@ def patience(words: str) -> Iterator[None]:
 
         with Console(stderr=True).status(words):
             yield
+
+
+@contextmanager
+def progress_bar(
+    words: str, *, total: float | None = None, count: str = "", left: bool = False
+) -> "Iterator[Callable[..., None] | None]":
+    """Show a bar on a terminal; yield what changes it, or None where nobody watches.
+
+    What is yielded takes ``completed``, ``total``, ``description`` (first these words) and
+    ``note``, which is shown last.
+
+    Parameters
+    ----------
+    words : str
+        What is done, before the bar.
+    total : float, optional
+        The end, if it is known already.
+    count : str, optional
+        How progress is written behind the bar, in the markup of rich; default both numbers.
+    left : bool, optional
+        Whether to estimate the time left.
+    """
+    if not shows_progress():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = [
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn(count) if count else MofNCompleteColumn(),
+        *([TimeRemainingColumn()] if left else []),
+        TextColumn("{task.fields[note]}"),
+    ]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        yield partial(bar.update, bar.add_task(words, total=total, note=""))
 
 
 def fail(message: str) -> NoReturn:

@@ -1,7 +1,7 @@
 """``polycorner drum``: dumbbells in motion in a slowly rotating, tilted drum."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,13 +13,14 @@ from polycorner.cli.common import (
     fail,
     output_options,
     prepare,
+    progress_bar,
     unfinished,
     write_answer,
     writing,
 )
 from polycorner.cli.drum_options import drum_options, merged
 from polycorner.cli.drum_report import drum_answer, print_drum
-from polycorner.cli.manner import shows_progress, timed
+from polycorner.cli.manner import timed
 
 if TYPE_CHECKING:
     from polycorner.models.drum import DumbbellDrum
@@ -206,7 +207,12 @@ def _run(
     from polycorner.studies.drum_runs import Saving, run
 
     seconds = values["duration"]
-    with writing(folder), timed("simulating"), _bar("simulated", seconds, "s") as progress:
+    shown = "{task.completed:.1f} of {task.total:g} s"
+    with (
+        writing(folder),
+        timed("simulating"),
+        progress_bar("simulated", total=seconds, count=shown, left=True) as change,
+    ):
         return run(
             model,
             q,
@@ -214,29 +220,8 @@ def _run(
             dt=values["dt"],
             noise=noise,
             saving=Saving(folder, resume=resume),
-            progress=progress,
+            progress=change and (lambda done: change(completed=done)),
         )
-
-
-@contextmanager
-def _bar(words: str, total: float, unit: str) -> "Iterator[Callable[[float], None] | None]":
-    """Show a bar with the time left on a terminal, nothing in a pipe."""
-    if not shows_progress():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn(f"{{task.completed:.1f}} of {{task.total:g}} {unit}"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    ) as bar:
-        task = bar.add_task(words, total=total)
-        yield lambda done: bar.update(task, completed=done)
 
 
 # --------------------------------------------------------------------------------------- the answer
@@ -291,6 +276,6 @@ def _write(run: "DrumRun", answer: dict[str, Any], out: Path) -> list[Path]:
 def _write_film(run: "DrumRun", film: Path) -> Path:
     from polycorner.pictures.movies import write_movie
 
-    with writing(film, "--movie"), timed("filming"), _bar("movie", 1.0, "") as progress:
-        told = None if progress is None else lambda done, count: progress(done / count)
+    with writing(film, "--movie"), timed("filming"), progress_bar("movie", left=True) as change:
+        told = change and (lambda done, count: change(completed=done, total=count))
         return write_movie(run, film, progress=told)

@@ -1,7 +1,6 @@
 """``polycorner paper``: the statements of the paper, checked one by one."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,13 +13,14 @@ from polycorner.cli.common import (
     output_options,
     patience,
     prepare,
+    progress_bar,
     settings_option,
     writing,
 )
-from polycorner.cli.manner import manner, shows_progress, timed
+from polycorner.cli.manner import manner, timed
 
 if TYPE_CHECKING:
-    from paper_checks.running import Progress, Run
+    from paper_checks.running import Run
 
 EPILOG = """\b
 Examples:
@@ -86,29 +86,10 @@ def _checked(ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers
     except ValueError as error:
         message = str(error)
         fail(f"--{message}" if message.startswith("section") else message)
-    with _bar("checked", len(claims)) as progress:
-        return replace(run(claims, workers=workers, progress=progress), slow=left_out)
-
-
-@contextmanager
-def _bar(words: str, total: int) -> "Iterator[Progress | None]":
-    """Show on a terminal how many are done and which are being worked on."""
-    if not shows_progress():
-        with timed(f"{total} to be {words}"):
-            yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (
-        TextColumn(words),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda done, ids: bar.update(task, completed=done, description=", ".join(ids))
+    words = f"{len(claims)} to be checked"
+    with timed(words), progress_bar("checked", total=len(claims)) as change:
+        told = change and (lambda done, ids: change(completed=done, note=", ".join(ids)))
+        return replace(run(claims, workers=workers, progress=told), slow=left_out)
 
 
 # ----------------------------------------------------------------------------------------- files
@@ -150,12 +131,12 @@ def _draw(
             fail(f"figures: expected {', '.join(KNOWN)}; got {name!r}")
     drawn: list[str] = []
     total = len(names or [f for f in KNOWN.values() if slow or not f.slow])
-    with writing(out), _bar("drawn", total) as told:
+    with writing(out), timed(f"{total} to be drawn"), progress_bar("drawn", total=total) as change:
 
         def progress(name: str) -> None:
             drawn.append(name)
-            if told is not None:
-                told(len(drawn), [])
+            if change is not None:
+                change(completed=len(drawn))
 
         written = write(out, names or None, slow=slow, progress=progress)
     deliver([str(path) for path in written], lambda: None, written, as_json=as_json)

@@ -4,12 +4,21 @@ import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import deliver, fail, prepare, unfinished, write_answer, writing
-from polycorner.cli.manner import shows_progress, timed
+from polycorner.cli.common import (
+    deliver,
+    fail,
+    prepare,
+    progress_bar,
+    unfinished,
+    write_answer,
+    writing,
+)
+from polycorner.cli.manner import timed
 from polycorner.cli.report import keys, print_answer
 
 if TYPE_CHECKING:
@@ -107,42 +116,19 @@ class Search:
     @contextmanager
     def patience(self) -> "Iterator[Progress | None]":
         """Show a bar with rate and estimate on a terminal, nothing in a pipe."""
-        with timed(f"searching {self.model}"), self._bar() as progress:
-            yield progress
-
-    @contextmanager
-    def _bar(self) -> "Iterator[Progress | None]":
-        if not shows_progress():
-            yield None
-            return
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-        )
-
-        with Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
-            console=Console(stderr=True),
-            transient=True,
-        ) as bar:
-            task = bar.add_task(self.model, total=None, rate="")
+        begun = perf_counter()
+        with timed(f"searching {self.model}"), progress_bar(self.model) as change:
+            if change is None:
+                yield None
+                return
 
             def progress(corners: int, edges: int, pending: int) -> None:
-                elapsed = bar.tasks[0].elapsed
-                bar.update(
-                    task,
+                pace = edges / (perf_counter() - begun)
+                change(
                     completed=edges,
                     total=edges + pending,
                     description=f"{self.model}: {corners} corners, edges",
-                    rate=f"{edges / elapsed:.0f}/s, {pending * elapsed / max(edges, 1):.0f} s left"
-                    if elapsed
-                    else "",
+                    note=f"{pace:.0f}/s, {pending / pace:.0f} s left" if edges else "",
                 )
 
             yield progress

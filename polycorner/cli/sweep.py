@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import deliver, fail, output_options, prepare, write_answer
-from polycorner.cli.manner import console, remark, shows_progress
+from polycorner.cli.common import (
+    deliver,
+    fail,
+    output_options,
+    prepare,
+    progress_bar,
+    write_answer,
+)
+from polycorner.cli.manner import console, remark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,7 +129,7 @@ def _computed(
     if seed is not None and not plan.random:
         fail(f"--seed: expected none, for {plan.study} draws no random numbers; got {seed}")
     chosen = (seed if seed is not None else plan.seed or 0) if plan.random else None
-    with _executor(scheduler, workers) as executor, _bar(file.stem) as progress:
+    with _executor(scheduler, workers) as executor, _told(file.stem) as progress:
         return compute(
             plan.function,
             plan.grid,
@@ -155,32 +162,16 @@ def _executor(scheduler: str | None, workers: int | None) -> Iterator[Any]:
 
 
 @contextmanager
-def _bar(name: str) -> "Iterator[Report | None]":
-    """Show a bar with an estimate of what is left on a terminal, nothing in a pipe."""
-    if not shows_progress():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(name, total=None)
+def _told(name: str) -> "Iterator[Report | None]":
+    """Show how many points are done, how many failed, and the time left."""
+    with progress_bar(name, left=True) as change:
+        if change is None:
+            yield None
+            return
 
         def progress(done: int, failed: int, total: int) -> None:
             words = f"{name}, {failed} failed" if failed else name
-            bar.update(task, completed=done + failed, total=total, description=words)
+            change(completed=done + failed, total=total, description=words)
 
         yield progress
 
