@@ -12,8 +12,7 @@ block that presses on it.  A step (:func:`step_once`) is
 1. drift half a step and evaluate every body; wake what can no longer rest;
 2. blocks of the bodies that are awake and of the contacts between them; islands of contacts;
 3. solve each island: Gauss-Seidel sweeps over the blocks, Newton's method on the natural map
-   ``p = proj(p - rho u)`` ([Acary]) once the sweeps have found which blocks stick and which slip,
-   and the method of multipliers where it cycles; both solve systems as large as the velocities;
+   ``p = proj(p - rho u)`` ([Acary]); an island at rest is first asked whether it stays so;
 4. bodies at rest within the solver's accuracy get exactly the velocity of rest; an island whose
    forces fit in their sets sleeps, and is only asked whether they still fit;
 5. events, energies, and drift the other half of the step.
@@ -58,14 +57,24 @@ CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
 TOUCH = 1e-7  # scaled gap up to which bodies touch
 NEAR = 1e-2  # scaled gap up to which a contact is watched
 FIT = 1e-9  # relative slack with which forces at rest fit in their sets
-GUESS = 1e-2  # residual, relative to the speeds, from which Newton's method is tried at once
-STIFF, STIFFEST = 1e2, 1e4  # of the augmented Lagrangian, relative to the contacts
 SKIN = 0.4  # of the reach, by which lists of neighbours are wider
-MARGIN = 0.95  # share of friction with which a heap at rest is asked to rest
 SPARE = 0.01  # share of friction that lets a sleeper sleep unasked
 LONGEST = np.int64(50)  # steps for which it does
 BEND = 1e-4  # scaled depth beyond which a gap must not close by its curvature within a step
-SOFT = 1e-6  # relative softness of contacts in Newton steps, so that redundant ones have a solution
+NEARLY = 10.0  # times the tolerance, up to which speeds count as those of rest
+PRESS = 0.2  # of the pressure that would stop a body, on contacts at rest that need not press
+AWAY = 0.1  # relative distance from the boundary of sets from which forces at rest are sought
+INWARD = 1e-9  # relative distance from the boundary of sets that forces at rest keep
+BALANCE = 1e-2  # of the tolerance, to which they balance
+PATIENCE = 25  # steps in which they are sought
+CENTRING = 2  # steps towards the centre of their sets
+SOFTEST = 1e-13  # relative softness of bodies in those steps
+SOFT = 1e2  # times the tolerance: softness of contacts in Newton steps, relative to the contacts
+SOFTER = 1e-2  # the most at first; three times that in the next round, and so on
+ROUNDS = 3  # of a cycle
+SWEEPS = 10  # in a round
+MOST = 20  # Newton steps in a round
+IDLE = 6  # Newton steps in vain after which it ends
 
 
 class Scene(NamedTuple):
@@ -188,7 +197,6 @@ class Room(NamedTuple):
     block_shape: Field
     origin: Field  # (B, 4) where the block comes from, and a mark
     weight: Field  # (B,) load; of a gap, by how much its curvature closes it
-    ease: Field  # (B,) share of the load that is used
     offset: Field  # (B, 2)
     slant: Field  # (B, 2, 2k) Jacobian
     pushed: Field  # (B, 2, 2k) mass^-1 Jacobian'
@@ -198,11 +206,12 @@ class Room(NamedTuple):
     mass: Field  # (N, k, k)
     turned: Field  # (B,) whose slip passed through zero in this step
     best: Field  # (B, 2) impulses of the least residual
-    hat: Field  # (B, 2) multipliers
-    held: Field  # (B,) load of friction, or what is added to a normal velocity, while they are held
-    cone: Field  # (B,) the other block of a contact and its friction that form a cone, or -1
+    hat: Field  # (B, 2) impulses before it was asked whether an island stays at rest
+    held: Field  # (B,) whether a block can bear at rest
     curve: Field  # (B, 9) derivative of the law of a block, and of the contact that presses on it
     answer: Field  # (B, 2) impulses of a Newton step before the velocities answer
+    lean: Field  # (B, 2k) what is left of a normal when friction is eliminated
+    lead: Field  # (B, 2) by how much friction changes with its load
     jac: Field  # (3, 2k)
     bent: Field  # (3, 2k)
     square: Field  # (k, k)
@@ -213,9 +222,8 @@ class Room(NamedTuple):
     slots: Field  # (max(C, P),)
     members: Field  # (N,) bodies of an island
     local: Field  # (N,) their numbers in it
-    back: Field  # (N, k) their velocities before a step
     step: Field  # (N k,)
-    slope_of: Field  # (N k,)
+    reach: Field  # (N k,) end of each of its rows
     matrix: Field  # band, row by row
 
 
@@ -594,20 +602,25 @@ def keeps(scene, room, lam, i, v):
 
 @inner
 def fits(scene, motion, room, i, pull):
-    """Return whether a body at rest stays so, whatever proves it; see :func:`balanced`."""
-    return balanced(scene, motion, room, i, pull, False) or balanced(
-        scene, motion, room, i, pull, True
+    """Return whether a body at rest stays so, whatever proves it; see :func:`balanced`.
+
+    First the impulses of the last step, if they leave some friction unused; then others.
+    """
+    return (
+        balanced(scene, motion, room, i, pull, True, -SPARE)
+        or balanced(scene, motion, room, i, pull, False, FIT)
+        or balanced(scene, motion, room, i, pull, True, FIT)
     )
 
 
 @inner
-def balanced(scene, motion, room, i, pull, again):
+def balanced(scene, motion, room, i, pull, again, slack):
     """Return whether a body at rest stays so: forces, pulls and impulses in their sets balance.
 
-    The impulses of the last step (of friction with a known load first none, then ``again`` those)
-    are corrected by the smallest change, weighted by the loads, that restores balance; if the
-    result lies in its sets, it proves rest.  It is left in
-    ``room.fit_grip`` and ``room.fit_lam``.
+    The impulses of the last step (with ``again``, or else of friction with a known load none) are
+    corrected by the smallest change, weighted by the loads, that restores balance; if the result
+    lies in its sets, up to a relative slack, it proves rest.  It is left in ``room.fit_grip`` and
+    ``room.fit_lam``.
     """
     k, F, m = scene.size, scene.shape.shape[0], scene.bounce.size
     A, r = room.square, room.side
@@ -652,7 +665,7 @@ def balanced(scene, motion, room, i, pull, again):
                 change += room.slope[i, row, c] * r[c]
             grip[i, f, row - scene.row[f]] += before * before * change
         load = load_of(scene, room, lam, i, f)
-        if not inside(scene, scene.shape[f, 0], grip[i, f, 0], grip[i, f, 1], load, FIT):
+        if not inside(scene, scene.shape[f, 0], grip[i, f, 0], grip[i, f, 1], load, slack):
             return False
     return True
 
@@ -751,7 +764,7 @@ def watch_pair(scene, motion, room, a, b, limit, count):
     pair_gaps(scene, room, a, b, room.qm)
     for g in range(m):
         if work[n + g] < limit:
-            if count == room.near.shape[0]:
+            if count + motion.counts[0] >= room.near.shape[0]:  # contacts of sleepers are kept, too
                 return -1
             room.near[count, 0], room.near[count, 1], room.near[count, 2] = a, b, g
             room.near_gap[count] = work[n + g]
@@ -769,13 +782,19 @@ def watch_pair(scene, motion, room, a, b, limit, count):
 
 
 @small
-def watch(scene, motion, room, h, count):
-    """Note all small gaps between bodies of which one is awake; return how many, or -1."""
+def watched_up_to(scene, room, h):
+    """Return the gap up to which contacts are watched: any body may be hit by the fastest."""
     fastest = 0.0
     for i in range(scene.bodies):
         if room.awake[i]:
             fastest = max(fastest, room.speed[i])
-    limit = NEAR * scene.scale + 2.0 * h * fastest
+    return NEAR * scene.scale + 2.0 * h * fastest
+
+
+@small
+def watch(scene, motion, room, h, count):
+    """Note all small gaps between bodies of which one is awake; return how many, or -1."""
+    limit = watched_up_to(scene, room, h)
     for s in range(room.listed[0]):
         a, b = room.pairs[s, 0], room.pairs[s, 1]
         if room.seen[s] or not (room.awake[a] or room.awake[b]):
@@ -853,7 +872,7 @@ def new_block(room, b, k, first, second, rows):
     """Start a block with a Jacobian of zeros."""
     room.body[b, 0], room.body[b, 1], room.rows[b] = first, second, rows
     room.press_by[b] = -1
-    room.weight[b], room.ease[b] = 0.0, 1.0
+    room.weight[b] = 0.0
     for r in range(2):
         room.offset[b, r] = 0.0
         room.p[b, r] = 0.0
@@ -862,7 +881,7 @@ def new_block(room, b, k, first, second, rows):
 
 
 @small
-def body_blocks(scene, motion, room, i, h, count):
+def body_blocks(scene, motion, room, i, h, limit, count):
     """Append the blocks of a body's own contacts."""
     k, m = scene.size, scene.bounce.size
     block_of, looked = room.own, False
@@ -873,7 +892,7 @@ def body_blocks(scene, motion, room, i, h, count):
             before += room.normal[i, g, c] * motion.v[i, c]
             free += room.normal[i, g, c] * room.free[i, c]
         gap = room.gap[i, g]
-        near = gap + h * min(before, free, 0.0) < NEAR * scene.scale + 2.0 * h * room.speed[i]
+        near = gap + h * min(before, free, 0.0) < limit
         if not near and not motion.touch[i, g]:
             motion.lam[i, g] = 0.0
             continue
@@ -1040,7 +1059,7 @@ def relax(scene, room, b, u, out):
             push(scene, room, b, ZERO, new - p)
             room.p[b, 0] = new
         return abs(new - p) / rho
-    load = room.ease[b] * (room.weight[b] if owner < 0 else room.p[owner, 0])
+    load = room.weight[b] if owner < 0 else room.p[owner, 0]
     shape = room.block_shape[b]
     x, y = room.p[b, 0], room.p[b, 1]
     if room.rows[b] == 1:
@@ -1077,7 +1096,7 @@ def residual(scene, room, first, last, u, out):
             far = abs(max(0.0, room.p[b, 0] - u[0] * rho) - room.p[b, 0]) / rho
         else:
             owner = room.press_by[b]
-            load = room.ease[b] * (room.weight[b] if owner < 0 else room.p[owner, 0])
+            load = room.weight[b] if owner < 0 else room.p[owner, 0]
             y = room.p[b, 1] - u[1] * rho if room.rows[b] == 2 else 0.0
             project(scene, room.block_shape[b], room.p[b, 0] - u[0] * rho, y, load, out)
             far = abs(out[0] - room.p[b, 0]) / rho
@@ -1091,27 +1110,33 @@ def residual(scene, room, first, last, u, out):
 def number_bodies(scene, motion, room, first, last):
     """Give numbers to the bodies of an island; return how many, and the bandwidth.
 
-    They ascend along the substrate.  Contacts couple only bodies that are near, so that the matrix
-    of :func:`solve_band` is a band.  Nothing is numbered (0 is returned) if it has no room.
+    From the lowest on, neighbours get the next numbers ([CM]), so that the matrix of
+    :func:`solve_band` is a narrow band.  Nothing is numbered (0 is returned) if it has no room.
     """
-    k, n, reach = scene.size, ZERO, ZERO
+    k, n, done, reach = scene.size, ZERO, ZERO, ZERO
     members, local = room.members, room.local
     for i in range(scene.bodies):
         local[i] = NONE
+    lowest = NONE
     for s in range(first, last):
         for side in range(2):
             i = room.body[room.order[s], side]
-            if i >= 0 and room.awake[i] and local[i] < 0:
-                local[i] = ZERO
+            if i >= 0 and room.awake[i]:
                 along = motion.q[i, scene.place[1]]
-                at = n
-                while at > 0 and motion.q[members[at - 1], scene.place[1]] > along:
-                    members[at] = members[at - 1]
-                    at -= 1
-                members[at] = i
-                n += 1
-    for at in range(n):
-        local[members[at]] = at
+                if lowest < 0 or along < motion.q[lowest, scene.place[1]]:
+                    lowest = i
+    members[0], local[lowest], n = lowest, ZERO, ONE
+    while done < n:
+        i = members[done]
+        done += ONE
+        for s in range(first, last):
+            b = room.order[s]
+            x, y = room.body[b, 0], room.body[b, 1]
+            if room.rows[b] == 0 and i in (x, y):
+                other = y if x == i else x
+                if other >= 0 and room.awake[other] and local[other] < 0:
+                    members[n], local[other] = other, n
+                    n += ONE
     for s in range(first, last):
         i, j = room.body[room.order[s], 0], room.body[room.order[s], 1]
         if i >= 0 and j >= 0 and room.awake[i] and room.awake[j]:
@@ -1123,30 +1148,45 @@ def number_bodies(scene, motion, room, first, last):
 
 
 @inner
-def solve_band(A, b, n, width):
+def solve_band(A, b, n, width, reach):
     """Solve ``A x = b`` in place for a band matrix; row ``i`` starts with column ``i - width``.
 
-    The symmetric part of ``A`` is definite or nearly so: no rows are exchanged.
+    The symmetric part of ``A`` is definite or nearly so: no rows are exchanged.  ``reach`` gets the
+    envelope: row ``j`` ends, and so does column ``j`` below the diagonal, before ``reach[j]``.
     """
     stay_whole()
     stride = 2 * width + 1
+    for i in range(n):
+        at = i * stride + width - i
+        last = min(n, i + width + 1)
+        while last > i + 1 and A[at + last - 1] == 0.0:
+            last -= 1
+        reach[i] = last
+        first = max(0, i - width)
+        while first < i and A[at + first] == 0.0:
+            first += 1
+        for j in range(first, i):
+            reach[j] = max(reach[j], i + 1)
     for j in range(n):
         pivot = A[j * stride + width]
         if not abs(pivot) > 0.0:
             return False
-        last = min(n, j + width + 1)
+        last = reach[j]
+        at = j * stride + width - j
+        above = A[at + j + 1 : at + last]
         for i in range(j + 1, last):
             at = i * stride + width - i
             f = A[at + j] / pivot
+            reach[i] = max(reach[i], last)
             if f != 0.0:
-                other = j * stride + width - j
-                for c in range(j + 1, last):
-                    A[at + c] -= f * A[other + c]
+                below = A[at + j + 1 : at + last]
+                for c in range(above.size):
+                    below[c] -= f * above[c]
                 b[i] -= f * b[j]
     for i in range(n - 1, -1, -1):
         at = i * stride + width - i
         value = b[i]
-        for c in range(i + 1, min(n, i + width + 1)):
+        for c in range(i + 1, reach[i]):
             value -= A[at + c] * b[c]
         b[i] = value / A[at + i]
     return True
@@ -1180,7 +1220,7 @@ def couple(scene, room, b, width):
     if owner >= 0:
         swap = sides == 2 and room.body[owner, 0] != room.body[b, 0]
         for x in range(sides * k):
-            jac[0, x] = room.slant[owner, 0, (x + k) % (2 * k) if swap else x]
+            jac[0, x] = room.slant[owner, 0, (x + k if x < k else x - k) if swap else x]
     for r in range(rows):
         for x in range(sides * k):
             jac[1 + r, x] = room.slant[b, r, x]
@@ -1232,27 +1272,29 @@ def along_row(scene, room, b, r, vector):
 
 
 @small
-def newton(scene, room, first, last, n, width, goal, most, worst, u, out):
+def newton(scene, room, first, last, n, width, goal, soft, worst, u, out):
     """Take semismooth Newton steps on the natural map; keep the best impulses and their residual.
 
     The map is ``p - proj(p - rho u)`` with the velocities ``u = J v + d`` of the rows; its
     derivative is that of the projection, and for friction also that of its load ([Acary]).  The
     steps ``dp = a - G J dv`` of the blocks are put into ``M dv = J' dp``, so that what is solved is
-    as large as the velocities and not as the impulses.  Redundant contacts have a solution because
-    all are a little soft.
+    as large as the velocities and not as the impulses.  All contacts are a little soft, so that
+    redundant ones have a solution; this also damps the steps, as in the method of multipliers, of
+    which it is one step ([Rockafellar76]): softer contacts converge where hard ones cycle.
     """
     size, x = n * scene.size, room.step
-    least, former, steps = np.inf, np.inf, ZERO
+    least, former, steps, idle = np.inf, np.inf, ZERO, 0
     while True:
+        idle = 0 if worst < least else idle + 1
         if worst < least:
             least = worst
             keep(room, first, last, room.p, room.best)
         settled = worst <= goal and worst > 0.1 * former
-        if settled or worst <= 1e-5 * goal or steps == most or not worst < 1e6 * least:
+        if settled or worst <= 1e-2 * goal or idle == IDLE or steps == MOST:
             break
         former = worst
-        natural_map(scene, room, first, last, n, width, u, out)
-        if not solve_band(room.matrix, x, size, width):
+        natural_map(scene, room, first, last, n, width, soft, u, out)
+        if not solve_band(room.matrix, x, size, width, room.reach):
             break
         for s in range(first, last):
             take_step(scene, room, room.order[s], x)
@@ -1282,7 +1324,7 @@ def take_step(scene, room, b, x):
 
 
 @small
-def natural_map(scene, room, first, last, n, width, u, out):
+def natural_map(scene, room, first, last, n, width, soft, u, out):
     """Linearise the natural map of an island.
 
     ``room.curve`` and ``room.answer`` get ``G`` and ``a`` of each block; see :func:`newton`.
@@ -1300,20 +1342,22 @@ def natural_map(scene, room, first, last, n, width, u, out):
             if p - rho * u[0] <= 0.0:
                 curve[b, 4], answer[b, 0] = 0.0, -p
             else:
-                curve[b, 4], answer[b, 0] = rho / SOFT, -rho * u[0] / SOFT
+                curve[b, 4], answer[b, 0] = rho / soft, -rho * u[0] / soft
         else:
-            friction_map(scene, room, b, u, out)
-        couple(scene, room, b, width)
+            friction_map(scene, room, b, soft, u, out)
+        owner = room.press_by[b]
+        bears = curve[b, 4] > 0.0 if room.rows[b] == 0 else owner < 0 or room.p[owner, 0] > 0.0
+        if bears:
+            couple(scene, room, b, width)
         for r in range(max(1, room.rows[b])):
             pull_with(scene, room, b, r, answer[b, r], x)
 
 
 @small
-def friction_map(scene, room, b, u, out):
+def friction_map(scene, room, b, soft, u, out):
     """Linearise the natural map of one friction contact."""
     curve, rho, d, owner = room.curve, room.stiff[b, 3], room.rows[b], room.press_by[b]
-    pressing = room.weight[b] if owner < 0 else room.p[owner, 0]
-    load = room.ease[b] * pressing
+    load = room.weight[b] if owner < 0 else room.p[owner, 0]
     px, py = room.p[b, 0], room.p[b, 1] if d == 2 else 0.0
     zx, zy = px - rho * u[0], py - rho * u[1] if d == 2 else 0.0
     project(scene, room.block_shape[b], zx, zy, load, out)
@@ -1322,18 +1366,18 @@ def friction_map(scene, room, b, u, out):
     if d == 1:
         d01 = d10 = d11 = 0.0
     if owner >= 0 and load > 0.0:  # the load changes, too
-        change = room.answer[owner, 0] / pressing
+        change = room.answer[owner, 0] / load
         ex = out[0] - d00 * zx - d01 * zy
         ey = out[1] - d10 * zx - d11 * zy if d == 2 else 0.0
         fx -= ex * change
         fy -= ey * change
-        stiff = curve[owner, 4] / pressing
+        stiff = curve[owner, 4] / load
         ex *= stiff
         ey *= stiff
     else:
         ex = ey = 0.0
     # the inverse of 1 - D, a little soft
-    s00, s11 = 1.0 + SOFT - d00, 1.0 + SOFT - d11
+    s00, s11 = 1.0 + soft - d00, 1.0 + soft - d11
     determinant = s00 * s11 - d01 * d10
     i00, i01, i10, i11 = s11 / determinant, d01 / determinant, d10 / determinant, s00 / determinant
     curve[b, 3], curve[b, 6] = i00 * ex + i01 * ey, i10 * ex + i11 * ey
@@ -1341,188 +1385,6 @@ def friction_map(scene, room, b, u, out):
     curve[b, 7], curve[b, 8] = rho * (i10 * d00 + i11 * d10), rho * (i10 * d01 + i11 * d11)
     curve[b, 0] = curve[b, 1] = curve[b, 2] = 0.0
     room.answer[b, 0], room.answer[b, 1] = -(i00 * fx + i01 * fy), -(i10 * fx + i11 * fy)
-
-
-@inner
-def project_cone(mu, z, x, y, out):
-    """Project on the cone ``|(x, y)| <= mu z``; out: the point (3), its derivative (9 numbers)."""
-    for a in range(12):
-        out[a] = 0.0
-    far = np.sqrt(x * x + y * y)
-    if far <= mu * z:
-        out[0], out[1], out[2] = z, x, y
-        out[3] = out[7] = out[11] = 1.0
-        return
-    if mu * far <= -z:
-        return
-    ex, ey = x / far, y / far
-    f = 1.0 / (1.0 + mu * mu)
-    top = f * (z + mu * far)
-    g = mu * top / far
-    out[0], out[1], out[2] = top, mu * top * ex, mu * top * ey
-    out[3], out[4], out[5] = f, f * mu * ex, f * mu * ey
-    out[6], out[9] = out[4], out[5]
-    out[7] = f * mu * mu * ex * ex + g * ey * ey
-    out[8] = out[10] = (f * mu * mu - g) * ex * ey
-    out[11] = f * mu * mu * ey * ey + g * ex * ex
-
-
-@inner
-def find_cones(scene, room, first, last):
-    """Note which contacts form a cone with their friction: those whose friction is a disc."""
-    for s in range(first, last):
-        b = room.order[s]
-        room.cone[b] = NONE
-        owner, shape = room.press_by[b], room.block_shape[b]
-        if room.rows[b] == 0 or owner < 0 or room.cone[owner] >= 0:
-            continue
-        kind = scene.kinds[shape]
-        even = kind == INTERVAL and scene.sizes[shape, 0] == -scene.sizes[shape, 1]
-        if (kind == DISC and room.rows[b] == 2) or even:
-            room.cone[b], room.cone[owner] = owner, b
-
-
-@small
-def radius_of(scene, shape):
-    """Return the radius of a disc, or half the length of an interval about zero."""
-    return scene.sizes[shape, 1 if scene.kinds[shape] == INTERVAL else 0]
-
-
-@inner
-def augment(scene, motion, room, first, last, n, width, goal, stiff, worst, u, out):
-    """Solve by the method of multipliers; keep the best impulses; the stiffness, and the residual.
-
-    With the loads of friction held, or for a disc with ``mu |u_T|`` held that De Saxce and Feng add
-    to the normal velocity ([Acary]), the step is a convex programme: its augmented Lagrangian in
-    the velocities is minimised by Newton's method, whose step is halved while it goes beyond the
-    minimum along it, and the multipliers are renewed.  This is slower than :func:`newton`, and
-    does not cycle where it does.
-    """
-    find_cones(scene, room, first, last)
-    least, idle = worst, 0
-    keep(room, first, last, room.p, room.best)
-    for _ in range(10):
-        keep(room, first, last, room.p, room.hat)
-        for s in range(first, last):  # what presses comes before what it presses on
-            b = room.order[s]
-            owner = room.press_by[b]
-            if room.rows[b] == 0:
-                room.held[b] = 0.0
-                continue
-            room.held[b] = room.weight[b] if owner < 0 else room.p[owner, 0]
-            if room.cone[b] >= 0 and room.p[owner, 0] > 0.0:
-                slip_of(scene, room, b, room.new, u)
-                slip = np.sqrt(u[0] * u[0] + (u[1] * u[1] if room.rows[b] == 2 else 0.0))
-                room.held[owner] = room.ease[b] * radius_of(scene, room.block_shape[b]) * slip
-        descend(scene, motion, room, first, last, n, width, goal, stiff, u, out)
-        rebuild(scene, room, first, last)
-        worst = residual(scene, room, first, last, u, out)
-        idle = 0 if worst < 0.9 * least else idle + 1
-        if worst < least:
-            least = worst
-            keep(room, first, last, room.p, room.best)
-        if worst <= goal or idle == 4:
-            break
-        stiff = min(2.0 * stiff, STIFFEST)
-    if least < worst:
-        keep(room, first, last, room.best, room.p)
-        rebuild(scene, room, first, last)
-    return stiff, least
-
-
-@inner
-def descend(scene, motion, room, first, last, n, width, goal, stiff, u, out):
-    """Minimise the augmented Lagrangian of an island over the velocities."""
-    k, x, slope = scene.size, room.step, room.slope_of
-    size = n * k
-    respond(scene, room, first, last, n, stiff, u, out)
-    for _ in range(10):
-        far = 0.0
-        for at in range(n):
-            i = room.members[at]
-            for c in range(k):
-                value = 0.0
-                for a in range(k):
-                    value += room.inverse[i, c, a] * slope[at * k + a]
-                far = max(far, abs(value) * scene.unit[c])
-        if far <= 0.1 * goal:
-            break
-        start_matrix(scene, room, n, width)
-        for c in range(size):
-            x[c] = -slope[c]
-        for s in range(first, last):
-            b = room.order[s]
-            if room.rows[b] > 0 or room.cone[b] < 0:
-                couple(scene, room, b, width)
-        if not solve_band(room.matrix, x, size, width):
-            break
-        motion.counts[4] += 1
-        before, share = 0.0, 1.0
-        for c in range(size):
-            before += x[c] * slope[c]
-        for at in range(n):
-            for c in range(k):
-                room.back[at, c] = room.new[room.members[at], c]
-        while True:
-            for at in range(n):
-                for c in range(k):
-                    room.new[room.members[at], c] = room.back[at, c] + share * x[at * k + c]
-            respond(scene, room, first, last, n, stiff, u, out)
-            after = 0.0
-            for c in range(size):
-                after += x[c] * slope[c]
-            if after <= 0.5 * abs(before) or share < 0.01:
-                break
-            share *= 0.5
-
-
-@inner
-def respond(scene, room, first, last, n, stiff, u, out):
-    """Set the impulses that answer the velocities, their derivatives, and the slope that is left.
-
-    The impulses are ``proj(hat - sigma u)`` with the multipliers ``hat`` and the stiffness
-    ``sigma``; the slope is ``M (v - v_free) - J' p``.
-    """
-    k, slope, curve = scene.size, room.slope_of, room.curve
-    for at in range(n):
-        i = room.members[at]
-        for c in range(k):
-            value = 0.0
-            for a in range(k):
-                value += room.mass[i, c, a] * (room.new[i, a] - room.free[i, a])
-            slope[at * k + c] = value
-    for s in range(first, last):
-        b = room.order[s]
-        partner, rows = room.cone[b], room.rows[b]
-        if rows == 0 and partner >= 0:
-            continue
-        slip_of(scene, room, b, room.new, u)
-        sigma = stiff * room.stiff[b, 3]
-        if partner >= 0:
-            sigma = min(sigma, stiff * room.stiff[partner, 3])
-        x = room.hat[b, 0] - sigma * u[0]
-        y = room.hat[b, 1] - sigma * u[1] if rows == 2 else 0.0
-        if rows == 0:
-            room.p[b, 0] = max(0.0, x)
-            curve[b, 4] = sigma if x > 0.0 else 0.0
-        elif partner < 0:
-            project(scene, room.block_shape[b], x, y, room.ease[b] * room.held[b], out)
-            for a in range(4):
-                curve[b, a] = 0.0
-            curve[b, 4], curve[b, 5] = sigma * out[2], sigma * out[3]
-            curve[b, 6], curve[b, 7], curve[b, 8] = 0.0, sigma * out[4], sigma * out[5]
-            room.p[b, 0], room.p[b, 1] = out[0], out[1]
-        else:
-            slip_of(scene, room, partner, room.new, u)
-            z = room.hat[partner, 0] - sigma * (u[0] + room.held[partner])
-            mu = room.ease[b] * radius_of(scene, room.block_shape[b])
-            project_cone(mu, z, x, y, out)
-            room.p[partner, 0], room.p[b, 0], room.p[b, 1] = out[0], out[1], out[2]
-            for a in range(9):
-                curve[b, a] = sigma * out[3 + a]
-            pull_with(scene, room, partner, ZERO, -room.p[partner, 0], slope)
-        for r in range(max(1, rows)):
-            pull_with(scene, room, b, r, -room.p[b, r], slope)
 
 
 @inner
@@ -1551,10 +1413,11 @@ def rebuild(scene, room, first, last):
 
 @inner
 def iterate(scene, motion, room, first, last, speed, sweeps):
-    """Sweep over the blocks, and go on with Newton's method and multipliers; the residual.
+    """Sweep over the blocks, and go on with Newton's method; return the residual.
 
-    It ends when the residual has reached its goal, when ``sweeps`` are done, or when a round of
-    all three no longer halves it.
+    Contacts are made softer from round to round, and hard again after the last of a cycle.  It ends
+    when the residual has reached its goal, when ``sweeps`` are done, or when a cycle has not halved
+    what its first round left.
     """
     u, out = room.two, room.image
     goal = scene.tolerance * speed
@@ -1562,9 +1425,9 @@ def iterate(scene, motion, room, first, last, speed, sweeps):
     if worst <= goal:
         return worst
     n, width = number_bodies(scene, motion, room, first, last)
-    done, stiff, former = 0, STIFF, np.inf
+    done, cycle, former = 0, 0, np.inf
     while True:
-        for _ in range(2 if done == 0 else 30):
+        for _ in range(2 if done == 0 else SWEEPS):
             worst = 0.0
             for s in range(first, last):
                 worst = max(worst, relax(scene, room, room.order[s], u, out))
@@ -1572,36 +1435,20 @@ def iterate(scene, motion, room, first, last, speed, sweeps):
             if worst <= goal:
                 break
         worst = residual(scene, room, first, last, u, out)
-        if worst > goal and n > 0 and (done > 2 or worst <= GUESS * speed):
-            most = 4 if done > 2 else 3
-            steps, worst = newton(scene, room, first, last, n, width, goal, most, worst, u, out)
+        if worst > goal and n > 0:
+            soft = min(SOFTER, SOFT * scene.tolerance) if cycle == 0 else SOFTER * 3.0**cycle
+            steps, worst = newton(scene, room, first, last, n, width, goal, soft, worst, u, out)
             motion.counts[4] += steps
-        if worst > goal and n > 0 and done > 2:
-            stiff, worst = augment(
-                scene, motion, room, first, last, n, width, goal, stiff, worst, u, out
-            )
-        if worst <= goal or done >= sweeps or (done > 32 and n > 0 and worst > 0.5 * former):
+        if worst <= goal or done >= sweeps:
             break
-        former = worst
+        if n > 0:
+            if cycle == 0:
+                former = worst
+            elif cycle == ROUNDS - 1 and worst > 0.5 * former:
+                break
+            cycle = (cycle + 1) % ROUNDS
     motion.counts[3] += done
     return worst
-
-
-@small
-def sticks_all(scene, room, first, last, limit):
-    """Return whether no friction contact of an island slips faster than a limit."""
-    u = room.two
-    for s in range(first, last):
-        b = room.order[s]
-        if room.rows[b] > 0:
-            owner = room.press_by[b]
-            if owner >= 0 and room.p[owner, 0] <= 0.0:
-                continue
-            slip_of(scene, room, b, room.new, u)
-            for r in range(room.rows[b]):
-                if abs(u[r]) > limit:
-                    return False
-    return True
 
 
 @small
@@ -1631,12 +1478,346 @@ def turn_back(scene, motion, room, first, last):
     return found
 
 
+# ------------------------------------------------------------------------------- a heap at rest
+
+
+@small
+def add_linear(c0, c1, c2, load, x, y, out):
+    """Add the barrier ``-log(c0 load + c1 x + c2 y)`` to a slope (3) and a curvature (6)."""
+    f = 1.0 / (c0 * load + c1 * x + c2 * y)
+    c0, c1, c2 = c0 * f, c1 * f, c2 * f
+    out[0], out[1], out[2] = out[0] - c0, out[1] - c1, out[2] - c2
+    out[3], out[4], out[5] = out[3] + c0 * c0, out[4] + c0 * c1, out[5] + c0 * c2
+    out[6], out[7], out[8] = out[6] + c1 * c1, out[7] + c1 * c2, out[8] + c2 * c2
+
+
+@small
+def add_quadratic(a, b, load, x, y, out):
+    """Add the barrier ``-log(load^2 - (x / a)^2 - (y / b)^2)``."""
+    e, f = 1.0 / (a * a), 1.0 / (b * b)
+    g = 2.0 / (load * load - e * x * x - f * y * y)
+    c0, c1, c2 = -g * load, g * e * x, g * f * y
+    out[0], out[1], out[2] = out[0] + c0, out[1] + c1, out[2] + c2
+    out[3], out[4], out[5] = out[3] + c0 * c0 - g, out[4] + c0 * c1, out[5] + c0 * c2
+    out[6], out[7], out[8] = out[6] + c1 * c1 + g * e, out[7] + c1 * c2, out[8] + c2 * c2 + g * f
+
+
+@small
+def barrier(scene, shape, load, x, y, out):
+    """Differentiate the barrier of ``load`` times a set: slope and curvature in load, x and y."""
+    for a in range(9):
+        out[a] = 0.0
+    kind = scene.kinds[shape]
+    a, b = scene.sizes[shape, 0], scene.sizes[shape, 1]
+    if kind == INTERVAL:
+        add_linear(-a, 1.0, 0.0, load, x, y, out)
+        add_linear(b, -1.0, 0.0, load, x, y, out)
+        out[8] = 1.0
+    elif kind == DISC:
+        add_quadratic(a, a, load, x, y, out)
+    elif kind == ELLIPSE:
+        add_quadratic(a, b, load, x, y, out)
+    elif kind == CUT_DISC:
+        add_quadratic(a, a, load, x, y, out)
+        add_linear(b, 1.0, 0.0, load, x, y, out)
+        add_linear(b, -1.0, 0.0, load, x, y, out)
+    else:
+        first, last = scene.corner[shape], scene.corner[shape + 1]
+        for i in range(first, last):
+            j = i + 1 if i + 1 < last else first
+            ax, ay = scene.vertices[i, 0], scene.vertices[i, 1]
+            ex, ey = scene.vertices[j, 0] - ax, scene.vertices[j, 1] - ay
+            add_linear(ey * ax - ex * ay, -ey, ex, load, x, y, out)
+
+
+@inner
+def bears(scene, motion, room, first, last, speed, goal):
+    """Note in ``room.held`` which blocks can bear at rest; return whether rest is possible at all.
+
+    Those of contacts that neither open nor close; none may slip or have to open.  All get
+    impulses in the interior of their sets.
+    """
+    u, out = room.two, room.image
+    for s in range(first, last):
+        b = room.order[s]
+        owner, shape = room.press_by[b], room.block_shape[b]
+        slip_of(scene, room, b, motion.v, u)
+        if room.rows[b] == 0:
+            if u[0] < -NEARLY * goal:
+                return False
+            room.held[b] = 1.0 if u[0] <= NEARLY * goal else 0.0
+            least = PRESS * room.stiff[b, 3] * speed
+            room.p[b, 0] = max(room.p[b, 0], least) * room.held[b]
+            continue
+        room.held[b] = 1.0
+        if owner >= 0:
+            room.held[b] = room.held[owner]
+        if room.held[b] == 0.0:
+            room.p[b, 0], room.p[b, 1] = 0.0, 0.0
+            continue
+        if abs(u[0]) > NEARLY * goal or (room.rows[b] == 2 and abs(u[1]) > NEARLY * goal):
+            return False
+        load = room.weight[b] if owner < 0 else room.p[owner, 0]
+        if scene.kinds[shape] == INTERVAL or room.rows[b] == 1:
+            room.p[b, 1] = 0.0
+        tries = 0
+        while not inside(scene, shape, room.p[b, 0], room.p[b, 1], load, -AWAY):
+            tries += 1
+            share = 0.8 if tries < 20 else 0.0
+            room.p[b, 0] *= share
+            room.p[b, 1] *= share
+            if tries > 20:
+                return False
+        barrier(scene, shape, load, room.p[b, 0], room.p[b, 1], out)
+        if not (load > 0.0 and out[6] < np.inf):  # a set without interior
+            return False
+    return True
+
+
+@inner
+def weigh(scene, room, first, last, n, width, speed):
+    """Set up the Newton step of :func:`stays`: matrix and right side.
+
+    Of each block that bears, ``room.curve`` gets the inverse of its curvature (2 x 2) and how its
+    slope changes with its load (2); of each contact, ``room.lean`` the row that is left of its
+    normal when its friction is eliminated.
+    """
+    k, curve, answer, out, x = scene.size, room.curve, room.answer, room.image, room.step
+    stiffest = 0.0
+    for s in range(first, last):
+        b = room.order[s]
+        for a in range(9):
+            curve[b, a] = 0.0
+        if room.rows[b] == 0 and room.held[b] > 0.0:
+            p = room.p[b, 0]
+            slope = 1.0 / (PRESS * room.stiff[b, 3] * speed) - 1.0 / p
+            curve[b, 0], answer[b, 0], answer[b, 1] = 1.0 / (p * p), slope, slope
+            for c in range(2 * k):
+                room.lean[b, c] = room.slant[b, 0, c]
+    for s in range(first, last):
+        b = room.order[s]
+        owner, rows = room.press_by[b], room.rows[b]
+        if rows == 0 or room.held[b] == 0.0:
+            continue
+        load = room.weight[b] if owner < 0 else room.p[owner, 0]
+        barrier(scene, room.block_shape[b], load, room.p[b, 0], room.p[b, 1], out)
+        flat = rows == 1 or scene.kinds[room.block_shape[b]] == INTERVAL
+        if flat:
+            x00, x01, x11 = 1.0 / out[6], 0.0, 0.0
+        else:
+            determinant = out[6] * out[8] - out[7] * out[7]
+            x00, x01, x11 = out[8] / determinant, -out[7] / determinant, out[6] / determinant
+        curve[b, 4], curve[b, 5], curve[b, 7], curve[b, 8] = x00, x01, x01, x11
+        answer[b, 0], answer[b, 1] = out[1], out[2]
+        stiffest = max(stiffest, max(x00, x11) / room.stiff[b, 3])
+        if owner < 0:
+            continue
+        t0, t1 = x00 * out[4] + x01 * out[5], x01 * out[4] + x11 * out[5]
+        room.lead[b, 0], room.lead[b, 1] = t0, t1
+        curve[owner, 0] += out[3] - t0 * out[4] - t1 * out[5]
+        answer[owner, 0] += out[0] - t0 * out[1] - t1 * out[2]
+        answer[owner, 1] += out[0]
+        shift = 0 if room.body[owner, 0] == room.body[b, 0] else k
+        for c in range(2 * k):
+            at = (c + shift) % (2 * k)
+            room.lean[owner, at] -= t0 * room.slant[b, 0, c]
+            if rows == 2:
+                room.lean[owner, at] -= t1 * room.slant[b, 1, c]
+    for s in range(first, last):
+        b = room.order[s]
+        if room.rows[b] == 0 and room.held[b] > 0.0:
+            stiffest = max(stiffest, 1.0 / (curve[b, 0] * room.stiff[b, 3]))
+    start_matrix(scene, room, n, width)
+    for a in range(n * k * (2 * width + 1)):
+        room.matrix[a] *= SOFTEST * stiffest
+    for s in range(first, last):
+        b = room.order[s]
+        if room.held[b] == 0.0:
+            continue
+        if room.rows[b] > 0:
+            couple(scene, room, b, width)
+            g0, g1 = answer[b, 0], answer[b, 1]
+            pull_with(scene, room, b, ZERO, curve[b, 4] * g0 + curve[b, 5] * g1, x)
+            if room.rows[b] == 2:
+                pull_with(scene, room, b, ONE, curve[b, 7] * g0 + curve[b, 8] * g1, x)
+        else:
+            lean_on(scene, room, b, width)
+
+
+@small
+def lean_on(scene, room, b, width):
+    """Add what is left of a contact's normal to the matrix and the right side."""
+    k, x, lean = scene.size, room.step, room.lean
+    stride, share = 2 * width + 1, 1.0 / room.curve[b, 0]
+    for side in range(2):
+        i = room.body[b, side]
+        if i < 0 or not room.awake[i]:
+            continue
+        for c in range(k):
+            row = room.local[i] * k + c
+            value = share * lean[b, side * k + c]
+            x[row] += value * room.answer[b, 0]
+            for other in range(2):
+                j = room.body[b, other]
+                if j < 0 or not room.awake[j]:
+                    continue
+                at = row * stride + width - row + room.local[j] * k
+                for d in range(k):
+                    room.matrix[at + d] += value * lean[b, other * k + d]
+
+
+@inner
+def changes(scene, room, first, last):
+    """Put the Newton step of the impulses into ``room.best``; return its squared local length."""
+    k, x, curve, answer, best = scene.size, room.step, room.curve, room.answer, room.best
+    square = 0.0
+    for s in range(first, last):
+        b = room.order[s]
+        best[b, 0], best[b, 1] = 0.0, 0.0
+        if room.rows[b] > 0 or room.held[b] == 0.0:
+            continue
+        value = 0.0
+        for side in range(2):
+            i = room.body[b, side]
+            if i >= 0 and room.awake[i]:
+                for c in range(k):
+                    value += room.lean[b, side * k + c] * x[room.local[i] * k + c]
+        best[b, 0] = (value - answer[b, 0]) / curve[b, 0]
+        square += best[b, 0] * (along_row(scene, room, b, ZERO, x) - answer[b, 1])
+    for s in range(first, last):
+        b = room.order[s]
+        owner = room.press_by[b]
+        if room.rows[b] == 0 or room.held[b] == 0.0:
+            continue
+        a0 = along_row(scene, room, b, ZERO, x) - answer[b, 0]
+        a1 = along_row(scene, room, b, ONE, x) - answer[b, 1] if room.rows[b] == 2 else 0.0
+        best[b, 0] = curve[b, 4] * a0 + curve[b, 5] * a1
+        best[b, 1] = curve[b, 7] * a0 + curve[b, 8] * a1
+        if owner >= 0:
+            best[b, 0] -= room.lead[b, 0] * best[owner, 0]
+            best[b, 1] -= room.lead[b, 1] * best[owner, 0]
+        square += best[b, 0] * a0 + best[b, 1] * a1
+    return square
+
+
+@inner
+def within(scene, room, first, last, share):
+    """Return whether impulses changed by a share of a step are in the interior of their sets."""
+    p, best = room.p, room.best
+    for s in range(first, last):
+        b = room.order[s]
+        if room.held[b] == 0.0:
+            continue
+        x = p[b, 0] + share * best[b, 0]
+        if room.rows[b] == 0:
+            if x <= INWARD * p[b, 0]:
+                return False
+            continue
+        owner = room.press_by[b]
+        y = p[b, 1] + share * best[b, 1]
+        load = room.weight[b] if owner < 0 else p[owner, 0] + share * best[owner, 0]
+        if not inside(scene, room.block_shape[b], x, y, load, -INWARD):
+            return False
+    return True
+
+
+@inner
+def centre(scene, motion, room, first, last, n, width, speed, goal):
+    """Move impulses towards balance and the centre of their sets; return whether they balance."""
+    k, x, p, best = scene.size, room.step, room.p, room.best
+    balanced_for, stuck = 0, 0
+    for _ in range(PATIENCE):
+        far = 0.0
+        for at in range(n):
+            i = room.members[at]
+            for c in range(k):
+                value = 0.0
+                for a in range(k):
+                    value += room.mass[i, c, a] * (motion.v[i, a] - room.free[i, a])
+                x[at * k + c] = value
+        for s in range(first, last):
+            b = room.order[s]
+            for r in range(max(1, room.rows[b])):
+                pull_with(scene, room, b, r, -p[b, r], x)
+        for at in range(n):
+            i = room.members[at]
+            for c in range(k):
+                value = 0.0
+                for a in range(k):
+                    value += room.inverse[i, c, a] * x[at * k + a]
+                far = max(far, abs(value) * scene.unit[c])
+        if far <= BALANCE * goal:
+            balanced_for += 1
+        if balanced_for > CENTRING:
+            return True
+        weigh(scene, room, first, last, n, width, speed)
+        if not solve_band(room.matrix, x, n * k, width, room.reach):
+            return balanced_for > 0
+        motion.counts[4] += 1
+        square = changes(scene, room, first, last)
+        share, least = 1.0, 0.0
+        if balanced_for > 0:
+            if square < 0.1:
+                return True
+            least = 1.0 / (1.0 + np.sqrt(square))  # goes down, and stays inside ([BV] sec. 9.6)
+        while not within(scene, room, first, last, share):
+            share *= 0.7
+            if share < 1e-3:
+                return balanced_for > 0
+        if share < 1.0:
+            share = max(least, 0.7 * share)
+        stuck += 1 if share < 0.1 else 0
+        if stuck == 2:
+            return balanced_for > 0
+        for s in range(first, last):
+            b = room.order[s]
+            for r in range(2):
+                p[b, r] += share * best[b, r]
+    return balanced_for > 0
+
+
+@inner
+def stays(scene, motion, room, first, last, speed):
+    """Return whether an island at rest stays so; then its impulses prove it.
+
+    At rest nothing slips, so that De Saxce's term vanishes and the question is convex: are there
+    impulses in the sets that balance the forces?  They are sought in the interior, at the least of
+    ``sum n / n_0 - sum log(distance from the boundary)`` over the balanced ones, by Newton's method
+    from unbalanced ones ([BV] sec. 10.3; the sums hold no force that grows without end in a jam).
+    Forces far from their bounds go on to balance while the loads change: the heap can sleep.
+    """
+    k = scene.size
+    n, width = number_bodies(scene, motion, room, first, last)
+    if n == 0:
+        return False
+    goal = scene.tolerance * speed
+    keep(room, first, last, room.p, room.hat)
+    proved = False
+    if bears(scene, motion, room, first, last, speed, goal):
+        proved = centre(scene, motion, room, first, last, n, width, speed, goal)
+    if not proved:
+        keep(room, first, last, room.hat, room.p)
+        return False
+    for at in range(n):
+        i = room.members[at]
+        for c in range(k):
+            room.new[i, c] = motion.v[i, c]
+    for s in range(first, last):
+        b = room.order[s]
+        if room.rows[b] == 0 and room.held[b] > 0.0:  # shut; what little is wrong is left
+            slip_of(scene, room, b, room.new, room.two)
+            room.offset[b, 0] -= room.two[0]
+    return True
+
+
+# ------------------------------------------------------------------------------------ all islands
+
+
 @small
 def solve_island(scene, motion, room, first, last):
     """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
 
-    An island at rest is first asked whether it would rest with a little less friction: the
-    forces found then go on to balance while the loads change, and it can sleep for a while.
+    An island at rest is first asked whether it stays so: see :func:`stays`.
     """
     u = room.two
     speed, quiet = 0.0, True
@@ -1665,15 +1846,8 @@ def solve_island(scene, motion, room, first, last):
                     for c in range(scene.size):
                         room.new[i, c] = room.free[i, c]
         return 0.0
-    if quiet:
-        for s in range(first, last):
-            room.ease[room.order[s]] = MARGIN
-        worst = iterate(scene, motion, room, first, last, speed, scene.sweeps)
-        goal = scene.tolerance * speed
-        for s in range(first, last):
-            room.ease[room.order[s]] = 1.0
-        if worst <= goal and sticks_all(scene, room, first, last, 2.0 * goal):
-            return worst / speed
+    if quiet and stays(scene, motion, room, first, last, speed):
+        return residual(scene, room, first, last, u, room.image) / speed
     while True:
         worst = iterate(scene, motion, room, first, last, speed, scene.sweeps)
         if worst > scene.tolerance * speed or not turn_back(scene, motion, room, first, last):
@@ -1688,18 +1862,54 @@ def solve_island(scene, motion, room, first, last):
 def rouse(scene, motion, room, h, time, index):
     """Put to work the bodies that are awake and sleepers whose forces fit no more.
 
-    A sleeper whose forces fit with room to spare is not even asked until they could have used
-    it up, at the rate at which they changed when it was asked before.
+    Return whether there is any.  A sleeper whose forces fit with room to spare is not even asked
+    until they could have used it up, at the rate at which they changed when it was asked before.
     """
+    busy = False
     for i in range(scene.bodies):
-        room.awake[i], room.asked[i] = 0, 0
+        room.awake[i], room.asked[i], room.touched[i] = 0, 0, 0
         if not motion.alive[i]:
             continue
         if motion.asleep[i] and motion.due[i] > index:
             for c in range(scene.size):
                 room.qm[i, c] = motion.q[i, c] + 0.5 * h * motion.v[i, c]
             continue
-        room.awake[i] = 0 if ask(scene, motion, room, i, motion.pull, h, time, index) else 1
+        if not ask(scene, motion, room, i, motion.pull, h, time, index):
+            room.awake[i], busy = 1, True
+    if busy and scene.pair_at != 0:
+        rouse_heaps(scene, motion, room, h, time, index)
+    return busy
+
+
+@small
+def rouse_heaps(scene, motion, room, h, time, index):
+    """Wake all of a heap at rest in which one was woken: it is asked as a whole (:func:`stays`)."""
+    N, root, struck, busy = scene.bodies, room.root, room.touched, room.next
+    woken = False
+    for i in range(N):
+        root[i] = i
+        struck[i], busy[i] = 0, 0
+        woken = woken or (motion.asleep[i] and room.awake[i])
+    if not woken:
+        return
+    for s in range(motion.counts[0]):
+        if motion.flags[s, 1]:
+            pair = motion.keys[s] // scene.pair_gaps
+            x, y = root_of(root, pair // N), root_of(root, pair % N)
+            root[max(x, y)] = min(x, y)
+    for i in range(N):
+        if motion.alive[i]:
+            r = root_of(root, i)
+            if not motion.rests[i]:
+                busy[r] = 1
+            if motion.asleep[i] and room.awake[i]:
+                struck[r] = 1
+    for i in range(N):
+        r = root_of(root, i)
+        if motion.alive[i] and not room.awake[i] and struck[r] and not busy[r]:
+            if not room.asked[i]:
+                ask(scene, motion, room, i, motion.pull, h, time, index)
+            room.awake[i] = 1
 
 
 @inner
@@ -2021,7 +2231,7 @@ def comes_to_rest(scene, motion, room, i, rest):
         size = max(size, abs(rest[c]) * unit)
         far = max(far, abs(room.new[i, c] - rest[c]) * unit)
         old = max(old, abs(motion.v[i, c] - rest[c]) * unit)
-    if far > 10.0 * scene.tolerance * size:
+    if far > NEARLY * scene.tolerance * size:
         return False
     still = old <= 1e-13 * size
     for c in range(k):
@@ -2179,9 +2389,10 @@ def collect(scene, motion, room, h, near):
     for i in range(scene.bodies):
         for c in range(scene.size):
             room.ahead[i, c] = room.qm[i, c] + h * motion.v[i, c]
+    limit = watched_up_to(scene, room, h)
     for i in range(scene.bodies):
         if motion.alive[i] and room.awake[i]:
-            blocks = body_blocks(scene, motion, room, i, h, blocks)
+            blocks = body_blocks(scene, motion, room, i, h, limit, blocks)
     slots = room.slots
     for s in range(near):  # in the order of their numbers, whatever was met first
         slots[s] = key_of(scene, room, s) * near + s
@@ -2199,24 +2410,22 @@ def collect(scene, motion, room, h, near):
 
 
 @small
-def step_once(scene, motion, room, h, events, numbers, count):
-    """Advance by one step; return whether there was room for all contacts, and the events."""
-    k, N = scene.size, scene.bodies
-    index = motion.counts[1]
-    time = index * h
-    rouse(scene, motion, room, h, time + 0.5 * h, index)
+def solve(scene, motion, room, h, time, index):
+    """Solve a step of the bodies that are awake and of those they wake.
+
+    Return whether there was room for all contacts, and how many blocks there are.
+    """
     near, blocks = ZERO, ZERO
     if scene.pair_at != 0:
         if stale(scene, motion, room, time) and not list_neighbours(scene, motion, room, time):
-            return False, count
+            return False, blocks
         for s in range(room.listed[0]):
             room.seen[s] = 0
     while True:
-        start_bodies(scene, motion, room)
         if scene.pair_at != 0:
             near = watch(scene, motion, room, h, near)
             if near < 0:
-                return False, count
+                return False, blocks
         blocks = collect(scene, motion, room, h, near)
         islands(scene, room, blocks)
         solve_islands(scene, motion, room, blocks, h)
@@ -2225,12 +2434,29 @@ def step_once(scene, motion, room, h, events, numbers, count):
             scene, motion, room, blocks, h, time + 0.5 * h, index
         ):
             break
-    for i in range(N):
+        start_bodies(scene, motion, room)
+    for i in range(scene.bodies):
         if room.size[i + 1] > room.size[i]:
             motion.sums[4] = max(motion.sums[4], room.error[i])
             motion.counts[2] += 1 if room.error[i] > scene.tolerance else 0
+    return True, blocks
+
+
+@small
+def step_once(scene, motion, room, h, events, numbers, count):
+    """Advance by one step; return whether there was room for all contacts, and the events."""
+    k, N = scene.size, scene.bodies
+    index = motion.counts[1]
+    time = index * h
+    blocks, busy = ZERO, rouse(scene, motion, room, h, time + 0.5 * h, index)
+    start_bodies(scene, motion, room)
+    if busy:
+        enough, blocks = solve(scene, motion, room, h, time, index)
+        if not enough:
+            return False, count
     account(scene, motion, room, blocks, h)
-    count = contact_events(scene, motion, room, blocks, h, time, events, numbers, count)
+    if busy:
+        count = contact_events(scene, motion, room, blocks, h, time, events, numbers, count)
     keep_sticking(scene, motion, room, blocks)
     for i in range(N):
         room.seen_rest[i] = motion.rests[i]

@@ -135,8 +135,8 @@ class Engine:
         return dict(self.motion._asdict())
 
     def load(self, arrays: dict[str, Any]) -> None:
-        """Go on from arrays saved before."""
-        needed = int(arrays["counts"][0])
+        """Go on from arrays saved before, with as much room, so that it is bit for bit the same."""
+        needed = len(arrays["keys"])
         while self.capacity < needed:
             self.capacity *= 2
         empty = _still(
@@ -280,7 +280,6 @@ def _room(herd: Herd, capacity: int) -> "Room":
         block_shape=whole(B),
         origin=whole(B, 4),
         weight=np.zeros(B),
-        ease=np.ones(B),
         offset=np.zeros((B, 2)),
         slant=np.zeros((B, 2, 2 * k)),
         pushed=np.zeros((B, 2, 2 * k)),
@@ -292,9 +291,10 @@ def _room(herd: Herd, capacity: int) -> "Room":
         best=np.zeros((B, 2)),
         hat=np.zeros((B, 2)),
         held=np.zeros(B),
-        cone=whole(B),
         curve=np.zeros((B, 9)),
         answer=np.zeros((B, 2)),
+        lean=np.zeros((B, 2 * k)),
+        lead=np.zeros((B, 2)),
         jac=np.zeros((3, 2 * k)),
         bent=np.zeros((3, 2 * k)),
         square=np.zeros((k, k)),
@@ -305,8 +305,7 @@ def _room(herd: Herd, capacity: int) -> "Room":
         slots=whole(max(capacity, pairs, 1)),
         members=whole(N),
         local=whole(N),
-        back=np.zeros((N, k)),
         step=np.zeros(N * k),
-        slope_of=np.zeros(N * k),
+        reach=whole(N * k),
         matrix=np.zeros(N * k * min(2 * N * k, BAND)),
     )

@@ -62,11 +62,16 @@ def test_encounters_start_apart_and_a_climbing_one_below():
         drum.placed(pair)  # refuses what overlaps
 
 
-def test_bunches_are_judged_only_after_the_whole_time():
-    found = bunch.of_sixty_leave(duration=0.02, starts=2, top=300.0)
-    assert found.verdict is Verdict.NOT_TESTABLE
-    assert found.numbers["left"] == 0
-    assert "2 start(s)" in found.evidence
+def test_bunches_are_judged_by_how_many_have_left(monkeypatch):
+    monkeypatch.setattr(bunch, "OBSERVED_TIME", 0.02)
+    found = {leaving: bunch.of_sixty_leave(leaving, starts=2) for leaving in (0, 40)}
+    assert {leaving: one.verdict for leaving, one in found.items()} == {
+        0: Verdict.HOLDS_UNDER,
+        40: Verdict.REFUTED,
+    }
+    assert found[40].numbers["left"] == 0
+    assert "2 starts" in found[40].evidence
+    assert "0.02 s" in found[40].evidence
 
 
 def test_the_reach_of_a_dyad_is_speed_times_time():
