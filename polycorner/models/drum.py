@@ -25,7 +25,7 @@ from polycorner.motion import formulation as equations
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.scene import Body, Grip, Herd, Pairing
-from polycorner.motion.simulate import check_step, run, whole_stride
+from polycorner.motion.simulate import check_step, run, whole_steps, whole_stride
 
 if TYPE_CHECKING:
     from polycorner.motion.engine import Engine
@@ -263,11 +263,8 @@ class DumbbellDrum:
         ``every``: record every so many steps, default about a thousand times.  See
         :func:`polycorner.motion.simulate.simulate`.
         """
-        if isinstance(duration, bool) or not isinstance(duration, Real) or not 0 <= duration < 1e12:
-            msg = f"duration: expected a time in s; got {duration!r}"
-            raise ValueError(msg)
         engine = self.engine(q, dt=dt, noise=noise)
-        steps = round(float(duration) / dt)
+        steps = whole_steps(duration, dt)
         return run(engine, steps, whole_stride(every, steps), progress).trajectory(self.herd)
 
     def placed(self, q: ArrayLike) -> Array:

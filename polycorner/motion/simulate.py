@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from polycorner.motion.trajectory import Trajectory
 
 FRAMES = 1000  # instants recorded by default
+LONGEST = 1e12  # s
 
 
 def simulate(
@@ -80,6 +81,14 @@ def simulate(
         raise ValueError(msg)
     steps = round((float(t_end) - state.time) / dt)
     return run(engine, steps, whole_stride(every, steps), progress).trajectory(system)
+
+
+def whole_steps(duration: float, dt: float) -> int:
+    """Return how many steps of ``dt`` a time takes, refusing what is no time in s."""
+    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0 <= duration < LONGEST:
+        msg = f"duration: expected a time in s; got {duration!r}"
+        raise ValueError(msg)
+    return round(float(duration) / dt)
 
 
 def whole_stride(every: int | None, steps: int) -> int:

@@ -1,5 +1,6 @@
 """Figures of parameter studies: one parameter across, a curve for each value of another."""
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
@@ -20,11 +21,24 @@ MOST_CURVES = 12  # of many values of the second parameter, so many are drawn
 def draw_study(study: str, found: "xr.Dataset") -> Figure | None:
     """Draw a study that ships; None if it has no figure or more than two axes of several values."""
     draw = DRAWN.get(study)
+    if study in REPEATED:
+        found = _averaged(found, REPEATED[study])
     try:
         across, others = _axes(found)
     except ValueError:
         return None
     return None if draw is None else draw(found.squeeze(), across, others)
+
+
+def _averaged(found: "xr.Dataset", over: str) -> "xr.Dataset":
+    """Return means along an axis of members, with their standard errors as ``<name>_error``."""
+    if over not in found.dims:
+        return found
+    results = found.drop_vars([name for name in found if found[name].dtype.kind not in "iuf"])
+    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # none, or one member
+        count = results.count(over)
+        errors = results.std(over, ddof=1) / np.sqrt(count)
+        return results.mean(over).merge(errors.rename({n: f"{n}_error" for n in errors}))
 
 
 def _axes(found: "xr.Dataset") -> tuple[str, str | None]:
@@ -116,14 +130,9 @@ def _beside(rests: Any) -> Any:
 def draw_climbing_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
     """Draw climb rates and headings with twice their standard errors; the law is dotted."""
     figure, first, second = _panels("Nested pairs driven by a turning drum")
-    x = found[across].values
-    width = float(np.ptp(x)) / max(1, len(x) - 1)
-    curves = list(_curves(found, others))
-    for k, (colour, label, curve) in enumerate(curves):
-        beside = x + 0.04 * width * (k - (len(curves) - 1) / 2)  # so that bars do not hide bars
+    for beside, colour, label, curve in _side_by_side(found, across, others):
         for axes, name in ((first, "climb_rate"), (second, "heading")):
-            y, bar = curve[name].values, 2 * curve[f"{name}_error"].values
-            axes.errorbar(beside, y, yerr=bar, fmt="o-", ms=4, capsize=3, color=colour, label=label)
+            _with_bars(axes, beside, curve, name, color=colour, label=label)
         first.plot(beside, curve["law"].values, ":", color=colour)
     first.plot([], [], ":", color="0.4", label="ω ρ tan(heading)")
     first.axhline(0, color="0.8", lw=0.8, zorder=0)
@@ -133,7 +142,44 @@ def draw_climbing_sweep(found: "xr.Dataset", across: str, others: str | None) ->
     return figure
 
 
+def _side_by_side(
+    found: "xr.Dataset", across: str, others: str | None
+) -> "Iterator[tuple[Array, str, str | None, xr.Dataset]]":
+    """Yield places, colour, label and results of curves; places so that bars do not hide bars."""
+    x = found[across].values
+    width = float(np.ptp(x)) / max(1, len(x) - 1)
+    curves = list(_curves(found, others))
+    for k, (colour, label, curve) in enumerate(curves):
+        yield x + 0.04 * width * (k - (len(curves) - 1) / 2), colour, label, curve
+
+
+def _with_bars(axes: Axes, x: Array, curve: "xr.Dataset", name: str, **looks: Any) -> None:
+    """Draw a result with twice its standard error, if there is one."""
+    y, bar = curve[name].values, 2 * curve[f"{name}_error"].values
+    axes.errorbar(x, y, yerr=bar, ms=4, capsize=3, **{"fmt": "o-", **looks})
+
+
+def draw_bunch_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
+    """Draw how many left, and how many are in dyads at the end, with twice the standard errors."""
+    figure, first, second = _panels("Dumbbells of a bunch in a turning drum")
+    for x, colour, label, curve in _side_by_side(found, across, others):
+        _with_bars(first, x, curve, "left", color=colour, label=label)
+        _with_bars(second, x, curve, "in_right", color=colour)
+        _with_bars(second, x, curve, "in_left", color=colour, fmt="s:", mfc="white")
+    second.plot([], [], "ko-", ms=4, label="in right-handed dyads")
+    second.plot([], [], "ks:", ms=4, mfc="white", label="in left-handed dyads")
+    for axes, words in ((first, "have left"), (second, "in the drum at the end")):
+        axes.set(ylabel=words, xlabel=_axis_label(found, across))
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    if others:
+        first.legend(fontsize=9, frameon=False)
+    second.legend(fontsize=9, frameon=False)
+    return figure
+
+
+REPEATED: Mapping[str, str] = {"bunch": "start"}  # axes of members of ensembles
 DRAWN: Mapping[str, Callable[["xr.Dataset", str, str | None], Figure]] = {
     "heading": draw_heading_sweep,
     "climbing": draw_climbing_sweep,
+    "bunch": draw_bunch_sweep,
 }

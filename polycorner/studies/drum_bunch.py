@@ -16,7 +16,7 @@ from polycorner.geometry.manifold import Array
 from polycorner.models.drum import DumbbellDrum
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulate import run
+from polycorner.motion.simulate import run, whole_steps
 from polycorner.studies.drum_pairs import LEFT_AS, Handed, Sizes, dyads_among, left_as
 from polycorner.studies.drum_single import Mean
 from polycorner.studies.drum_starts import scatter
@@ -158,7 +158,7 @@ def follow_bunch(
     q = scattered(drum, np.random.default_rng(seed))
     noise = Noise(chatter=chatter, seed=seed)
     engine = drum.engine(q, dt=dt, noise=noise)
-    steps, stride = round(duration / dt), max(1, round(interval / dt))
+    steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
     path = run(engine, steps, stride, progress).trajectory(engine.herd)
     left = tuple((e.time, e.bodies[0]) for e in path.of_kind(EventKind.EXIT))
     effort = path.effort

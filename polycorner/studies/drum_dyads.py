@@ -18,7 +18,7 @@ from polycorner.models.drum import DumbbellDrum
 from polycorner.models.dumbbell_formulas import CONTACTS
 from polycorner.models.dumbbells import Chirality
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulate import run
+from polycorner.motion.simulate import run, whole_steps
 from polycorner.studies.drum_pairs import Sizes, chirality, gaps
 from polycorner.studies.drum_single import APART, Mean
 
@@ -167,7 +167,8 @@ def follow_dyads(
     places[:, 1] += offset
     herd = replace(drum, count=len(places))
     engine = herd.engine(places, dt=dt, noise=noise, solver=SOLVER)
-    path = run(engine, round(duration / dt), max(1, round(interval / dt))).trajectory(engine.herd)
+    steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
+    path = run(engine, steps, stride).trajectory(engine.herd)
     q = path.q.copy()
     q[..., 1] -= offset
     q = q.reshape(len(path), len(starts), 2, 4)

@@ -5,7 +5,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from numbers import Real
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from polycorner import __version__
 from polycorner.geometry.manifold import Array
 from polycorner.models.drum import DumbbellDrum
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulate import whole_stride
+from polycorner.motion.simulate import whole_steps, whole_stride
 from polycorner.studies.drum_checkpoints import Checkpoint
 from polycorner.studies.interrupts import first_interrupt
 
@@ -129,14 +128,11 @@ def run(
     TypeError, ValueError
         Naming the argument; also if a checkpoint is of a run with other parameters.
     """
-    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0 <= duration < 1e9:
-        msg = f"duration: expected a time in s; got {duration!r}"
-        raise ValueError(msg)
     from polycorner.motion.recorder import Recorder
 
     noise = noise or Noise()
     engine = drum.engine(q, dt=dt, noise=noise)
-    steps = round(float(duration) / dt)
+    steps = whole_steps(duration, dt)
     stride = whole_stride(every, steps) if every is not None else default_stride(duration, dt)
     recorder = Recorder(engine)
     book = None

@@ -18,7 +18,7 @@ from polycorner.models.drum import DumbbellDrum
 from polycorner.models.keel import Keel, exact_eastern_boundary
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulate import run
+from polycorner.motion.simulate import run, whole_steps
 from polycorner.motion.trajectory import Trajectory
 
 APART = 1e4  # mm along the drum, so that dumbbells of one run never meet
@@ -141,7 +141,7 @@ def follow(
     theta = np.atleast_1d(reals(headings, "headings"))
     q = np.stack([np.full_like(theta, azimuth), APART * np.arange(len(theta)), theta], axis=-1)
     engine = replace(drum, count=len(theta)).engine(q, dt=dt, noise=noise, solver=Solver())
-    return run(engine, round(duration / dt), STRIDE).trajectory(engine.herd)
+    return run(engine, whole_steps(duration, dt), STRIDE).trajectory(engine.herd)
 
 
 def zigzags(trajectory: Trajectory, spin: float) -> tuple[Zigzag, ...]:

@@ -1,4 +1,4 @@
-"""Parameter studies that ship: the heading of a dyad, and how driven pairs climb."""
+"""Parameter studies that ship: headings of dyads, how driven pairs climb, who leaves a bunch."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -148,10 +148,98 @@ def climbing(
     }
 
 
+def bunch(
+    start: int,
+    *,
+    noise: float = 0.0,
+    top: float = 300.0,
+    sliding: float = 0.3,
+    rolling: float = 0.1,
+    rubbing: float = 0.3,
+    tilt: float = 7.0,
+    spin: float = 0.01,
+    length: float = 16.0,
+    ball_radius: float = 3.0,
+    rod_radius: float = 1.5,
+    count: int = 60,
+    duration: float = 1200.0,
+    dt: float = 0.004,
+) -> dict[str, Any]:
+    """Follow a bunch of dumbbells at the bottom of the drum; return who left, and who is a dyad.
+
+    See :func:`~polycorner.studies.drum_bunch.follow_bunch`.  Defaults are the paper's drum, with
+    what the paper does not give as in :class:`~polycorner.models.drum.DumbbellDrum`.
+
+    Parameters
+    ----------
+    start : int
+        Seed of the start and of the noise: one member of an ensemble.
+    noise : float
+        Amplitude of the chatter, see :class:`~polycorner.motion.noise.Noise`.
+    top : float
+        Where the drum ends, in mm.
+    sliding, rolling, rubbing : float
+        Static coefficients; the dynamic ones change in proportion to the drum's defaults.
+    tilt, spin : float
+        Of the drum, in degrees and rad/s.
+    length, ball_radius, rod_radius : float
+        In mm.
+    count : int
+        How many dumbbells.
+    duration, dt : float
+        In s.
+
+    Returns
+    -------
+    dict
+        Numbers of dumbbells: ``left``, and of them ``left_right``, ``left_left`` and
+        ``left_single`` as members of right- and left-handed dyads and of none; at the end
+        ``in_right``, ``in_left``, in as many of ``both``, ``single``, and ``rollers``.  ``reach``,
+        the mean height of those in the drum, and ``max_penetration`` in mm; ``missed``, the share
+        of the groups in contact that were not solved to the tolerance.
+    """
+    from polycorner.models.drum import DumbbellDrum
+    from polycorner.studies.drum_bunch import drum_for_bunch, follow_bunch
+
+    if isinstance(start, bool) or not isinstance(start, int) or start < 0:
+        msg = f"start: expected a whole number not below 0; got {start!r}"
+        raise ValueError(msg)
+    drum = DumbbellDrum(
+        length,
+        ball_radius,
+        rod_radius,
+        tilt=math.radians(tilt),
+        spin=spin,
+        sliding=in_proportion(sliding, DumbbellDrum.sliding),
+        rolling=in_proportion(rolling, DumbbellDrum.rolling),
+        rubbing=in_proportion(rubbing, DumbbellDrum.rubbing),
+    )
+    drum = drum_for_bunch(drum, count=count, top=top)
+    run = follow_bunch(drum, duration, seed=start, chatter=noise, dt=dt)
+    census, there = run.census(-1), run.present[-1]
+    return {
+        "left": len(run.exits),
+        **{f"left_{kind}": number for kind, number in run.exit_counts().items()},
+        "in_right": census["right"],
+        "in_left": census["left"],
+        "both": census["both"],
+        "single": census["single"],
+        "rollers": int(run.rollers(-1).sum()),
+        "reach": (float(run.q[-1, there, 1].mean()) if there.any() else math.nan, "mm"),
+        "max_penetration": (run.max_penetration, "mm"),
+        "missed": run.unconverged / max(1, run.islands),
+    }
+
+
+def in_proportion(static: float, usual: tuple[float, float]) -> tuple[float, float]:
+    """Return a static coefficient and the dynamic one, by the usual two."""
+    return static, static * usual[1] / usual[0]
+
+
 LENGTHS = dict.fromkeys(("length", "ball_radius", "rod_radius", "drum_radius"), "mm")
+DRUM = LENGTHS | {"tilt": "deg", "spin": "rad/s", "duration": "s", "noise": "1"}
 STUDIES: Mapping[str, Shipped] = {
     "heading": Shipped(heading, LENGTHS),
-    "climbing": Shipped(
-        climbing, LENGTHS | {"tilt": "deg", "spin": "rad/s", "duration": "s", "noise": "1"}
-    ),
+    "climbing": Shipped(climbing, DRUM),
+    "bunch": Shipped(bunch, DRUM | {"top": "mm", "dt": "s"}),
 }

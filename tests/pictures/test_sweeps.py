@@ -57,6 +57,34 @@ def test_climb_rates_have_bars_of_two_standard_errors():
         np.testing.assert_allclose(spans, 4 * found["climb_rate_error"].values[:, k])
 
 
+def test_members_of_an_ensemble_are_averaged():
+    names, rng = ("rubbing", "start", "top"), np.random.default_rng(2)
+    data = {name: (names, rng.integers(9, size=(2, 5, 3))) for name in ("left", "in_left")}
+    data["in_right"] = (names, np.where(rng.random((2, 5, 3)) < 0.2, np.nan, 3.0))
+    data["status"] = (names, np.ones((2, 5, 3), dtype=np.int8))
+    data["message"] = (names, np.full((2, 5, 3), "", dtype=object))
+    found = xr.Dataset(data, {"rubbing": [0.1, 0.3], "start": range(5), "top": [50, 60, 70]})
+    figure = draw_study("bunch", found)
+    FigureCanvasAgg(figure).draw()
+    first, second = (axes.containers for axes in figure.axes)
+    assert [one.get_label() for one in first] == ["rubbing 0.1", "rubbing 0.3"]
+    for k, one in enumerate(first):
+        points, _, (bars,) = one
+        left = found["left"].values[k]
+        np.testing.assert_allclose(points.get_ydata(), left.mean(axis=0))
+        spans = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
+        np.testing.assert_allclose(spans, 4 * left.std(axis=0, ddof=1) / np.sqrt(5))
+    np.testing.assert_allclose(second[0][0].get_ydata(), 3.0)  # of those that were computed
+
+
+def test_one_member_has_no_bar():
+    names = ("start", "top")
+    data = {name: (names, [[1, 2]]) for name in ("left", "in_left", "in_right", "status")}
+    figure = draw_study("bunch", xr.Dataset(data, {"start": [0], "top": [50.0, 60.0]}))
+    FigureCanvasAgg(figure).draw()
+    assert figure.axes[0].containers[0][0].get_ydata().tolist() == [1, 2]
+
+
 def test_other_studies_and_more_axes_have_no_figure(headings):
     assert draw_study("mine:own", headings) is None
     assert draw_study("heading", headings.expand_dims(drum_radius=[50.0, 125.0])) is None

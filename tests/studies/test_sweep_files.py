@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from polycorner.studies.sweep_files import read_study
-from polycorner.studies.sweep_studies import climbing, heading
+from polycorner.studies.sweep_studies import bunch, climbing, heading
 from polycorner.studies.sweeps import sweep
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "studies"
@@ -21,7 +21,7 @@ def written(tmp_path, text):
 def test_examples_are_studies():
     studies = {file.stem: read_study(file) for file in EXAMPLES.glob("*.toml")}
     assert {name: plan.function for name, plan in studies.items()} == {
-        "heading": heading, "climbing": climbing
+        "heading": heading, "climbing": climbing, "bunch": bunch
     }  # fmt: skip
     assert studies["heading"].grid.axes["length"].unit == "mm"
     assert (studies["climbing"].seed, studies["climbing"].random) == (1, True)
@@ -45,7 +45,7 @@ def test_axes_are_lists_or_ranges(tmp_path):
 
 MISTAKES = {
     'studdy = "heading"': r"expected study, seed, axes, fixed; got studdy \(did you mean study\?\)",
-    'study = "haeding"': r"study: expected heading, climbing or module:function; got haeding \(did",
+    'study = "haeding"': r"study: expected heading, climbing, bunch or .*; got haeding \(did",
     "study = 3": "study: expected",
     'study = "no_such_module:f"': "study: expected module:function that can be imported",
     'study = "math:no_such"': "study: expected module:function that can be imported",

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from polycorner.models import DumbbellPair
 from polycorner.models.drum import DumbbellDrum
 from polycorner.motion.noise import Noise
+from polycorner.studies.drum_bunch import follow_bunch
 from polycorner.studies.drum_dyads import follow_dyads
 from polycorner.studies.dyad import dyad_minima
-from polycorner.studies.sweep_studies import climbing, heading
+from polycorner.studies.sweep_studies import bunch, climbing, heading
 from polycorner.studies.sweeps import sweep
 
 
@@ -81,3 +82,40 @@ def test_climbing_names_what_is_wrong(wrong, words):
     given = {"noise": 0.1, "tilt": 7.0, "rng": np.random.default_rng(1)} | wrong
     with pytest.raises(ValueError, match=words):
         climbing(**given)
+
+
+def test_members_of_a_bunch_are_counted():
+    fixed = {"count": 12, "duration": 30.0, "top": 30.0, "tilt": 0.0, "sliding": 0.15, "noise": 0.1}
+    found = sweep(bunch, {"start": [0, 3], "rubbing": [0.1, 0.3]}, fixed=fixed)
+    drum = DumbbellDrum(
+        count=12, floor=True, top=30.0, tilt=0.0, sliding=(0.15, 0.1), rubbing=(0.1, 0.1)
+    )
+    run = follow_bunch(drum, 30.0, seed=3, chatter=0.1, dt=0.004)
+    at = {name: values.item() for name, values in found.sel(start=3, rubbing=0.1).items()}
+    assert at["left"] == len(run.exits) > 0
+    assert at["left"] == at["left_right"] + at["left_left"] + at["left_single"]
+    assert at["left_left"] == run.exit_counts()["left"]
+    stayed = run.present[-1]
+    assert at["in_right"] + at["in_left"] + at["both"] + at["single"] == stayed.sum()
+    assert at["reach"] == run.q[-1, stayed, 1].mean()
+    assert at["max_penetration"] == run.max_penetration
+    assert at["missed"] == run.unconverged / run.islands
+    assert len(np.unique(found["reach"])) == 4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"start": 1.5}, r"start: expected a whole number not below 0; got 1\.5"),
+        ({"start": -1}, "start: expected"),
+        ({"noise": -1.0}, "chatter: expected"),
+        ({"count": 0}, "count: expected"),
+        ({"rubbing": -0.1}, "rubbing: expected"),
+        ({"top": 0.0}, "top: expected"),
+        ({"dt": 0.1}, "dt: expected"),
+        ({"duration": math.nan}, "duration: expected"),
+    ],
+)
+def test_bunches_name_what_is_wrong(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        bunch(**({"start": 1, "count": 3, "duration": 0.01} | wrong))
