@@ -1535,7 +1535,9 @@ def bears(scene, motion, room, first, last, speed, goal):
     """Note in ``room.held`` which blocks can bear at rest; return whether rest is possible at all.
 
     Those of contacts that neither open nor close; none may slip or have to open.  All get
-    impulses in the interior of their sets.
+    impulses in the interior of their sets.  Bounds that are off by a few tolerances are moved to
+    what rest asks for, whatever the answer: where they were not, heaps missed the tolerance a third
+    more often, and one jam twitched for seconds.
     """
     u, out = room.two, room.image
     for s in range(first, last):
@@ -1545,7 +1547,10 @@ def bears(scene, motion, room, first, last, speed, goal):
         if room.rows[b] == 0:
             if u[0] < -NEARLY * goal:
                 return False
-            room.held[b] = 1.0 if u[0] <= NEARLY * goal else 0.0
+            room.held[b] = 0.0
+            if u[0] <= NEARLY * goal:  # shut
+                room.held[b] = 1.0
+                room.offset[b, 0] -= u[0]
             least = PRESS * room.stiff[b, 3] * speed
             room.p[b, 0] = max(room.p[b, 0], least) * room.held[b]
             continue
@@ -1802,11 +1807,6 @@ def stays(scene, motion, room, first, last, speed):
         i = room.members[at]
         for c in range(k):
             room.new[i, c] = motion.v[i, c]
-    for s in range(first, last):
-        b = room.order[s]
-        if room.rows[b] == 0 and room.held[b] > 0.0:  # shut; what little is wrong is left
-            slip_of(scene, room, b, room.new, room.two)
-            room.offset[b, 0] -= room.two[0]
     return True
 
 
