@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 FLAGS = (
     "--headless",
@@ -26,9 +28,12 @@ DEEP = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # WebGL witho
 PATIENCE = 30.0  # s
 
 
-def found() -> str | None:
-    """Return a browser of this family, None if there is none on this machine."""
-    return next(filter(None, map(shutil.which, NAMES)), None)
+def needed() -> str:
+    """Return a browser of this family; skip the test if there is none on this machine."""
+    name = next(filter(None, map(shutil.which, NAMES)), None)
+    if name is None:
+        pytest.skip("no Chromium on this machine")
+    return name
 
 
 class Page:

@@ -1,4 +1,4 @@
-"""What every test shares: a silent plotting back end and the amount of generated input.
+"""What tests share: a silent plotting back end, the amount of generated input, a browser.
 
 ``HYPOTHESIS_PROFILE=thorough`` asks for more examples than the default profile ``fast``.
 """
@@ -6,7 +6,9 @@
 import os
 import signal
 
+import chromium
 import matplotlib as mpl
+import pytest
 from hypothesis import HealthCheck, settings
 
 mpl.use("Agg")
@@ -30,3 +32,11 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory):
+    """An empty page in a browser, for the tests of one file."""
+    profile = tmp_path_factory.mktemp("profile")
+    with chromium.page(chromium.needed(), profile, graphics=True) as opened:
+        yield opened

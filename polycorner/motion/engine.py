@@ -1,11 +1,13 @@
 """A running simulation: the compiled core with its state, work space and recorded events."""
 
 from dataclasses import dataclass
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.geometry.kernels import one_at_a_time
 from polycorner.geometry.manifold import Array
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise, Solver
@@ -97,8 +99,7 @@ class Engine:
 
     def advance(self, steps: int) -> list[Event]:
         """Advance by so many steps and return what happened."""
-        from polycorner.motion import compiled
-
+        compiled = self._core()
         happened: list[Event] = []
         while steps > 0:
             why, done, count = compiled.advance(
@@ -109,6 +110,17 @@ class Engine:
             if why == compiled.CROWDED:
                 self._grow()
         return happened
+
+    def _core(self) -> ModuleType:
+        """Return the compiled core; the first call compiles it, unless another process has."""
+        from polycorner.motion import compiled
+
+        if not compiled.advance.overloads:
+            with one_at_a_time("motion"):
+                compiled.advance(
+                    self.scene, self.motion, self.room, self.dt, 0, self._events, self._numbers
+                )
+        return compiled
 
     def _read(self, count: int) -> list[Event]:
         contacts, names = self.herd.body.contacts, self.pair_contacts

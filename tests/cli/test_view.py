@@ -7,7 +7,6 @@ import subprocess
 import sys
 from contextlib import contextmanager
 
-import chromium
 import commands
 import numpy as np
 import pytest
@@ -40,15 +39,6 @@ def serving(*arguments):
             assert process.stderr.read() == ""
         finally:
             process.kill()
-
-
-@pytest.fixture(scope="module")
-def tab(tmp_path_factory):
-    name = chromium.found()
-    if name is None:
-        pytest.skip("no Chromium on this machine")
-    with chromium.page(name, tmp_path_factory.mktemp("profile"), graphics=True) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")

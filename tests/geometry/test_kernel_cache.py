@@ -4,6 +4,7 @@ import gc
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import sympy as sp
 
 import polycorner
 from polycorner import Manifold, SmoothFunction
-from polycorner.geometry.kernels import cache_directory
+from polycorner.geometry.kernels import cache_directory, one_at_a_time
 
 ROOT = Path(polycorner.__file__).parents[1]
 LINE = Manifold.euclidean("x")
@@ -146,3 +147,37 @@ def test_a_folder_that_cannot_be_made_costs_a_warning_only(tmp_path, monkeypatch
     assert origin == "compiled"
     assert f.value([0.5]) == pytest.approx(np.cos(1.5), abs=1e-15)
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_one_waits_until_the_other_is_done(tmp_path, monkeypatch):
+    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path / "new"))
+    done = []
+
+    def later():
+        with one_at_a_time("slow"):
+            done.append("later")
+
+    waiting = threading.Thread(target=later)
+    with one_at_a_time("slow"):
+        waiting.start()
+        waiting.join(0.3)
+        assert waiting.is_alive()
+        with one_at_a_time("other"):
+            done.append("first")
+    waiting.join(30)
+    assert done == ["first", "later"]
+
+
+def test_a_mistake_lets_the_next_one_in(tmp_path, monkeypatch):
+    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path))
+    with pytest.raises(KeyboardInterrupt), one_at_a_time("slow"):
+        raise KeyboardInterrupt
+    with one_at_a_time("slow"):
+        assert list(tmp_path.iterdir()) == [tmp_path / "slow.lock"]
+
+
+def test_where_no_lock_can_be_kept_nobody_waits(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path / "file"))
+    with one_at_a_time("slow"), one_at_a_time("slow"):
+        assert [path.name for path in tmp_path.iterdir()] == ["file"]

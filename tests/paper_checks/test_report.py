@@ -3,7 +3,6 @@
 import re
 from html.parser import HTMLParser
 
-import chromium
 import pytest
 import small_catalogue
 
@@ -168,26 +167,15 @@ def test_a_figure_that_breaks_is_said_to():
 
 
 @pytest.fixture(scope="module")
-def browser():
-    name = chromium.found()
-    if name is None:
-        pytest.skip("no Chromium on this machine")
-    return name
-
-
-@pytest.fixture(scope="module")
-def opened(browser, page, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("report")
-    file = folder / "report.html"
-    file.write_text(page, encoding="utf-8")
-    with chromium.page(browser, folder / "profile") as tab:
-        yield tab, file
+def file(page, tmp_path_factory):
+    written = tmp_path_factory.mktemp("report") / "report.html"
+    written.write_text(page, encoding="utf-8")
+    return written
 
 
 @pytest.mark.parametrize("width", [1200, 360])
 @pytest.mark.parametrize("dark", [False, True])
-def test_in_a_browser(opened, width, dark):
-    tab, file = opened
+def test_in_a_browser(tab, file, width, dark):
     tab.open(file, width=width, dark=dark)
     assert [url for url in tab.requests() if not url.startswith("data:image/")] == [file.as_uri()]
     assert tab.complaints() == []
@@ -205,8 +193,7 @@ def test_in_a_browser(opened, width, dark):
 COLOUR = "getComputedStyle(document.body).backgroundColor"
 
 
-def test_buttons_show_the_claims_of_one_verdict(opened):
-    tab, file = opened
+def test_buttons_show_the_claims_of_one_verdict(tab, file):
     tab.open(file, width=1200)
     shown = "[...document.querySelectorAll('article')].filter(a => a.offsetHeight > 0).length"
     assert tab.value(shown) == len(RUN.results)

@@ -200,15 +200,6 @@ def test_pages_are_html_files(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory):
-    name = chromium.found()
-    if name is None:
-        pytest.skip("no Chromium on this machine")
-    with chromium.page(name, tmp_path_factory.mktemp("profile"), graphics=True) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def file(way, tmp_path_factory):
     film = scene_film.pair_film(DRUM, way.points)
     path = tmp_path_factory.mktemp("pages") / "film.html"
@@ -330,10 +321,7 @@ def colour_at(tab, point):
 
 
 def test_a_browser_without_webgl_says_so_and_shows_the_numbers(file, tmp_path):
-    name = chromium.found()
-    if name is None:
-        pytest.skip("no Chromium on this machine")
-    with chromium.page(name, tmp_path / "profile") as flat:
+    with chromium.page(chromium.needed(), tmp_path / "profile") as flat:
         flat.ask(
             "Page.addScriptToEvaluateOnNewDocument",
             source="HTMLCanvasElement.prototype.getContext = () => null;",
