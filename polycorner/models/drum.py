@@ -287,11 +287,18 @@ class DumbbellDrum:
         if steep >= math.pi / 2:
             msg = f"q: expected azimuths within a quarter turn, where balls press; got {steep:g}"
             raise ValueError(msg)
-        self._check_floor(array)
+        self._check_ends(array)
         self._check_overlap(array)
         return array
 
-    def _check_floor(self, q: Array) -> None:
+    def _check_ends(self, q: Array) -> None:
+        worst = int(np.argmax(q[:, 1]))
+        if q[worst, 1] > self.top:
+            msg = (
+                f"top: expected a height above all dumbbells; got {self.top:g} mm, and number "
+                f"{worst + 1} is at {q[worst, 1]:.6g} mm"
+            )
+            raise ValueError(msg)
         if not self.floor:
             return
         low = q[:, 1] - self.length / 2 * np.abs(np.cos(q[:, 2])) - self.ball_radius

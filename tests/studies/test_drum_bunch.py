@@ -117,10 +117,16 @@ def test_a_bunch_stays_in_the_drum_and_sorts_itself():
 
 
 def test_dumbbells_leave_at_the_top():
-    drum = replace(SMALL, top=0.1)
-    run = follow_bunch(drum, 0.01, seed=2)
+    drum = replace(SMALL, top=40.0, tilt=math.radians(-40))  # steep: all slide out
+    run = follow_bunch(drum, 0.5, seed=2, interval=0.01)
     assert len(run.exits) == 8
+    assert run.exits[0][0] > 0.02
     assert not run.present[-1].any()
+
+
+def test_a_bunch_that_begins_above_the_top_is_refused():
+    with pytest.raises(ValueError, match=r"top: .* got 10 mm, and number \d is at 17\.2"):
+        follow_bunch(replace(SMALL, top=10.0), 1.0, seed=2)
 
 
 def test_a_drum_without_a_bottom_is_refused():

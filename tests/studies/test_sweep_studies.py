@@ -85,14 +85,27 @@ def test_climbing_names_what_is_wrong(wrong, words):
 
 
 def test_members_of_a_bunch_are_counted():
-    fixed = {"count": 12, "duration": 30.0, "top": 30.0, "tilt": 0.0, "sliding": 0.15, "noise": 0.1}
+    fixed = {
+        "count": 12,
+        "duration": 0.2,
+        "top": 60.0,
+        "tilt": -20.0,
+        "sliding": 0.15,
+        "noise": 0.1,
+    }
     found = sweep(bunch, {"start": [0, 3], "rubbing": [0.1, 0.3]}, fixed=fixed)
     drum = DumbbellDrum(
-        count=12, floor=True, top=30.0, tilt=0.0, sliding=(0.15, 0.1), rubbing=(0.1, 0.1)
+        count=12,
+        floor=True,
+        top=60.0,
+        tilt=math.radians(-20.0),
+        sliding=(0.15, 0.1),
+        rubbing=(0.1, 0.1),
     )
-    run = follow_bunch(drum, 30.0, seed=3, chatter=0.1, dt=0.004)
+    run = follow_bunch(drum, 0.2, seed=3, chatter=0.1, dt=0.004)
     at = {name: values.item() for name, values in found.sel(start=3, rubbing=0.1).items()}
-    assert at["left"] == len(run.exits) > 0
+    assert at["left"] == len(run.exits)
+    assert 0 < at["left"] < 12
     assert at["left"] == at["left_right"] + at["left_left"] + at["left_single"]
     assert at["left_left"] == run.exit_counts()["left"]
     stayed = run.present[-1]
