@@ -222,6 +222,8 @@ class Room(NamedTuple):
     slots: Field  # (max(C, P),)
     members: Field  # (N,) bodies of an island
     local: Field  # (N,) their numbers in it
+    ring: Field  # (N,) first side of a contact of each, as 2 block + side
+    chain: Field  # (B, 2) the side after it
     step: Field  # (N k,)
     reach: Field  # (N k,) end of each of its rows
     matrix: Field  # band, row by row
@@ -1114,29 +1116,32 @@ def number_bodies(scene, motion, room, first, last):
     :func:`solve_band` is a narrow band.  Nothing is numbered (0 is returned) if it has no room.
     """
     k, n, done, reach = scene.size, ZERO, ZERO, ZERO
-    members, local = room.members, room.local
-    for i in range(scene.bodies):
-        local[i] = NONE
+    members, local, ring, chain = room.members, room.local, room.ring, room.chain
     lowest = NONE
     for s in range(first, last):
         for side in range(2):
             i = room.body[room.order[s], side]
-            if i >= 0 and room.awake[i]:
+            if i >= 0:
+                local[i], ring[i] = NONE, NONE
                 along = motion.q[i, scene.place[1]]
-                if lowest < 0 or along < motion.q[lowest, scene.place[1]]:
+                if room.awake[i] and (lowest < 0 or along < motion.q[lowest, scene.place[1]]):
                     lowest = i
+    for s in range(last - 1, first - 1, -1):
+        b = room.order[s]
+        for side in range(2):
+            i = room.body[b, side]
+            if i >= 0 and room.rows[b] == 0:
+                chain[b, side], ring[i] = ring[i], 2 * b + side
     members[0], local[lowest], n = lowest, ZERO, ONE
     while done < n:
-        i = members[done]
+        at = ring[members[done]]
         done += ONE
-        for s in range(first, last):
-            b = room.order[s]
-            x, y = room.body[b, 0], room.body[b, 1]
-            if room.rows[b] == 0 and i in (x, y):
-                other = y if x == i else x
-                if other >= 0 and room.awake[other] and local[other] < 0:
-                    members[n], local[other] = other, n
-                    n += ONE
+        while at >= 0:
+            other = room.body[at // 2, 1 - at % 2]
+            if other >= 0 and room.awake[other] and local[other] < 0:
+                members[n], local[other] = other, n
+                n += ONE
+            at = chain[at // 2, at % 2]
     for s in range(first, last):
         i, j = room.body[room.order[s], 0], room.body[room.order[s], 1]
         if i >= 0 and j >= 0 and room.awake[i] and room.awake[j]:

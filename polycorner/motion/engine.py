@@ -317,6 +317,8 @@ def _room(herd: Herd, capacity: int) -> "Room":
         slots=whole(max(capacity, pairs, 1)),
         members=whole(N),
         local=whole(N),
+        ring=whole(N),
+        chain=whole(B, 2),
         step=np.zeros(N * k),
         reach=whole(N * k),
         matrix=np.zeros(N * k * min(2 * N * k, BAND)),
