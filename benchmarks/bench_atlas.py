@@ -14,8 +14,9 @@ from scipy.spatial import HalfspaceIntersection
 from side_by_side import interleave, peak, print_table, ratio, write
 
 from polycorner import Manifold, Polyhedron, skeleton
-from polycorner.models import DumbbellPair, SphereCluster
-from polycorner.studies.pair_atlas import pair_atlas
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.statics.skeleton import pair_atlas
+from polycorner.models import SphereCluster
 
 ROUNDS = 5
 COUNTS = (5, 6, 7, 8)

@@ -20,7 +20,7 @@ IMPORTS = {
     "import numpy": "import numpy",
     "import polycorner": "import numpy, polycorner",
     "minimise and DumbbellPair": "from polycorner import minimise; "
-    "from polycorner.models import DumbbellPair",
+    "from polycorner.dumbbells import DumbbellPair",
 }
 COMMANDS = {
     "polycorner --help": ("--help",),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from side_by_side import interleave, print_table, ratio, write
 
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 PAIRS, BLOCK, ROUNDS, SINGLE = 1_000_000, 1000, 7, 2000
 AGREEMENT = 1e-9

@@ -17,7 +17,7 @@ import solvers
 from side_by_side import interleave, print_table, ratio, write
 
 from polycorner import Certificate, certify, minimise
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 STARTS, ROUNDS = 200, 2
 SAME = 1e-4  # largest scaled distance from the corner that still counts as being there

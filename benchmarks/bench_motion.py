@@ -1,8 +1,9 @@
 """Dumbbells in the turning drum: polycorner beside MuJoCo, speed, memory, and what they do.
 
 The same drum, sizes, friction and starts, at steps of a millisecond, one thread.  MuJoCo's cost is
-given for the model as `polycorner.models.drum_mjcf` writes it, for a drum of half as many boxes
-(faster, coarser), and for rolling resistance in a joint (three dimensions a contact, not six).
+given for the model as `polycorner.dumbbells.dynamics.mjcf` writes it, for a drum of half as many
+boxes (faster, coarser), and for rolling resistance in a joint (three dimensions a contact, not
+six).
 """
 
 import math
@@ -17,11 +18,11 @@ from typing import Any
 import numpy as np
 from side_by_side import interleave, peak, print_table, ratio, write
 
-from polycorner.models import DumbbellDrum, DumbbellPair
-from polycorner.models.drum_mjcf import GRAVITY, DrumScene
-from polycorner.models.drum_mujoco import MujocoDrum
+from polycorner.dumbbells import DumbbellDrum, DumbbellPair
+from polycorner.dumbbells.dynamics.mjcf import GRAVITY, DrumScene
+from polycorner.dumbbells.dynamics.mujoco_drum import MujocoDrum
+from polycorner.dumbbells.dynamics.starts import scatter
 from polycorner.motion.noise import Noise
-from polycorner.studies.drum_starts import scatter
 
 ROUNDS = 5
 DYAD = 2

@@ -17,8 +17,8 @@ import numpy as np
 from side_by_side import ROOT, print_table, seconds, write
 
 from polycorner import Certificate, minimise
-from polycorner.minima.proof import Proof, prove
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
+from polycorner.proofs.proof import Proof, prove
 
 sys.path.append(str(Path(ROOT, "tests")))
 from minima.exact_kinds import KINDS, departures, programme

@@ -14,9 +14,15 @@ import solvers
 from side_by_side import interleave, print_table, write
 
 from polycorner import minimise
-from polycorner.minima.search import Minima, minima
-from polycorner.models import DumbbellPair, Pinball
-from polycorner.studies.pair_minima import energy_symmetry, minima_map, pair_minima, scattered
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.statics.minima_map import (
+    energy_symmetry,
+    minima_map,
+    pair_minima,
+    scattered,
+)
+from polycorner.minimisation.search import Minima, minima
+from polycorner.models import Pinball
 
 STARTS, PART, ROUNDS = 1000, 100, 5
 SAME = 1e-4  # largest scaled distance from a minimum that still counts as being there

@@ -15,9 +15,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.pictures.placements import forbidden_solid, relative_gap
 from polycorner.pictures.meshes import Isosurface, isosurface
-from polycorner.pictures.solids import forbidden_solid, relative_gap
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 TURN = math.pi

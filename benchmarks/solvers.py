@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 Solver = Callable[[np.ndarray], np.ndarray]
 

@@ -2,19 +2,18 @@
 
 import sys
 import warnings
+from importlib import import_module
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
 from numpydoc.xref import DEFAULT_LINKS
-
-import polycorner.models
-import polycorner.studies
 
 # The gallery's workers are replaced when their memory has grown, which is as well.
 warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # for the folder `extensions`
+ROOMS = import_module("extensions.homes").ROOMS
 
 project = "polycorner"
 author = "The polycorner developers"
@@ -68,9 +67,9 @@ numpydoc_xref_aliases = {name: name for name in DEFAULT_LINKS} | {
     "Path": "pathlib.Path",
 }
 numpydoc_xref_aliases |= {
-    name: f"{room.__name__}.{name}"
-    for room in (polycorner, polycorner.models, polycorner.studies)
-    for name in room.__all__
+    name: f"{room}.{name}"
+    for room in reversed(ROOMS)
+    for name in import_module(room).__all__
     if name[0].isupper()
 }
 nitpicky = True  # a name that is set as a link leads to its description ...

@@ -19,8 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models import DumbbellPair
-from polycorner.studies import dyad_minima, heading_curve, paper_heading
+from polycorner.dumbbells import DumbbellPair, dyad_minima, heading_curve, paper_heading
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 RODS = (0.5, 1.0, 1.5, 2.0, 2.5)
@@ -60,7 +59,8 @@ def order_in_curvature() -> float:
 
 def draw(path: Path) -> Path:
     """Draw both curves of the paper and the computed ones for several rod radii."""
-    from polycorner.pictures.plots import draw_heading, save
+    from polycorner.dumbbells.pictures.dyads import draw_heading
+    from polycorner.pictures.style import save
 
     return save(draw_heading(PAIR, LENGTHS.tolist(), RODS), path)
 

@@ -20,8 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner import Certificate, Corner, Skeleton, certify, skeleton
+from polycorner import Certificate, Skeleton, certify, skeleton
 from polycorner.models import Tutorial
+from polycorner.skeletons import Corner
 
 REGION = Tutorial()
 
@@ -56,8 +57,8 @@ def letter(corner: Corner) -> str:
 
 def draw(result: Result, path: Path) -> Path:
     """Draw the region with the names of its corners and sides."""
-    from polycorner.pictures.plots import save
     from polycorner.pictures.regions import draw_region
+    from polycorner.pictures.style import save
 
     figure = draw_region(
         REGION.polyhedron,

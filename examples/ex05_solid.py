@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.pictures.placements import forbidden_solid, relative_placements
 from polycorner.pictures.meshes import components_of_complement, write_mesh
 from polycorner.pictures.solid_view import draw_solid
-from polycorner.pictures.solids import forbidden_solid, relative_placements
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 P = PAIR.ball_radius + PAIR.rod_radius
@@ -90,7 +90,7 @@ def corners() -> tuple[np.ndarray, list[str]]:
 
 def draw(path: Path, resolution: int = 128) -> Path:
     """Draw the solid over half a turn, and write it as a GLB with ``l/2`` mm to a radian."""
-    from polycorner.pictures.plots import save
+    from polycorner.pictures.style import save
 
     solid = forbidden_solid(PAIR, resolution, period=math.pi)
     points, names = corners()

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models.disks import TorusDisks
+from polycorner.models.disks.disks import TorusDisks
 
 # How many labelled copies, modulo translations, each configuration of three disks has there.
 COPIES = (2, 6, 6)
@@ -38,8 +38,8 @@ def main() -> dict[tuple[int, str], list[tuple[float, int]]]:
 
 def draw(path: Path) -> Path:
     """Draw the critical configurations of four disks on the hexagonal torus."""
-    from polycorner.pictures.plots import save
-    from polycorner.pictures.torus import draw_critical
+    from polycorner.pictures.disks import draw_critical
+    from polycorner.pictures.style import save
 
     model = TorusDisks(4, "hexagonal")
     return save(draw_critical(model, model.critical(np.random.default_rng(0))), path)

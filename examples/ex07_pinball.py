@@ -19,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner import Certificate, Entrapment, LocalType, Skeleton, certify, minimise, skeleton
+from polycorner import Certificate, Entrapment, Skeleton, certify, minimise, skeleton
 from polycorner.models import Pinball
+from polycorner.polyhedra import LocalType
 
 BOARD = Pinball()
 BALLS = 250
@@ -69,8 +70,8 @@ def held_as(rest: Certificate) -> str:
 
 def draw(result: Result, path: Path) -> Path:
     """Draw the board, its corners, and every ball where it rests, coloured by how it is held."""
-    from polycorner.pictures.plots import save
     from polycorner.pictures.regions import draw_region
+    from polycorner.pictures.style import save
 
     balls = [(held_as(rest), rest.point) for group in result.rests.values() for rest in group]
     figure = draw_region(

@@ -19,9 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models import DumbbellPair
-from polycorner.studies import PairAtlas, long_rod_length, pair_atlas
-from polycorner.studies.pair_map import PairMap, pair_map
+from polycorner.dumbbells import DumbbellPair, PairAtlas, long_rod_length, pair_atlas
+from polycorner.dumbbells.statics.skeleton_map import PairMap, pair_map
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 LENGTHS, RODS = np.linspace(2, 5, 5), np.linspace(0.1, 0.9, 4)
@@ -53,8 +52,8 @@ def main() -> Result:
 
 def draw(result: Result, whole: PairMap, folder: Path) -> list[Path]:
     """Draw the map, the atlas and its motions into a folder."""
-    from polycorner.pictures.pair_atlas import draw_atlas, draw_map, draw_motions
-    from polycorner.pictures.plots import save
+    from polycorner.dumbbells.pictures.skeleton import draw_atlas, draw_map, draw_motions
+    from polycorner.pictures.style import save
 
     return [
         save(draw_atlas(result.atlas), folder / "ex08_atlas.png"),

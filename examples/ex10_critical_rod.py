@@ -23,15 +23,15 @@ from pathlib import Path
 import sympy
 
 from polycorner import Certificate, minimise, stationary_on
-from polycorner.models import DumbbellPair
-from polycorner.studies.critical import (
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.statics.critical import (
     critical_length,
     critical_rod_radius,
     escape_barrier,
     plane_critical_formula,
 )
-from polycorner.studies.dyad import CORNER
-from polycorner.studies.sensitivity import ErrorBar, heading_error_bar, pair_sensitivity
+from polycorner.dumbbells.statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
+from polycorner.dumbbells.statics.minima import CORNER
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 TOLERANCES = {"length": 0.1, "ball_radius": 0.05, "rod_radius": 0.05, "drum_radius": 1.0}
@@ -98,8 +98,8 @@ def apart(rod: float) -> float:
 
 def draw(folder: Path) -> list[Path]:
     """Draw the branches that meet, and the critical thickness over the length."""
-    from polycorner.pictures.bifurcation import draw_bifurcation, draw_critical
-    from polycorner.pictures.plots import save
+    from polycorner.dumbbells.pictures.bifurcation import draw_bifurcation, draw_critical
+    from polycorner.pictures.style import save
 
     radius = PAIR.ball_radius
     drums = [math.inf, PAIR.drum_radius, 10 * radius, 4 * radius]

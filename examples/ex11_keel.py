@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models.keel import Keel, Turning, exact_eastern_boundary
+from polycorner.dumbbells.statics.keel import Keel, Turning, exact_eastern_boundary
 
 # Static coefficients as the paper gives them in the text; it does not give the dynamic ones.
 KEEL = Keel(math.radians(7), rolling=0.1, sliding=0.3, rolling_dynamic=0.05, sliding_dynamic=0.2)
@@ -70,8 +70,8 @@ def main() -> Result:
 
 def draw(path: Path) -> Path:
     """Draw regions of rest, turning points and torques."""
-    from polycorner.pictures.keel import draw_keel
-    from polycorner.pictures.plots import save
+    from polycorner.dumbbells.pictures.keel import draw_keel
+    from polycorner.pictures.style import save
 
     return save(draw_keel(KEEL), path)
 

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models.scenes import GRAVITY, bouncing_ball
+from polycorner.models.textbook import GRAVITY, bouncing_ball
 from polycorner.motion.events import EventKind
-from polycorner.motion.simulate import simulate
+from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 
 RESTITUTION, HEIGHT = 0.7, 1.0
@@ -87,7 +87,7 @@ def draw(result: Result, path: Path) -> Path:
     """Draw height and energies against time."""
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.plots import save
+    from polycorner.pictures.style import save
 
     motion, unit = result.path, GRAVITY * HEIGHT
     figure = Figure(figsize=(8, 5.6), layout="constrained")

@@ -23,12 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
-from polycorner.models.scenes import GRAVITY, ball_on_plane, sliding_block
+from polycorner.models.textbook import GRAVITY, ball_on_plane, sliding_block
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc
-from polycorner.motion.simulate import simulate
+from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
+from polycorner.spaces.manifold import Array
 
 SLIDING, ROLLING = 0.2, 0.02
 PUSH = (3.0, 1.0)  # m/s, without spin
@@ -115,7 +115,7 @@ def draw(result: Result, path: Path) -> Path:
     """Draw the speeds of the ball, and the block in its plane of place and velocity."""
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.plots import save
+    from polycorner.pictures.style import save
 
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)

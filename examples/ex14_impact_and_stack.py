@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
-from polycorner.models.scenes import GRAVITY, box_on_plane, row_of_balls, stack, table
+from polycorner.models.textbook import GRAVITY, box_on_plane, row_of_balls, stack, table
 from polycorner.motion.friction import Disc, Interval
-from polycorner.motion.simulate import simulate
+from polycorner.motion.simulation import simulate
 from polycorner.motion.system import System
 from polycorner.motion.trajectory import Trajectory
+from polycorner.spaces.manifold import Array
 
 HALF_WIDTH, HALF_HEIGHT, TILT = 0.35, 1.0, 0.25
 SLENDER = math.atan(HALF_WIDTH / HALF_HEIGHT)
@@ -111,7 +111,7 @@ def draw(result: Result, path: Path) -> Path:
     """Draw the tilt of the block and its energy against time."""
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.plots import save
+    from polycorner.pictures.style import save
 
     motion = result.rocking
     figure = Figure(figsize=(8, 5.2), layout="constrained")

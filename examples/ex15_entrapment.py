@@ -25,11 +25,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from polycorner.models import DumbbellPair
-from polycorner.models.well_escape import mean_escape_time, overdamped_escape_time
-from polycorner.models.wells import Well
-from polycorner.studies.dyad_wells import Hold, Shaking, dyad_holds, hold_times
-from polycorner.studies.wells import Escapes, escapes, kick_of, ladder
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_times
+from polycorner.models.wells.escape import mean_escape_time, overdamped_escape_time
+from polycorner.models.wells.holding import Escapes, escapes, kick_of, ladder
+from polycorner.models.wells.wells import Well
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 DEPTH, DRAG = 1.5, 0.8  # units of the temperature, of sqrt(m T) / a
@@ -79,9 +79,9 @@ def times(wells: Sequence[Well]) -> list[float]:
 
 def draw(path: Path, count: int = 100) -> Path:
     """Draw wells, paths, times to escape, capture, and the wells of the dyad."""
-    from polycorner.pictures.plots import save
-    from polycorner.pictures.wells import draw_wells
-    from polycorner.studies.wells import compare
+    from polycorner.dumbbells.pictures.wells import draw_wells
+    from polycorner.models.wells.holding import compare
+    from polycorner.pictures.style import save
 
     return save(draw_wells(compare(count=count), PAIR), path)
 

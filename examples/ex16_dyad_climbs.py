@@ -17,10 +17,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from polycorner.geometry.manifold import Array
-from polycorner.models.drum import DumbbellDrum
-from polycorner.studies.drum_dyads import DyadPaths, follow_dyads
-from polycorner.studies.drum_single import Zigzag, follow, onset_azimuths, zigzags
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
+from polycorner.dumbbells.dynamics.singles import Zigzag, follow, onset_azimuths, zigzags
+from polycorner.spaces.manifold import Array
 
 DRUM = DumbbellDrum(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 HEADING = math.radians(8)  # near the minimum of the energy of the pair, 7.94 degrees
@@ -57,7 +57,7 @@ def draw(result: Result, path: Path) -> Path:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.plots import save
+    from polycorner.pictures.style import save
 
     figure = Figure(figsize=(8.5, 6.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)

@@ -14,15 +14,20 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.driven import one_dyad
 from paper_checks.forces import judged
 from paper_checks.torque import DRUM
-from polycorner.geometry.manifold import Array
-from polycorner.models.drum import DumbbellDrum
-from polycorner.models.dumbbells import Chirality
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import (
+    BunchRun,
+    drum_for_bunch,
+    exit_statistics,
+    follow_bunch,
+)
+from polycorner.dumbbells.dynamics.dyads import handedness
+from polycorner.dumbbells.dynamics.pairs import is_dyad
+from polycorner.dumbbells.pair import Chirality
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulate import run
-from polycorner.studies.drum_bunch import BunchRun, drum_for_bunch, exit_statistics, follow_bunch
-from polycorner.studies.drum_dyads import handedness
-from polycorner.studies.drum_pairs import is_dyad
+from polycorner.motion.simulation import run
+from polycorner.spaces.manifold import Array
 
 PICTURE = (8.0, 2.0, 0.5)  # l, r, t of the paper's picture of a bunch
 LARGER = (16.0, 3.0, 1.5)  # of its dyads

@@ -30,7 +30,7 @@ from paper_checks.experiment import (
     to_axis,
 )
 from polycorner import stationary_on
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 Array = np.ndarray
 NEWTON = 8

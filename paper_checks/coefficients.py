@@ -9,8 +9,8 @@ import numpy as np
 
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.forces import STATIC, TILT, frame, is_zero, judged, tex
-from polycorner.geometry.manifold import Array
-from polycorner.models.keel import RestRegion
+from polycorner.dumbbells.statics.keel import RestRegion
+from polycorner.spaces.manifold import Array
 
 ROUNDING = 1.0  # degree: what "about 20 degrees" leaves open
 SAMPLES = 20_000

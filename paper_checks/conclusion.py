@@ -10,7 +10,6 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from polycorner import (
     AllOf,
     AnyOf,
-    LocalType,
     Manifold,
     Polyhedron,
     SmoothFunction,
@@ -19,9 +18,10 @@ from polycorner import (
     stratum_at,
 )
 from polycorner.models import Pinball
+from polycorner.polyhedra import LocalType
 
 if TYPE_CHECKING:
-    from polycorner.geometry.manifold import Array
+    from polycorner.spaces.manifold import Array
 
 BOARD = Pinball()
 ASIDE = 1e-3  # how far from a corner balls are let go

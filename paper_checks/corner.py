@@ -27,8 +27,12 @@ from paper_checks.experiment import (
     rests,
 )
 from polycorner import stationary_on
-from polycorner.models import DumbbellPair, plane_heading_formula
-from polycorner.studies import critical_rod_radius, heading_error_bar
+from polycorner.dumbbells import (
+    DumbbellPair,
+    critical_rod_radius,
+    heading_error_bar,
+    plane_heading_formula,
+)
 
 LENGTH, BALL, ROD = sympy.symbols("l r t", positive=True)
 PRINTED_HEADING = sympy.atan(BALL / LENGTH)

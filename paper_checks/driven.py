@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 
 from paper_checks.torque import DRUM
-from polycorner.models.dumbbells import Chirality
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
+from polycorner.dumbbells.pair import Chirality
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulate import run
+from polycorner.motion.simulation import run
 from polycorner.motion.trajectory import Trajectory
-from polycorner.studies.drum_dyads import DyadPaths, follow_dyads
 
 Kind = Literal["end_to_end", "side_by_side"]
 Starts = tuple[tuple[Chirality, float], ...]  # chirality and heading, in degrees

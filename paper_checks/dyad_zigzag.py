@@ -14,11 +14,11 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.driven import one_dyad
 from paper_checks.forces import STATIC, frame, is_zero, judged, tex
 from paper_checks.torque import DRUM
-from polycorner.geometry.manifold import Array
-from polycorner.models.keel import RestRegion
+from polycorner.dumbbells.dynamics.singles import onset_azimuths
+from polycorner.dumbbells.statics.keel import RestRegion
 from polycorner.motion.events import EventKind
 from polycorner.motion.trajectory import Trajectory
-from polycorner.studies.drum_single import onset_azimuths
+from polycorner.spaces.manifold import Array
 
 
 def highest(path: Trajectory) -> float:

@@ -11,8 +11,7 @@ import sympy
 from paper_checks import tilt
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.experiment import EXPERIMENT, PLANE, exact
-from polycorner.models import DumbbellPair
-from polycorner.studies import PairAtlas, pair_atlas
+from polycorner.dumbbells import DumbbellPair, PairAtlas, pair_atlas
 
 Array = np.ndarray
 MEAN_HEADING = 40.0

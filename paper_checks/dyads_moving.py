@@ -14,9 +14,9 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.driven import CLEARANCE, LASTING, LATE, TWO, Starts, dyads, pairs
 from paper_checks.forces import judged
-from polycorner.geometry.manifold import Array
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, handedness, minimiser_heading
 from polycorner.motion.noise import Noise
-from polycorner.studies.drum_dyads import DyadPaths, handedness, minimiser_heading
+from polycorner.spaces.manifold import Array
 
 BOTH: Starts = (("R", 8.0), ("L", -8.0))
 FOUR: Starts = (("R", 2.0), ("R", 6.0), ("R", 10.0), ("R", 14.0))

@@ -13,9 +13,9 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.driven import LASTING, LATE, TWO, Kind, Starts, dyads, pairs
 from paper_checks.forces import judged
-from polycorner.geometry.manifold import Array
-from polycorner.studies.drum_dyads import handedness
-from polycorner.studies.drum_pairs import is_dyad
+from polycorner.dumbbells.dynamics.dyads import handedness
+from polycorner.dumbbells.dynamics.pairs import is_dyad
+from polycorner.spaces.manifold import Array
 
 FOUR: Starts = (("R", 2.0), ("R", 6.0), ("R", 10.0), ("R", 14.0))
 STRONG = 0.4  # chatter under which headings of pairs change within minutes

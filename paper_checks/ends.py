@@ -10,7 +10,7 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.corner import BALL, LENGTH, sizes
 from paper_checks.experiment import EXPERIMENT, exact, height
 from polycorner import stratum_at
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 
 def least_at(azimuth: sympy.Expr = sympy.S.Zero, heading: sympy.Expr = sympy.S.Zero) -> Finding:

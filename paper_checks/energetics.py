@@ -22,8 +22,12 @@ from paper_checks.experiment import (
     rests,
 )
 from polycorner import Minima, Proof, minimise, prove
-from polycorner.models import DumbbellPair
-from polycorner.studies import critical_rod_radius, pair_minima, plane_critical_formula
+from polycorner.dumbbells import (
+    DumbbellPair,
+    critical_rod_radius,
+    pair_minima,
+    plane_critical_formula,
+)
 
 THIN = DumbbellPair(length=12.5, ball_radius=3, rod_radius=0.05, drum_radius=125)
 THICK = replace(EXPERIMENT, rod_radius=2.95)

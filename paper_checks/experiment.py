@@ -14,8 +14,7 @@ from itertools import permutations
 import sympy
 
 from polycorner import Proof, prove
-from polycorner.models import DumbbellPair
-from polycorner.studies import DyadMinimum, dyad_minima
+from polycorner.dumbbells import DumbbellPair, DyadMinimum, dyad_minima
 
 Interval = tuple[Fraction, Fraction]
 

@@ -9,8 +9,8 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.forces import STATIC, frame, is_zero, judged, row, tex
 from paper_checks.torque import DRUM, potential
+from polycorner.dumbbells.dynamics.singles import follow, keel_ratio, zigzags
 from polycorner.motion.noise import Noise
-from polycorner.studies.drum_single import follow, keel_ratio, zigzags
 
 LEVEL = replace(DRUM, tilt=0.0)
 

@@ -10,7 +10,7 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.experiment import EXPERIMENT, PLANE, proof
 from paper_checks.lemma import X
 from polycorner import stratum_at
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 SPLITS = ((1, 1, 0), (2, 1, 1), (1, 2, 1), (0, 2, 1), (3, 0, 1))
 POINTS = 40

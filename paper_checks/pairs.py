@@ -11,8 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.models import DumbbellPair
-from polycorner.studies import PairAtlas, pair_atlas
+from polycorner.dumbbells import DumbbellPair, PairAtlas, pair_atlas
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.strata_near import PLANE, Spot, examples, plane_sets, region_atlas, spots
-from polycorner import AllOf, LocalType, Polyhedron, Stratum, skeleton, stratum_at
+from polycorner import AllOf, Polyhedron, Stratum, skeleton, stratum_at
 from polycorner.models import Tutorial
+from polycorner.polyhedra import LocalType
 
 # ------------------------------------------------------------------------------------- the strata
 

@@ -9,11 +9,11 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.coefficients import held
 from paper_checks.forces import STATIC, TILT, does, frame, judged, tex
-from polycorner.geometry.manifold import Array
-from polycorner.models.drum import DumbbellDrum
-from polycorner.models.keel import RestRegion, exact_eastern_boundary
-from polycorner.motion.simulate import run
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.statics.keel import RestRegion, exact_eastern_boundary
+from polycorner.motion.simulation import run
 from polycorner.motion.trajectory import Trajectory
+from polycorner.spaces.manifold import Array
 
 DYNAMIC = (0.06, 0.2)  # of rolling and sliding; the paper gives none
 NUDGE = 1.0  # mm/s

@@ -7,7 +7,7 @@ import sympy
 
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.experiment import EXPERIMENT, centres
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 NOTICED = 0.1  # degrees: a change smaller than what the tolerances of the sizes make
 

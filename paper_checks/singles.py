@@ -16,11 +16,11 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.forces import STATIC, judged
 from paper_checks.torque import DRUM
 from paper_checks.turning import turns
-from polycorner.geometry.manifold import Array
-from polycorner.models.keel import Keel
+from polycorner.dumbbells.dynamics.singles import follow, zigzags
+from polycorner.dumbbells.statics.keel import Keel
 from polycorner.motion.noise import Noise
 from polycorner.motion.trajectory import Trajectory
-from polycorner.studies.drum_single import follow, zigzags
+from polycorner.spaces.manifold import Array
 
 NOISY = 0.35  # at which headings decay while dumbbells still climb at first
 START = (15.0, 15.0, -15.0, -15.0, 0.0, 0.0)

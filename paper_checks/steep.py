@@ -10,10 +10,10 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.forces import STATIC, judged
 from paper_checks.singles import risen
 from paper_checks.torque import DRUM
-from polycorner.models.keel import Keel
-from polycorner.models.keel_formulas import s_curve
+from polycorner.dumbbells.dynamics.singles import follow
+from polycorner.dumbbells.statics.keel import Keel
+from polycorner.dumbbells.statics.keel_formulas import s_curve
 from polycorner.motion.noise import Noise
-from polycorner.studies.drum_single import follow
 
 RAPID = 1.0  # mm/s, what is called a rapid descent: some times the speed of climbing
 

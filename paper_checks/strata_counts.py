@@ -11,7 +11,7 @@ import numpy as np
 
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.pairs import DRUM, PLANE, atlas, first_contacts, kinds
-from polycorner.studies import PairAtlas
+from polycorner.dumbbells import PairAtlas
 
 Ends = tuple[str, ...]
 PARTS = ("corners", "edges", "faces")

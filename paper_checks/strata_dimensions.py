@@ -8,7 +8,8 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.cylinder import typeset
 from paper_checks.pairs import DELTA, DRUM, E_CORNER, Array, atlas, first_contacts, parts
-from polycorner import LocalType, stratum_at
+from polycorner import stratum_at
+from polycorner.polyhedra import LocalType
 
 if TYPE_CHECKING:
     import sympy

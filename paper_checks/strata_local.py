@@ -21,7 +21,7 @@ from paper_checks.pairs import (
     parts,
 )
 from polycorner import minimise, prove
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 
 def ball_on_ball(equality: str = "line") -> Finding:

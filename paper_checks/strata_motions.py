@@ -11,7 +11,7 @@ from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.cylinder import typeset
 from paper_checks.pairs import CONTACTS, DRUM, PLANE, Array, atlas, degrees, differentiated
 from polycorner import minimise
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 FULL = 360
 

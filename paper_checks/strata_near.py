@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Skeleton, Stratum, skeleton, stratum_at
-from polycorner.models import DumbbellPair, Tutorial
-from polycorner.studies import pair_atlas
+from polycorner.dumbbells import DumbbellPair, pair_atlas
+from polycorner.models import Tutorial
 
 if TYPE_CHECKING:
     import sympy
 
-    from polycorner.geometry.manifold import Array
+    from polycorner.spaces.manifold import Array
 
 PLANE, SPACE, FOUR = (Manifold.euclidean(names) for names in ("x y", "x y z", "x y z w"))
 Points = Sequence[Sequence[float]]

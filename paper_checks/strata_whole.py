@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.pairs import CONTACTS, DRUM, PLANE, Array, atlas
-from polycorner.models import DumbbellPair
-from polycorner.studies import long_rod_length
+from polycorner.dumbbells import DumbbellPair, long_rod_length
 
 
 def touching_both_ends(rod: float) -> float:

@@ -10,11 +10,11 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.forces import STATIC, TILT, does, frame, judged, tex
 from paper_checks.rest import DYNAMIC
-from polycorner.geometry.manifold import Array
-from polycorner.models.drum import DumbbellDrum
-from polycorner.models.keel import RestRegion
-from polycorner.models.keel_formulas import net_torque, s_curve
-from polycorner.studies.drum_single import follow
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.singles import follow
+from polycorner.dumbbells.statics.keel import RestRegion
+from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
+from polycorner.spaces.manifold import Array
 
 DRUM = DumbbellDrum(sliding=(STATIC[1], DYNAMIC[1]), rolling=(STATIC[0], DYNAMIC[0]))
 

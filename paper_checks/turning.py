@@ -9,10 +9,10 @@ import numpy as np
 from paper_checks.claims import Claim, Finding, Means, Verdict
 from paper_checks.forces import STATIC, TILT, frame, judged
 from paper_checks.rest import DYNAMIC
-from polycorner.geometry.manifold import Array
-from polycorner.models.drum import DumbbellDrum
-from polycorner.models.keel import RestRegion
-from polycorner.studies.drum_single import Zigzag, follow, keel_of, onset_azimuths, zigzags
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.singles import Zigzag, follow, keel_of, onset_azimuths, zigzags
+from polycorner.dumbbells.statics.keel import RestRegion
+from polycorner.spaces.manifold import Array
 
 DRUM = DumbbellDrum(sliding=(STATIC[1], DYNAMIC[1]), rolling=(STATIC[0], DYNAMIC[0]))
 STEP = 1e-4  # rad, by which the drum is turned at a time

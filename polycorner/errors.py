@@ -1,7 +1,7 @@
 """The two exceptions of the package, and how its sentences name a misspelt word.
 
 Wrong use raises ``ValueError`` or ``TypeError`` at the door.  A numerical outcome is a
-:class:`~polycorner.minima.certificate.Verdict`.  What is left is a back end that breaks.
+:class:`~polycorner.minimisation.certificate.Verdict`.  What is left is a back end that breaks.
 """
 
 from collections.abc import Iterable

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
-import polycorner.models
-import polycorner.studies
+import polycorner
 from docs.extensions import homes, links, mathml
 from polycorner import minimise
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-ROOMS = (polycorner, polycorner.models, polycorner.studies)
+ROOMS = [import_module(room) for room in homes.ROOMS]
 
 
 @pytest.mark.parametrize("page", ["api.md", "notation.md"])
@@ -119,10 +118,10 @@ def test_formulas_are_typeset_and_keep_their_tex():
 @pytest.mark.parametrize(
     ("target", "name"),
     [
-        ("polycorner.polyhedra.skeleton.skeleton", "polycorner.skeleton"),
-        ("polycorner.models.drum.DumbbellDrum", "polycorner.models.DumbbellDrum"),
-        ("polycorner.studies.drum_pairs.left_as", None),
-        ("polycorner.polyhedra.skeleton.missing", None),
+        ("polycorner.skeletons.search.skeleton", "polycorner.skeleton"),
+        ("polycorner.dumbbells.drum.DumbbellDrum", "polycorner.dumbbells.DumbbellDrum"),
+        ("polycorner.dumbbells.dynamics.pairs.left_as", None),
+        ("polycorner.skeletons.search.missing", None),
     ],
 )
 def test_public_names(target, name):

@@ -25,7 +25,7 @@ from examples import (
     ex15_entrapment,
     ex16_dyad_climbs,
 )
-from polycorner import LocalType
+from polycorner.polyhedra import LocalType
 
 ROOT = Path(__file__).parents[1]
 

@@ -8,6 +8,22 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+# Every package with public names, the root first.
+ROOMS = (
+    "polycorner",
+    "polycorner.spaces",
+    "polycorner.formulas",
+    "polycorner.polyhedra",
+    "polycorner.skeletons",
+    "polycorner.minimisation",
+    "polycorner.proofs",
+    "polycorner.motion",
+    "polycorner.models",
+    "polycorner.files",
+    "polycorner.sweeps",
+    "polycorner.dumbbells",
+)
+
 DOCSTRING = re.compile(r"docstring of ([\w.]+)")
 
 
@@ -28,9 +44,9 @@ def found(target: str) -> Any:
 
 
 def public_name(target: str) -> str | None:
-    """Return ``polycorner.skeleton`` for ``polycorner.polyhedra.skeleton.skeleton``, else None."""
+    """Return ``polycorner.skeleton`` for ``polycorner.skeletons.search.skeleton``, else None."""
     name = target.rpartition(".")[2]
-    for room in ("polycorner", "polycorner.models", "polycorner.studies"):
+    for room in ROOMS:
         if name in found(room).__all__ and found(f"{room}.{name}") is found(target):
             return f"{room}.{name}"
     return None

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure as Drawing
 
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
-from polycorner.models.wells import Well
-from polycorner.studies import dyad_minima
-from polycorner.studies.wells import ladder
+from polycorner.dumbbells import dyad_minima
+from polycorner.models.wells.holding import ladder
+from polycorner.models.wells.wells import Well
 
 FRICTION, RESTITUTION = 0.04, 0.6  # of the depth per rim; of the wall
 START, TIME = 0.9, 16.0  # where the mass is let go, in rims; in rims times sqrt(mass / depth)

@@ -10,8 +10,8 @@ from matplotlib.patches import Rectangle
 
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
-from polycorner.models.keel import Turning
-from polycorner.studies.drum_single import keel_of
+from polycorner.dumbbells.dynamics.singles import keel_of
+from polycorner.dumbbells.statics.keel import Turning
 
 DRUM = style.DRUM
 RHO = DRUM.centre_radius  # of the cylinder on which the centres of the balls move

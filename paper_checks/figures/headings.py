@@ -9,9 +9,8 @@ from matplotlib.figure import Figure as Drawing
 
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
-from polycorner.models import plane_heading_formula
-from polycorner.models.dumbbells import Chirality
-from polycorner.studies import heading_curve
+from polycorner.dumbbells import heading_curve, plane_heading_formula
+from polycorner.dumbbells.pair import Chirality
 
 PAIR = style.PAIR
 LENGTHS = np.linspace(8.0, 30.0, 23)  # mm

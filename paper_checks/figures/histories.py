@@ -11,11 +11,11 @@ from matplotlib.figure import Figure as Drawing
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from paper_checks.figures.style import minus
-from polycorner.models.dumbbells import Chirality
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
+from polycorner.dumbbells.dynamics.singles import Zigzag, follow, zigzags
+from polycorner.dumbbells.pair import Chirality
 from polycorner.motion.noise import Noise
 from polycorner.motion.trajectory import Trajectory
-from polycorner.studies.drum_dyads import DyadPaths, follow_dyads
-from polycorner.studies.drum_single import Zigzag, follow, zigzags
 
 STEP = 2e-3  # s
 EARLY = 60.0  # s that are shown enlarged

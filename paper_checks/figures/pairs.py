@@ -12,8 +12,8 @@ from matplotlib.figure import Figure as Drawing
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from paper_checks.figures.style import minus
-from polycorner.polyhedra.tracing import traced
-from polycorner.studies import DyadMinimum, PairAtlas, dyad_minima, pair_atlas
+from polycorner.dumbbells import DyadMinimum, PairAtlas, dyad_minima, pair_atlas
+from polycorner.skeletons.refinement import traced
 
 PAIR = style.PLANE
 TOUCH = 1e-6  # mm

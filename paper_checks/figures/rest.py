@@ -9,10 +9,10 @@ from matplotlib.figure import Figure as Drawing
 
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
-from polycorner.models.keel import RestRegion
-from polycorner.models.keel_formulas import net_torque, s_curve
-from polycorner.pictures.keel import HEADINGS, place_region, place_regions, place_torque
-from polycorner.studies.drum_single import keel_of
+from polycorner.dumbbells.dynamics.singles import keel_of
+from polycorner.dumbbells.pictures.keel import HEADINGS, place_region, place_regions, place_torque
+from polycorner.dumbbells.statics.keel import RestRegion
+from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
 
 KEEL = keel_of(style.DRUM)
 TILT = KEEL.tilt

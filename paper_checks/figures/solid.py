@@ -16,11 +16,11 @@ from matplotlib.lines import Line2D
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from paper_checks.figures.pairs import LETTERS, PAIR, atlas
-from polycorner.pictures.pair_solid import relative_corners, relative_curves
+from polycorner.dumbbells.pictures.placements import forbidden_solid
+from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
 from polycorner.pictures.sharp import SharpSurface
 from polycorner.pictures.solid_view import View, place_solid
-from polycorner.pictures.solids import forbidden_solid
-from polycorner.polyhedra.tracing import traced
+from polycorner.skeletons.refinement import traced
 
 RESOLUTION = 112  # cells of the solid along each side
 REACH = (0.0, 0.45, 0.9)  # of the instants of a motion, in the manifold's scales, from the corner

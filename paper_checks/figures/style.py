@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase, SubFigure
 from matplotlib.patches import Circle, Polygon
 
-from polycorner.models import DumbbellDrum, DumbbellPair
+from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 
 # Lengths in mm, as in the paper; the drum is tilted by 7 degrees and turns with 0.01 rad/s.
 PLANE = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)

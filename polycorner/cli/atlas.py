@@ -1,29 +1,23 @@
 """``polycorner atlas``: corners, edges and faces of a model, and how they hang together."""
 
-import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from polycorner.cli.common import (
-    chosen_pair,
     fail,
-    given,
     output_options,
-    pair_settings,
-    parameters,
     seed_option,
     settings_option,
 )
+from polycorner.cli.lazy import LazyGroup
 from polycorner.cli.manner import Command
-from polycorner.cli.report import keys
 from polycorner.cli.search import Search
 
+MEMBERS = {"dyad": "polycorner.dumbbells.cli.atlas:dyad"}
 # Random points that a search in the plane falls from.
 STARTS = 60
-UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
 # Corners above which a picture is clearer without their numbers.
 CROWDED = 12
 KEPT = """
@@ -41,7 +35,7 @@ def examples(*lines: str) -> str:
 EPILOG = examples("dyad --plane --json", "spheres --count 8", "tutorial --out out") + KEPT
 
 
-@click.group(epilog=EPILOG, no_args_is_help=True)
+@click.group(cls=LazyGroup, members=MEMBERS, epilog=EPILOG, no_args_is_help=True)
 def atlas() -> None:
     """Walk from corner to corner of a model and report how its faces hang together."""
 
@@ -56,58 +50,6 @@ def search_options(command: Command) -> Command:
     ):
         command = option(command)
     return command
-
-
-@atlas.command(epilog=examples("dyad --plane --json", "dyad --heading 5 --out out") + KEPT)
-@pair_settings
-@click.option("--plane", is_flag=True, help="The developed plane: the same as --drum inf.")
-@click.option("--heading", type=float, help="Mean heading in the drum, degrees. [0]")
-@search_options
-def dyad(
-    plane: bool, heading: float | None, as_json: bool, out: Path | None, seed: int, budget: int,
-    resume: bool, **options: float | None,
-) -> None:  # fmt: skip
-    """Walk through the placements of two dumbbells: corners, and the motions that join them."""
-    if given("plane") and given("drum"):
-        fail(f"--plane: expected no --drum beside it; got {options['drum']:g}")
-    if plane:
-        options["drum"] = math.inf
-    pair = chosen_pair(None, options)
-    if heading is not None and (pair.is_plane or not math.isfinite(heading)):
-        fail(f"--heading: expected an angle in degrees, of a pair in a drum; got {heading:g}")
-    degrees = heading or 0.0
-    from polycorner.studies.pair_atlas import PairAtlas, pair_starts
-
-    angle = math.radians(degrees)
-    polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
-    search = Search("dyad", parameters(pair) | {"heading": degrees}, out, seed, budget)
-    found = search.run(
-        polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
-    )
-    whole = PairAtlas(pair, found, None if pair.is_plane else angle)
-    extra: dict[str, Any] = {"components": keys(whole.components)}
-    try:
-        if search.finished:
-            extra["components_ordered"] = keys(whole.components_ordered)
-            extra["components_unordered"] = keys(whole.components_unordered)
-    except ValueError:
-        search.drawn = False
-        found = replace(found, notes=(*found.notes, UNMATCHED))
-    answer = search.answer(found, extra, names=[whole.kind(c) for c in found.corners])
-    for corner in answer["corners"]:
-        corner["dimension"] += 0 if pair.is_plane else 1
-        corner["rank"] -= 0 if pair.is_plane else 1
-
-    def draw(folder: Path) -> list[Path]:
-        from polycorner.pictures import pair_atlas, pair_solid, plots
-
-        return [
-            plots.save(pair_atlas.draw_atlas(whole), folder / "atlas.png"),
-            plots.save(pair_atlas.draw_motions(whole), folder / "motions.png"),
-            *pair_solid.write_solid(whole, folder),
-        ]
-
-    search.finish(answer, as_json=as_json, draw=draw)
 
 
 @atlas.command(epilog=examples("spheres --count 7", "spheres --count 8 --out out") + KEPT)
@@ -136,7 +78,8 @@ def spheres(
     answer = search.answer(found, extra)
 
     def draw(folder: Path) -> list[Path]:
-        from polycorner.pictures import clusters, plots
+        from polycorner.pictures import clusters
+        from polycorner.pictures import style as plots
 
         if not found.corners:
             return []
@@ -180,7 +123,7 @@ def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) ->
     """List the critical largest common radii of hard disks on a flat torus."""
     import numpy as np
 
-    from polycorner.models.disks import TorusDisks
+    from polycorner.models.disks.disks import TorusDisks
 
     try:
         model = TorusDisks(count, "hexagonal" if torus == "hexagonal" else "square")
@@ -202,7 +145,8 @@ def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) ->
     answer = {"model": "disks", "parameters": search.parameters, "critical": rows}
 
     def draw(folder: Path) -> list[Path]:
-        from polycorner.pictures import plots, torus
+        from polycorner.pictures import disks as torus
+        from polycorner.pictures import style as plots
 
         return [plots.save(torus.draw_critical(model, found), folder / "critical.png")]
 
@@ -219,8 +163,9 @@ def _planar(
     def draw(folder: Path) -> list[Path]:
         import numpy as np
 
-        from polycorner.pictures import plots, regions
-        from polycorner.polyhedra.tracing import traced
+        from polycorner.pictures import regions
+        from polycorner.pictures import style as plots
+        from polycorner.skeletons.refinement import traced
 
         curves = [traced(found, edge) for edge in found.edges]
         low, high = np.vstack(curves).min(axis=0), np.vstack(curves).max(axis=0)

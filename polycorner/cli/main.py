@@ -21,16 +21,9 @@ from time import perf_counter
 import click
 
 from polycorner import __version__
-from polycorner.cli.atlas import atlas
-from polycorner.cli.completion import VARIABLE, completion
-from polycorner.cli.drum import drum
-from polycorner.cli.dyad import dyad
-from polycorner.cli.manner import Manner, everywhere, manner_options
-from polycorner.cli.minima import minima
-from polycorner.cli.paper import paper
-from polycorner.cli.prove import prove
-from polycorner.cli.sweep import sweep
-from polycorner.cli.view import view
+from polycorner.cli.completion import VARIABLE
+from polycorner.cli.lazy import LazyGroup
+from polycorner.cli.manner import Manner, manner_options
 
 UNEXPECTED, NO_OUTPUT, INTERRUPTED, UNREAD = 70, 74, 130, 141
 EXIT_CODES = {
@@ -41,6 +34,13 @@ EXIT_CODES = {
     NO_OUTPUT: "standard output cannot be written",
     INTERRUPTED: "interrupted; what was found is kept where the command says so",
     UNREAD: "whoever read standard output has gone",
+}
+COMMANDS = {
+    **{name: f"polycorner.cli.{name}:{name}" for name in ("atlas", "completion", "sweep")},
+    **{
+        name: f"polycorner.dumbbells.cli.{name}:{name}"
+        for name in ("drum", "dyad", "minima", "paper", "prove", "view")
+    },
 }
 EXAMPLES = """\b
 Examples:
@@ -55,16 +55,9 @@ Exit codes:
 EPILOG = EXAMPLES + "\n".join(f"  {code:<3}  {words}" for code, words in EXIT_CODES.items())
 
 
-class Root(click.Group):
-    """The command; whatever is added to it, and below that, gets the options of manner."""
-
-    def add_command(self, cmd: click.Command, name: str | None = None) -> None:
-        """Add a subcommand."""
-        super().add_command(everywhere(cmd), name)
-
-
 @click.group(
-    cls=Root,
+    cls=LazyGroup,
+    members=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,
     no_args_is_help=True,
@@ -73,17 +66,6 @@ class Root(click.Group):
 @manner_options
 def cli() -> None:
     """Faces of curvilinear polyhedra, and where energies come to rest on them."""
-
-
-cli.add_command(dyad)
-cli.add_command(atlas)
-cli.add_command(prove)
-cli.add_command(minima)
-cli.add_command(drum)
-cli.add_command(paper)
-cli.add_command(sweep)
-cli.add_command(completion)
-cli.add_command(view)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

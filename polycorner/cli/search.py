@@ -22,9 +22,9 @@ from polycorner.cli.manner import timed
 from polycorner.cli.report import keys, print_answer
 
 if TYPE_CHECKING:
-    from polycorner.polyhedra.atlas import Skeleton
     from polycorner.polyhedra.polyhedron import Polyhedron
     from polycorner.polyhedra.symmetry import Symmetry
+    from polycorner.skeletons.elements import Skeleton
 
     Progress = Callable[[int, int, int], None]
 
@@ -55,7 +55,7 @@ class Search:
         """Where an unfinished search is kept."""
         if self.out is not None:
             return self.out / "atlas-state.json"
-        from polycorner.geometry.kernels import cache_directory
+        from polycorner.formulas.kernels import cache_directory
 
         return (
             cache_directory() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
@@ -72,10 +72,10 @@ class Search:
         """Search, or go on, saving every so often; also what an interrupted search found."""
         import numpy as np
 
-        from polycorner.polyhedra.atlas import Completeness
-        from polycorner.polyhedra.skeleton import resume as go_on
-        from polycorner.polyhedra.skeleton import skeleton
-        from polycorner.studies.files import save_atlas
+        from polycorner.files import save_atlas
+        from polycorner.skeletons.elements import Completeness
+        from polycorner.skeletons.search import resume as go_on
+        from polycorner.skeletons.search import skeleton
 
         left = self.budget
         with self.patience() as progress:
@@ -104,7 +104,7 @@ class Search:
         return found
 
     def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
-        from polycorner.studies.files import load_atlas
+        from polycorner.files import load_atlas
 
         if not self.state.exists():
             fail("--resume: expected an unfinished search with the same options; got none")

@@ -22,7 +22,7 @@ from polycorner.cli.manner import console, remark
 if TYPE_CHECKING:
     import xarray as xr
 
-    from polycorner.studies.sweep_files import StudyFile
+    from polycorner.sweeps.study_files import StudyFile
 
     Report = Callable[[int, int, int], object]
 
@@ -55,7 +55,7 @@ def sweep(
     """Compute a study at every point of its grid, and keep what is finished."""
     _check(scheduler, workers, seed, resume=resume or retry, out=out)
     prepare(out)
-    from polycorner.studies.sweep_tables import SweepError
+    from polycorner.sweeps.results import SweepError
 
     try:
         plan = _plan(study)
@@ -90,7 +90,7 @@ def _check(
 
 
 def _plan(study: Path) -> "StudyFile":
-    from polycorner.studies.sweep_files import read_study
+    from polycorner.sweeps.study_files import read_study
 
     sys.path.insert(0, str(study.resolve().parent))  # a function of the user's own lies there
     return read_study(study)
@@ -98,13 +98,13 @@ def _plan(study: Path) -> "StudyFile":
 
 def _check_store(store: Path, *, resume: bool) -> None:
     """Refuse to go on with an unfinished study unasked, or to resume what was never begun."""
-    from polycorner.studies.sweep_identity import stored_study
+    from polycorner.sweeps.identity import stored_study
 
     begun = stored_study(store) is not None
     if resume and not begun:
         fail(f"--resume: expected a study in {store}; got none")
     if begun and not resume:
-        from polycorner.studies.sweeps import open_results
+        from polycorner.sweeps.execution import open_results
 
         pending = int((open_results(store)["status"].values == 0).sum())
         if pending:
@@ -124,7 +124,7 @@ def _computed(
     *,
     retry: bool,
 ) -> "xr.Dataset":
-    from polycorner.studies.sweeps import sweep as compute
+    from polycorner.sweeps.execution import sweep as compute
 
     if seed is not None and not plan.random:
         fail(f"--seed: expected none, for {plan.study} draws no random numbers; got {seed}")
@@ -249,7 +249,8 @@ def _failures(found: "xr.Dataset") -> list[dict[str, Any]]:
 
 
 def _write(plan: "StudyFile", found: "xr.Dataset", answer: dict[str, Any], out: Path) -> list[Path]:
-    from polycorner.pictures import plots, sweeps
+    from polycorner.pictures import style as plots
+    from polycorner.pictures import sweeps
 
     written = [out / STORE, write_answer(answer, out, "sweep.json")]
     figure = sweeps.draw_study(plan.study, found) if answer["done"] else None

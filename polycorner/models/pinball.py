@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.geometry.functions import Family, SmoothFunction
-from polycorner.geometry.manifold import Array, Manifold, finite, reals
+from polycorner.formulas.functions import Family, SmoothFunction
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
+from polycorner.spaces.manifold import Array, Manifold, finite, reals
 
 if TYPE_CHECKING:
     import sympy
@@ -179,7 +179,7 @@ def _double_area(corners: Array) -> float:
 @lru_cache(maxsize=1)
 def _heights() -> Family:
     """Return the height; parameter ``s``, the sine of the tilt."""
-    from polycorner.geometry.kernels import source_key
+    from polycorner.formulas.kernels import source_key
 
     return Family(("height",), ("x", "y"), ("s",), _height_formula, source_key(__name__))
 

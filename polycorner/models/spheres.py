@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.geometry import kernels
-from polycorner.geometry.functions import Family, SmoothFunction
-from polycorner.geometry.manifold import Array, Manifold
+from polycorner.formulas import kernels
+from polycorner.formulas.functions import Family, SmoothFunction
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.polyhedra.symmetry import Relabelling, Symmetry
+from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
     import sympy

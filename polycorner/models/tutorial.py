@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array, Manifold
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.polyhedra.strata import stratum_at
+from polycorner.spaces.manifold import Array, Manifold
 
 SIDES = (
     Wall("AB", (0.2, -1.6), (1, 12), 0.4),

@@ -1,1 +1,5 @@
-"""Nonsmooth dynamics: bodies that touch, rub, roll, rest and move again."""
+"""Nonsmooth dynamics with unilateral contacts and friction."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -41,10 +41,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.geometry.manifold import Array
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexSet
 from polycorner.motion.system import OVERLAP, State, System
+from polycorner.spaces.manifold import Array
 
 CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
 BEND = OVERLAP  # scaled depth beyond which no gap may close by its curvature within a step

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.geometry.manifold import Array, finite, reals, scalar
+from polycorner.spaces.manifold import Array, finite, reals, scalar
 
 INTERVAL, DISC, ELLIPSE, CUT_DISC, POLYGON = range(5)
 Code = tuple[int, tuple[float, float, float, float], Array]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.geometry.functions import Family
-from polycorner.geometry.manifold import Array
+from polycorner.formulas.functions import Family
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import sympy

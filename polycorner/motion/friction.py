@@ -18,7 +18,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
 from polycorner.motion.convex_sets import (
     CUT_DISC,
     DISC,
@@ -32,6 +31,7 @@ from polycorner.motion.convex_sets import (
     over,
 )
 from polycorner.motion.polygons import ConvexPolygon, from_support
+from polycorner.spaces.manifold import Array
 
 __all__ = [
     "CUT_DISC",

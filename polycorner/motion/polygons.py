@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.geometry.manifold import Array, finite, reals
 from polycorner.motion.convex_sets import (
     POLYGON,
     ROUNDING,
@@ -17,6 +16,7 @@ from polycorner.motion.convex_sets import (
     length,
     over,
 )
+from polycorner.spaces.manifold import Array, finite, reals
 
 
 @dataclass(frozen=True, init=False)

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.motion.engine import Engine
+from polycorner.motion.engine.driver import Engine
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.trajectory import Touch, Trajectory
 
 if TYPE_CHECKING:
-    from polycorner.motion.scene import Herd
+    from polycorner.motion.engine.layout import Herd
     from polycorner.motion.system import System
 
 WORK = ("substrate", "applied", "noise")

@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from polycorner.errors import SolverError
-from polycorner.geometry.manifold import Array
 from polycorner.motion.assembly import (
     FrictionBlock,
     StepProblem,
@@ -35,6 +34,7 @@ from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.friction import CutDisc, Disc, Ellipse, Interval
 from polycorner.motion.residual import NO_LOAD, compliance, natural_residual, nearest, speed
 from polycorner.motion.system import State, System
+from polycorner.spaces.manifold import Array
 
 SETTLED = 1e-11  # residual, relative to the step's speed, at which a step is solved
 ROUNDS = 200  # at most so many programmes for the loads

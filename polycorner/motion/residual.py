@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
 from polycorner.motion.assembly import StepProblem
 from polycorner.motion.convex_sets import ConvexSet
+from polycorner.spaces.manifold import Array
 
 NO_LOAD = 1e-100  # a load so small that impulses per load may overflow
 

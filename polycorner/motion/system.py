@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.geometry.manifold import Array, Manifold
 from polycorner.motion.formulation import Formulation, Laws, dotted, energies
 from polycorner.motion.friction import ConvexSet
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
     import sympy

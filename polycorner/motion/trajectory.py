@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.geometry.manifold import Array
-from polycorner.motion.engine import Effort
+from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
-from polycorner.tables import Printed, Sheet, Table, facts, listed, number, titled
+from polycorner.printing import Printed, Sheet, Table, facts, listed, number, titled
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
-    from polycorner.motion.scene import Herd
+    from polycorner.motion.engine.layout import Herd
     from polycorner.motion.system import System
     from polycorner.polyhedra.strata import Stratum
 

@@ -1,1 +1,1 @@
-"""Everything one looks at; never imported by the core."""
+"""Figures of regions, clusters, disks and studies; never imported by the core."""

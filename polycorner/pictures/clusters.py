@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path
 from numpy.typing import ArrayLike
 
-from polycorner.geometry.manifold import Array, finite, reals
 from polycorner.models.spheres import SphereCluster
 from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.spaces.manifold import Array, finite, reals
 
 BALL, SINGULAR_BALL = "#56B4E9", "#E69F00"  # Okabe and Ito
 BAR, OPENING, CLOSING = "0.25", "#D55E00", "#009E73"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.geometry.manifold import Array
+from polycorner.spaces.manifold import Array
 
 Function = Callable[[Array], Array]
 Bounds = Sequence[tuple[float, float]]

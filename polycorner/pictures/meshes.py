@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.errors import SolverError
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import (
     AXES,
     Bounds,
@@ -25,6 +24,7 @@ from polycorner.pictures.grids import (
     layer,
 )
 from polycorner.pictures.sewing import IN_CELL, keys_of, merged, sewn_euler_characteristic, shared
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import trimesh

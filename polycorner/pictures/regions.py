@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
-from polycorner.geometry.manifold import Array, finite, reals
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, stratum_at
+from polycorner.spaces.manifold import Array, finite, reals
 
 Labelled = Sequence[tuple[str, ArrayLike]]
 Edges = Sequence[ArrayLike | tuple[str, ArrayLike]]

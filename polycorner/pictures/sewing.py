@@ -3,8 +3,8 @@
 import numpy as np
 
 from polycorner.errors import SolverError
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import AXES, Indices, Mask
+from polycorner.spaces.manifold import Array
 
 # Kinds of vertices in a key after those on an edge along axis 0, 1 or 2.
 ON_NODE, IN_CELL = 3, 4

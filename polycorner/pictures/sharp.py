@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.errors import SolverError
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import Bounds, Indices, Mask
 from polycorner.pictures.meshes import Isosurface, closed_mesh, isosurface
 from polycorner.pictures.sharp_cuts import Cut, cut_along_creases, edges_of
 from polycorner.pictures.sharp_flips import flipped
 from polycorner.pictures.sharp_strata import Chart, Gaps
 from polycorner.pictures.sharp_thinning import Labelled, labelled, thinned
+from polycorner.spaces.manifold import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import Indices, Mask
 from polycorner.pictures.sharp_strata import Chart
+from polycorner.spaces.manifold import Array
 
 ROUNDS = 6
 # A new vertex stays this fraction of an edge away from its ends, before it is settled.

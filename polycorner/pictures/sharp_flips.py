@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import Indices, Mask
 from polycorner.pictures.sharp_cuts import edges_of
 from polycorner.pictures.sharp_thinning import LONG, Labelled
+from polycorner.spaces.manifold import Array
 
 # Pairs with a face of a shape below this are tried; the worse shape has to grow by the gain.
 TRIED, GAIN = 0.5, 0.05

@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import Mask
+from polycorner.spaces.manifold import Array
 
 # Of points ``(N, 3)`` the values ``(N, m)`` and, for order 1, the gradients ``(N, m, 3)``.
 Gaps = Callable[[Array, int], tuple[Array, ...]]

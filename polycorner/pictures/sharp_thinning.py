@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array
 from polycorner.pictures.grids import Indices, Mask
 from polycorner.pictures.sharp_cuts import Cut, edges_of
 from polycorner.pictures.sharp_strata import Chart
+from polycorner.spaces.manifold import Array
 
 # Edges shorter than this many cells are drawn together; none becomes longer than the other.
 SHORT, LONG = 0.45, 1.8

@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.geometry.manifold import Array
+from polycorner.spaces.manifold import Array
 
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from polycorner.geometry.manifold import Array
-from polycorner.pictures.plots import SHADES
+from polycorner.pictures.style import SHADES
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,7 +6,7 @@ Rows are gradients in scaled coordinates; the linearised cone is ``{d : A d >= 0
 import numpy as np
 
 from polycorner.errors import SolverError
-from polycorner.geometry.manifold import Array
+from polycorner.spaces.manifold import Array
 
 
 def unit_rows(matrix: Array) -> Array:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.geometry.functions import Bundle, Family, SmoothFunction
-from polycorner.geometry.manifold import Array, Manifold, scalar
+from polycorner.formulas.functions import Bundle, Family, SmoothFunction
+from polycorner.spaces.manifold import Array, Manifold, scalar
 
 if TYPE_CHECKING:
     import sympy

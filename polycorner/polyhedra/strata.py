@@ -7,10 +7,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.geometry.manifold import Array
 from polycorner.polyhedra.cones import inward_direction, rank
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
-from polycorner.tables import Printed, Sheet, facts, names
+from polycorner.printing import Printed, Sheet, facts, names
+from polycorner.spaces.manifold import Array
 
 TOLERANCE = 1e-8
 RANK_TOLERANCE = 1e-6
@@ -101,7 +101,7 @@ def stratum_at(
 
     Examples
     --------
-    >>> from polycorner.geometry.manifold import Manifold
+    >>> from polycorner.spaces.manifold import Manifold
     >>> M = Manifold.euclidean("x y")
     >>> x, y = M.symbols
     >>> stratum_at(Polyhedron(M, {"floor": y, "wall": x}), [0.0, 0.0]).dimension

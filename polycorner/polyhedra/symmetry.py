@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polycorner.geometry.manifold import Array, Manifold
+from polycorner.spaces.manifold import Array, Manifold
 
 # From the names of functions at one point to the names of the same bodies' functions at another.
 Relabelling = Mapping[str, str]

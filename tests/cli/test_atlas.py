@@ -21,11 +21,11 @@ from oracles import CONTACTS, gaps
 
 from polycorner import skeleton
 from polycorner.cli.main import main
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.statics.skeleton import long_rod_length, pair_atlas
 from polycorner.models.pinball import Pinball
 from polycorner.models.spheres import SphereCluster
 from polycorner.models.tutorial import Tutorial
-from polycorner.studies.pair_atlas import long_rod_length, pair_atlas
 
 SEARCHES = ("dyad", "spheres", "tutorial", "pinball")
 MODELS = (*SEARCHES, "disks")

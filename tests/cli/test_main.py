@@ -38,8 +38,9 @@ def walk(command, *names):
     """Yield every command below one as ``(names, command)``, groups too."""
     yield names, command
     if isinstance(command, click.Group):
-        for name, below in command.commands.items():
-            yield from walk(below, *names, name)
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            yield from walk(command.get_command(context, name), *names, name)
 
 
 EVERY = dict(walk(cli))
@@ -267,7 +268,7 @@ def broken(*_):
 
 
 def test_an_unexpected_error_is_one_sentence_and_verbose_shows_where(capsys, monkeypatch):
-    monkeypatch.setattr("polycorner.cli.dyad.chosen_pair", broken)
+    monkeypatch.setattr("polycorner.dumbbells.cli.dyad.chosen_pair", broken)
     code, out, err = run(capsys, "dyad")
     assert (code, out, err.count("\n")) == (70, "", 1)
     assert "unexpected RuntimeError: a wheel came off" in err

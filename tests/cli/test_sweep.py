@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from polycorner.studies.sweep_studies import heading
-from polycorner.studies.sweeps import open_results, sweep
+from polycorner.dumbbells.studies import heading
+from polycorner.sweeps.execution import open_results, sweep
 
 TESTS = Path(__file__).parents[1]
 HEADING = """

@@ -12,8 +12,9 @@ from scipy.ndimage import label, minimum_filter
 from scipy.optimize import root
 from strategies import reals
 
-from polycorner import LocalType, Verdict, certify, minimise, skeleton, stratum_at
+from polycorner import Verdict, certify, minimise, skeleton, stratum_at
 from polycorner.models.pinball import Pinball
+from polycorner.polyhedra import LocalType
 
 BOARD = Pinball()
 D, E = BOARD.polyhedron, BOARD.energy

@@ -24,8 +24,9 @@ from oracles_spheres import (
     without_one_contact,
 )
 
-from polycorner import Completeness, End, Symmetry, skeleton
+from polycorner import Symmetry, skeleton
 from polycorner.models.spheres import SphereCluster
+from polycorner.skeletons import Completeness, End
 
 few = settings(max_examples=settings.default.max_examples // 4)
 

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from scipy.optimize import root
 from strategies import directions, reals
 
-from polycorner import LocalType, Manifold, Polyhedron, certify, minimise, stratum_at
+from polycorner import Manifold, Polyhedron, certify, minimise, stratum_at
 from polycorner.models.planar import MAX_TRIES, Wall, meeting_corners, uniform_points
 from polycorner.models.tutorial import Tutorial
+from polycorner.polyhedra import LocalType
 
 REGION = Tutorial()
 D = REGION.polyhedron

@@ -14,9 +14,11 @@ import pytest
 import sympy
 
 from polycorner import Manifold, Polyhedron, minimise
+from polycorner.dumbbells import drum_formulas
+from polycorner.dumbbells import formulas as dumbbell_formulas
+from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.errors import SolverError
-from polycorner.models import drum_formulas, dumbbell_formulas, scenes
-from polycorner.models.drum import GRAVITY, DumbbellDrum
+from polycorner.models import textbook as scenes
 from polycorner.motion.assembly import (
     FrictionBlock,
     StepProblem,
@@ -29,7 +31,7 @@ from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, In
 from polycorner.motion.noise import Solver
 from polycorner.motion.reference import reference_step, solve_step
 from polycorner.motion.residual import natural_residual, speed
-from polycorner.motion.simulate import start, step
+from polycorner.motion.simulation import start, step
 from polycorner.motion.system import Friction, State, System, velocities
 
 ACCURATE = Solver(1e-10)

@@ -6,13 +6,13 @@ import cvxpy as cp
 import numpy as np
 import pytest
 
-from polycorner.models.drum import DumbbellDrum
-from polycorner.motion import compiled
-from polycorner.motion import engine as engine_room
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.starts import bunch
+from polycorner.motion.engine import compiled
+from polycorner.motion.engine import driver as engine_room
 from polycorner.motion.friction import CutDisc, Disc, Ellipse, Interval
 from polycorner.motion.noise import Noise
 from polycorner.motion.polygons import ConvexPolygon
-from polycorner.studies.drum_starts import bunch
 
 SQUARE = ConvexPolygon([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 EDGES = {  # how far a force (load, x, y) is from the boundary: a product, from the definition

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from polycorner import minimise
-from polycorner.models import scenes
-from polycorner.models.drum import DumbbellDrum
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.models import textbook as scenes
 from polycorner.motion.assembly import assemble
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.noise import Solver
-from polycorner.motion.simulate import simulate, start
+from polycorner.motion.simulation import simulate, start
 from polycorner.motion.system import State
 
 G = scenes.GRAVITY

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.special import ellipkinc
 
-from polycorner.models import scenes
+from polycorner.models import textbook as scenes
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc, Ellipse, Interval
 from polycorner.motion.noise import Solver
-from polycorner.motion.simulate import simulate, start, step
+from polycorner.motion.simulation import simulate, start, step
 
 G = scenes.GRAVITY
 FALL = math.sqrt(2 / G)  # from a height of 1

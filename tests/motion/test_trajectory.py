@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from polycorner import Manifold, Polyhedron
-from polycorner.motion.engine import Effort
+from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.system import System
 from polycorner.motion.trajectory import Trajectory

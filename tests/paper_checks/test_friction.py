@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paper_checks import Verdict, coefficients, forces, rest, torque, turning
-from polycorner.models.keel_formulas import force_ratio, net_torque
+from polycorner.dumbbells.statics.keel_formulas import force_ratio, net_torque
 
 azimuths = st.floats(-0.7, 0.7)
 headings = st.floats(-1.5, 1.5)

@@ -7,7 +7,7 @@ import pytest
 
 from paper_checks import cylinder, geometry, heading_angle
 from paper_checks.claims import Verdict
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
 
 TILT, RADIUS = math.radians(7), 125.0
 RNG = np.random.default_rng(3)

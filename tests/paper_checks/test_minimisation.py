@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from paper_checks import Verdict, chart, entrapment, lemma, minimisation, rod_weight
 from paper_checks.experiment import EXPERIMENT, PLANE, rests
 from polycorner import Manifold, Polyhedron, certify, prove
-from polycorner.models import plane_heading_formula
+from polycorner.dumbbells import plane_heading_formula
 
 # ------------------------------------------------------------------------------------------ lemma
 

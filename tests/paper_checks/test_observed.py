@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from paper_checks import Verdict, bunch, driven, dyad_zigzag, steep
+from polycorner.dumbbells.dynamics.dyads import handedness
+from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.motion.events import Event, EventKind
-from polycorner.studies.drum_dyads import handedness
-from polycorner.studies.drum_pairs import is_dyad
 
 
 def events(*entries):
@@ -81,7 +81,7 @@ def test_the_reach_of_a_dyad_is_speed_times_time():
 
 def test_more_sliding_friction_lets_steeper_dumbbells_climb():
     """Set against the region of rest: the last heading at which the drum makes a dumbbell roll."""
-    from polycorner.models.keel import RestRegion
+    from polycorner.dumbbells.statics.keel import RestRegion
 
     theta = np.radians(np.arange(-60.0, 90.0, 0.05))
     for sliding in (0.15, 0.2, 0.3, 0.45):

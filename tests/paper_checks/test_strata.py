@@ -15,8 +15,7 @@ from paper_checks import (
     strata_whole,
 )
 from paper_checks.claims import Verdict
-from polycorner.models import DumbbellPair
-from polycorner.studies import long_rod_length
+from polycorner.dumbbells import DumbbellPair, long_rod_length
 
 PLANE, DRUM = pairs.PLANE, pairs.DRUM
 LENGTH, BALL, ROD = PLANE.length, PLANE.ball_radius, PLANE.rod_radius

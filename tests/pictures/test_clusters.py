@@ -26,7 +26,7 @@ from polycorner.pictures.clusters import (
     draw_clusters,
     draw_motion,
 )
-from polycorner.pictures.plots import save
+from polycorner.pictures.style import save
 
 DPI = 150  # of files that are saved
 

@@ -7,8 +7,8 @@ from matplotlib.colors import to_rgb
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron
 from polycorner.models.tutorial import Tutorial
-from polycorner.pictures.plots import save
 from polycorner.pictures.regions import RESTS, SHADE, draw_region
+from polycorner.pictures.style import save
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from examples import ex05_solid
-from polycorner.models import DumbbellPair
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.pictures.placements import forbidden_solid
 from polycorner.pictures import solid_view
 from polycorner.pictures.meshes import isosurface
-from polycorner.pictures.plots import save
 from polycorner.pictures.solid_view import View, draw_solid, place_solid, visible
-from polycorner.pictures.solids import forbidden_solid
+from polycorner.pictures.style import save
 
 TAU = math.tau
 PAIR = DumbbellPair(16, 3, 1.5)

@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from polycorner.dumbbells.studies import heading
 from polycorner.pictures.sweeps import draw_study
-from polycorner.studies.sweep_studies import heading
-from polycorner.studies.sweeps import sweep
+from polycorner.sweeps.execution import sweep
 
 RODS = [1.5, 2.9]
 

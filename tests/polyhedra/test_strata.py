@@ -9,8 +9,9 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner import AllOf, AnyOf, LocalType, Manifold, Polyhedron, SmoothFunction, stratum_at
-from polycorner.geometry.functions import Family
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, stratum_at
+from polycorner.formulas.functions import Family
+from polycorner.polyhedra import LocalType
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols

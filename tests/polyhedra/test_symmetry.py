@@ -11,14 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles_atlas import orbit_counts
 
-from polycorner import (
-    Element,
-    Manifold,
-    Polyhedron,
-    SmoothFunction,
-    Symmetry,
-    skeleton,
-)
+from polycorner import Manifold, Polyhedron, SmoothFunction, Symmetry, skeleton
+from polycorner.polyhedra import Element
 from polycorner.polyhedra.symmetry import renamed
 
 PLANE = Manifold.euclidean("x y")

@@ -1,0 +1,53 @@
+from .errors import PolycornerError, SolverError
+from .formulas import SmoothFunction
+from .minimisation import (
+    Certificate,
+    Entrapment,
+    Minima,
+    Sensitivity,
+    Verdict,
+    certify,
+    minima,
+    minimise,
+    sensitivity,
+    stationary_on,
+)
+from .motion import Friction, State, System, Trajectory, simulate, velocities
+from .polyhedra import AllOf, AnyOf, Polyhedron, Stratum, Symmetry, stratum_at
+from .proofs import Proof, prove
+from .skeletons import Skeleton, skeleton
+from .spaces import Manifold
+
+__version__: str
+__all__ = [
+    "AllOf",
+    "AnyOf",
+    "Certificate",
+    "Entrapment",
+    "Friction",
+    "Manifold",
+    "Minima",
+    "PolycornerError",
+    "Polyhedron",
+    "Proof",
+    "Sensitivity",
+    "Skeleton",
+    "SmoothFunction",
+    "SolverError",
+    "State",
+    "Stratum",
+    "Symmetry",
+    "System",
+    "Trajectory",
+    "Verdict",
+    "certify",
+    "minima",
+    "minimise",
+    "prove",
+    "sensitivity",
+    "simulate",
+    "skeleton",
+    "stationary_on",
+    "stratum_at",
+    "velocities",
+]

@@ -1,0 +1,5 @@
+"""The dumbbells of the paper: one, a pair, and many in a rotating drum."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,36 @@
+from .drum import DumbbellDrum
+from .formulas import plane_heading_formula
+from .pair import DumbbellPair
+from .statics.critical import critical_length, critical_rod_radius, plane_critical_formula
+from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
+from .statics.keel import Keel, RestRegion
+from .statics.minima import DyadMinimum, dyad_minima, heading_curve, paper_heading
+from .statics.minima_map import MinimaMap, minima_map, pair_minima
+from .statics.skeleton import PairAtlas, long_rod_length, pair_atlas
+from .statics.skeleton_map import PairMap, pair_map
+
+__all__ = [
+    "DumbbellDrum",
+    "DumbbellPair",
+    "DyadMinimum",
+    "ErrorBar",
+    "Keel",
+    "MinimaMap",
+    "PairAtlas",
+    "PairMap",
+    "RestRegion",
+    "critical_length",
+    "critical_rod_radius",
+    "dyad_minima",
+    "heading_curve",
+    "heading_error_bar",
+    "long_rod_length",
+    "minima_map",
+    "pair_atlas",
+    "pair_map",
+    "pair_minima",
+    "pair_sensitivity",
+    "paper_heading",
+    "plane_critical_formula",
+    "plane_heading_formula",
+]

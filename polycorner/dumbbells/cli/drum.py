@@ -1,0 +1,281 @@
+"""``polycorner drum``: dumbbells in motion in a slowly rotating, tilted drum."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from polycorner.cli.common import (
+    deliver,
+    fail,
+    output_options,
+    prepare,
+    progress_bar,
+    unfinished,
+    write_answer,
+    writing,
+)
+from polycorner.cli.manner import timed
+from polycorner.dumbbells.cli.drum_options import drum_options, merged
+from polycorner.dumbbells.cli.drum_report import drum_answer, print_drum
+
+if TYPE_CHECKING:
+    from polycorner.dumbbells.drum import DumbbellDrum
+    from polycorner.dumbbells.dynamics.runs import DrumRun
+    from polycorner.motion.noise import Noise
+
+EPILOG = """\b
+Examples:
+  polycorner drum --heading 10 --out out
+  polycorner drum --pair R --noise 0.2 --duration 120 --json
+  polycorner drum --count 60 --noise 0.3 --top 400 --duration 1200 --out out --movie
+A single dumbbell or a pair starts on the lowest line at eta = 0, far from bottom and top;
+a bunch (--count without --heading or --start) lies at the bottom of the drum.
+Ctrl-C ends a run, keeps it and reports what was done (exit code 130);
+the same command with --resume goes on from there, also after the process was killed.
+"""
+
+
+MOST = 5000  # dumbbells; scattering more would take longer than anyone waits
+# The library's names for what the options say.
+NAMES = {
+    "count": "count",
+    "length": "length",
+    "ball_radius": "ball",
+    "rod_radius": "rod",
+    "drum_radius": "drum",
+    "top": "top",
+    "tilt": "tilt",
+    "spin": "spin",
+    "sliding": "mu_slide",
+    "rolling": "mu_roll",
+    "rubbing": "mu_contact",
+    "chatter": "noise",
+    "duration": "duration",
+    "dt": "dt",
+    "seed": "seed",
+    "heading": "heading",
+    "headings": "heading",
+    "q": "start",
+    "checkpoint": "resume",
+    "movie": "movie",
+}
+
+
+@click.command(epilog=EPILOG)
+@drum_options
+@click.option("--resume", is_flag=True, help="Go on with the run that was stopped or killed.")
+@click.option(
+    "--movie",
+    is_flag=False,
+    flag_value="",
+    default=None,
+    metavar="[FILE]",
+    help="Movie, .mp4 or .gif; without a name, in the folder of --out.",
+)
+@output_options
+def drum(
+    config: Path | None, resume: bool, movie: str | None, as_json: bool, out: Path | None,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Simulate dumbbells in a slowly rotating, tilted drum: zigzags, keel effect, dyads."""
+    values = merged(config, options)
+    film = _film(movie, out)
+    prepare(out)
+    with _named_options():
+        model, noise, q = _described(values)
+        folder = _folder(model, q, values, noise, out)
+        run = _run(model, noise, q, values, folder, resume=resume)
+        answer = drum_answer(run, values)
+    _finish(run, answer, out, film, folder, as_json=as_json)
+
+
+@contextmanager
+def _named_options() -> Iterator[None]:
+    """Turn the library's complaints into one line that begins with the option."""
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        name, colon, rest = str(error).partition(":")
+        if not colon or name not in NAMES:
+            raise
+        fail(f"--{NAMES[name].replace('_', '-')}:{rest}")
+
+
+# ------------------------------------------------------------------------------------ what is asked
+
+
+def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, Any]":
+    """Return the drum, the noise and the placements that the options describe."""
+    import numpy as np
+
+    _check_angles(values)
+    count = _count(values)
+    in_bunch = count > 1 and not (values["pair"] or values["heading"] or values["start"])
+    from polycorner.dumbbells.drum import DumbbellDrum
+    from polycorner.dumbbells.dynamics import starts as drum_starts
+    from polycorner.motion.noise import Noise
+    from polycorner.motion.simulation import check_step
+
+    model = DumbbellDrum(
+        length=values["length"],
+        ball_radius=values["ball"],
+        rod_radius=values["rod"],
+        drum_radius=values["drum"],
+        count=count,
+        tilt=math.radians(values["tilt"]),
+        spin=values["spin"],
+        sliding=values["mu_slide"],
+        rolling=values["mu_roll"],
+        rubbing=(values["mu_contact"], values["mu_contact"]),
+        floor=in_bunch,
+        top=math.inf if values["top"] is None else values["top"],
+    )
+    noise = Noise(chatter=values["noise"], seed=values["seed"])
+    check_step(values["dt"], model.largest_step)
+    headings = [math.radians(h) for h in values["heading"] or ()]
+    if values["start"]:
+        q = np.array(values["start"]) * [math.radians(1), 1.0, math.radians(1)]
+    elif values["pair"]:
+        q = drum_starts.nested_pair(
+            model, values["pair"], heading=headings[0] if headings else None
+        )
+    elif in_bunch:
+        q = drum_starts.bunch(model, np.random.default_rng(values["seed"]))
+    else:
+        q = drum_starts.isolated(model, headings or [math.radians(10)])
+    model.placed(q)
+    return model, noise, q
+
+
+def _check_angles(values: dict[str, Any]) -> None:
+    if not -90 < values["tilt"] < 90:
+        fail(f"--tilt: expected an angle between -90 and 90 degrees; got {values['tilt']:g}")
+    for heading in values["heading"] or ():
+        if not math.isfinite(heading):
+            fail(f"--heading: expected an angle in degrees; got {heading:g}")
+    if values["start"] and (values["pair"] or values["heading"]):
+        fail("--start: expected no --pair and no --heading beside it; got both")
+    for azimuth, eta, heading in values["start"] or ():
+        if not (abs(azimuth) < 90 and math.isfinite(eta) and math.isfinite(heading)):
+            fail(
+                "--start: expected an azimuth between -90 and 90 degrees, eta in mm and a heading; "
+                f"got {azimuth:g} {eta:g} {heading:g}"
+            )
+    if values["pair"] and len(values["heading"] or ()) > 1:
+        fail(f"--heading: expected one, the mean heading of the pair; got {len(values['heading'])}")
+
+
+def _count(values: dict[str, Any]) -> int:
+    """Return how many dumbbells there are."""
+    placed = 2 if values["pair"] else len(values["start"] or values["heading"] or ())
+    count = values["count"]
+    if count is None:
+        return placed or 1
+    if placed and count != placed:
+        how = "--pair is two" if values["pair"] else f"{placed} are placed"
+        fail(f"--count: expected none, or {placed} as {how}; got {count}")
+    if count > MOST:
+        fail(f"--count: expected at most {MOST}; got {count}")
+    return int(count)
+
+
+# ------------------------------------------------------------------------------------------ the run
+
+
+def _folder(
+    model: "DumbbellDrum", q: Any, values: dict[str, Any], noise: "Noise", out: Path | None
+) -> Path:
+    """Return where an unfinished run is kept."""
+    if out is not None:
+        return out / "drum-state"
+    from polycorner.dumbbells.dynamics.checkpoints import Checkpoint
+    from polycorner.dumbbells.dynamics.runs import parameters
+    from polycorner.formulas.kernels import cache_directory
+
+    chosen = parameters(model, q, values["duration"], values["dt"], noise)
+    return cache_directory() / f"drum-{Checkpoint('', chosen).key[:16]}"
+
+
+def _run(
+    model: "DumbbellDrum", noise: "Noise", q: Any, values: dict[str, Any], folder: Path,
+    *, resume: bool,
+) -> "DrumRun":  # fmt: skip
+    from polycorner.dumbbells.dynamics.runs import Saving, run
+
+    seconds = values["duration"]
+    shown = "{task.completed:.1f} of {task.total:g} s"
+    with (
+        writing(folder),
+        timed("simulating"),
+        progress_bar("simulated", total=seconds, count=shown, left=True) as change,
+    ):
+        return run(
+            model,
+            q,
+            seconds,
+            dt=values["dt"],
+            noise=noise,
+            saving=Saving(folder, resume=resume),
+            progress=change and (lambda done: change(completed=done)),
+        )
+
+
+# --------------------------------------------------------------------------------------- the answer
+
+
+def _film(movie: str | None, out: Path | None) -> Path | None:
+    """Return where the movie goes, after checking that it can be written."""
+    if movie is None:
+        return None
+    if movie == "" and out is None:
+        fail("--movie: expected a file name or --out beside it; got neither")
+    from polycorner.dumbbells.pictures import movies
+
+    if movie == "" and out is not None:
+        return out / f"drum{movies.movie_suffix()}"
+    with _named_options():
+        movies.check_movie(movie)
+    return Path(movie)
+
+
+def _finish(
+    run: "DrumRun", answer: dict[str, Any], out: Path | None, film: Path | None, folder: Path,
+    *, as_json: bool,
+) -> None:  # fmt: skip
+    """Print the answer, write the files, and end the process if the run was stopped."""
+    written = _write(run, answer, out) if out is not None else []
+    if film is not None:
+        written.append(_write_film(run, film))
+    deliver(answer, lambda: print_drum(answer), written, as_json=as_json)
+    if not run.finished:
+        unfinished(folder)
+        raise click.exceptions.Exit(130)
+    from polycorner.dumbbells.dynamics.checkpoints import Checkpoint
+
+    Checkpoint(folder, {}).clear()
+
+
+def _write(run: "DrumRun", answer: dict[str, Any], out: Path) -> list[Path]:
+    from polycorner.dumbbells.dynamics.files import save_run
+    from polycorner.dumbbells.pictures import drum as pictures
+    from polycorner.pictures import style as plots
+
+    with writing(out), timed("drawing and writing"):
+        return [
+            write_answer(answer, out, "drum.json"),
+            save_run(run, out / "trajectory.nc"),
+            plots.save(pictures.draw_history(run), out / "history.png"),
+            plots.save(pictures.draw_drum(run), out / "drum.png"),
+        ]
+
+
+def _write_film(run: "DrumRun", film: Path) -> Path:
+    from polycorner.dumbbells.pictures.movies import write_movie
+
+    with writing(film, "--movie"), timed("filming"), progress_bar("movie", left=True) as change:
+        told = change and (lambda done, count: change(completed=done, total=count))
+        return write_movie(run, film, progress=told)

@@ -1,0 +1,1 @@
+"""Dumbbells in the rotating drum: single ones, dyads and bunches."""

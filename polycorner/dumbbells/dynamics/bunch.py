@@ -1,0 +1,199 @@
+"""A bunch of dumbbells at the bottom of the turning drum: who rolls, who slides, who leaves.
+
+The experiment of [GMBN] sec. 3.2: 60 dumbbells are put into the bottom, and after twenty minutes
+some forty have left at the top, as right-handed dyads.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.pairs import LEFT_AS, Handed, Sizes, dyads_among, left_as
+from polycorner.dumbbells.dynamics.singles import Mean
+from polycorner.dumbbells.dynamics.starts import scatter
+from polycorner.motion.events import EventKind
+from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import run, whole_steps
+from polycorner.spaces.manifold import Array
+
+TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
+COUNT = 60
+WIDTH = 0.35  # rad, half the width of the strip in which the bunch is put
+TRIES = 1000  # places in vain before the strip grows
+WINDOW = 10.0  # s, longer than a zigzag
+ROLLING = math.radians(30.0)  # own spin within the window beyond which it counts as a roller
+KINDS = tuple(LEFT_AS.values())
+
+
+def drum_for_bunch(drum: DumbbellDrum, *, count: int = COUNT, top: float = TOP) -> DumbbellDrum:
+    """Return the drum with a flat bottom, an open top and ``count`` dumbbells."""
+    return replace(drum, count=count, floor=True, top=top)
+
+
+def scattered(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WIDTH) -> Array:
+    """Return dumbbells scattered near the bottom without overlap, ``(count, 3)``.
+
+    Places and headings are uniform in a strip ``|phi| <= width``; what overlaps is drawn anew, and
+    the strip, at first two lengths high, grows by a tenth whenever it is full.
+    """
+    height = 2 * drum.length + 2 * drum.ball_radius
+    return scatter(drum, rng, width=width, height=height, tries=TRIES)
+
+
+@dataclass(frozen=True, eq=False)
+class BunchRun:
+    """A bunch followed for a time.
+
+    Attributes
+    ----------
+    drum : DumbbellDrum
+    times : (T,) array
+    q : (T, N, 4) array
+        Placements; those of dumbbells that have left stay as they were.
+    present : (T, N) array of bool
+    exits : tuple of (float, int)
+        Time of leaving at the top, and number.
+    unconverged, islands : int
+        Islands of touching dumbbells not solved to the tolerance, and all that were solved.
+    max_penetration : float
+        In mm.
+    """
+
+    drum: DumbbellDrum
+    times: Array
+    q: Array
+    present: NDArray[np.bool_]
+    exits: tuple[tuple[float, int], ...]
+    unconverged: int
+    islands: int
+    max_penetration: float
+
+    def dyads(self, index: int) -> list[Handed]:
+        """Return the dyads at an instant: two numbers and the chirality +1 (right) or -1.
+
+        By :func:`polycorner.dumbbells.dynamics.pairs.is_dyad`; a dumbbell may be in several.
+        """
+        return dyads_among(Sizes.of_drum(self.drum), self.q[index], self.present[index])
+
+    @cached_property
+    def exit_kinds(self) -> tuple[str, ...]:
+        """As what each dumbbell left, in the order of :attr:`exits`.
+
+        By :func:`polycorner.dumbbells.dynamics.pairs.left_as`.
+        """
+        return tuple(left_as(self.times, self.exits, self.dyads))
+
+    def exit_counts(self) -> dict[str, int]:
+        """Return how many left, by kind."""
+        return {kind: self.exit_kinds.count(kind) for kind in KINDS}
+
+    def census(self, index: int) -> dict[str, int]:
+        """Return how many dumbbells are in right and left dyads, single, and present.
+
+        Of several dyads the commoner chirality counts; where they balance, ``both``.
+        """
+        hands: dict[int, int] = {}
+        for i, j, hand in self.dyads(index):
+            for body in (i, j):
+                hands[body] = hands.get(body, 0) + hand
+        found = [{1: "right", -1: "left", 0: "both"}[int(np.sign(n))] for n in hands.values()]
+        present = int(self.present[index].sum())
+        counts = {kind: found.count(kind) for kind in ("right", "left", "both")}
+        return counts | {"single": present - len(hands), "present": present}
+
+    def rollers(self, index: int) -> NDArray[np.bool_]:
+        """Return which dumbbells roll, ``(N,)``: sliders and those that left do not.
+
+        A roller has turned about its own axis by more than 30 degrees, in sum, up and down, within
+        the 10 s before the instant.
+        """
+        first = int(np.searchsorted(self.times, self.times[index] - WINDOW))
+        spun = np.abs(np.diff(self.q[first : index + 1, :, 3], axis=0)).sum(axis=0)
+        return np.asarray(self.present[index] & (spun > ROLLING))
+
+    def azimuths(self, index: int) -> tuple[float, float]:
+        """Return the mean azimuths of rollers and of sliders, in rad; nan for none."""
+        rolls = self.rollers(index)
+        slides = self.present[index] & ~rolls
+        phi = self.q[index, :, 0]
+        return (
+            float(phi[rolls].mean()) if rolls.any() else math.nan,
+            float(phi[slides].mean()) if slides.any() else math.nan,
+        )
+
+
+def follow_bunch(
+    drum: DumbbellDrum,
+    duration: float,
+    *,
+    seed: int = 0,
+    chatter: float = 0.0,
+    dt: float = 1e-3,
+    interval: float = 0.5,
+    progress: Callable[[float], None] | None = None,
+) -> BunchRun:
+    """Follow a scattered bunch for ``duration`` s.
+
+    Parameters
+    ----------
+    drum : DumbbellDrum
+        With a bottom, as of :func:`drum_for_bunch`.
+    seed : int, optional
+        Of the start and of the noise.
+    chatter : float, optional
+        Amplitude of the noise of the loads.
+    dt, interval : float, optional
+        Step, and time between records, in s.
+    progress : callable, optional
+        Called with the time now and then.
+    """
+    if not drum.floor:
+        msg = "drum: expected one with a bottom, on which the bunch lies; got floor=False"
+        raise ValueError(msg)
+    q = scattered(drum, np.random.default_rng(seed))
+    noise = Noise(chatter=chatter, seed=seed)
+    engine = drum.engine(q, dt=dt, noise=noise)
+    steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
+    path = run(engine, steps, stride, progress).trajectory(engine.herd)
+    left = tuple((e.time, e.bodies[0]) for e in path.of_kind(EventKind.EXIT))
+    effort = path.effort
+    return BunchRun(
+        drum,
+        path.times,
+        path.q,
+        path.present,
+        left,
+        effort.unconverged,
+        effort.islands,
+        path.max_penetration,
+    )
+
+
+@dataclass(frozen=True)
+class Exits:
+    """How many of a bunch left, over an ensemble: mean with standard error of each kind."""
+
+    duration: float
+    count: int
+    by_kind: dict[str, Mean]
+    total: Mean
+
+
+def exit_statistics(runs: Iterable[BunchRun]) -> Exits:
+    """Return means over runs of the same drum and duration."""
+    many = list(runs)
+    if not many:
+        msg = "runs: expected at least one run; got none"
+        raise ValueError(msg)
+    counts = [one.exit_counts() for one in many]
+    return Exits(
+        float(many[0].times[-1]),
+        many[0].drum.count,
+        {kind: Mean.of([c[kind] for c in counts]) for kind in KINDS},
+        Mean.of([len(one.exits) for one in many]),
+    )

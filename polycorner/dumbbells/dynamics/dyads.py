@@ -1,0 +1,311 @@
+"""Dyads driven by the turning drum: what heading they take, how they climb, how long they hold.
+
+Nested pairs are started at chosen headings and followed under noise, many in one run, far apart
+from each other.  The heading they take is set against the minimiser of the energy, which knows
+nothing of friction ([GMBN] sec. 7); nothing is fitted.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.pairs import Sizes, chirality, gaps
+from polycorner.dumbbells.dynamics.singles import APART, Mean
+from polycorner.dumbbells.formulas import CONTACTS
+from polycorner.dumbbells.pair import Chirality
+from polycorner.motion.noise import Noise, Solver
+from polycorner.motion.simulation import run, whole_steps
+from polycorner.spaces.manifold import Array
+
+Start = tuple[Chirality, float]
+SOLVER = Solver(tolerance=1e-6, sweeps=300)
+TOUCH = 0.01  # mm, below which a gap counts as a contact
+CLEARANCE = 0.05  # mm, between the dumbbells of a pair at the start
+
+
+def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
+    """Return the chirality of pairs: +1 right, -1 left, 0 not defined.
+
+    By :func:`polycorner.dumbbells.dynamics.pairs.chirality`.
+
+    Parameters
+    ----------
+    drum : DumbbellDrum
+    q : (..., 2, k) array
+        Placements of A and B, beginning with ``phi, eta, theta``.
+    """
+    return chirality(Sizes.of_drum(drum).balls(q).reshape(*q.shape[:-2], 4, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class DyadPaths:
+    """Motions of ``n`` pairs in one run, recorded at ``T`` instants.
+
+    Attributes
+    ----------
+    drum : DumbbellDrum
+        With ``count = 2``.
+    starts : tuple of (str, float)
+        Chirality and heading, in rad, at the start.
+    noise : Noise
+    times : (T,) array
+    q : (T, n, 2, 4) array
+        ``phi, eta, theta, psi`` of both dumbbells; ``eta`` counted from the start's mean.
+    unconverged : int
+        Islands of touching dumbbells not solved to the tolerance.
+    """
+
+    drum: DumbbellDrum
+    starts: tuple[Start, ...]
+    noise: Noise
+    times: Array
+    q: Array
+    unconverged: int
+
+    @cached_property
+    def heading(self) -> Array:
+        """Mean heading of each pair, ``(T, n)``, in rad; it follows the motion continuously."""
+        return np.asarray(self.q[..., 2].mean(axis=-1))
+
+    @cached_property
+    def eta(self) -> Array:
+        """Mean axial position, ``(T, n)``, in mm."""
+        return np.asarray(self.q[..., 1].mean(axis=-1))
+
+    @cached_property
+    def azimuth(self) -> Array:
+        """Mean azimuth, ``(T, n)``, in rad."""
+        return np.asarray(self.q[..., 0].mean(axis=-1))
+
+    @cached_property
+    def shift(self) -> Array:
+        """How far the dumbbells are shifted along their mean axis, ``(T, n)``, in mm."""
+        apart = self.q[..., 1, :] - self.q[..., 0, :]
+        across = self.drum.centre_radius * apart[..., 0]
+        along = across * np.sin(self.heading) + apart[..., 1] * np.cos(self.heading)
+        return np.asarray(np.abs(along))
+
+    @cached_property
+    def hand(self) -> NDArray[np.int64]:
+        """Chirality, ``(T, n)``: +1 right, -1 left, 0 not defined."""
+        return handedness(self.drum, self.q)
+
+    @cached_property
+    def contacts(self) -> NDArray[np.bool_]:
+        """Which of the nine gaps are closed to within 0.01 mm, ``(T, n, 9)``."""
+        return gaps(self.drum, self.q) < TOUCH
+
+    def strata(self, *, after: float = 0.0) -> dict[str, float]:
+        """Return shares of time by the contacts that touch, commonest first.
+
+        Ball-ball contacts count as ``ball``, ball-rod ones as ``rod`` and rod-rod as ``cross``, so
+        the nested corner is ``ball rod rod``, whatever the numbering.
+        """
+        kinds = np.array([_kind(name) for name in CONTACTS])
+        closed = self.contacts[self.times >= after].reshape(-1, len(CONTACTS))
+        names = [" ".join(sorted(kinds[row])) or "none" for row in closed]
+        found = {name: names.count(name) / len(names) for name in set(names)}
+        return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+
+    @property
+    def lifetimes(self) -> Array:
+        """How long each pair stayed near and kept its chirality, ``(n,)``; inf: to the end.
+
+        Near means centres closer than ``l + 2 r`` in the developed plane.
+        """
+        sizes = Sizes.of_drum(self.drum)
+        apart = sizes.apart(self.q[..., 0, :], self.q[..., 1, :])
+        lost = (apart >= sizes.reach) | (self.hand != self.hand[0])
+        when = self.times[np.argmax(lost, axis=0)]
+        return np.where(lost.any(axis=0), when, math.inf)
+
+    def climb_rates(self, *, after: float = 0.0) -> Array:
+        """Return the mean rise per time from ``after`` on, ``(n,)``, in mm/s."""
+        first = int(np.searchsorted(self.times, after))
+        return np.asarray((self.eta[-1] - self.eta[first]) / (self.times[-1] - self.times[first]))
+
+
+def _kind(contact: str) -> str:
+    return {4: "ball", 3: "rod", 2: "cross"}[len(contact)]
+
+
+def follow_dyads(
+    drum: DumbbellDrum,
+    starts: Sequence[Start],
+    duration: float,
+    *,
+    noise: Noise | None = None,
+    dt: float = 2e-3,
+    interval: float = 0.1,
+) -> DyadPaths:
+    """Follow nested pairs from rest on the lowest line, all in one run with noise of their own.
+
+    Parameters
+    ----------
+    drum : DumbbellDrum
+        Its ``count`` is not used, and it has to be without bottom and top.
+    starts : sequence of (str, float)
+        Chirality and heading, in rad, of each pair.
+    duration, dt, interval : float
+        Time to simulate, step, and time between records, in s.
+    """
+    if drum.floor or math.isfinite(drum.top):
+        msg = "drum: expected one without bottom and top, in which pairs are put far apart"
+        raise ValueError(msg)
+    if not starts:
+        msg = "starts: expected at least one chirality and heading; got none"
+        raise ValueError(msg)
+    two = replace(drum, count=2)
+    nests = [two.pair.nested(hand, heading=angle, clearance=CLEARANCE) for hand, angle in starts]
+    places = np.concatenate([nest.reshape(2, 3) for nest in nests])
+    offset = APART * np.repeat(np.arange(len(starts)), 2)
+    places[:, 1] += offset
+    herd = replace(drum, count=len(places))
+    engine = herd.engine(places, dt=dt, noise=noise, solver=SOLVER)
+    steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
+    path = run(engine, steps, stride).trajectory(engine.herd)
+    q = path.q.copy()
+    q[..., 1] -= offset
+    q = q.reshape(len(path), len(starts), 2, 4)
+    noise, lost = noise or Noise(), path.effort.unconverged
+    return DyadPaths(two, tuple(starts), noise, path.times, q, lost)
+
+
+@dataclass(frozen=True)
+class Steady:
+    """What pairs of one length do: means in time, then over those that held.
+
+    Headings and azimuth in degrees, ``climb_rate`` in mm/s, ``shift`` in mm; signs are those for
+    right-handed pairs (of left-handed ones, mirrored).
+
+    Attributes
+    ----------
+    drum : DumbbellDrum
+    chatter : float
+        Amplitude of the noise.
+    heading, shift, azimuth, climb_rate : Mean
+    early, late : Mean
+        The heading in both halves of the time: where they differ, it has not settled.
+    scatter : float
+        Standard deviation of the heading in time.
+    held, count : int
+        Pairs that held to the end, and all.
+    minimiser : float
+        Heading of the energy's minimiser.
+    strata : mapping from str to float
+        See :meth:`DyadPaths.strata`.
+    """
+
+    drum: DumbbellDrum
+    chatter: float
+    heading: Mean
+    shift: Mean
+    azimuth: Mean
+    climb_rate: Mean
+    early: Mean
+    late: Mean
+    scatter: float
+    held: int
+    count: int
+    minimiser: float
+    strata: dict[str, float]
+
+    @property
+    def settled(self) -> bool:
+        """Whether both halves give the same heading to within two standard errors."""
+        error = math.hypot(self.early.error, self.late.error)
+        return abs(self.early.value - self.late.value) <= 2 * error
+
+
+def steady(paths: DyadPaths, *, after: float) -> Steady:
+    """Return time averages from ``after`` on, and their means over the pairs."""
+    late = paths.times >= after
+    if not late.any():
+        msg = f"after: expected a time before the end, {paths.times[-1]:g} s; got {after:g}"
+        raise ValueError(msg)
+    sign = np.array([1.0 if hand == "R" else -1.0 for hand, _ in paths.starts])
+    held = np.isinf(paths.lifetimes)
+    heading = np.degrees(sign * paths.heading[late])[:, held]
+    half = max(1, len(heading) // 2)
+
+    def averaged(values: Array) -> Mean:
+        return Mean.of(values.mean(axis=0))
+
+    return Steady(
+        drum=paths.drum,
+        chatter=paths.noise.chatter,
+        heading=averaged(heading),
+        shift=averaged(paths.shift[late][:, held]),
+        azimuth=averaged(np.degrees(paths.azimuth[late][:, held])),
+        climb_rate=Mean.of((sign * paths.climb_rates(after=after))[held]),
+        early=averaged(heading[:half]),
+        late=averaged(heading[half:]),
+        scatter=float(heading.std(axis=0).mean()) if held.any() else math.nan,
+        held=int(held.sum()),
+        count=len(held),
+        minimiser=minimiser_heading(paths.drum),
+        strata=paths.strata(after=after),
+    )
+
+
+def steady_headings(
+    drum: DumbbellDrum,
+    lengths: Iterable[float],
+    noise: Noise,
+    *,
+    headings: Sequence[float] = (2.0, 6.0, 10.0, 14.0),
+    duration: float = 300.0,
+    after: float = 150.0,
+    hand: Chirality = "R",
+) -> tuple[Steady, ...]:
+    """Return what pairs of each length do, started with several headings, in degrees, under noise.
+
+    For left-handed pairs the headings are taken negative.
+    """
+    sign = 1.0 if hand == "R" else -1.0
+    starts = [(hand, sign * math.radians(angle)) for angle in headings]
+    found = []
+    for length in lengths:
+        longer = replace(drum, length=float(length))
+        found.append(steady(follow_dyads(longer, starts, duration, noise=noise), after=after))
+    return tuple(found)
+
+
+def heading_at_shift(drum: DumbbellDrum, shift: float) -> float:
+    """Return the heading, in degrees, of least energy of a right-handed pair with a given shift.
+
+    Parallel dumbbells ``p = r + t`` across and ``s`` along their axis apart, in the trough:
+    ``tan 2 theta = 2 s p / (s^2 + l^2 - p^2)``.  At the corner ``s = l - sqrt(4 r^2 - p^2)``; at
+    the other end of the way along the rods, balls side by side, ``s = sqrt(4 r^2 - p^2)``.
+    """
+    p = drum.ball_radius + drum.rod_radius
+    return math.degrees(math.atan2(2 * shift * p, shift**2 + drum.length**2 - p**2) / 2)
+
+
+def minimiser_heading(drum: DumbbellDrum, *, azimuth: float = 0.0) -> float:
+    """Return the heading, in degrees, at which the energy of a right-handed pair is least.
+
+    ``azimuth``, in rad, holds the pair's mean azimuth there instead of at the lowest line.  Of a
+    pair with its half-turn symmetry the energy is then ``cos(azimuth)`` times what it was, and the
+    heading is the same.  A tilt pulls at all balls alike and does nothing while the mean is held.
+    """
+    import sympy
+
+    from polycorner.minimisation.methods import minimise
+    from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+
+    pair = replace(drum, count=2).pair
+    start = pair.nested("R")
+    domain = pair.polyhedron
+    if azimuth:
+        first, _, _, second, _, _ = pair.manifold.symbols
+        held = sympy.sin((first + second) / 2 - azimuth)
+        domain = Polyhedron(pair.manifold, AllOf(*domain.functions), {"azimuth": held})
+        start = start + azimuth * np.array([1, 0, 0, 1, 0, 0])
+    found = minimise(domain, pair.energy, start)
+    return float(np.degrees(pair.heading(found.point)).mean())

@@ -1,0 +1,267 @@
+"""The tilted, turning drum and its dumbbells as an MJCF document, MuJoCo's format ([MuJoCo]).
+
+Units are mm, g and s; MuJoCo knows none, but some of its defaults are lengths, and those are set
+here.
+
+The inside of a drum is none of MuJoCo's shapes.  Here it is a ring of boxes whose inner faces are
+tangent to the drum: a body on a hinge, heavy and servo-driven, so that it turns evenly whatever
+rolls in it.  With ``n`` boxes a ball finds the surface at most ``R (sec(pi/n) - 1)`` too far out
+and ``pi/n`` too steep or too flat: a micrometre and a quarter of a degree with 720.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.spaces.manifold import Array
+
+GRAVITY = 9806.65  # mm/s^2
+TIMES_HEAVIER = 1e5  # inertia of the drum about its axis over that of its content
+SPINNING_FRICTION = 1e-4  # mm; turning on the spot is free in the drum, but MuJoCo wants it > 0
+TOLERANCE = 1e-8  # of the solver, relative to the inertia of the dumbbells
+IMPEDANCE = "0.95 0.99 0.1"  # of contacts; the third number is a length
+
+
+@dataclass(frozen=True)
+class DrumScene:
+    """Equal dumbbells in a tilted drum that turns; defaults are those of [GMBN] sec. 2, app. A.
+
+    In space the drum's axis is ``y`` and its bottom ``y = 0``; a ball's centre at azimuth ``phi``
+    and ``eta`` along the axis is ``(rho sin phi, eta, -rho cos phi)`` with ``rho = R - r``.
+    Tilting turns gravity, not the drum.
+
+    Parameters
+    ----------
+    length, ball_radius, rod_radius, drum_radius : float
+        Sizes in mm, as in :class:`~polycorner.dumbbells.pair.DumbbellPair`; an infinite drum is
+        the plane ``z = 0``, at rest and endless.
+    tilt : float
+        Angle between the drum's axis and the horizontal, in radians.
+    spin : float
+        Angular velocity of the drum in rad/s; positive spin carries towards positive ``phi``.
+    count : int
+        How many dumbbells.
+    ball_mass : float
+        Mass of a ball in g; rods have none.
+    mu_slide, mu_roll : float
+        Sliding friction and rolling resistance of a ball on the drum, force per load.  MuJoCo
+        does not tell static from dynamic coefficients.
+    mu_contact : float
+        Sliding friction where dumbbells touch.
+    drum_length : float
+        Length of the drum in mm, open at the top.
+    dt : float
+        Time step in s.
+    segments : int
+        How many boxes make the drum.
+    impratio : float
+        MuJoCo's stiffness of friction relative to that of normal forces; what rests creeps at a
+        speed inversely proportional to it.
+    noslip_iterations : int
+        Sweeps of MuJoCo's NoSlip solver after each solve.
+    rolling : {"cone", "joint"}
+        Where rolling resistance lives: with sliding in the friction cone of the contact, as is
+        usual in MuJoCo, or by itself, as friction of a joint about the dumbbell's own axis; the
+        joint's friction is that of the load on level ground, ``2 m g cos(tilt)``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+    """
+
+    length: float
+    ball_radius: float
+    rod_radius: float
+    drum_radius: float = math.inf
+    tilt: float = math.radians(7)
+    spin: float = 0.01
+    count: int = 1
+    ball_mass: float = 0.12
+    mu_slide: float = 0.3
+    mu_roll: float = 0.1
+    mu_contact: float = 0.3
+    drum_length: float = 300.0
+    dt: float = 1e-3
+    segments: int = 720
+    impratio: float = 100.0
+    noslip_iterations: int = 0
+    rolling: Literal["cone", "joint"] = "cone"
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @cached_property
+    def pair(self) -> DumbbellPair:
+        """Two such dumbbells in such a drum, untilted and at rest."""
+        return DumbbellPair(self.length, self.ball_radius, self.rod_radius, self.drum_radius)
+
+    def rows(self, *, across: int = 12) -> Array:
+        """Return parallel dumbbells in rows across the lowest meridian, ``(count, 3)``.
+
+        Columns are ``phi, eta, theta``, in the plane ``x, y, theta``.  Nothing touches; the lowest
+        balls hang a radius above the bottom.
+        """
+        row, column = np.divmod(np.arange(self.count), across)
+        pitch, lift = 2.2 * self.ball_radius, 2 * self.ball_radius + self.length / 2
+        if not self.pair.is_plane:
+            pitch = 2 * math.asin(pitch / (2 * self.pair.centre_radius))
+        lateral = pitch * (column - (min(self.count, across) - 1) / 2)
+        along = lift + row * (self.length + 2.4 * self.ball_radius)
+        return np.stack([lateral, along, np.zeros(self.count)], axis=-1)
+
+
+def mjcf(scene: DrumScene) -> str:
+    """Return the scene as an MJCF document, ready for ``mujoco.MjModel.from_xml_string``.
+
+    A dumbbell is a body along its own ``y``; all of them start at the origin, to be placed by
+    whoever moves them.  Friction cones are elliptic.  On the drum they have six dimensions
+    (``condim`` 6: normal force, sliding in two directions, spinning, rolling about two axes), or
+    three if rolling resistance belongs to a joint; between dumbbells three.  The coefficient of
+    rolling is a length, ``mu_roll r``.  Contacts have a time constant of four steps, twice the
+    least that MuJoCo takes: a friction cone of a convex model pushes what slides or rolls away from
+    the surface, and stiffer contacts rattle.
+
+    Parameters
+    ----------
+    scene : DrumScene
+        What to write.
+    """
+    in_drum = not scene.pair.is_plane
+    bodies = "\n".join(_dumbbell(scene, k) for k in range(scene.count))
+    return f"""<mujoco model="drum">
+  <compiler angle="radian" boundmass="0" boundinertia="0"/>
+  {_option(scene)}
+  {_default(scene)}
+  <worldbody>
+{_drum(scene) if in_drum else '    <geom class="surface" type="plane" size="0 0 1"/>'}
+{bodies}
+  </worldbody>
+  {_servo(scene) if in_drum else ""}
+</mujoco>
+"""
+
+
+def _option(scene: DrumScene) -> str:
+    """Return the solver's settings.
+
+    MuJoCo compares costs divided by the trace of the inertia matrix with the tolerance.  The drum
+    dominates that trace: without the factor Newton's method would stop before it starts.
+    """
+    down = (0.0, -GRAVITY * math.sin(scene.tilt), -GRAVITY * math.cos(scene.tilt))
+    share = 1.0 if scene.pair.is_plane else _trace(scene) / _drum_inertia(scene)
+    return (
+        f'<option timestep="{_text(scene.dt)}" gravity="{_text(*down)}" integrator="implicitfast" '
+        f'cone="elliptic" impratio="{_text(scene.impratio)}" tolerance="{_text(TOLERANCE * share)}"'
+        f' noslip_iterations="{scene.noslip_iterations}" noslip_tolerance="0"/>'
+    )
+
+
+def _default(scene: DrumScene) -> str:
+    """Return kinds of surfaces: the drum's friction rules over the dumbbells', and is the drum's.
+
+    What stands still or turns (type 1) meets dumbbells (type 2) only.
+    """
+    friction = _text(scene.mu_slide, SPINNING_FRICTION, scene.mu_roll * scene.ball_radius)
+    condim = 6 if scene.rolling == "cone" else 3
+    return f"""<default>
+    <geom solref="{_text(4 * scene.dt, 1)}" solimp="{IMPEDANCE}" contype="2" conaffinity="3"
+          condim="3" friction="{_text(scene.mu_contact, 0, 0)}"/>
+    <default class="surface">
+      <geom contype="1" conaffinity="0" priority="1" condim="{condim}" friction="{friction}"/>
+    </default>
+    <default class="bottom">
+      <geom contype="1" conaffinity="0" priority="2" condim="1"/>
+    </default>
+  </default>"""
+
+
+def _drum(scene: DrumScene) -> str:
+    """Return the bottom, which has no friction, and the turning ring of boxes."""
+    step, thick, half = math.tau / scene.segments, scene.ball_radius, scene.drum_length / 2
+    wide = 1.01 * scene.drum_radius * math.tan(step / 2)  # faces overlap outside the ring
+    out = scene.drum_radius + thick
+    boxes = "\n".join(
+        f'      <geom class="surface" type="box" size="{_text(wide, half, thick)}" '
+        f'pos="{_text(out * math.sin(b), half, -out * math.cos(b))}" '
+        f'xyaxes="{_text(math.cos(b), 0, math.sin(b), 0, 1, 0)}"/>'
+        for b in step * np.arange(scene.segments)
+    )
+    return f"""    <geom class="bottom" type="plane" size="0 0 1" zaxis="0 1 0"/>
+    <body name="drum">
+      <inertial pos="0 0 0" mass="1" diaginertia="{_text(*3 * [_drum_inertia(scene)])}"/>
+      <joint name="spin" type="hinge" axis="0 -1 0"/>
+{boxes}
+    </body>"""
+
+
+def _servo(scene: DrumScene) -> str:
+    """Return the drive, which makes good within a step what the content takes from the spin."""
+    gain = _drum_inertia(scene) / scene.dt
+    return (
+        '<actuator><general joint="spin" gainprm="0" biastype="affine" '
+        f'biasprm="{_text(gain * scene.spin, 0, -gain)}"/></actuator>'
+    )
+
+
+def _dumbbell(scene: DrumScene, k: int) -> str:
+    half, ball = scene.length / 2, f'size="{_text(scene.ball_radius)}"'
+    mass = f'mass="{_text(scene.ball_mass)}"'
+    return f"""    <body name="dumbbell{k}">
+      {"<freejoint/>" if scene.rolling == "cone" else _joints(scene)}
+      <geom type="sphere" {ball} pos="{_text(0, -half, 0)}" {mass}/>
+      <geom type="sphere" {ball} pos="{_text(0, half, 0)}" {mass}/>
+      <geom type="capsule" size="{_text(scene.rod_radius)}" mass="0"
+            fromto="{_text(0, -half, 0, 0, half, 0)}"/>
+    </body>"""
+
+
+def _joints(scene: DrumScene) -> str:
+    """Return slides along x, y, z, hinges about z, x and the own axis; the last has friction."""
+    load = 2 * scene.ball_mass * GRAVITY * math.cos(scene.tilt)
+    loss = _text(scene.mu_roll * scene.ball_radius * load)
+    x, y, z = "1 0 0", "0 1 0", "0 0 1"
+    kinds = (("slide", x), ("slide", y), ("slide", z), ("hinge", z), ("hinge", x))
+    return "".join(f'<joint type="{kind}" axis="{axis}"/>' for kind, axis in kinds) + (
+        f'<joint type="hinge" axis="{y}" frictionloss="{loss}" '
+        f'solreffriction="{_text(4 * scene.dt, 1)}" solimpfriction="{IMPEDANCE}"/>'
+    )
+
+
+def _drum_inertia(scene: DrumScene) -> float:
+    return TIMES_HEAVIER * scene.count * 2 * scene.ball_mass * scene.drum_radius**2
+
+
+def _trace(scene: DrumScene) -> float:
+    """Return the trace of the inertia matrix of all dumbbells."""
+    ball = 0.4 * scene.ball_radius**2
+    return scene.count * 2 * scene.ball_mass * (3 + 3 * ball + scene.length**2 / 2)
+
+
+def _text(*numbers: float) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _check(scene: DrumScene) -> None:
+    rules = (
+        ("count", scene.count >= 1, "at least one dumbbell"),
+        ("ball_mass", scene.ball_mass > 0, "a positive mass in g"),
+        ("mu_slide", scene.mu_slide > 0, "a positive coefficient"),
+        ("mu_roll", scene.mu_roll >= 0, "a coefficient not below 0"),
+        ("mu_contact", scene.mu_contact >= 0, "a coefficient not below 0"),
+        ("drum_length", scene.drum_length > 0, "a positive length in mm"),
+        ("dt", scene.dt > 0, "a positive time in s"),
+        ("segments", scene.segments >= 8, "at least 8 boxes"),
+        ("impratio", scene.impratio > 0, "a positive ratio"),
+        ("noslip_iterations", scene.noslip_iterations >= 0, "a number not below 0"),
+        ("rolling", scene.rolling in ("cone", "joint"), "'cone' or 'joint'"),
+        ("spin", not scene.pair.is_plane or scene.spin == 0, "0 in the plane, which cannot turn"),
+    )
+    for name, holds, expected in rules:
+        if not holds:
+            msg = f"{name}: expected {expected}; got {getattr(scene, name)!r}"
+            raise ValueError(msg)

@@ -1,0 +1,171 @@
+"""Where dumbbells are put into the drum: alone, as a nested pair, or as a bunch at the bottom."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.pair import Chirality, DumbbellPair
+from polycorner.minimisation.methods import minimise
+from polycorner.spaces.manifold import Array
+
+WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
+ROOM = 3.0  # area of that strip in areas of the dumbbells
+GAP = 0.05  # mm, between dumbbells of a bunch
+TRIES = 2000  # places in vain before the strip grows
+NEWTON_STEPS = 30
+
+
+def isolated(
+    drum: DumbbellDrum, headings: Sequence[float], *, azimuth: float = 0.0, eta: float = 0.0
+) -> Array:
+    """Return dumbbells too far apart to touch, ``(N, 3)``.
+
+    The steepest heading is highest, so that those that climb and those that descend part.
+
+    Parameters
+    ----------
+    headings : sequence of float
+        One for each dumbbell, in rad.
+    azimuth, eta : float, optional
+        Azimuth of all, in rad, and axial position of the lowest, in mm.
+    """
+    angles = np.array(headings, dtype=np.float64)
+    if angles.shape != (drum.count,) or not np.isfinite(angles).all():
+        msg = f"headings: expected {drum.count} angles in rad; got {list(headings)}"
+        raise ValueError(msg)
+    step = 2 * (drum.length + 2 * drum.ball_radius)
+    q = np.full((drum.count, 3), azimuth)
+    q[:, 1] = eta + step * np.argsort(np.argsort(angles, kind="stable"), kind="stable")
+    q[:, 2] = angles
+    return q
+
+
+def nested_pair(
+    drum: DumbbellDrum, chirality: Chirality, *, heading: float | None = None, eta: float = 0.0
+) -> Array:
+    """Return a nested pair on the lowest line whose three contacts just touch, ``(2, 3)``.
+
+    Parameters
+    ----------
+    chirality : {"R", "L"}
+    heading : float, optional
+        Mean heading in rad; default that at rest in a level drum that stands still.
+    eta : float, optional
+        Mean axial position in mm.
+
+    Notes
+    -----
+    The certified minimiser of the energy is turned as a whole in the developed plane.  The drum's
+    curvature spoils the contacts a little, so Newton's method restores them: where a
+    dumbbell is as seen from the other is three unknowns, as many as there are contacts.
+
+    Raises
+    ------
+    ValueError
+        If there is no such corner, as with rods almost as thick as balls or at steep headings.
+    """
+    pair = drum.pair
+    start = pair.nested(chirality)  # refuses what is no chirality
+    rest = minimise(pair.polyhedron, pair.energy, start)
+    cornered = len(rest.active) == 3 and pair.chirality(rest.point) == chirality
+    q = rest.point if cornered else start
+    if heading is not None or not cornered:
+        now = float(q[[2, 5]].mean())
+        q = _cornered(pair, _turned(pair, q, (now if heading is None else heading) - now))
+    if pair.chirality(q) != chirality:
+        msg = f"heading: expected one at which such dumbbells nest; got {heading}"
+        raise ValueError(msg)
+    places = q.reshape(2, 3) - np.array([q[[0, 3]].mean(), q[[1, 4]].mean() - eta, 0.0])
+    return np.asarray(places)
+
+
+def _turned(pair: DumbbellPair, q: Array, angle: float) -> Array:
+    """Return the pair turned about its middle as a rigid body of the developed plane."""
+    places = q.reshape(2, 3) * np.array([pair.centre_radius, 1.0, 1.0])
+    middle = places.mean(axis=0)
+    across, along = (places - middle)[:, :2].T
+    turned = places.copy()  # headings are counted from the axis towards growing azimuth
+    turned[:, 0] = middle[0] + math.cos(angle) * across + math.sin(angle) * along
+    turned[:, 1] = middle[1] - math.sin(angle) * across + math.cos(angle) * along
+    turned[:, 2] += angle
+    return np.asarray(turned / np.array([pair.centre_radius, 1.0, 1.0])).reshape(6)
+
+
+def _cornered(pair: DumbbellPair, q: Array) -> Array:
+    """Return the nearby pair with the same mean placement whose three nearest contacts touch."""
+    bundle, unit = pair.polyhedron.bundle, np.array([pair.centre_radius, 1.0, pair.length / 2])
+    nearest = np.argsort(bundle.evaluate(q, 0)[0])[:3]
+    change = np.concatenate([-np.eye(3), np.eye(3)]) / unit  # of both, against each other
+    for _ in range(NEWTON_STEPS):
+        gaps, slopes = bundle.evaluate(q, 1)
+        try:
+            move = np.linalg.solve(slopes[nearest] @ change, -gaps[nearest])
+        except np.linalg.LinAlgError:
+            break
+        size = float(np.abs(move).max())
+        q = q + change @ move * min(1.0, pair.ball_radius / max(size, 1e-300))
+        if size < 1e-13 * pair.length:
+            break
+    gaps = bundle.evaluate(q, 0)[0]
+    if not (gaps.min() > -1e-9 and np.abs(gaps[nearest]).max() < 1e-9):
+        msg = (
+            "heading: expected one at which such dumbbells touch at three contacts; "
+            f"got {math.degrees(float(q[[2, 5]].mean())):g} degrees"
+        )
+        raise ValueError(msg)
+    return q
+
+
+def bunch(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WIDTH) -> Array:
+    """Return dumbbells scattered without overlap near the bottom, ``(N, 3)``.
+
+    Places and headings are uniform in a strip about the lowest line; what overlaps is drawn anew
+    (random sequential addition), and the strip grows when it is full.
+
+    Parameters
+    ----------
+    rng : Generator
+    width : float, optional
+        Half the strip's width as an angle, in rad.
+    """
+    room = ROOM * drum.count * (2 * math.pi * drum.ball_radius**2)
+    room += ROOM * drum.count * 2 * drum.rod_radius * drum.length
+    height = drum.length + 2 * drum.ball_radius + room / (2 * width * drum.centre_radius)
+    return scatter(drum, rng, width=width, height=height, tries=TRIES)
+
+
+def scatter(
+    drum: DumbbellDrum, rng: np.random.Generator, *, width: float, height: float, tries: int
+) -> Array:
+    """Return dumbbells scattered without overlap in a strip above the bottom, ``(N, 3)``.
+
+    Parameters
+    ----------
+    rng : Generator
+    width, height : float
+        Half the strip's width as an angle, in rad, and up to where centres lie, in mm.
+    tries : int
+        Places in vain before the strip grows by a tenth.
+    """
+    found, vain = np.empty((0, 3)), 0
+    while len(found) < drum.count:
+        theta = rng.uniform(-math.pi / 2, math.pi / 2)
+        low = drum.length / 2 * math.cos(theta) + drum.ball_radius + GAP
+        new = np.array([rng.uniform(-width, width), rng.uniform(low, max(low, height)), theta])
+        vain += 1
+        if _is_free(drum, found, new):
+            found, vain = np.concatenate([found, new[None]]), 0
+        elif vain > tries:
+            height, vain = 1.1 * height, 0
+    return found
+
+
+def _is_free(drum: DumbbellDrum, others: Array, new: Array) -> bool:
+    apart = np.hypot(drum.centre_radius * (others[:, 0] - new[0]), others[:, 1] - new[1])
+    near = others[apart < drum.length + 2 * drum.ball_radius + GAP]
+    if len(near) == 0:
+        return True
+    pairs = np.concatenate([near, np.tile(new, (len(near), 1))], axis=1)
+    return bool(drum.pair.polyhedron.bundle.evaluate(pairs, 0)[0].min() > GAP)

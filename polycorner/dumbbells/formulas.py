@@ -1,0 +1,210 @@
+"""The formulas of a dumbbell pair, in a drum and in the developed plane.
+
+Dumbbell A has the coordinates number 1, dumbbell B number 2.  Ball 1 of a dumbbell is the end at
+``-l/2`` along its axis, ball 2 the end at ``+l/2``; the axis has heading ``theta`` from the
+meridian towards growing azimuth.  In the drum the centres lie on a cylinder of radius
+``rho = R - r`` and the rod is the chord between them ([GMBN] sec. 5).
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from polycorner.formulas import functions, kernels
+from polycorner.spaces import distances as bodies
+
+if TYPE_CHECKING:
+    import sympy
+
+    Expressions = dict[str, sympy.Expr]
+    Formulas = tuple[Expressions, Expressions]
+
+CONTACTS = ("A1B1", "A1B2", "A2B1", "A2B2", "A1b", "A2b", "aB1", "aB2", "ab")
+DRUM = ("phi", "eta", "theta")
+PLANE = ("x", "y", "theta")
+BALLS = (("A1", 1, -1), ("A2", 1, 1), ("B1", 2, -1), ("B2", 2, 1))
+
+
+def variables(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the coordinates of both dumbbells."""
+    return tuple(f"{name}{k}" for k in (1, 2) for name in names)
+
+
+@lru_cache(maxsize=1)
+def drum_gaps() -> functions.Family:
+    """Return the nine gaps in the drum; parameters ``l r t rho``."""
+    return _family(CONTACTS, DRUM, ("l", "r", "t", "rho"), lambda: _gaps(_drum_centres()))
+
+
+@lru_cache(maxsize=1)
+def plane_gaps() -> functions.Family:
+    """Return the nine gaps in the developed plane; parameters ``l r t``."""
+    return _family(CONTACTS, PLANE, ("l", "r", "t"), lambda: _gaps(_plane_centres()))
+
+
+@lru_cache(maxsize=1)
+def drum_energy() -> functions.Family:
+    """Return the weighted height of centres above the floor, in mm; parameters ``l R rho w``.
+
+    Each ball counts once and each rod ``w`` times, at the middle of its chord.
+    """
+    return _family(("height",), DRUM, ("l", "R", "rho", "w"), _drum_heights)
+
+
+@lru_cache(maxsize=1)
+def plane_energy() -> functions.Family:
+    """Return half the weighted sum of squared lateral positions, in mm^2; parameters ``l w``.
+
+    It is the limit of ``rho`` times the height above the lowest as the drum grows.
+    """
+    return _family(("trough",), PLANE, ("l", "w"), _plane_heights)
+
+
+@lru_cache(maxsize=1)
+def mean_heading() -> functions.Family:
+    """Return ``sin((theta1 + theta2)/2 - h)``; parameter ``h``, in radians."""
+    key = repr((kernels.source_key(__name__), "heading"))
+    return functions.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key)
+
+
+def _mean_heading() -> "Formulas":
+    import sympy
+
+    first, second, h = _symbols("theta1 theta2 h")
+    return {}, {"heading": sympy.sin((first + second) / 2 - h)}
+
+
+def _family(
+    names: tuple[str, ...],
+    coordinates: tuple[str, ...],
+    parameters: tuple[str, ...],
+    formulas: "Callable[[], Formulas]",
+) -> functions.Family:
+    key = repr((kernels.source_key(bodies.__name__, __name__), names, coordinates, parameters))
+    return functions.Family(names, variables(coordinates), parameters, formulas, key)
+
+
+def _symbols(names: str) -> "list[sympy.Symbol]":
+    import sympy
+
+    found = sympy.symbols(names, real=True)
+    return list(found) if isinstance(found, tuple) else [found]
+
+
+def _drum_centres() -> "Expressions":
+    import sympy
+
+    length, rho = _symbols("l rho")
+    definitions: Expressions = {}
+    for k in (1, 2):
+        phi, eta, theta, s, c = _symbols(f"phi{k} eta{k} theta{k} s{k} c{k}")
+        definitions[f"s{k}"] = length * sympy.sin(theta) / (2 * rho)
+        definitions[f"c{k}"] = sympy.sqrt(1 - s**2)
+        for ball, owner, sign in BALLS:
+            if owner == k:
+                sine = sympy.sin(phi) * c + sign * sympy.cos(phi) * s
+                cosine = sympy.cos(phi) * c - sign * sympy.sin(phi) * s
+                definitions[f"{ball}x"] = rho * sine
+                definitions[f"{ball}y"] = eta + sign * length * sympy.cos(theta) / 2
+                definitions[f"{ball}z"] = -rho * cosine
+    return definitions
+
+
+def _plane_centres() -> "Expressions":
+    import sympy
+
+    (length,) = _symbols("l")
+    definitions: Expressions = {}
+    for ball, k, sign in BALLS:
+        x, y, theta = _symbols(f"x{k} y{k} theta{k}")
+        definitions[f"{ball}x"] = x + sign * length * sympy.sin(theta) / 2
+        definitions[f"{ball}y"] = y + sign * length * sympy.cos(theta) / 2
+        definitions[f"{ball}z"] = sympy.S.Zero
+    return definitions
+
+
+def _gaps(centres: "Expressions") -> "Formulas":
+    """Ball-ball, ball-rod and rod-rod gaps from the centres of the four balls."""
+    definitions = dict(centres)
+    balls = {ball: tuple(_symbols(f"{ball}x {ball}y {ball}z")) for ball, _, _ in BALLS}
+    r, t = _symbols("r t")
+    expressions: Expressions = {}
+
+    def define(name: str, expression: "sympy.Expr") -> "sympy.Symbol":
+        definitions[name] = expression
+        return _symbols(name)[0]
+
+    apart = {
+        (a, b): define(f"d{a}{b}", bodies.norm(bodies.minus(balls[a], balls[b])))
+        for a in ("A1", "A2")
+        for b in ("B1", "B2")
+    }
+    for (a, b), distance in apart.items():
+        expressions[f"{a}{b}"] = distance - 2 * r
+    ends = []
+    for ball, owner, _ in BALLS:
+        rod = ("B1", "B2") if owner == 1 else ("A1", "A2")
+        contact = f"{ball}b" if owner == 1 else f"a{ball}"
+        segment = (balls[rod[0]], balls[rod[1]])
+        at = define(f"foot{contact}", bodies.foot(balls[ball], *segment))
+        to_line = define(f"line{contact}", bodies.point_line_distance(balls[ball], *segment, at))
+        to_start, to_end = (apart[(ball, end) if owner == 1 else (end, ball)] for end in rod)
+        to_rod = bodies.point_segment_distance(at, to_start, to_end, to_line)
+        distance = define(f"d{contact}", to_rod)
+        ends.append(distance)
+        expressions[contact] = distance - r - t
+    crossing, distance = bodies.segment_segment_distance(
+        (balls["A1"], balls["A2"]), (balls["B1"], balls["B2"]), ends
+    )
+    definitions |= crossing
+    expressions["ab"] = distance - 2 * t
+    return definitions, expressions
+
+
+def _drum_heights() -> "Formulas":
+    import sympy
+
+    length, radius, rho, weight = _symbols("l R rho w")
+    heights = []
+    for k in (1, 2):
+        phi, theta = _symbols(f"phi{k} theta{k}")
+        chord = sympy.sqrt(1 - (length * sympy.sin(theta) / (2 * rho)) ** 2)
+        middle = radius - rho * sympy.cos(phi) * chord
+        heights.append((2 + weight) * middle)
+    return {}, {"height": sum(heights[1:], heights[0])}
+
+
+def _plane_heights() -> "Formulas":
+    import sympy
+
+    length, weight = _symbols("l w")
+    total = sympy.S.Zero
+    for k in (1, 2):
+        x, theta = _symbols(f"x{k} theta{k}")
+        total += (2 + weight) * (x**2 + (length * sympy.sin(theta) / 2) ** 2) / 2
+    return {}, {"trough": total}
+
+
+def plane_heading_formula() -> "sympy.Expr":
+    """Return ``theta_s(r, t, l)`` of the three-contact corner in the plane, derived symbolically.
+
+    The two dumbbells are parallel, their axes ``p = r + t`` apart and shifted by
+    ``D = l - sqrt(4 r^2 - p^2)``, so that each inner ball touches the other rod and both touch.
+    The trough energy of the four balls, balanced about the lowest line, has a derivative of the
+    form ``A sin 2 theta - B cos 2 theta``; its coefficients are read off and checked.
+    """
+    import sympy
+
+    length, r, t, theta = sympy.symbols("l r t theta", positive=True)
+    p = r + t
+    along = length - sympy.sqrt(4 * r**2 - p**2)
+    offset = along * sympy.sin(theta) - p * sympy.cos(theta)
+    signs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    lateral = [(a * offset + b * length * sympy.sin(theta)) / 2 for a, b in signs]
+    slope = sympy.diff(sum(x**2 for x in lateral) / 2, theta)
+    a, b = slope.subs(theta, sympy.pi / 4), -slope.subs(theta, 0)
+    form = a * sympy.sin(2 * theta) - b * sympy.cos(2 * theta)
+    if sympy.simplify(slope - form) != 0:
+        msg = "the slope of the trough energy is not of the form that the derivation needs"
+        raise AssertionError(msg)
+    return sympy.atan(sympy.simplify(b / a)) / 2

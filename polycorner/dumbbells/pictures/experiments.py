@@ -1,0 +1,139 @@
+"""Figures of motion in the drum: steady headings of dyads, climbing, and who leaves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import KINDS, BunchRun
+from polycorner.dumbbells.dynamics.dyads import Steady, heading_at_shift
+from polycorner.dumbbells.dynamics.singles import Zigzag
+from polycorner.spaces.manifold import Array
+
+COLOURS = {"right": "#0072B2", "left": "#009E73", "single": "#8A6D3B"}
+MINIMISER, PAPER, OTHER_END = "#333333", "#C1272D", "#7B3294"
+TILTED, LEVEL = "#0072B2", "#E69F00"
+
+
+def draw_steady_headings(found: Sequence[Steady]) -> Figure:
+    """Draw headings that right-handed pairs take, against length, and where shifts end.
+
+    First panel: means with twice their standard errors, filled for a tilted and open for a level
+    drum; the energy's minimiser, ``arctan(r/l)``, and the heading of least energy at the other end
+    of the way along the rods.  Second panel: the shift along the axis, between the ends of the way.
+    """
+    figure, drum = Figure(figsize=(12.5, 5.6), layout="constrained"), found[0].drum
+    first, second = figure.subplots(1, 2)
+    lengths = np.array([one.drum.length for one in found])
+    span = np.linspace(lengths.min() - 1, lengths.max() + 1, 200)
+    p = drum.ball_radius + drum.rod_radius
+    waist = float(np.sqrt(4 * drum.ball_radius**2 - p**2))
+    first.plot(span, np.degrees(np.arctan2(drum.ball_radius, span)), color=PAPER, ls="--")
+    first.plot(span, _at_shift(drum, span, span - waist), color=MINIMISER)
+    first.plot(span, _at_shift(drum, span, np.full_like(span, waist)), color=OTHER_END, ls=":")
+    second.plot(span, span - waist, color=MINIMISER, label="inner balls touch: the corner δ")
+    second.plot(
+        span, np.full_like(span, waist), color=OTHER_END, ls=":", label="balls side by side"
+    )
+    _points(first, found, "heading")
+    _points(second, found, "shift")
+    curves = ("arctan(r/l)", "least energy (plane)", "least energy, balls side by side")
+    for line, label in zip(first.lines[:3], curves, strict=True):
+        line.set_label(label)
+    chatters = sorted({one.chatter for one in found})
+    noise = ", ".join(f"{value:g}" for value in chatters)
+    first.set(title="(a) heading", ylabel="heading of right-handed pairs (degrees)", ylim=(0, None))
+    second.set(title="(b) shift along the axis", ylabel="shift (mm)", ylim=(0, None))
+    for axes in (first, second):
+        axes.set_xlabel("length l (mm)")
+        axes.legend(fontsize=9)
+    figure.suptitle(
+        f"Driven pairs, r = {drum.ball_radius:g} mm, t = {drum.rod_radius:g} mm, "
+        f"R = {drum.drum_radius:g} mm;  chatter {noise};  bars: two standard errors"
+    )
+    return figure
+
+
+def _at_shift(drum: DumbbellDrum, lengths: Array, shifts: Array) -> Array:
+    pairs = zip(lengths, shifts, strict=True)
+    return np.array([heading_at_shift(replace(drum, length=float(x)), float(s)) for x, s in pairs])
+
+
+def _points(axes: Axes, found: Sequence[Steady], what: str) -> None:
+    for tilted in (True, False):
+        some = [one for one in found if (one.drum.tilt != 0) == tilted]
+        if not some:
+            continue
+        means = [getattr(one, what) for one in some]
+        axes.errorbar(
+            [one.drum.length for one in some],
+            [mean.value for mean in means],
+            yerr=[2 * mean.error for mean in means],
+            fmt="o" if tilted else "s",
+            color=TILTED if tilted else LEVEL,
+            mfc=TILTED if tilted else "white",
+            capsize=3,
+            label=f"simulated, tilt {np.degrees(some[0].drum.tilt):.3g}°",
+        )
+
+
+def draw_climbing(
+    zigzags: Sequence[Zigzag], drum: DumbbellDrum, found: Sequence[Steady] = ()
+) -> Figure:
+    """Draw climb rates against headings: of single dumbbells, of driven pairs, and the law.
+
+    The law, of a perfect keel, is ``omega rho tan(theta)``.
+    """
+    figure = Figure(figsize=(7.5, 5.4), layout="constrained")
+    axes = figure.subplots()
+    headings = [float(np.degrees(one.heading.mean())) for one in zigzags]
+    reach = max([1.0, *np.abs(headings), *(abs(one.heading.value) for one in found)])
+    span = np.linspace(-1.05 * reach, 1.05 * reach, 300)
+    law = drum.spin * drum.centre_radius * np.tan(np.radians(span))
+    axes.plot(span, law, color=MINIMISER, label="ω ρ tan θ")
+    rates = [one.climb_rate for one in zigzags]
+    axes.plot(headings, rates, "o", color=TILTED, label="single dumbbells, no noise")
+    for level in (False, True):
+        some = [one for one in found if (one.drum.tilt == 0) == level]
+        if some:
+            axes.errorbar(
+                [one.heading.value for one in some],
+                [one.climb_rate.value for one in some],
+                xerr=[2 * one.heading.error for one in some],
+                yerr=[2 * one.climb_rate.error for one in some],
+                fmt="s" if level else "D",
+                color=LEVEL if level else COLOURS["left"],
+                capsize=3,
+                label=f"right-handed pairs with noise, tilt {np.degrees(some[0].drum.tilt):.3g}°",
+            )
+    axes.axhline(0, color="0.8", linewidth=0.7, zorder=0.5)
+    axes.set(xlabel="heading θ (degrees)", ylabel="climb rate (mm/s)")
+    axes.legend(fontsize=9)
+    return figure
+
+
+def draw_exits(runs: Mapping[str, BunchRun]) -> Figure:
+    """Draw, for each bunch by its name, who has left, and as what, against time.
+
+    Below: how many of those in the drum are in right and left dyads or single.
+    """
+    figure = Figure(figsize=(6.2 * len(runs), 7.2), layout="constrained")
+    grid = figure.subplots(2, len(runs), squeeze=False)
+    for (above, below), (name, one) in zip(grid.T, runs.items(), strict=True):
+        for kind in KINDS:
+            left = [t for (t, _), k in zip(one.exits, one.exit_kinds, strict=True) if k == kind]
+            times, counts = [0.0, *left, float(one.times[-1])], [*range(len(left) + 1), len(left)]
+            above.step(times, counts, where="post", color=COLOURS[kind], label=kind)
+        above.set(title=name, ylabel="have left", xlabel="time (s)")
+        above.set_ylim(0, max(1.0, 1.05 * len(one.exits)))
+        chosen = np.unique(np.linspace(0, len(one.times) - 1, 80).round().astype(int))
+        census = [one.census(int(index)) for index in chosen]
+        for kind in KINDS:
+            numbers = [entry[kind] for entry in census]
+            below.plot(one.times[chosen], numbers, color=COLOURS[kind], label=kind)
+        below.set(ylabel="in the drum", xlabel="time (s)", ylim=(0, one.drum.count))
+        above.legend(fontsize=9)
+    return figure

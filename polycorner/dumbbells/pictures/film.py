@@ -1,0 +1,283 @@
+"""Dumbbells at many instants, with all that is said of them: what a page in the browser plays."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.pairs import Handed, Sizes, dyads_among
+from polycorner.dumbbells.dynamics.runs import DrumRun
+from polycorner.dumbbells.formulas import CONTACTS
+from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
+from polycorner.dumbbells.pictures.movies import chosen_frames
+from polycorner.polyhedra.cones import rank
+from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
+from polycorner.spaces.manifold import Array, finite, reals
+
+if TYPE_CHECKING:
+    from polycorner.motion.trajectory import Touch
+
+TOUCHING = 1e-6  # scaled distance within which a contact of a configuration counts as closed
+FRAMES = 1000  # of a long run, at most
+HANDS: Mapping[str | None, str] = {"R": "right-handed", "L": "left-handed", None: "none"}
+FIRST, SECOND, SINGLE, RIGHT, LEFT = range(5)  # what a dumbbell is coloured as
+
+
+@dataclass(frozen=True)
+class Words:
+    """What is written beside a frame.
+
+    Attributes
+    ----------
+    stratum : str
+        The face of the polyhedron: its dimension, rank and local type; empty if not computed.
+    chirality : str
+    """
+
+    stratum: str
+    chirality: str
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Dumbbells at ``T`` instants.
+
+    Attributes
+    ----------
+    title, note : str
+        What is shown, in a line and in a sentence.
+    pair : DumbbellPair
+        The lengths.
+    times : (T,) array
+        What the timeline counts, and ``unit`` what in: ``s``, or ball radii along a path.
+    centres : (T, N, 2, 3) array
+        Ball centres in mm; NaN for dumbbells that have left.
+    roles : (T, N) array of int
+        How dumbbells are coloured: 0 and 1 the members of a pair; 2 single, 3 in a right-handed
+        and 4 in a left-handed dyad.
+    energies : mapping from str to (T,) array
+        By name with unit.
+    contacts : tuple of T mappings from str to (3,) array
+        Closed contacts, and where they are, in mm.
+    words : tuple of T Words
+    wall : Wall
+    spin : float
+        Of the drum, rad/s.
+    """
+
+    title: str
+    note: str
+    pair: DumbbellPair
+    times: Array
+    unit: str
+    centres: Array
+    roles: NDArray[np.int64]
+    energies: Mapping[str, Array]
+    contacts: tuple[Mapping[str, Array], ...]
+    words: tuple[Words, ...]
+    wall: Wall
+    spin: float = 0.0
+
+    def __len__(self) -> int:
+        """Return the number of instants."""
+        return len(self.times)
+
+
+def stratum_words(stratum: Stratum) -> str:
+    """Return a face in words, such as ``dimension 3, rank 3, quadrant``."""
+    return f"dimension {stratum.dimension}, rank {stratum.rank}, {stratum.local_type.name.lower()}"
+
+
+def energy_name(pair: DumbbellPair) -> str:
+    """Return the name of the energy of a pair with its unit."""
+    return "Energy (mm²)" if pair.is_plane else "Energy (mm)"
+
+
+# ----------------------------------------------------------------------------------------- a pair
+
+
+def pair_film(
+    pair: DumbbellPair,
+    q: ArrayLike,
+    *,
+    times: ArrayLike | None = None,
+    unit: str = "",
+    title: str = "Two dumbbells",
+    note: str = "",
+    tolerance: float = TOUCHING,
+) -> Film:
+    """Return a path of a pair ``(T, 6)``, or one configuration ``(6,)``, as a film.
+
+    Strata and chirality are those of :func:`~polycorner.stratum_at` at every point.
+
+    Parameters
+    ----------
+    pair : DumbbellPair
+    q : (T, 6) or (6,) array
+    times : (T,) array, optional
+        Increasing; default the length of the way in ball radii.
+    unit : str, optional
+        Of the times.
+    title, note : str, optional
+        What is written above the film.
+    tolerance : float, optional
+        Scaled distance within which a contact counts as closed.
+
+    Raises
+    ------
+    ValueError
+        For arrays that do not fit, or times that do not increase.
+    """
+    points = np.atleast_2d(finite(reals(q, "q"), "q"))
+    if points.ndim != 2 or points.shape[1] != 6 or not len(points):
+        msg = f"q: expected shape (T, 6) with T at least 1; got {np.shape(q)}"
+        raise ValueError(msg)
+    if times is None:
+        scales = pair.manifold.scale_array
+        steps = np.linalg.norm(pair.manifold.difference(points[1:], points[:-1]) / scales, axis=1)
+        instants, unit = np.concatenate([[0.0], np.cumsum(steps)]), unit or "ball radii"
+    else:
+        instants = _increasing(times, len(points))
+    strata = [stratum_at(pair.polyhedron, point, tolerance=tolerance) for point in points]
+    centres = pair.ball_centres(points)
+    contacts = tuple(
+        {name: contact_point(pair, balls, name) for name in stratum.active}
+        for balls, stratum in zip(centres, strata, strict=True)
+    )
+    return Film(
+        title,
+        note,
+        pair,
+        instants,
+        unit,
+        centres.reshape(-1, 2, 2, 3),
+        np.tile([FIRST, SECOND], (len(points), 1)),
+        {energy_name(pair): np.asarray(pair.energy.value(points))},
+        contacts,
+        tuple(Words(stratum_words(s), HANDS[s.chirality]) for s in strata),
+        wall_around(pair, centres),
+    )
+
+
+def _increasing(times: ArrayLike, count: int) -> Array:
+    instants = finite(reals(times, "times"), "times")
+    if instants.shape != (count,) or not (np.diff(instants) > 0).all():
+        msg = f"times: expected {count} increasing numbers; got shape {instants.shape}"
+        raise ValueError(msg)
+    return instants
+
+
+# ------------------------------------------------------------------------------------------ a run
+
+
+def run_film(run: DrumRun, *, frames: int = FRAMES, title: str = "Dumbbells in the drum") -> Film:
+    """Return a motion in the drum as a film of at most ``frames`` of its instants.
+
+    Contacts are those that the motion recorded as touching, called ``A1b`` for one or two
+    dumbbells and ``3-7 A1b`` for more.  Of a pair the film gives the face of the polyhedron, from
+    the gradients of the touching contacts, and the chirality; of more dumbbells how many dyads of
+    each hand there are (:func:`~polycorner.dumbbells.dynamics.pairs.dyads_among`).
+    """
+    path, drum = run.trajectory, run.drum
+    chosen = chosen_frames(len(path), frames)
+    q = np.where(path.present[chosen][..., None], path.q[chosen], np.nan)
+    centres = dumbbell_centres(drum.pair, np.nan_to_num(q))
+    centres[~path.present[chosen]] = np.nan
+    shots = [_Shot.of(run, k, balls) for k, balls in zip(chosen, centres, strict=True)]
+    return Film(
+        title,
+        _described(drum),
+        drum.pair,
+        np.asarray(path.times[chosen]),
+        "s",
+        centres,
+        np.array([shot.roles for shot in shots]),
+        {
+            "Kinetic energy (nJ)": path.kinetic[chosen],
+            "Potential energy (nJ)": path.potential[chosen],
+        },
+        tuple(shot.contacts for shot in shots),
+        tuple(Words(shot.face, shot.hands) for shot in shots),
+        wall_around(drum.pair, centres),
+        drum.spin,
+    )
+
+
+def _described(drum: DumbbellDrum) -> str:
+    r, t = drum.ball_radius, drum.rod_radius
+    return (
+        f"{drum.count} of l = {drum.length:g}, r = {r:g}, t = {t:g} mm in a drum of radius "
+        f"{drum.drum_radius:g} mm, tilted by {math.degrees(drum.tilt):.3g}°, turning with "
+        f"{drum.spin:g} rad/s"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Shot:
+    """One recorded instant of a run: what touches, and which dumbbells are dyads."""
+
+    pair: DumbbellPair
+    q: Array
+    present: NDArray[np.bool_]
+    centres: Array
+    touching: "tuple[Touch, ...]"
+    dyads: "list[Handed]"
+
+    @classmethod
+    def of(cls, run: DrumRun, index: int, centres: Array) -> "_Shot":
+        path, drum = run.trajectory, run.drum
+        q, present = path.q[index], path.present[index]
+        dyads = dyads_among(Sizes.of_drum(drum), q, present) if drum.count > 2 else []
+        return cls(drum.pair, q, present, centres, path.touching[index], dyads)
+
+    @property
+    def between(self) -> "list[Touch]":
+        """What touches between dumbbells, not the bottom."""
+        return [touch for touch in self.touching if touch[1] in CONTACTS]
+
+    @property
+    def contacts(self) -> dict[str, Array]:
+        found = {}
+        for bodies, contact, _ in self.between:
+            numbers = "-".join(str(body + 1) for body in bodies)
+            name = contact if len(self.q) == 2 else f"{numbers} {contact}"
+            found[name] = contact_point(self.pair, self.centres[[*bodies]].reshape(4, 3), contact)
+        return found
+
+    @property
+    def roles(self) -> list[int]:
+        """How dumbbells are coloured; one in dyads of both hands counts with the last."""
+        count = len(self.q)
+        if count <= 2:
+            return [FIRST, SECOND][:count]
+        roles = [SINGLE] * count
+        for i, j, hand in self.dyads:
+            roles[i] = roles[j] = RIGHT if hand > 0 else LEFT
+        return roles
+
+    @property
+    def face(self) -> str:
+        """The face of the polyhedron of one or two dumbbells, if nothing else is touched."""
+        names = [contact for _, contact, _ in self.between]
+        if len(self.q) > 2 or not self.present.all() or len(names) < len(self.touching):
+            return ""
+        free = 3 * len(self.q)
+        if not names:
+            return f"dimension {free}, rank 0, interior"
+        rows = [self.pair.polyhedron.names.index(name) for name in names]
+        _, gradients = self.pair.polyhedron.bundle.evaluate(self.q[:, :3].reshape(6), 1)
+        r = rank(gradients[rows] * self.pair.manifold.scale_array, RANK_TOLERANCE)
+        return f"dimension {free - r}, rank {r}, {'quadrant' if r == len(rows) else 'dependent'}"
+
+    @property
+    def hands(self) -> str:
+        if len(self.q) > 2:
+            right = sum(hand > 0 for _, _, hand in self.dyads)
+            return f"{right} right-handed, {len(self.dyads) - right} left-handed dyads"
+        whole = len(self.q) == 2 and bool(self.present.all())
+        return HANDS[self.pair.chirality(self.q[:, :3].reshape(6)) if whole else None]

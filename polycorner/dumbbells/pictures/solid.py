@@ -1,0 +1,223 @@
+"""The solid of forbidden placements of a pair, with the corners and edges of its atlas over it."""
+
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from polycorner.dumbbells.pictures.placements import (
+    forbidden_solid,
+    relative_coordinates,
+    relative_gaps,
+)
+from polycorner.dumbbells.statics.skeleton import PairAtlas
+from polycorner.pictures.meshes import write_mesh
+from polycorner.pictures.sharp import SharpSurface
+from polycorner.pictures.sharp_strata import Chart
+from polycorner.pictures.solid_view import draw_solid
+from polycorner.pictures.style import save
+from polycorner.skeletons.refinement import traced
+from polycorner.spaces.manifold import Array
+
+KINDS = {
+    (2, 0, 0): "ball on ball twice",
+    (1, 1, 0): "ball on ball, ball on rod",
+    (0, 2, 0): "two balls on rods",
+}
+SAME = 1e-6  # mm or radians
+LETTERS = {"Delta": "\\Delta", "E": "\\mathcal{E}"}
+
+
+def contacts_in_words(active: Iterable[str]) -> str:
+    """Return the kind of an edge by its contacts, such as ``two balls on rods``."""
+    lengths = Counter(len(name) for name in active)
+    kind = (lengths[4], lengths[3], lengths[2])
+    return KINDS.get(kind, "{} ball-ball, {} ball-rod, {} rod-rod".format(*kind))
+
+
+def relative_curves(
+    atlas: PairAtlas,
+    period: float,
+    naming: Callable[[tuple[str, ...]], str] = contacts_in_words,
+) -> list[tuple[str, Array]]:
+    """Return the edges as ``(name, (k, 3))`` in relative placements, each once.
+
+    The relative heading is brought into one period about zero; an edge that leaves it is cut there.
+    Balls of a dumbbell are alike here, so in the drum a half-turn about the vertical gives a
+    second image, and edges that differ by a relabelling of balls may coincide.
+
+    Parameters
+    ----------
+    atlas : PairAtlas
+    period : float
+        Of the relative heading, in radians.
+    naming : callable, optional
+        Name of an edge from the names of its contacts; default :func:`contacts_in_words`.
+    """
+    curves: list[tuple[str, Array]] = []
+    for edge in atlas.skeleton.edges:
+        line = traced(atlas.skeleton, edge)
+        points = relative_coordinates(atlas.pair, line, mean_heading=atlas.heading)
+        label = naming(edge.active)
+        for piece in _cut(atlas, points, period):
+            curves += [(label, image) for image in _images(atlas, piece)]
+    kept: list[tuple[str, Array]] = []
+    for label, line in curves:
+        if not any(label == name and _coincide(line, other) for name, other in kept):
+            kept.append((label, line))
+    return kept
+
+
+def _cut(atlas: PairAtlas, points: Array, period: float) -> list[Array]:
+    """Return the pieces of an edge in one period about zero, each up to where it leaves it."""
+    turns = np.round(points[:, 2] / period)
+    cuts = np.flatnonzero(np.diff(turns)) + 1
+    pieces = np.split(points, cuts)
+    for k, cut in enumerate(cuts.tolist()):
+        if abs(points[cut, 2] - points[cut - 1, 2]) > SAME:
+            end = _on_seam(atlas, points[cut - 1], points[cut], turns[cut - 1 : cut + 1], period)
+            pieces[k] = np.vstack([pieces[k], end])
+            pieces[k + 1] = np.vstack([end, pieces[k + 1]])
+    starts = np.concatenate([[0], cuts])
+    shifted = [
+        piece - np.array([0.0, 0.0, period * turns[start]])
+        for piece, start in zip(pieces, starts.tolist(), strict=True)
+    ]
+    return [piece for piece in shifted if len(piece) > 1]
+
+
+def _on_seam(atlas: PairAtlas, one: Array, other: Array, turns: Array, period: float) -> Array:
+    """Return where the edge through two points crosses the end of a period, ``(1, 3)``."""
+    place = period * turns.mean()
+    share = (place - one[2]) / (other[2] - one[2])
+    guess = (one + share * (other - one))[None]
+    guess[:, 2] = place
+    gaps = relative_gaps(atlas.pair, mean_heading=atlas.heading)
+    held = abs(gaps(one[None], 0)[0]) < SAME
+    fixed = np.array([[False, False, True]])
+    return Chart(gaps, np.zeros(3), np.ones(3)).settle(guess, held, fixed)[0]
+
+
+def _coincide(one: Array, other: Array) -> bool:
+    """Return whether two polylines are one curve: its ends and its middle, either way along it."""
+    places = one[[0, len(one) // 2, -1]]
+    steps = np.linalg.norm(np.diff(other, axis=0), axis=1).max()
+    apart = np.linalg.norm(places[:, None] - other, axis=-1).min(axis=1)
+    return bool((apart <= steps).all() and len(other) > 1)
+
+
+def _images(atlas: PairAtlas, points: Array) -> list[Array]:
+    if atlas.heading is None:
+        return [points]
+    return [points, points * np.array([-1, -1, 1])]
+
+
+def relative_corners(
+    atlas: PairAtlas, period: float, *, hands: bool = False
+) -> tuple[Array, list[str]]:
+    """Return the corners ``(k, 3)`` in relative placements, each once, and their letters.
+
+    ``hands`` adds the chirality to a letter.
+    """
+    points: list[Array] = []
+    letters = []
+    for corner in atlas.skeleton.corners:
+        point = relative_coordinates(atlas.pair, corner.point, mean_heading=atlas.heading)
+        point[2] -= period * np.round(point[2] / period)
+        kind, hand = atlas.kind(corner).split("_")
+        for image in _images(atlas, point):
+            if all(abs(image - other).max() > 1e-6 for other in points):
+                points.append(image)
+                letters.append(_written(kind, hand if hands else ""))
+    return np.array(points), letters
+
+
+def _written(kind: str, hand: str) -> str:
+    """Return a letter as it is typeset; kinds without one stay as they are."""
+    if kind not in LETTERS:
+        return kind
+    return f"${LETTERS[kind]}_{hand}$" if hand else f"${LETTERS[kind]}$"
+
+
+@dataclass(frozen=True)
+class SolidFacts:
+    """How large the solid is, and how well its mesh agrees with the atlas.
+
+    Attributes
+    ----------
+    volume, curved_volume : float
+        Of the mesh, and with the curvature of its faces, in mm^2 rad.
+    euler_characteristic : int
+        Of the surface, the seam of the relative heading sewn together.
+    watertight : bool
+        Whether the mesh is closed and wound consistently.
+    faces, unresolved : int
+        Number of triangles, and of those that lie on no single contact.
+    surface_error, edge_error : float
+        Largest gap on faces and on edges, see :class:`~polycorner.pictures.sharp.SharpSurface`,
+        in mm.
+    corner_error : float
+        Largest distance of a corner of the atlas from the nearest vertex; a radian counts ``l/2``
+        mm.
+    corners : int
+        Number of corners of the atlas in one period.
+    """
+
+    volume: float
+    curved_volume: float
+    euler_characteristic: int
+    watertight: bool
+    faces: int
+    unresolved: int
+    surface_error: float
+    edge_error: float
+    corner_error: float
+    corners: int
+
+
+def solid_facts(solid: SharpSurface, atlas: PairAtlas) -> SolidFacts:
+    """Return the size of a solid and the errors of its mesh against the atlas of the same pair."""
+    low, high = solid.bounds[2].tolist()
+    points, _ = relative_corners(atlas, high - low)
+    return SolidFacts(
+        volume=solid.volume,
+        curved_volume=solid.curved_volume,
+        euler_characteristic=solid.euler_characteristic,
+        watertight=solid.watertight,
+        faces=len(solid.labels),
+        unresolved=solid.unresolved,
+        surface_error=solid.surface_error,
+        edge_error=solid.edge_error,
+        corner_error=solid.corner_error(points, (1.0, 1.0, atlas.pair.length / 2)),
+        corners=len(points),
+    )
+
+
+def write_solid(atlas: PairAtlas, folder: Path, *, resolution: int = 96) -> list[Path]:
+    """Write ``solid.png``, ``solid.glb`` and ``solid.json``; a radian is as long as ``l/2`` mm.
+
+    In the plane over half a turn of the relative heading, since the balls of a dumbbell are alike;
+    in the drum over a whole turn at the atlas's mean heading.  The JSON file, and the extras of
+    the GLB file, hold the :class:`SolidFacts`.
+    """
+    period = math.pi if atlas.heading is None else math.tau
+    solid = forbidden_solid(atlas.pair, resolution, period=period, mean_heading=atlas.heading)
+    curves = relative_curves(atlas, period)
+    points, letters = relative_corners(atlas, period)
+    facts = asdict(solid_facts(solid, atlas))
+    figure = draw_solid(solid.mesh, curves, points, letters, caps=solid.caps)
+    mesh = write_mesh(
+        solid.mesh,
+        folder / "solid.glb",
+        curves=curves,
+        points=points,
+        scale=(1.0, 1.0, atlas.pair.length / 2),
+        facts=facts,
+    )
+    numbers = folder / "solid.json"
+    numbers.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    return [save(figure, folder / "solid.png"), mesh, numbers]

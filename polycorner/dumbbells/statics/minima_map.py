@@ -1,0 +1,342 @@
+"""Where two dumbbells can rest: all minima of a pair, and how they depend on its proportions.
+
+A kind of rest is named by the contacts that hold it, those with positive multipliers:
+
+=============  ====================================================================
+``G``          none: end to end on the lowest line, any distance apart
+``delta``      a ball-ball contact and two ball-rod contacts: nested
+``staggered``  three ball-ball contacts: nested without reaching a waist
+``crossed``    rod on rod: one lies across the other, free to shift along it
+others         the numbers of ball-ball, ball-rod and rod-rod contacts, ``crossed 201``
+               where there is one between the rods
+=============  ====================================================================
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
+from polycorner.minimisation.certificate import Certificate, certify
+from polycorner.minimisation.search import Minima, minima
+from polycorner.minimisation.search import Progress as Falls
+from polycorner.polyhedra.symmetry import Element, Symmetry
+from polycorner.spaces.manifold import Array, finite, reals
+
+CURVATURES = (0.128, 0.5, 1.0, 1.5)
+RODS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
+LENGTHS = (2.2, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
+FITTING = 0.995  # largest chord of the cylinder of ball centres that a dumbbell may be
+
+NAMES = {(0, 0, 0): "G", (1, 2, 0): "delta", (3, 0, 0): "staggered", (0, 0, 1): "crossed"}
+
+# What is told after every pair: how many are done, and how many there are.
+Progress = Callable[[int, int], None]
+
+
+def energy_symmetry(pair: DumbbellPair, *, mirror: bool = False) -> Symmetry:
+    """Return what leaves both the polyhedron and the energy of a pair unchanged.
+
+    Shifting the pair along the drum, relabelling the dumbbells and the balls of either, and the
+    half-turn about the vertical axis; rolling the pair is no symmetry of its energy.  With
+    ``mirror`` also the reflection in the vertical plane through the drum's axis, so that right-
+    and left-handed rests count as one.
+    """
+    unit, half = pair.ball_radius, pair.length / 2
+
+    def invariants(q: Array) -> Array:
+        arms = [half * f(theta) for theta in (q[2], q[5]) for f in (math.cos, math.sin)]
+        if pair.is_plane:
+            return np.array([q[0], q[3], q[4] - q[1], *arms]) / unit
+        rho = pair.centre_radius
+        sides = [rho * f(phi) for phi in (q[0], q[3]) for f in (math.cos, math.sin)]
+        return np.array([*sides, q[4] - q[1], *arms]) / unit
+
+    group = _with(relabellings(), half_turn_in_place())
+    if mirror:
+        group = _with(group, Element(pair.mirror, {}))
+    return Symmetry(_shift, invariants, elements=group)
+
+
+def _shift(q: Array) -> Array:
+    """Return the velocity of shifting the pair along the drum, ``(1, 6)``."""
+    del q  # the same everywhere
+    return np.array([[0.0, 1, 0, 0, 1, 0]])
+
+
+def _with(group: tuple[Element, ...], more: Element) -> tuple[Element, ...]:
+    """Return a group without the identity, enlarged by an involution that keeps names."""
+
+    def both(element: Element) -> Element:
+        return Element(lambda q: more.apply(element.apply(q)), element.names)
+
+    return (*group, more, *[both(element) for element in group])
+
+
+def scattered(pair: DumbbellPair, rng: np.random.Generator, count: int) -> Array:
+    """Return random placements without overlap anywhere in the drum, ``(count, 6)``.
+
+    Independent draws from one distribution.  Headings are uniform, and so is the azimuth of A; with
+    even odds B is near A, within ``l/2 + 2 r`` across and along, or anywhere, its azimuth uniform
+    and within ``l + 2 r`` along.  In the plane azimuths are replaced by lateral positions within
+    ``l + 2 r``.
+    """
+    close = int(rng.binomial(count, 0.5))
+    near = _placed(pair, rng, close, pair.length / 2 + 2 * pair.ball_radius)
+    return np.asarray(rng.permutation(np.concatenate([near, _placed(pair, rng, count - close)])))
+
+
+def _placed(
+    pair: DumbbellPair, rng: np.random.Generator, count: int, near: float | None = None
+) -> Array:
+    """Return placements of B within ``near`` of A, in mm, or anywhere."""
+    reach, rho = pair.length + 2 * pair.ball_radius, pair.centre_radius
+    around = reach if pair.is_plane else math.pi
+    beside = around if near is None else near / (1 if pair.is_plane else rho)
+    size = np.array([around, 0.0, math.pi, beside, reach if near is None else near, math.pi])
+    found = np.empty((0, 6))
+    while len(found) < count:  # lying across the drum, two always fit beside each other
+        q = size * rng.uniform(-1, 1, (4 * count, 6))
+        q[:, 3] += q[:, 0]
+        found = np.concatenate([found, q[np.asarray(pair.polyhedron.contains(q))]])
+    return pair.manifold.wrap(found[:count])
+
+
+def pair_minima(
+    pair: DumbbellPair,
+    *,
+    starts: int = 1000,
+    rng: np.random.Generator | int | None = None,
+    mirror: bool = False,
+    progress: Falls | None = None,
+) -> Minima:
+    """Find where a pair can rest, up to shifts and relabelling, from scattered placements.
+
+    Parameters
+    ----------
+    pair : DumbbellPair
+        The dumbbells.
+    starts : int, optional
+        How many placements :func:`scattered` draws.
+    rng : Generator or int, optional
+        Source of them; default a generator with seed 0.
+    mirror : bool, optional
+        Whether mirror images count as one.
+    progress : callable, optional
+        As for :func:`~polycorner.minimisation.search.minima`.
+    """
+    if isinstance(starts, bool) or not isinstance(starts, int) or starts < 1:
+        msg = f"starts: expected a positive whole number; got {starts!r}"
+        raise ValueError(msg)
+    generator = np.random.default_rng(0 if rng is None else rng)
+    return minima(
+        pair.polyhedron,
+        pair.energy,
+        starts=scattered(pair, generator, starts),
+        symmetry=energy_symmetry(pair, mirror=mirror),
+        progress=progress,
+    )
+
+
+def kind_of(certificate: Certificate) -> str:
+    """Return the name of a rest by the contacts that hold it; see the table above."""
+    analysis = certificate.analysis
+    lengths = Counter(len(certificate.active[k]) for k in analysis.strong_positions)
+    numbers = (lengths[4], lengths[3], lengths[2])
+    word = "crossed " if numbers[2] else ""
+    return NAMES.get(numbers, word + "{}{}{}".format(*numbers))
+
+
+def crossing_room(pair: DumbbellPair) -> float:
+    """Return by how much a level crossing fits, in mm; negative where there is none.
+
+    One dumbbell lies on the lowest line; the rod of the other, ``2 t`` higher, is a level chord
+    across it, ``2 w`` wide with ``w^2 = 4 t (rho - t)``, and not above the drum's axis,
+    ``2 t <= rho``.  It has to be long enough, ``l >= 2 w``.  Its outer ends are
+    ``u = l/2 - sqrt(l^2/4 - w^2)`` short of the balls below when it crosses in the middle; those
+    have to be ``g`` apart along the drum, ``g^2 = 4 r^2 - 4 t rho``.  So it rests in the middle if
+    ``u >= g``, and otherwise ``u + g`` off the middle, with one of its balls beyond the lower ones,
+    if there the lower ball clears the upper rod.  The least difference of the better one is
+    returned; in both the upper balls clear the lower rod, ``4 t rho >= (r + t)^2``.
+    """
+    if pair.is_plane:
+        return -math.inf
+    half, r, t, rho = pair.length / 2, pair.ball_radius, pair.rod_radius, pair.centre_radius
+    width = 2 * math.sqrt(t * max(rho - t, 0.0))
+    if width > half or 2 * t > rho:
+        return min(half - width, rho - 2 * t)
+    short = half - math.sqrt(half**2 - width**2)
+    apart = math.sqrt(max(4 * r**2 - 4 * t * rho, 0.0))
+    arm = max(half - short - apart, 0.0) * width / half
+    off = math.hypot(arm, 2 * t) - r - t
+    return min(half - width, max(short - apart, off))
+
+
+@dataclass(frozen=True, eq=False)
+class MinimaMap:
+    """Which kinds of rest random starts find, over the proportions of a pair.
+
+    Attributes
+    ----------
+    curvatures, rods, lengths : (k,), (n,) and (m,) arrays
+        ``l/R`` (0 is the plane), ``t/r`` and ``l/r``.
+    kinds : tuple of str
+        Every kind that was found.
+    counts : (k, n, m, kinds) array of int
+        How many starts ended in each kind; -1 for a pair that does not fit in its drum, or was
+        not looked at.
+    distinct : (k, n, m, kinds) array of int
+        How many rests of that kind there are, mirror images and relabelled ones counted once.
+    lost : (k, n, m) array of int
+        How many starts ended in no minimum.
+    starts : int
+        How many were let fall for each pair.
+    examples : mapping from str to (DumbbellPair, Certificate)
+        For each kind the pair where most starts ended in it, the dumbbells close together.
+    """
+
+    curvatures: Array
+    rods: Array
+    lengths: Array
+    kinds: tuple[str, ...]
+    counts: NDArray[np.int64]
+    distinct: NDArray[np.int64]
+    lost: NDArray[np.int64]
+    starts: int
+    examples: Mapping[str, tuple[DumbbellPair, Certificate]]
+
+    def has(self, kind: str) -> NDArray[np.bool_]:
+        """Whether a kind was found, ``(k, n, m)``."""
+        if kind not in self.kinds:
+            return np.zeros(self.lost.shape, dtype=bool)
+        return np.asarray(self.counts[..., self.kinds.index(kind)] > 0)
+
+    @property
+    def looked_at(self) -> NDArray[np.bool_]:
+        """Which pairs fit in their drums and were looked at, ``(k, n, m)``."""
+        return np.asarray(self.lost >= 0)
+
+    def pair(self, i: int, j: int, k: int) -> DumbbellPair | None:
+        """Return a pair of the grid, in ball radii; None if it does not fit in its drum."""
+        return _pair(*(float(x) for x in (self.curvatures[i], self.rods[j], self.lengths[k])))
+
+
+def minima_map(
+    *,
+    curvatures: ArrayLike = CURVATURES,
+    rods: ArrayLike = RODS,
+    lengths: ArrayLike = LENGTHS,
+    starts: int = 600,
+    rng: np.random.Generator | int | None = None,
+    progress: Progress | None = None,
+) -> MinimaMap:
+    """Map which kinds of rest there are over ``l/R``, ``t/r`` and ``l/r``.
+
+    Mirror images count as one.  What a kind's share of the starts is depends on how
+    :func:`scattered` draws them; a kind that is not found may be rare instead of absent.
+
+    Parameters
+    ----------
+    curvatures : (k,) array, optional
+        ``l/R``, increasing, at least 0 (the plane) and below 2.
+    rods : (n,) array, optional
+        ``t/r``, increasing and strictly between 0 and 1.
+    lengths : (m,) array, optional
+        ``l/r``, increasing and at least 2.
+    starts : int, optional
+        How many are let fall for each pair.
+    rng : Generator or int, optional
+        Source of the starts; default a generator with seed 0.
+    progress : callable, optional
+        Called as ``progress(done, pairs)`` after every pair.
+
+    Returns
+    -------
+    MinimaMap
+        Also after an interruption (Ctrl-C): pairs that were not reached count as not looked at.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of a wrong kind, shape or range.
+    """
+    axes = (
+        _axis("curvatures", curvatures, 0.0, 2.0, "at least 0 and below 2"),
+        _axis("rods", rods, 1e-9, 1.0, "above 0 and below 1"),
+        _axis("lengths", lengths, 2.0, math.inf, "at least 2"),
+    )
+    generator = np.random.default_rng(0 if rng is None else rng)
+    survey = _Survey(tuple(len(axis) for axis in axes), starts)
+    cells = list(product(*(range(len(axis)) for axis in axes)))
+    try:
+        for done, cell in enumerate(cells, 1):
+            pair = _pair(*(float(axis[k]) for axis, k in zip(axes, cell, strict=True)))
+            if pair is not None:
+                survey.put(cell, pair, pair_minima(pair, starts=starts, rng=generator, mirror=True))
+            if progress is not None:
+                progress(done, len(cells))
+    except KeyboardInterrupt:
+        pass  # the pairs that were reached are the answer
+    return survey.result(*axes)
+
+
+class _Survey:
+    """What was found so far."""
+
+    def __init__(self, shape: tuple[int, ...], starts: int) -> None:
+        self.starts = starts
+        self.lost = np.full(shape, -1, dtype=np.int64)
+        self.counts: dict[str, NDArray[np.int64]] = {}
+        self.distinct: dict[str, NDArray[np.int64]] = {}
+        self.examples: dict[str, tuple[int, DumbbellPair, Certificate]] = {}
+
+    def put(self, cell: tuple[int, ...], pair: DumbbellPair, found: Minima) -> None:
+        """Put down what was found for one pair; an unfinished search does not count."""
+        if found.interrupted:
+            raise KeyboardInterrupt
+        self.lost[cell] = sum(found.elsewhere.values())
+        for certificate, count, points in zip(found, found.counts, found.points, strict=True):
+            kind = kind_of(certificate)
+            for table, more in ((self.counts, count), (self.distinct, 1)):
+                table.setdefault(kind, np.zeros(self.lost.shape, dtype=np.int64))[cell] += more
+            if count > self.examples.get(kind, (0,))[0]:
+                closest = min(points, key=lambda q: abs(q[4] - q[1]))
+                example = certify(pair.polyhedron, pair.energy, closest)
+                self.examples[kind] = (count, pair, example)
+
+    def result(self, curvatures: Array, rods: Array, lengths: Array) -> MinimaMap:
+        """Return the map; kinds in the order of how many starts ended in them."""
+        kinds = tuple(sorted(self.counts, key=lambda kind: -int(self.counts[kind].sum())))
+        counts, distinct = (
+            np.array([np.where(self.lost < 0, -1, table[kind]) for kind in kinds], dtype=np.int64)
+            .reshape(len(kinds), *self.lost.shape)
+            .transpose(1, 2, 3, 0)
+            for table in (self.counts, self.distinct)
+        )
+        examples = {kind: self.examples[kind][1:] for kind in kinds}
+        return MinimaMap(
+            curvatures, rods, lengths, kinds, counts, distinct, self.lost, self.starts, examples
+        )
+
+
+def _pair(curvature: float, rod: float, length: float) -> DumbbellPair | None:
+    """Return the pair with given ``l/R``, ``t/r`` and ``l/r`` in ball radii, if it fits."""
+    drum = math.inf if curvature == 0 else length / curvature
+    if drum <= 1 or length > FITTING * 2 * (drum - 1):
+        return None
+    return DumbbellPair(length, 1.0, rod, drum)
+
+
+def _axis(name: str, given: ArrayLike, low: float, high: float, expected: str) -> Array:
+    axis = finite(np.atleast_1d(reals(given, name)), name)
+    inside = ((axis >= low) & (axis < high)).all()
+    if axis.ndim != 1 or not len(axis) or not (np.diff(axis) > 0).all() or not inside:
+        msg = f"{name}: expected increasing numbers {expected}; got {given!r}"
+        raise ValueError(msg)
+    return axis

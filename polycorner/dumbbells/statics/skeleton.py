@@ -1,0 +1,143 @@
+"""The atlas of the pair: which corners there are, and which motions join them."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.symmetries import ball_relabellings, relabellings
+from polycorner.polyhedra.symmetry import Element
+from polycorner.skeletons.elements import Corner, Skeleton
+from polycorner.skeletons.orbits import Orbits, orbits
+from polycorner.skeletons.search import BUDGET, Progress, skeleton
+from polycorner.spaces.manifold import Array
+
+PLACEMENTS = 6
+
+
+@dataclass(frozen=True)
+class PairAtlas:
+    """Corners, edges and faces of ``D`` for a pair, modulo motions of the pair as a whole.
+
+    Attributes
+    ----------
+    pair : DumbbellPair
+        The dumbbells.
+    skeleton : Skeleton
+        In the plane that of ``D``, in the drum that of its section at a mean heading.
+    heading : float or None
+        That mean heading, in radians; None in the plane.
+    """
+
+    pair: DumbbellPair
+    skeleton: Skeleton
+    heading: float | None
+
+    @cached_property
+    def ordered(self) -> Mapping[str, Orbits]:
+        """Corners, edges and faces up to relabelling of balls; A and B are told apart."""
+        return self._orbits(ball_relabellings())
+
+    @cached_property
+    def unordered(self) -> Mapping[str, Orbits]:
+        """Corners, edges and faces up to relabelling of the dumbbells and of their balls.
+
+        Relabelling the balls of one dumbbell turns the mean heading by a quarter turn; in the drum
+        the relative placement it leads to is then told by its nearest neighbour in the section.
+        """
+        return self._orbits(relabellings())
+
+    def _orbits(self, elements: Sequence[Element]) -> Mapping[str, Orbits]:
+        nearby = None if self.heading is None else self.pair.relative
+        return orbits(self.skeleton, elements, nearby=nearby)
+
+    @property
+    def components(self) -> dict[int, int]:
+        """Connected components of the strata of ``M x M`` by dimension, for labelled pairs.
+
+        A corner of the relative placements is a component of ``D3``, an edge one of ``D4``, a face
+        one of ``D5``; every one of them is swept out by the motions of the pair as a whole and,
+        in the drum, by the mean heading.
+        """
+        counts = self.skeleton.components
+        return {3 + k: counts[dimension] for k, dimension in enumerate(sorted(counts))}
+
+    @property
+    def components_ordered(self) -> dict[int, int]:
+        """The same for ordered pairs of dumbbells whose balls are alike, headings modulo ``pi``."""
+        return self._counts(self.ordered)
+
+    @property
+    def components_unordered(self) -> dict[int, int]:
+        """The same for unordered pairs of dumbbells whose balls are alike."""
+        return self._counts(self.unordered)
+
+    def _counts(self, grouped: Mapping[str, Orbits]) -> dict[int, int]:
+        """Count orbits by dimension; a single component of ``D6`` stays single."""
+        counts = {3 + k: len(found) for k, found in enumerate(grouped.values())}
+        return counts | ({6: 1} if self.components.get(6) == 1 else {})
+
+    def kind(self, corner: Corner) -> str:
+        """Return the paper's letter for a corner with its chirality, as ``Delta_R``.
+
+        ``Delta``: a ball-ball contact and two ball-rod contacts; ``E``: two of either; for other
+        corners the numbers of ball-ball, ball-rod and rod-rod contacts.
+        """
+        lengths = Counter(len(name) for name in corner.active)
+        numbers = (lengths[4], lengths[3], lengths[2])
+        letter = {(1, 2, 0): "Delta", (2, 2, 0): "E"}.get(numbers, "C{}{}{}".format(*numbers))
+        return f"{letter}_{corner.chirality or 'N'}"
+
+
+def pair_atlas(
+    pair: DumbbellPair,
+    *,
+    heading: float = 0.0,
+    budget: int = BUDGET,
+    progress: Progress | None = None,
+    rng: np.random.Generator | int | None = None,
+) -> PairAtlas:
+    """Compute the atlas of a pair, in the plane or on a section of the drum.
+
+    It starts from nested pairs of both chiralities and from random placements.
+
+    Parameters
+    ----------
+    pair : DumbbellPair
+        The dumbbells.
+    heading : float, optional
+        Mean heading of the section in the drum, in radians.
+    budget, progress, rng
+        As for :func:`~polycorner.skeletons.search.skeleton`.
+    """
+    generator = np.random.default_rng(0 if rng is None else rng)
+    found = skeleton(
+        pair.polyhedron if pair.is_plane else pair.section(heading),
+        pair_starts(pair, generator, heading),
+        symmetry=pair.symmetry,
+        budget=budget,
+        progress=progress,
+        rng=generator,
+    )
+    return PairAtlas(pair, found, None if pair.is_plane else heading)
+
+
+def pair_starts(pair: DumbbellPair, rng: np.random.Generator, heading: float = 0.0) -> Array:
+    """Return where the atlas starts: nested pairs of both chiralities, random placements."""
+    nested = [pair.nested(chirality, heading=heading) for chirality in ("R", "L")]
+    fitting = [q for q in nested if pair.polyhedron.contains(q)]
+    return np.array([*fitting, *pair.placements(rng, PLACEMENTS, heading=heading)])
+
+
+def long_rod_length(ball_radius: float, rod_radius: float) -> float:
+    """Return the length above which the rods are long enough, ``2 sqrt(4 r^2 - (r + t)^2)``.
+
+    At it a ball touches both balls of the other dumbbell and its rod at once: a right triangle
+    with legs ``l/2`` and ``r + t`` and hypotenuse ``2 r``.  Below it the ball touches both balls
+    before it reaches the rod, and nothing ever touches a rod.
+    """
+    return 2 * math.sqrt(4 * ball_radius**2 - (ball_radius + rod_radius) ** 2)

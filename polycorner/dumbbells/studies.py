@@ -1,0 +1,245 @@
+"""Parameter studies that ship: headings of dyads, how driven pairs climb, who leaves a bunch."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from polycorner.dumbbells.pair import Chirality, DumbbellPair
+from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
+
+FIRST, LAST = 2.0, 14.0  # degrees between which pairs start, as far as they are several
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """A study with a name.
+
+    Attributes
+    ----------
+    function : callable
+        For :func:`~polycorner.sweeps.execution.sweep`.
+    units : mapping from str to str
+        Of its parameters.
+    """
+
+    function: Callable[..., Mapping[str, Any]]
+    units: Mapping[str, str]
+
+
+def heading(
+    length: float,
+    rod_radius: float,
+    *,
+    ball_radius: float = 3.0,
+    drum_radius: float = 125.0,
+    chirality: Chirality = "R",
+) -> dict[str, Any]:
+    """Return the heading of a dyad at its corner, certified, beside the formulas for it.
+
+    The corner is where the energy is stationary on the face of the three contacts ``A2B1, A2b,
+    aB1``; ``minimum`` is 1 where its certificate says that it is a minimum.
+
+    Parameters
+    ----------
+    length, rod_radius, ball_radius, drum_radius : float
+        Of a :class:`~polycorner.dumbbells.pair.DumbbellPair`, in mm; ``drum_radius`` may be inf.
+    chirality : {"R", "L"}
+
+    Returns
+    -------
+    dict
+        ``heading``, ``paper_heading`` (``arctan(r/l)``) and ``plane_heading`` in degrees,
+        ``minimum``, ``multiplier_<contact>`` (``dE/dgap``; mm in the plane), the largest
+        ``residual`` of the certificate and its ``verdict``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such pair.
+    ArithmeticError
+        If the pair has no such corner: a ball does not fit beside the rod.
+    """
+    pair = DumbbellPair(length, ball_radius, rod_radius, drum_radius)
+    found = dyad_corner(pair, chirality)
+    certificate, sign = found.certificate, 1 if chirality == "R" else -1
+    if not set(CORNER) <= set(certificate.active):
+        why = certificate.verdict.value
+        msg = f"expected a corner where {' '.join(CORNER)} touch; got none: {why}"
+        raise ArithmeticError(msg)
+    residuals = certificate.residuals()
+    multipliers = found.multipliers
+    return {
+        "heading": (found.headings[0], "deg"),
+        "paper_heading": (sign * paper_heading(pair), "deg"),
+        "plane_heading": (sign * math.degrees(pair.plane_corner()[0]), "deg"),
+        "minimum": certificate.is_minimum,
+        **{
+            f"multiplier_{name}": (multipliers[name], "mm" if pair.is_plane else "1")
+            for name in CORNER
+        },
+        "residual": max(residuals.infeasibility, residuals.stationarity, residuals.complementarity),
+        "verdict": certificate.verdict.name,
+    }
+
+
+def climbing(
+    noise: float,
+    tilt: float,
+    *,
+    rng: np.random.Generator,
+    length: float = 16.0,
+    rod_radius: float = 1.5,
+    spin: float = 0.01,
+    pairs: int = 4,
+    duration: float = 60.0,
+) -> dict[str, Any]:
+    """Return how fast right-handed nested pairs climb in a turning drum, and at which heading.
+
+    Pairs start at headings from 2 to 14 degrees and are followed under noise; the first half of the
+    time is left out.  Other parameters are those of the paper's drum, the defaults of
+    :class:`~polycorner.dumbbells.drum.DumbbellDrum`.
+
+    Parameters
+    ----------
+    noise : float
+        Amplitude of the chatter, see :class:`~polycorner.motion.noise.Noise`.
+    tilt : float
+        Of the drum, in degrees.
+    rng : Generator
+        The noise's seed is drawn from it.
+    length, rod_radius : float
+        In mm.
+    spin : float
+        Of the drum, in rad/s.
+    pairs : int
+        How many.
+    duration : float
+        In s.
+
+    Returns
+    -------
+    dict
+        ``climb_rate`` in mm/s, ``heading`` and ``azimuth`` in degrees, each with its standard
+        ``_error`` over the pairs that ``held``; ``law``, ``spin rho tan(heading)`` in mm/s.
+    """
+    from polycorner.dumbbells.drum import DumbbellDrum
+    from polycorner.dumbbells.dynamics.dyads import Start, follow_dyads, steady
+    from polycorner.motion.noise import Noise
+
+    if isinstance(pairs, bool) or not isinstance(pairs, int) or pairs < 1:
+        msg = f"pairs: expected a positive whole number; got {pairs!r}"
+        raise ValueError(msg)
+    drum = DumbbellDrum(length, rod_radius=rod_radius, tilt=math.radians(tilt), spin=spin)
+    headings = np.radians(np.linspace(FIRST, LAST, pairs)).tolist()
+    starts: list[Start] = [("R", angle) for angle in headings]
+    shaken = Noise(chatter=noise, seed=int(rng.integers(2**63)))
+    found = steady(follow_dyads(drum, starts, duration, noise=shaken), after=duration / 2)
+    means = {"climb_rate": (found.climb_rate, "mm/s"), "heading": (found.heading, "deg")}
+    means["azimuth"] = (found.azimuth, "deg")
+    law = spin * drum.centre_radius * math.tan(math.radians(found.heading.value))
+    return {
+        **{name: (mean.value, unit) for name, (mean, unit) in means.items()},
+        **{f"{name}_error": (mean.error, unit) for name, (mean, unit) in means.items()},
+        "held": found.held,
+        "law": (law, "mm/s"),
+    }
+
+
+def bunch(
+    start: int,
+    *,
+    noise: float = 0.0,
+    top: float = 300.0,
+    sliding: float = 0.3,
+    rolling: float = 0.1,
+    rubbing: float = 0.3,
+    tilt: float = 7.0,
+    spin: float = 0.01,
+    length: float = 16.0,
+    ball_radius: float = 3.0,
+    rod_radius: float = 1.5,
+    count: int = 60,
+    duration: float = 1200.0,
+    dt: float = 0.004,
+) -> dict[str, Any]:
+    """Follow a bunch of dumbbells at the bottom of the drum; return who left, and who is a dyad.
+
+    See :func:`~polycorner.dumbbells.dynamics.bunch.follow_bunch`.  Defaults are the paper's drum,
+    with what the paper does not give as in :class:`~polycorner.dumbbells.drum.DumbbellDrum`.
+
+    Parameters
+    ----------
+    start : int
+        Seed of the start and of the noise: one member of an ensemble.
+    noise : float
+        Amplitude of the chatter, see :class:`~polycorner.motion.noise.Noise`.
+    top : float
+        Where the drum ends, in mm.
+    sliding, rolling, rubbing : float
+        Static coefficients; the dynamic ones change in proportion to the drum's defaults.
+    tilt, spin : float
+        Of the drum, in degrees and rad/s.
+    length, ball_radius, rod_radius : float
+        In mm.
+    count : int
+        How many dumbbells.
+    duration, dt : float
+        In s.
+
+    Returns
+    -------
+    dict
+        Numbers of dumbbells: ``left``, and of them ``left_right``, ``left_left`` and
+        ``left_single`` as members of right- and left-handed dyads and of none; at the end
+        ``in_right``, ``in_left``, in as many of ``both``, ``single``, and ``rollers``.  ``reach``,
+        the mean height of those in the drum, and ``max_penetration`` in mm; ``missed``, the share
+        of the groups in contact that were not solved to the tolerance.
+    """
+    from polycorner.dumbbells.drum import DumbbellDrum
+    from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch
+
+    if isinstance(start, bool) or not isinstance(start, int) or start < 0:
+        msg = f"start: expected a whole number not below 0; got {start!r}"
+        raise ValueError(msg)
+    drum = DumbbellDrum(
+        length,
+        ball_radius,
+        rod_radius,
+        tilt=math.radians(tilt),
+        spin=spin,
+        sliding=in_proportion(sliding, DumbbellDrum.sliding),
+        rolling=in_proportion(rolling, DumbbellDrum.rolling),
+        rubbing=in_proportion(rubbing, DumbbellDrum.rubbing),
+    )
+    drum = drum_for_bunch(drum, count=count, top=top)
+    run = follow_bunch(drum, duration, seed=start, chatter=noise, dt=dt)
+    census, there = run.census(-1), run.present[-1]
+    return {
+        "left": len(run.exits),
+        **{f"left_{kind}": number for kind, number in run.exit_counts().items()},
+        "in_right": census["right"],
+        "in_left": census["left"],
+        "both": census["both"],
+        "single": census["single"],
+        "rollers": int(run.rollers(-1).sum()),
+        "reach": (float(run.q[-1, there, 1].mean()) if there.any() else math.nan, "mm"),
+        "max_penetration": (run.max_penetration, "mm"),
+        "missed": run.unconverged / max(1, run.islands),
+    }
+
+
+def in_proportion(static: float, usual: tuple[float, float]) -> tuple[float, float]:
+    """Return a static coefficient and the dynamic one, by the usual two."""
+    return static, static * usual[1] / usual[0]
+
+
+LENGTHS = dict.fromkeys(("length", "ball_radius", "rod_radius", "drum_radius"), "mm")
+DRUM = LENGTHS | {"tilt": "deg", "spin": "rad/s", "duration": "s", "noise": "1"}
+STUDIES: Mapping[str, Shipped] = {
+    "heading": Shipped(heading, LENGTHS),
+    "climbing": Shipped(climbing, DRUM),
+    "bunch": Shipped(bunch, DRUM | {"top": "mm", "dt": "s"}),
+}

@@ -1,0 +1,242 @@
+"""What the live page shows of a pair: all that the library says of it, as JSON can hold it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from polycorner.dumbbells.pair import Chirality, DumbbellPair
+from polycorner.dumbbells.pictures.bodies import (
+    Wall,
+    box_of,
+    contact_point,
+    relative_stretch,
+    sizes_of,
+)
+from polycorner.dumbbells.pictures.film import HANDS, TOUCHING, stratum_words
+from polycorner.dumbbells.pictures.movies import chosen_frames
+from polycorner.dumbbells.pictures.placements import relative_coordinates
+from polycorner.dumbbells.viewer.descent import STRIDE, Descent, descent
+from polycorner.dumbbells.viewer.sliders import SHAPE, Slider, coordinates, sliders_for
+from polycorner.minimisation.certificate import Certificate, certify
+from polycorner.minimisation.verdicts import Verdict
+from polycorner.polyhedra.strata import LocalType
+from polycorner.spaces.manifold import Array
+
+DRUM = 125.0 / 16.0  # drum radius over length, of a pair that starts in the plane
+FRAMES = 150  # of a fall, at most
+START = 30.0  # degrees, the heading that buttons put a pair at: it has some way to fall
+
+
+@dataclass(frozen=True)
+class Board:
+    """A pair, where it is, and how far its sliders reach.
+
+    Attributes
+    ----------
+    pair : DumbbellPair
+    q : tuple of six float
+        The configuration, at full precision: a slider that is not moved does not round it.
+    sliders : mapping from str to Slider
+    drum_radius : float
+        ``R`` in mm, kept while the pair is in the plane.
+    """
+
+    pair: DumbbellPair
+    q: tuple[float, ...]
+    sliders: Mapping[str, Slider]
+    drum_radius: float
+
+    @classmethod
+    def of(cls, pair: DumbbellPair) -> "Board":
+        """Return the board that a page starts with: a right-handed pair above its minimum."""
+        radius = DRUM * pair.length if pair.is_plane else pair.drum_radius
+        board = cls(pair, (0.0,) * 6, sliders_for(pair, radius), radius)
+        return board.started("R")
+
+    @property
+    def rho(self) -> float:
+        """Millimetres along the wall for a unit of the lateral coordinate."""
+        return 1.0 if self.pair.is_plane else self.pair.centre_radius
+
+    @property
+    def units(self) -> Array:
+        """Unit of a slider over that of its coordinate, ``(6,)``."""
+        return np.array([self.rho, 1.0, 180.0 / math.pi] * 2)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The values of the sliders; headings are in ``[-180, 180]``."""
+        shown = self.units * np.array(self.q)
+        shown[[2, 5]] = [math.remainder(angle, 360.0) for angle in shown[[2, 5]].tolist()]
+        values = dict(zip(coordinates(), shown.tolist(), strict=True))
+        values |= {name: getattr(self.pair, name) for name, _ in SHAPE}
+        return values | {"drum_radius": self.drum_radius}
+
+    def moved(self, values: Mapping[str, float]) -> "Board":
+        """Return the board with some sliders moved.
+
+        Raises
+        ------
+        ValueError
+            If there are no such dumbbells, such as with rods thicker than balls.
+        """
+        shape = {name: values[name] for name, _ in SHAPE if name in values}
+        board = self
+        if shape:
+            radius = shape.get("drum_radius", self.drum_radius)
+            if self.pair.is_plane:
+                shape["drum_radius"] = math.inf
+            board = replace(self._as(replace(self.pair, **shape)), drum_radius=radius)
+        q = list(board.q)
+        for k, name in enumerate(coordinates()):
+            if name in values:
+                q[k] = values[name] / float(board.units[k])
+        return replace(board, q=tuple(q))
+
+    def _as(self, pair: DumbbellPair) -> "Board":
+        """Return the board of another pair in the same places along the wall, in mm."""
+        board = replace(self, pair=pair)
+        return replace(board, q=tuple((np.array(self.q) * self.units / board.units).tolist()))
+
+    def pressed(self, button: str) -> "Board":
+        """Return the board after one of the buttons but ``fall``."""
+        if button == "plane":
+            return self._as(replace(self.pair, drum_radius=math.inf))
+        if button == "drum":
+            return self._as(replace(self.pair, drum_radius=self.drum_radius))
+        return self.started("R" if button == "right" else "L")
+
+    def started(self, chirality: Chirality) -> "Board":
+        """Return the board with a nested pair off the lowest line, open and turned too far."""
+        sign = 1 if chirality == "R" else -1
+        heading, room = math.radians(sign * START), self.pair.ball_radius / 2
+        q = self.pair.nested(chirality, heading=heading, clearance=room)
+        q[[0, 3]] += sign * self.pair.length / (2 * self.rho)
+        return replace(self, q=tuple(q.tolist()))
+
+    # --------------------------------------------------------------------------------- answers
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """What the library says of the point, contacts closed within ``1e-6`` ball radii."""
+        return certify(self.pair.polyhedron, self.pair.energy, self.q, tolerance=TOUCHING)
+
+    @property
+    def mean_heading(self) -> float:
+        """The mean of both headings, in rad: in the drum the atlas is a section at it."""
+        return (self.q[2] + self.q[5]) / 2
+
+    def reading(self) -> dict[str, Any]:
+        """Return all numbers and words of the page."""
+        pair, c = self.pair, self.certificate
+        centres = pair.ball_centres(self.q)
+        names = pair.polyhedron.names
+        closed = c.stratum.active
+        return {
+            "sliders": self.values,
+            "sizes": sizes_of(pair),
+            "wall": self._wall.description,
+            "box": box_of(pair, centres),
+            "centres": centres.ravel().tolist(),
+            "contacts": [[n, contact_point(pair, centres, n).tolist()] for n in closed],
+            "gaps": dict(
+                zip(names, pair.polyhedron.values(np.array(self.q)).tolist(), strict=True)
+            ),
+            "place": atlas_place(pair, np.array(self.q)).tolist(),
+            "words": self.words,
+        }
+
+    @property
+    def words(self) -> dict[str, str]:
+        """What is written beside the pictures."""
+        pair, c = self.pair, self.certificate
+        outside = c.stratum.local_type is LocalType.OUTSIDE
+        headings = [math.degrees(angle) for angle in pair.heading(self.q).tolist()]
+        mean = math.degrees(float(pair.canonical([0, 0, self.mean_heading] * 2)[2]))
+        unit = "mm²" if pair.is_plane else "mm"
+        return {
+            "contacts": ", ".join(c.stratum.active) or "none",
+            "stratum": "outside the polyhedron" if outside else stratum_words(c.stratum),
+            "chirality": HANDS[c.stratum.chirality],
+            "headings": "{:.6f}° and {:.6f}°".format(*headings),
+            "energy": f"{c.energy:.6f} {unit}",
+            "multipliers": _multipliers(c),
+            "rest": c.verdict.value,
+            "section": "" if pair.is_plane else f"A section at mean heading {mean:.1f}°.",
+        }
+
+    @property
+    def _wall(self) -> Wall:
+        """All of the wall that sliders lead to."""
+        pair, room = self.pair, self.pair.length / 2 + self.pair.ball_radius
+        along, across = (self.sliders[f"{name}_A"].high + room for name in ("axial", "lateral"))
+        if pair.is_plane:
+            return Wall(math.inf, pair.ball_radius, (-across, across), (-along, along))
+        turn = min(across / pair.centre_radius, math.pi)
+        return Wall(pair.drum_radius, pair.ball_radius, (-turn, turn), (-along, along))
+
+    def fall(self) -> "tuple[Board, dict[str, Any]]":
+        """Return the board after a fall, and the fall as the page shows it."""
+        pair = self.pair
+        # A step shorter than rods are thick: one does not pass through the other.
+        stride = min(STRIDE, pair.rod_radius / (2 * pair.ball_radius))
+        found = descent(pair.polyhedron, pair.energy, self.q, stride=stride)
+        reached = found.certificate.verdict is not Verdict.INFEASIBLE
+        points = found.points if reached else np.array([self.q])
+        last = replace(self, q=tuple(points[-1].tolist()))
+        shown = [
+            replace(self, q=tuple(points[k].tolist())) for k in chosen_frames(len(points), FRAMES)
+        ]
+        return last, {
+            "frames": [board.reading() for board in shown],
+            "trail": [piece.tolist() for piece in trail(pair, points)],
+            "verdict": found.certificate.verdict.value,
+            "way": _way(found, pair) if reached else "",
+            "last": last.reading(),
+        }
+
+
+# ------------------------------------------------------------------------------------- the atlas
+
+
+def atlas_place(pair: DumbbellPair, q: Array) -> Array:
+    """Return relative placements ``(..., 3)`` as the atlas is drawn: ``delta`` in one period."""
+    heading = None if pair.is_plane else np.asarray((q[..., 2] + q[..., 5]) / 2)
+    given: Any = heading  # each placement in the section at its own mean heading
+    points = relative_coordinates(pair, q, mean_heading=given)
+    period = math.pi if pair.is_plane else math.tau
+    points[..., 2] -= period * np.round(points[..., 2] / period)
+    return np.asarray(points * relative_stretch(pair))
+
+
+def trail(pair: DumbbellPair, points: Array) -> list[Array]:
+    """Return a path ``(T, 6)`` in the atlas, in pieces where it leaves at the top or the bottom."""
+    line = atlas_place(pair, points)
+    jumps = np.abs(np.diff(line[:, 2])) > pair.length / 2
+    return np.split(line, np.flatnonzero(jumps) + 1)
+
+
+# ---------------------------------------------------------------------------------------- in words
+
+
+def _multipliers(c: Certificate) -> str:
+    if c.stratum.local_type is LocalType.OUTSIDE:
+        return "none: the dumbbells overlap"
+    if not c.stratum.active:
+        return "none: no contact is closed"
+    listed = ", ".join(f"{name} {value:.6f}" for name, value in c.multipliers.items())
+    if c.verdict is Verdict.NOT_STATIONARY:
+        return f"{listed} (least squares: the contacts do not balance the weight)"
+    return listed
+
+
+def _way(found: Descent, pair: DumbbellPair) -> str:
+    energies = np.asarray(pair.energy.value(found.points[[0, -1]]))
+    return (
+        f"The steepest way down, {found.lengths[-1]:.2f} ball radii long: the energy falls from "
+        f"{energies[0]:.6f} to {energies[1]:.6f}."
+    )

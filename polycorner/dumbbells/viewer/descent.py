@@ -1,0 +1,156 @@
+"""How a pair comes to rest: the steepest way down inside a polyhedron, contact by contact."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.methods import minimise
+from polycorner.minimisation.problem import Problem, pose
+from polycorner.polyhedra.strata import distances
+from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    from polycorner.minimisation.problem import Energy
+    from polycorner.polyhedra.polyhedron import Polyhedron
+
+STRIDE = 0.15  # scale units between two points of a path, at most
+LEAST = 1e-4  # the same, at least: the rest is the minimiser's
+TOUCHING = 1e-4  # scaled distance within which a contact closes if the energy presses on it
+MOST = 600  # points
+GROWTH = 1.5
+CORRECTIONS = 3
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """A way down, and why it ends where it does.
+
+    Attributes
+    ----------
+    points : (k, n) array
+        From the start, or the nearest point of the polyhedron, to the place of rest; coordinates
+        on circles are not wrapped.  The energy falls from each to the next.
+    certificate : Certificate
+        What :func:`~polycorner.minimise` says of the end; ``certificate.point`` is the last point
+        if it found one.
+    """
+
+    points: Array
+    certificate: Certificate
+
+    @property
+    def lengths(self) -> Array:
+        """Length of the way up to each point, ``(k,)``, in scale units."""
+        scales = self.certificate.problem.scales
+        steps = np.linalg.norm(np.diff(self.points, axis=0) / scales, axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def descent(
+    polyhedron: "Polyhedron",
+    energy: "Energy",
+    start: ArrayLike,
+    *,
+    stride: float = STRIDE,
+    most: int = MOST,
+) -> Descent:
+    """Return the steepest way down from ``start`` to rest.
+
+    At every point the step is the negative gradient in scaled coordinates, projected on the cone
+    of the contacts that are closed (``min |d + dE|`` over ``df_i d >= 0``, by non-negative least
+    squares), and then brought back to the polyhedron.  It is the motion of a body without inertia
+    in a thick fluid: contacts close one by one, and stay closed while the energy presses.  Close
+    to rest :func:`~polycorner.minimise` takes over; its certificate is that of the end.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        An intersection; unions are not followed.
+    energy : SmoothFunction or sympy.Expr
+    start : (n,) array
+        Where to start; outside, the nearest point that repeated linearisation finds.
+    stride : float, optional
+        Longest step in scale units; bodies thinner than that could be stepped over.
+    most : int, optional
+        Points at most.
+
+    Raises
+    ------
+    ValueError
+        For a polyhedron that is a union, or arguments that :func:`~polycorner.minimise` refuses.
+    """
+    if polyhedron.is_union:
+        msg = "polyhedron: expected an intersection; got a union"
+        raise ValueError(msg)
+    problem = pose(polyhedron, energy)
+    q = polyhedron.manifold.point(start, "start")
+    points = _steepest(problem, q, stride, most)
+    certificate = minimise(polyhedron, energy, points[-1] if points else q)
+    if not points:
+        return Descent(q[None], certificate)
+    last = points[-1] + polyhedron.manifold.difference(certificate.point, points[-1])
+    if len(points) > 1 and np.linalg.norm((last - points[-1]) / problem.scales) < LEAST:
+        points = points[:-1]
+    return Descent(np.array([*points, last]), certificate)
+
+
+def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Array]:
+    """Return the points of the way down; none if the polyhedron is not reached."""
+    everything = frozenset(range(problem.inequalities))
+    reached, q = problem.restore(everything, q)
+    if not reached:
+        return []
+    points, step = [q], stride
+    height, way, pressed = _downhill(problem, q)
+    while len(points) < most and step > LEAST:
+        size = float(np.linalg.norm(way))
+        if size <= LEAST:
+            break
+        ahead = _held(problem, q + step / size * way * problem.scales, pressed)
+        reached, trial = problem.restore(everything, ahead)
+        lower, onward, held = _downhill(problem, trial)
+        # A way back means that the step led beyond the lowest point; contacts only deflect.
+        if reached and lower < height and onward @ way >= 0:
+            q, height, way, pressed = trial, lower, onward, held
+            points.append(q)
+            step = min(GROWTH * step, stride)
+        else:
+            step /= 2
+    return points
+
+
+def _downhill(problem: Problem, q: Array) -> tuple[float, Array, Indices]:
+    """Return the energy, the steepest way down that is open, and the contacts it presses on.
+
+    In scaled coordinates and fractions of the slope.  With ``dE = sum w_i df_i - d`` over closed
+    contacts the weights are those of a least-squares fit with ``w_i >= 0``; then ``d`` is ``-dE``
+    projected on the cone ``df_i d >= 0``, and contacts with positive weights stay closed along it.
+    """
+    from scipy.optimize import nnls
+
+    values, gradients = problem.evaluate(q, 1)
+    m, slope = problem.inequalities, gradients[-1]
+    pull = slope / (float(np.linalg.norm(slope)) or 1.0)
+    closed = np.flatnonzero(distances(values[:m], gradients[:m]) <= TOUCHING)
+    if not len(closed):
+        return float(values[-1]), -pull, closed
+    rows = gradients[closed]
+    weights, _ = nnls(rows.T, pull)
+    return float(values[-1]), rows.T @ weights - pull, closed[weights > 0]
+
+
+def _held(problem: Problem, q: Array, pressed: Indices) -> Array:
+    """Return the point near ``q`` where some contacts are closed: a tangent leaves what is curved.
+
+    Newton's method with the shortest corrections.
+    """
+    for _ in range(CORRECTIONS if len(pressed) else 0):
+        values, gradients = problem.evaluate(q, 1)
+        move = np.linalg.lstsq(gradients[pressed], -values[pressed], rcond=1e-6)[0]
+        q = q + move * problem.scales
+    return q

@@ -1,0 +1,233 @@
+"""Pages served on this machine: the live page of a pair, and pages that were made before.
+
+The server answers those who call it by its name and come from its own pages: a request for another
+``Host`` (a name that was pointed here) and a connection from another ``Origin`` are refused.  It
+reads no file on anybody's behalf; what it may be sent is in
+:mod:`polycorner.dumbbells.viewer.sliders`.
+"""
+
+import json
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from tornado.ioloop import IOLoop
+from tornado.web import Application, HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.pictures.models_3d import solid_bytes
+from polycorner.dumbbells.viewer.board import Board
+from polycorner.dumbbells.viewer.page import page_file, three_script
+from polycorner.dumbbells.viewer.server import allowed, names_of
+from polycorner.dumbbells.viewer.sliders import MESSAGE, RefusedError, hello, parsed
+
+RATE = 300  # messages of a page in a second, at most
+PAGES = 16  # live pages at a time, at most
+QUIET = 0.15  # s without a message before the solid is drawn anew
+CELLS = 18  # of the solid along each axis; its edges and corners are exact at any number
+REFUSED = 1008  # the code of RFC 6455 for what breaks a rule
+HEADERS = {
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cache-Control": "no-store",
+    "Server": "polycorner",
+}
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
+    "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+UNFRAMED = "frame-ancestors 'none'"  # the rest is in the page, which works without a server, too
+TYPES = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
+
+Files = Mapping[str, str]
+
+
+class _Guarded(RequestHandler):
+    """Headers that keep a page to itself, and a refusal of other names."""
+
+    def initialize(self, names: tuple[str, ...], **_: Any) -> None:
+        self.names = names
+
+    def set_default_headers(self) -> None:
+        for name, value in HEADERS.items():
+            self.set_header(name, value)
+
+    def prepare(self) -> None:
+        if not allowed(self.request.host, self.names):
+            raise HTTPError(403, reason="This server is not called that.")
+
+    def write_error(self, status_code: int, **_: Any) -> None:
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(f"{status_code} {self._reason}\n")
+
+
+class _Missing(_Guarded):
+    """Everything that is not here."""
+
+    def prepare(self) -> None:
+        super().prepare()
+        raise HTTPError(404, reason="There is nothing of that name.")
+
+
+class _Fixed(_Guarded):
+    """A text that was ready when the server started."""
+
+    def initialize(self, names: tuple[str, ...], **given: Any) -> None:
+        super().initialize(names)
+        self.text, self.kind, self.policy = given["text"], given["kind"], given["policy"]
+
+    def get(self) -> None:
+        self.set_header("Content-Type", f"{TYPES[self.kind]}; charset=utf-8")
+        self.set_header("Content-Security-Policy", self.policy.format(host=self.request.host))
+        self.finish(self.text)
+
+
+class _Live(WebSocketHandler):
+    """One page of a pair: its board, and the values that have come and are not yet answered."""
+
+    def initialize(self, names: tuple[str, ...], pair: DumbbellPair) -> None:
+        self.names, self.board = names, Board.of(pair)
+        self.waiting: dict[str, float] = {}
+        self.counted, self.second = 0, 0
+        self.solid: Any = None
+        self.drawn: Any = None
+        self.refused = False
+
+    def prepare(self) -> None:
+        origin = self.request.headers.get("Origin")
+        if not allowed(self.request.host, self.names):
+            raise HTTPError(403, reason="This server is not called that.")
+        if origin is None or not self.check_origin(origin):
+            raise HTTPError(403, reason="Only this server's own page may connect.")
+
+    def check_origin(self, origin: str) -> bool:
+        return origin.lower() == f"http://{self.request.host.lower()}"
+
+    def open(self, *_: str, **__: str) -> None:
+        pages: set[_Live] = self.settings["pages"]
+        if len(pages) >= PAGES:
+            self._refuse(f"as many pages are open as there may be, {PAGES}: close one of them")
+            return
+        pages.add(self)
+        self._tell("hello", hello(self.board.sliders))
+        self._tell("reading", self.board.reading() | {"problem": ""})
+        self._draw_soon()
+
+    def on_close(self) -> None:
+        self.settings["pages"].discard(self)
+        if self.solid is not None:
+            IOLoop.current().remove_timeout(self.solid)
+
+    def on_message(self, message: str | bytes) -> None:
+        if self.refused:
+            return
+        try:
+            asked = self._understood(message)
+        except RefusedError as error:
+            self._refuse(str(error))
+            return
+        if isinstance(asked, str):
+            self._press(asked)
+            return
+        if not self.waiting:  # what comes before the answer is answered with it
+            IOLoop.current().add_callback(self._answer)
+        self.waiting |= asked
+
+    def _understood(self, message: str | bytes) -> dict[str, float] | str:
+        second = int(time.monotonic())
+        self.counted = self.counted + 1 if second == self.second else 1
+        self.second = second
+        if self.counted > RATE:
+            msg = f"expected at most {RATE} messages in a second"
+            raise RefusedError(msg)
+        if isinstance(message, bytes) or len(message) > MESSAGE:
+            msg = f"expected a text of at most {MESSAGE} characters"
+            raise RefusedError(msg)
+        return parsed(message, self.board.sliders)
+
+    def _refuse(self, words: str) -> None:
+        self.refused = True
+        self.close(REFUSED, words[:120])  # a closing frame has no room for more
+
+    def _answer(self) -> None:
+        values, self.waiting = self.waiting, {}
+        problem = ""
+        try:
+            self.board = self.board.moved(values)
+        except ValueError as error:
+            problem = f"There are no such dumbbells: {error}."
+        self._tell("reading", self.board.reading() | {"problem": problem})
+        self._draw_soon()
+
+    def _press(self, button: str) -> None:
+        if button == "fall":
+            self.board, fall = self.board.fall()
+            self._tell("fall", fall)
+        else:
+            self.board = self.board.pressed(button)
+            self._tell("reading", self.board.reading() | {"problem": ""})
+        self._draw_soon()
+
+    def _tell(self, kind: str, content: dict[str, Any]) -> None:
+        with suppress(WebSocketClosedError):  # the page may have gone away meanwhile
+            self.write_message(json.dumps({"kind": kind} | content, allow_nan=False))
+
+    def _draw_soon(self) -> None:
+        """Draw the solid once the page has been quiet for a moment, if it is another one."""
+        loop = IOLoop.current()
+        if self.solid is not None:
+            loop.remove_timeout(self.solid)
+        self.solid = loop.call_later(QUIET, self._draw)
+
+    def _draw(self) -> None:
+        self.solid = None
+        pair = self.board.pair
+        heading = None if pair.is_plane else round(self.board.mean_heading, 3)
+        if self.drawn != (pair, heading):
+            self.drawn = (pair, heading)
+            content = solid_bytes(pair, mean_heading=heading, resolution=CELLS)
+            with suppress(WebSocketClosedError):
+                self.write_message(content, binary=True)
+
+
+# ---------------------------------------------------------------------------------------- servers
+
+
+def live_application(pair: DumbbellPair, host: str) -> Application:
+    """Return the server of the live page of a pair; the first answers are compiled here."""
+    Board.of(pair).fall()
+    texts = {name: page_file(name) for name in ("scene.js", "board.js", "page.css")}
+    texts |= {"": page_file("board.html"), "three.js": three_script()}
+    return _application(texts, POLICY, host, [("/live", _Live, {"pair": pair})])
+
+
+def page_application(page: str, host: str) -> Application:
+    """Return the server of one page that is complete in itself."""
+    return _application({"": page}, UNFRAMED, host, [])
+
+
+def _application(texts: Files, policy: str, host: str, more: list[Any]) -> Application:
+    names = names_of(host)
+    routes: list[Any] = [
+        (f"/{name}", _Fixed, {"names": names, "text": text, "kind": _kind(name), "policy": policy})
+        for name, text in texts.items()
+    ]
+    routes += [(path, handler, {"names": names} | given) for path, handler, given in more]
+    return Application(
+        routes,
+        default_handler_class=_Missing,
+        default_handler_args={"names": names},
+        pages=set(),
+        websocket_max_message_size=8 * MESSAGE,
+        compress_response=True,
+        log_function=lambda _: None,
+    )
+
+
+def _kind(name: str) -> str:
+    return name.rpartition(".")[2] or "html"

@@ -1,0 +1,295 @@
+"""Atlases as JSON, finished or not: gone on with when they are loaded, after a check."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polycorner.files.atomic import Kind, load_json, number, read_number, save_json
+from polycorner.files.models import units_of
+from polycorner.files.skeleton_checks import corner_entry, fault, symmetry_entry
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.skeletons.assembly import assembled
+from polycorner.skeletons.curves import Ground
+from polycorner.skeletons.elements import Completeness, Skeleton
+from polycorner.skeletons.explorer import Curve, Explorer
+from polycorner.skeletons.faces import Flag, Passage
+from polycorner.skeletons.walks import End
+
+KIND = Kind("an atlas", "save_atlas", "polycorner atlas", schema=2, unsealed=1)
+FIRST = (
+    "polycorner atlas",
+    "label",
+    "functions",
+    "complete",
+    "tolerance",
+    "extent",
+    "corners",
+    "ends",
+    "curves",
+    "passages",
+    "seeds",
+    "pending",
+    "shot",
+    "notes",
+    "lost",
+    "random",
+)  # the entries of version 1; fmt: skip
+RANDOM = ("MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")
+
+
+def save_atlas(
+    atlas: Skeleton,
+    path: str | os.PathLike[str],
+    *,
+    label: str = "",
+    units: Mapping[str, str] | None = None,
+) -> Path:
+    """Write an atlas, finished or not, as JSON; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    atlas : Skeleton
+        What :func:`~polycorner.skeletons.search.skeleton` returned.
+    path : path
+        The file; its folder is made if need be.
+    label : str, optional
+        What the search is called; :func:`load_atlas` can insist on it.
+    units : mapping from str to str, optional
+        Units of coordinates by name.  Those of the package's models are known, and a circle of
+        period ``2 pi`` is an angle in ``rad``.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument.
+    OSError
+        If the file cannot be written.
+    """
+    if not isinstance(atlas, Skeleton) or not isinstance(atlas.state, Explorer):
+        msg = f"atlas: expected a Skeleton that skeleton returned; got {type(atlas).__name__}"
+        raise TypeError(msg)
+    explorer: Explorer = atlas.state
+    d, manifold = atlas.polyhedron, atlas.polyhedron.manifold
+    known = units_of(d, None, units).coordinates
+    content = {
+        "label": label,
+        "complete": atlas.complete.name,
+        "coordinates": [
+            {"name": name, "unit": known[name], "period": number(period), "scale": scale}
+            for name, period, scale in zip(
+                manifold.names, manifold.periods, manifold.scales, strict=True
+            )
+        ],
+        "functions": list(d.names),
+        "equations": list(d.equation_names),
+        "symmetry": symmetry_entry(explorer),
+        "tolerance": explorer.ground.tolerance,
+        "extent": number(explorer.ground.extent),
+        "corners": [corner_entry(explorer, place) for place in explorer.places],
+        "ends": [[[ray, edge] for ray, edge in p.edges.items()] for p in explorer.places],
+        "curves": [_curve(curve) for curve in explorer.curves],
+        "passages": [[_flag(p.start), _flag(p.stop)] for p in explorer.passages],
+        "seeds": [[count, seed.tolist()] for count, seed in explorer.seeds],
+        "pending": list(explorer.pending),
+        "shot": [[edge, sorted(face)] for edge, face in sorted(explorer.shot, key=_order)],
+        "notes": explorer.notes,
+        "lost": bool(explorer.register.lost),
+        "random": _listed(explorer.rng.bit_generator.state),
+    }
+    return save_json(KIND, path, content)
+
+
+def load_atlas(
+    path: str | os.PathLike[str],
+    polyhedron: Polyhedron,
+    *,
+    symmetry: Symmetry | None = None,
+    label: str | None = None,
+) -> Skeleton:
+    """Read an atlas back; :func:`~polycorner.skeletons.search.resume` goes on with it.
+
+    Checked anew: that names, periods and scales are those of the polyhedron; that the functions
+    have the values written at every corner, to ``1e-9`` of their slopes; that the corners lie on
+    the functions written, and all points of edges on theirs and in the polyhedron.  Files of
+    version 1 have neither digest nor values: of these a changed number may go unnoticed.
+
+    Parameters
+    ----------
+    path : path
+        A file that :func:`save_atlas` wrote.
+    polyhedron, symmetry
+        Those it was computed for: formulas are not in the file.
+    label : str, optional
+        What the search must be called.
+
+    Raises
+    ------
+    ValueError
+        If the file is no atlas or was changed, or if it is one of another polyhedron or symmetry.
+    """
+    content = load_json(KIND, path)
+    if content[KIND.key] == 1:
+        if set(content) != set(FIRST):
+            raise KIND.refusal(path, "is something else")
+        content = _from_first(content, polyhedron)
+    if label is not None and content.get("label") != label:
+        msg = f"path: expected an atlas called {label!r}; {path} is called {content.get('label')!r}"
+        raise ValueError(msg)
+    try:
+        _check_names(content, polyhedron, path)
+        return _restored(content, polyhedron, symmetry or Symmetry(), path)
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
+        raise KIND.refusal(path, f"is damaged ({error!r})") from error
+
+
+def _from_first(content: dict[str, Any], polyhedron: Polyhedron) -> dict[str, Any]:
+    """Return the entries of a file of version 1 as those of version 2."""
+    manifold = polyhedron.manifold
+    columns = zip(manifold.names, manifold.periods, manifold.scales, strict=True)
+    return content | {
+        "coordinates": [{"name": c, "period": number(p), "scale": s} for c, p, s in columns],
+        "equations": list(polyhedron.equation_names),
+        "symmetry": None,
+        "corners": [{"point": point} for point in content["corners"]],
+    }
+
+
+def _check_names(
+    content: dict[str, Any], polyhedron: Polyhedron, path: str | os.PathLike[str]
+) -> None:
+    manifold = polyhedron.manifold
+    written = [(c["name"], read_number(c["period"]), c["scale"]) for c in content["coordinates"]]
+    columns = zip(manifold.names, manifold.periods, manifold.scales, strict=True)
+    for what, found, wanted in (
+        ("functions", content["functions"], polyhedron.names),
+        ("equations", content["equations"], polyhedron.equation_names),
+        ("coordinates, periods and scales", written, columns),
+    ):
+        if list(found) != list(wanted):
+            names = ", ".join(polyhedron.names if what == "functions" else manifold.names)
+            msg = f"path: expected an atlas of {names}; {path} has other {what}"
+            raise ValueError(msg)
+
+
+def _restored(
+    content: dict[str, Any],
+    polyhedron: Polyhedron,
+    symmetry: Symmetry,
+    path: str | os.PathLike[str],
+) -> Skeleton:
+    extent = read_number(content["extent"])
+    ground = Ground(polyhedron, symmetry, float(content["tolerance"]), extent)
+    explorer = Explorer(ground, [], _generator(content["random"]))
+    try:
+        _fill(explorer, content)
+        found = fault(explorer, content)
+        atlas = None if found else assembled(explorer, Completeness[content["complete"]])
+    except ValueError as error:
+        raise KIND.refusal(path, f"is damaged ({error})") from error
+    if atlas is None:
+        raise KIND.refusal(path, f"is not what is computed here: {found}")
+    return atlas
+
+
+def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
+    n = explorer.manifold.dimension
+    for corner in content["corners"]:
+        explorer.register.restore(_points(corner["point"], n, 1))
+    for place, ends in zip(explorer.places, content["ends"], strict=True):
+        place.edges.update(dict(ends))
+    explorer.curves += [_read_curve(entry, n) for entry in content["curves"]]
+    explorer.passages += [
+        Passage(_read_flag(start), _read_flag(stop)) for start, stop in content["passages"]
+    ]
+    explorer.seeds.extend((count, _points(seed, n, 1)) for count, seed in content["seeds"])
+    explorer.pending.extend((corner, ray) for corner, ray in content["pending"])
+    explorer.shot.update((edge, frozenset(face)) for edge, face in content["shot"])
+    for sentence in content["notes"]:
+        explorer.register.note(sentence)
+    explorer.register.lost = bool(content["lost"])
+
+
+def _points(written: Any, n: int, dimensions: int) -> Any:
+    found = np.array(written, dtype=np.float64)
+    if found.ndim != dimensions or found.shape[-1] != n or not np.isfinite(found).all():
+        msg = f"{n} finite numbers make a point, not an array of shape {found.shape}"
+        raise ValueError(msg)
+    return found
+
+
+def _curve(curve: Curve) -> dict[str, Any]:
+    changed = {name: image for name, image in curve.relabelled.items() if name != image}
+    return {
+        "active": sorted(curve.active),
+        "kinds": [kind.name for kind in curve.kinds],
+        "start": curve.start,
+        "stop": curve.stop,
+        "relabelled": changed,
+        "length": float(curve.length),
+        "branches": int(curve.branches),
+        "points": curve.points.tolist(),
+    }
+
+
+def _read_curve(entry: dict[str, Any], n: int) -> Curve:
+    first, last = (End[name] for name in entry["kinds"])
+    return Curve(
+        points=_points(entry["points"], n, 2),
+        active=frozenset(entry["active"]),
+        kinds=(first, last),
+        start=_pair(entry["start"]),
+        stop=_pair(entry["stop"]),
+        relabelled=entry["relabelled"],
+        length=float(entry["length"]),
+        branches=entry["branches"],
+    )
+
+
+def _pair(half: list[int] | None) -> tuple[int, int] | None:
+    return None if half is None else (half[0], half[1])
+
+
+def _flag(flag: Flag) -> list[Any]:
+    return [flag[0], flag[1], sorted(flag[2])]
+
+
+def _read_flag(written: list[Any]) -> Flag:
+    kind, place, names = written
+    return kind, tuple(place) if isinstance(place, list) else place, frozenset(names)
+
+
+def _order(crossing: tuple[int, frozenset[int]]) -> tuple[int, list[int]]:
+    return crossing[0], sorted(crossing[1])
+
+
+# -------------------------------------------------------------------------------- random generators
+
+
+def _listed(state: Any) -> Any:
+    """Return the state of a bit generator, some of which have arrays in it, as plain values."""
+    if isinstance(state, Mapping):
+        return {name: _listed(value) for name, value in state.items()}
+    return state.tolist() if isinstance(state, np.ndarray | np.generic) else state
+
+
+def _generator(state: dict[str, Any]) -> np.random.Generator:
+    if state["bit_generator"] not in RANDOM:
+        msg = f"no bit generator is called {state['bit_generator']!r}"
+        raise LookupError(msg)
+    found = getattr(np.random, state["bit_generator"])()
+    found.state = _unlisted(state)
+    return np.random.Generator(found)
+
+
+def _unlisted(state: Any) -> Any:
+    if isinstance(state, dict):
+        return {name: _unlisted(value) for name, value in state.items()}
+    return np.array(state, dtype=np.uint64) if isinstance(state, list) else state

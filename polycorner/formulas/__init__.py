@@ -1,0 +1,5 @@
+"""Symbolic formulas, their derivatives, and the machine code made of them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

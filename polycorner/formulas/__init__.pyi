@@ -1,0 +1,6 @@
+from .functions import Family, SmoothFunction
+
+__all__ = [
+    "Family",
+    "SmoothFunction",
+]

@@ -1,0 +1,172 @@
+"""SymPy expressions as straight-line programs."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property, partial, reduce
+from typing import TYPE_CHECKING
+
+from polycorner.formulas.programs import Graph, Program
+
+if TYPE_CHECKING:
+    import sympy
+
+UNARY = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
+
+
+def compile_expressions(
+    expressions: Sequence["sympy.Expr"],
+    variables: Sequence[str],
+    parameters: Sequence[str] = (),
+    definitions: "Mapping[str, sympy.Expr] | None" = None,
+    names: Sequence[str] = (),
+) -> Program:
+    """Translate SymPy expressions into one program.
+
+    Parameters
+    ----------
+    expressions : sequence of sympy.Expr
+        What the program computes.
+    variables, parameters : sequence of str
+        Names of the symbols it reads, in order.
+    definitions : mapping from str to sympy.Expr, optional
+        Intermediate quantities by name, in an order in which each uses only earlier ones.
+    names : sequence of str, optional
+        What the expressions are called in error messages.
+
+    Raises
+    ------
+    ValueError
+        Naming a symbol that is neither variable, parameter nor definition, or a function that
+        has no translation.
+    """
+    translator = _Translator(variables, parameters)
+    for name, expression in (definitions or {}).items():
+        translator.subject = name
+        translator.names[name] = translator.translate(expression)
+    outputs = []
+    for position, expression in enumerate(expressions):
+        translator.subject = names[position] if names else f"expression {position + 1}"
+        outputs.append(translator.translate(expression))
+    return Program(translator.graph, tuple(outputs), len(variables), len(parameters))
+
+
+class _Translator:
+    """Walks SymPy trees once, sharing whatever it has seen."""
+
+    def __init__(self, variables: Sequence[str], parameters: Sequence[str]) -> None:
+        self.graph = Graph()
+        self.names = {name: self.graph.node("var", i) for i, name in enumerate(variables)}
+        self.names |= {name: self.graph.node("par", i) for i, name in enumerate(parameters)}
+        self.subject = ""
+        self._seen: dict[sympy.Basic, int] = {}
+
+    def translate(self, expression: "sympy.Basic") -> int:
+        if expression not in self._seen:
+            self._seen[expression] = self._translate(expression)
+        return self._seen[expression]
+
+    def _translate(self, e: "sympy.Basic") -> int:
+        kind = type(e).__name__
+        if kind in {"Symbol", "Dummy"}:
+            return self._symbol(str(e))
+        if getattr(e, "is_Rational", False) or getattr(e, "is_Float", False):
+            return self.graph.const(_exact(e))
+        rule = self._rules.get(kind)
+        if rule is None:
+            msg = f"{self.subject}: the function {kind} has no compiled form; got {e}"
+            raise ValueError(msg)
+        return rule(e)
+
+    def _symbol(self, name: str) -> int:
+        if name not in self.names:
+            msg = (
+                f"{self.subject}: the symbol {name} is no coordinate and no parameter; "
+                f"known are {', '.join(self.names)}"
+            )
+            raise ValueError(msg)
+        return self.names[name]
+
+    @cached_property
+    def _rules(self) -> "dict[str, Callable[[sympy.Basic], int]]":
+        g, t = self.graph, self.translate
+        rules: dict[str, Callable[[sympy.Basic], int]] = {
+            "Add": self._add,
+            "Mul": self._mul,
+            "Pow": self._pow,
+            "Pi": lambda _: g.const("pi"),
+            "Exp1": lambda _: g.const("e"),
+            "atan2": lambda e: g.node("atan2", t(e.args[0]), t(e.args[1])),
+            "Abs": self._abs,
+            "Min": lambda e: self._extreme(e, smallest=True),
+            "Max": lambda e: self._extreme(e, smallest=False),
+            "Piecewise": self._piecewise,
+            "StrictLessThan": lambda e: g.node("lt", t(e.args[0]), t(e.args[1])),
+            "LessThan": lambda e: g.node("le", t(e.args[0]), t(e.args[1])),
+            "StrictGreaterThan": lambda e: g.node("lt", t(e.args[1]), t(e.args[0])),
+            "GreaterThan": lambda e: g.node("le", t(e.args[1]), t(e.args[0])),
+            "Not": lambda e: g.node("not", t(e.args[0])),
+            "And": lambda e: self._fold("and", e.args),
+            "Or": lambda e: self._fold("or", e.args),
+        }
+        return rules | {op: partial(self._unary, op) for op in UNARY}
+
+    def _unary(self, op: str, e: "sympy.Basic") -> int:
+        return self.graph.unary(op, self.translate(e.args[0]))
+
+    def _fold(self, op: str, args: "Iterable[sympy.Basic]") -> int:
+        return reduce(lambda a, b: self.graph.node(op, a, b), map(self.translate, args))
+
+    def _add(self, e: "sympy.Basic") -> int:
+        return reduce(self.graph.add, map(self.translate, e.args))
+
+    def _mul(self, e: "sympy.Basic") -> int:
+        g = self.graph
+        above: list[sympy.Basic] = []
+        below: list[sympy.Basic] = []
+        for factor in e.args:
+            negative = type(factor).__name__ == "Pow" and factor.args[1].is_negative
+            (below if negative else above).append(1 / factor if negative else factor)
+        numerator = reduce(g.mul, map(self.translate, above), g.const(1))
+        if not below:
+            return numerator
+        return g.div(numerator, reduce(g.mul, map(self.translate, below)))
+
+    def _pow(self, e: "sympy.Basic") -> int:
+        base, exponent = e.args
+        if type(base).__name__ == "Exp1":
+            return self.graph.unary("exp", self.translate(exponent))
+        if exponent.is_Rational:
+            return self.graph.power(self.translate(base), _exact(exponent))
+        return self.graph.node("pow", self.translate(base), self.translate(exponent))
+
+    def _abs(self, e: "sympy.Basic") -> int:
+        u = self.translate(e.args[0])
+        g = self.graph
+        return g.select(g.node("lt", u, g.const(0)), g.neg(u), u)
+
+    def _extreme(self, e: "sympy.Basic", *, smallest: bool) -> int:
+        g = self.graph
+
+        def pick(a: int, b: int) -> int:
+            first = g.node("le", a, b) if smallest else g.node("le", b, a)
+            return g.select(first, a, b)
+
+        return reduce(pick, map(self.translate, e.args))
+
+    def _piecewise(self, e: "sympy.Basic") -> int:
+        *cases, (last, otherwise) = e.args
+        if type(otherwise).__name__ != "BooleanTrue":
+            msg = (
+                f"{self.subject}: expected the last case of a Piecewise to be True; got {otherwise}"
+            )
+            raise ValueError(msg)
+        result = self.translate(last)
+        for value, condition in reversed(cases):
+            result = self.graph.select(self.translate(condition), self.translate(value), result)
+        return result
+
+
+def _exact(number: "sympy.Basic") -> Fraction:
+    if getattr(number, "is_Float", False):
+        return Fraction(float(number))
+    return Fraction(int(number.p), int(number.q))

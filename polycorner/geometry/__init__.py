@@ -1,1 +1,0 @@
-"""Smooth functions on products of lines and circles."""

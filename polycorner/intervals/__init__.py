@@ -1,0 +1,1 @@
+"""Ball arithmetic: enclosures of values and derivatives over boxes."""

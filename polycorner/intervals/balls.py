@@ -1,0 +1,284 @@
+"""Ball arithmetic: numbers with an error bound, and what each operation does to them.
+
+A ball is a midpoint and a radius; an operation on balls returns a ball that contains all its
+results for arguments in the given balls, rounding included ([Johansson]).  This is the only module
+that knows the library behind it, FLINT.
+"""
+
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from polycorner.formulas.programs import Payload
+from polycorner.formulas.translate import UNARY
+
+if TYPE_CHECKING:
+    from flint import arb, arb_mat
+
+Ball: TypeAlias = "arb"
+Matrix: TypeAlias = "arb_mat"
+# What a comparison of balls says: None where both answers are possible.
+Truth: TypeAlias = bool | None
+
+
+@contextmanager
+def precision(bits: int) -> Iterator[None]:
+    """Compute with ``bits`` binary digits inside the block."""
+    from flint import ctx
+
+    with ctx.workprec(bits):
+        yield
+
+
+def current_precision() -> int:
+    """Return the number of binary digits that are computed with."""
+    from flint import ctx
+
+    return int(ctx.prec)
+
+
+def ball(middle: "Fraction | float | Ball", radius: "Fraction | float | Ball" = 0) -> Ball:
+    """Return a ball that contains every number within ``radius`` of ``middle``."""
+    from flint import arb
+
+    return arb(_plain(middle), _plain(radius))
+
+
+def between(lower: Fraction | float, upper: Fraction | float) -> Ball:
+    """Return a ball that contains the interval from ``lower`` to ``upper``."""
+    return ball(lower).union(ball(upper))
+
+
+def _plain(number: "Fraction | float | Ball") -> Any:
+    from flint import fmpq
+
+    if isinstance(number, Fraction):
+        return fmpq(number.numerator, number.denominator)
+    return number
+
+
+def constant(value: Payload) -> Ball:
+    """Return a ball about a fraction, ``"pi"`` or ``"e"``."""
+    from flint import arb
+
+    if value == "pi":
+        return arb.pi()
+    if value == "e":
+        return arb.const_e()
+    return ball(Fraction(value))
+
+
+# ---------------------------------------------------------------------------------- linear algebra
+
+
+def matrix(rows: "Sequence[Sequence[Any]]") -> Matrix:
+    """Return a matrix of balls."""
+    from flint import arb_mat
+
+    return arb_mat([list(row) for row in rows])
+
+
+def column(vector: "Sequence[Any]") -> Matrix:
+    """Return a matrix of one column."""
+    return matrix([[entry] for entry in vector])
+
+
+def identity(size: int) -> Matrix:
+    """Return the unit matrix."""
+    return matrix([[int(i == j) for j in range(size)] for i in range(size)])
+
+
+def entries(vector: Matrix) -> "list[Ball]":
+    """Return the entries of a matrix of one column."""
+    return list(vector.entries())
+
+
+def midpoints(balls: "Sequence[Ball]") -> "list[Ball]":
+    """Return the midpoints, as balls without radius."""
+    return [b.mid() for b in balls]
+
+
+def middle_inverse(rows: "Sequence[Sequence[Ball]]") -> "Matrix | None":
+    """Return an approximate inverse of a matrix's midpoint, or None where it is singular."""
+    try:
+        return matrix([midpoints(row) for row in rows]).inv().mid()
+    except ZeroDivisionError:
+        return None
+
+
+def dot(u: "Sequence[Any]", v: "Sequence[Any]") -> Ball:
+    """Return the sum of products."""
+    return sum((a * b for a, b in zip(u, v, strict=True)), ball(0))
+
+
+# ------------------------------------------------------------------------------- bounds of a ball
+
+
+def exact(number: Ball) -> Fraction:
+    """Return a ball without radius as a fraction."""
+    mantissa, exponent = (int(part) for part in number.man_exp())
+    return Fraction(mantissa) * Fraction(2) ** exponent
+
+
+def bounds(number: Ball) -> tuple[Fraction, Fraction]:
+    """Return exact lower and upper bounds of a finite ball."""
+    return exact(number.lower()), exact(number.upper())
+
+
+def decimals(
+    lower: Fraction, upper: Fraction, digits: int, *, inwards: bool = False
+) -> tuple[str, str]:
+    """Return decimal bounds of ``digits`` significant digits, rounded outwards (or inwards).
+
+    >>> decimals(Fraction(1, 3), Fraction(2, 3), 4)
+    ('0.3333', '0.6667')
+    """
+    largest = max(abs(lower), abs(upper))
+    if not largest:
+        return "0", "0"
+    place = _magnitude(largest) - digits
+    unit = Fraction(10) ** place
+    down, up = lower // unit, -(-upper // unit)
+    if inwards:
+        down, up = -(-lower // unit), upper // unit
+    return _decimal(down, place), _decimal(up, place)
+
+
+def _magnitude(number: Fraction) -> int:
+    """Return ``k`` with ``10^(k-1) <= number < 10^k``."""
+    bits = number.numerator.bit_length() - number.denominator.bit_length()
+    k = bits * 30103 // 100000 - 1
+    while Fraction(10) ** k <= number:
+        k += 1
+    return k
+
+
+def _decimal(count: int, place: int) -> str:
+    """Write ``count * 10^place``; with an exponent where zeros would outnumber the digits."""
+    from flint import fmpz
+
+    digits = str(fmpz(abs(count)))
+    sign = "-" if count < 0 else ""
+    if count == 0:
+        return "0"
+    if place >= 0 or len(digits) + place < -len(digits):
+        head, tail = digits[0], digits[1:]
+        power = place + len(tail)
+        short = f"{sign}{digits}{'0' * max(place, 0)}"
+        return short if 0 <= place <= 6 else f"{sign}{head}{'.' if tail else ''}{tail}e{power}"
+    digits = digits.rjust(1 - place, "0")
+    return f"{sign}{digits[:place]}.{digits[place:]}"
+
+
+# -------------------------------------------------------------------------------------- operations
+
+
+def square(x: Ball) -> Ball:
+    """Return ``x^2``, which is never negative."""
+    y = x * x
+    return y if y > 0 else y.nonnegative_part()
+
+
+def _less(x: Ball, y: Ball) -> Truth:
+    return True if x < y else False if x >= y else None
+
+
+def _at_most(x: Ball, y: Ball) -> Truth:
+    return True if x <= y else False if x > y else None
+
+
+def _not(x: Truth) -> Truth:
+    return None if x is None else not x
+
+
+def _and(x: Truth, y: Truth) -> Truth:
+    return False if x is False or y is False else None if x is None or y is None else True
+
+
+def _or(x: Truth, y: Truth) -> Truth:
+    return _not(_and(_not(x), _not(y)))
+
+
+def _select(condition: Truth, yes: Ball, no: Ball) -> Ball:
+    return yes.union(no) if condition is None else yes if condition else no
+
+
+@lru_cache(maxsize=1)
+def operations() -> dict[str, Callable[..., Any]]:
+    """Return what every operation of a program does with balls."""
+    from flint import arb
+
+    return {
+        **{name: getattr(arb, name) for name in UNARY},
+        "square": square,
+        "neg": operator.neg,
+        "add": operator.add,
+        "sub": operator.sub,
+        "mul": operator.mul,
+        "div": operator.truediv,
+        "pow": operator.pow,
+        "atan2": arb.atan2,
+        "lt": _less,
+        "le": _at_most,
+        "not": _not,
+        "and": _and,
+        "or": _or,
+        "select": _select,
+    }
+
+
+def _whole(number: Ball) -> bool:
+    return bool(number.is_exact() and number.is_integer())
+
+
+# Where each operation is analytic on a whole box, and what is wrong elsewhere; operations that are
+# not listed are analytic everywhere.
+ANALYTIC: dict[str, tuple[str, Callable[..., bool]]] = {
+    "sqrt": ("the argument of a square root may reach 0", lambda x: x > 0),
+    "log": ("the argument of a logarithm may reach 0", lambda x: x > 0),
+    "asin": ("the argument of an arcsine may reach 1 or -1", lambda x: -1 < x < 1),
+    "acos": ("the argument of an arccosine may reach 1 or -1", lambda x: -1 < x < 1),
+    "tan": ("a tangent may reach a pole", lambda x: x.cos() != 0),
+    "div": ("a denominator may reach 0", lambda _, y: y != 0),
+    "pow": (
+        "the base of a power may reach 0",
+        lambda x, y: x > 0 or (_whole(y) and (y >= 0 or x != 0)),
+    ),
+    "atan2": ("the arguments of atan2 may reach its cut", lambda y, x: x > 0 or y != 0),
+}
+
+# Partial derivatives of each operation by its arguments, from the arguments and the value; they are
+# not finite where the operation has none, except for atan2 on its cut.
+PARTIALS: dict[str, tuple[Callable[..., Any], ...]] = {
+    "neg": (lambda *_: -1,),
+    "add": (lambda *_: 1, lambda *_: 1),
+    "sub": (lambda *_: 1, lambda *_: -1),
+    "mul": (lambda x, _: x[1], lambda x, _: x[0]),
+    "square": (lambda x, _: 2 * x[0],),
+    "div": (lambda x, _: 1 / x[1], lambda x, y: -y / x[1]),
+    "sqrt": (lambda _, y: 1 / (2 * y),),
+    "sin": (lambda x, _: x[0].cos(),),
+    "cos": (lambda x, _: -x[0].sin(),),
+    "tan": (lambda _, y: 1 + y * y,),
+    "asin": (lambda x, _: 1 / (1 - x[0] * x[0]).sqrt(),),
+    "acos": (lambda x, _: -1 / (1 - x[0] * x[0]).sqrt(),),
+    "atan": (lambda x, _: 1 / (1 + square(x[0])),),
+    "sinh": (lambda x, _: x[0].cosh(),),
+    "cosh": (lambda x, _: x[0].sinh(),),
+    "tanh": (lambda _, y: 1 - y * y,),
+    "exp": (lambda _, y: y,),
+    "log": (lambda x, _: 1 / x[0],),
+    "pow": (lambda x, _: x[1] * x[0] ** (x[1] - 1), lambda x, y: y * x[0].log()),
+    "atan2": (
+        lambda x, _: x[1] / (square(x[0]) + square(x[1])),
+        lambda x, _: -x[0] / (square(x[0]) + square(x[1])),
+    ),
+}
+
+
+def narrower(x: Ball, y: Ball) -> Ball:
+    """Return the better of two enclosures of the same quantity."""
+    return y if y.is_finite() and (not x.is_finite() or y.rad() < x.rad()) else x

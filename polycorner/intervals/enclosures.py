@@ -1,0 +1,280 @@
+"""Formulas in ball arithmetic: enclosures of values and derivatives over whole boxes.
+
+What is evaluated is the graph of :mod:`~polycorner.formulas.programs`, the one that the compiled
+kernels come from, with its constants exact: fractions, pi and e are enclosed, and a floating-point
+number that a user gave is the dyadic fraction it is.
+
+Derivatives are taken only where a function is smooth on the whole box: every branch that matters
+is decided there, and no root, quotient, logarithm, power or angle comes to the edge of the domain
+on which it is analytic.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from polycorner.formulas.functions import Family, SmoothFunction
+from polycorner.formulas.programs import Graph, Payload, Program
+from polycorner.formulas.translate import UNARY, compile_expressions
+from polycorner.intervals.balls import ANALYTIC, constant, operations
+from polycorner.intervals.tapes import Box, Tape, arguments, needed
+from polycorner.spaces.manifold import Manifold
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.intervals.balls import Ball
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why something is undecided: what it is about, and the reason."""
+
+    name: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Return both."""
+        return f"{self.name}: {self.reason}"
+
+
+@lru_cache(maxsize=64)
+def exact_program(family: Family) -> Program:
+    """Return a family's program with every number exact, long floating-point ones included."""
+    import sympy
+
+    definitions, expressions = family.formulas()
+
+    def fractions(e: "sympy.Expr") -> "sympy.Expr":
+        found = e.atoms(sympy.Float)
+        return e.xreplace({number: sympy.Rational(number) for number in found}) if found else e
+
+    return compile_expressions(
+        [fractions(expressions[name]) for name in family.names],
+        family.variables,
+        family.parameters,
+        {name: fractions(e) for name, e in definitions.items()},
+        family.names,
+    )
+
+
+def write(graph: Graph, f: SmoothFunction, free: "Mapping[str, int] | None" = None) -> int:
+    """Write a function into a graph and return its node.
+
+    Coordinates are the graph's first variables; ``free`` gives the positions of parameters that
+    are variables, too.  All others are the exact numbers that the function is bound to.
+    """
+    program, places = exact_program(f.family), free or {}
+    output = program.outputs[f.family.names.index(f.member_name)]
+    inputs = {("var", i): graph.node("var", k) for i, k in enumerate(f.reads)}
+    for j, (name, value) in enumerate(zip(f.family.parameters, f.parameters, strict=True)):
+        if name in places:
+            inputs["par", j] = graph.node("var", places[name])
+        else:
+            inputs["par", j] = graph.const(Fraction(value))
+    placed: dict[int, int] = {}
+    for a in needed(program.graph, [output]):
+        op, args = program.graph.nodes[a]
+        if op in {"var", "par"}:
+            placed[a] = inputs[op, int(args[0])]
+        elif op != "const" and op not in operations():
+            msg = f"{f.name}: the operation {op} has no enclosure in ball arithmetic"
+            raise ValueError(msg)
+        else:
+            placed[a] = _rebuilt(graph, op, args, placed)
+    return placed[output]
+
+
+def _rebuilt(graph: Graph, op: str, args: tuple[Payload, ...], placed: dict[int, int]) -> int:
+    """Write one operation into another graph, its arguments being there already."""
+    if op == "const":
+        return graph.const(args[0])
+    if op == "var":
+        return graph.node(op, *args)
+    children = [placed[int(arg)] for arg in args]
+    if op in {"add", "sub", "neg", "mul", "div", "select"}:
+        result: int = getattr(graph, op)(*children)
+        return result
+    return graph.unary(op, *children) if op in UNARY else graph.node(op, *children)
+
+
+class Formulas:
+    """Functions on a manifold, written into one graph whose only inputs are a box's sides.
+
+    Parameters
+    ----------
+    functions : sequence of SmoothFunction
+        What is evaluated.
+    manifold : Manifold
+        Where they live; its coordinates are the first inputs.
+    free : sequence of str, optional
+        Names of parameters that are inputs too, after the coordinates.
+    """
+
+    def __init__(
+        self, functions: Sequence[SmoothFunction], manifold: Manifold, free: Sequence[str] = ()
+    ) -> None:
+        self.names = tuple(f.name for f in functions)
+        self.dimension, self.free = manifold.dimension, tuple(free)
+        self.inputs = self.dimension + len(self.free)
+        self.graph = Graph()
+        places = {name: self.dimension + k for k, name in enumerate(self.free)}
+        self.outputs = tuple([write(self.graph, f, places) for f in functions])
+        self._tapes: dict[tuple[int, ...], Tape] = {}
+        self._smooth: dict[Any, SmoothForms] = {}
+
+    def _tape(self, rows: tuple[int, ...]) -> Tape:
+        if rows not in self._tapes:
+            self._tapes[rows] = Tape(self.graph, [self.outputs[row] for row in rows])
+        return self._tapes[rows]
+
+    def values(self, box: Box, rows: Sequence[int]) -> "list[Ball]":
+        """Return enclosures of some functions on a box; both branches where one is undecided."""
+        tape = self._tape(tuple(rows))
+        found = tape.run(box)
+        return [found[slot] for slot in tape.outputs]
+
+    def smooth(self, box: Box, rows: Sequence[int]) -> "SmoothForms | Doubt":
+        """Return some functions as they are on a box, free of branches, or why that is undecided.
+
+        The functions returned equal the given ones at every point of the box and are analytic in a
+        neighbourhood of it.
+        """
+        rows = tuple(rows)
+        tape = self._tape(rows)
+        found = tape.run(box)
+        taken: dict[int, int] = {}
+        for row in rows:
+            reason = self._follow(self.outputs[row], tape, found, taken)
+            if reason:
+                return Doubt(self.names[row], reason)
+        key = (rows, tuple(sorted(taken.items())))
+        if key not in self._smooth:
+            self._smooth[key] = self._pruned(rows, taken)
+        return self._smooth[key]
+
+    def undefined(self, parameters: "Sequence[Ball]") -> str:
+        """Return a function that has no value for some parameters, wherever the point is.
+
+        Only what is computed from parameters alone, on no branch, is looked at; empty for none.
+        """
+        anywhere = [constant(Fraction(0))] * self.dimension
+        for name, output in zip(self.names, self.outputs, strict=True):
+            tape = Tape(self.graph, [output])
+            found = tape.run(Box([*anywhere, *parameters]))
+            waiting, fixed = [output], self._fixed(tape)
+            while waiting:
+                a = waiting.pop()
+                op, children = self.graph.nodes[a][0], arguments(self.graph, a)
+                if a in fixed and not found[tape.slots[a]].is_finite():
+                    return name
+                if op == "div" and children[1] in fixed and found[tape.slots[children[1]]] == 0:
+                    return name
+                if op != "select":
+                    waiting += children
+        return ""
+
+    def _fixed(self, tape: Tape) -> set[int]:
+        """Return the nodes of a tape that do not depend on the coordinates."""
+        fixed: set[int] = set()
+        for a in tape.nodes:
+            op, args = self.graph.nodes[a]
+            inputs = op == "var" and int(args[0]) < self.dimension
+            if not inputs and all(child in fixed for child in arguments(self.graph, a)):
+                fixed.add(a)
+        return fixed
+
+    def _follow(self, output: int, tape: Tape, found: list[Any], taken: dict[int, int]) -> str:
+        """Follow the branches taken from an output; return what prevents it from being smooth."""
+        waiting = [output]
+        while waiting:
+            a = waiting.pop()
+            if a in taken:
+                continue
+            children = arguments(self.graph, a)
+            given = [found[tape.slots[child]] for child in children]
+            op = self.graph.nodes[a][0]
+            if op == "select":
+                if given[0] is None:
+                    return "the box does not decide which branch is taken"
+                taken[a] = children[1] if given[0] else children[2]
+                waiting.append(taken[a])
+                continue
+            if op in ANALYTIC and not ANALYTIC[op][1](*given):
+                return ANALYTIC[op][0]
+            if not found[tape.slots[a]].is_finite():
+                return "its values on the box are not bounded"
+            taken[a] = a
+            waiting += children
+        return ""
+
+    def _pruned(self, rows: tuple[int, ...], taken: dict[int, int]) -> "SmoothForms":
+        graph = Graph()
+        placed: dict[int, int] = {}
+        for a in sorted(taken):
+            op, args = self.graph.nodes[a]
+            direct = taken[a] == a
+            placed[a] = _rebuilt(graph, op, args, placed) if direct else placed[taken[a]]
+        outputs = tuple([placed[self.outputs[row]] for row in rows])
+        return SmoothForms(graph, outputs, self.dimension, self.inputs)
+
+
+class SmoothForms:
+    """Branch-free functions with their derivatives, ready for evaluation in balls."""
+
+    def __init__(self, graph: Graph, outputs: tuple[int, ...], dimension: int, inputs: int) -> None:
+        self.graph, self.outputs = graph, outputs
+        self.dimension, self.inputs = dimension, inputs
+        self._tapes: dict[int, Tape] = {}
+
+    def _tape(self, order: int) -> Tape:
+        if order not in self._tapes:
+            d, n = self.graph.derivative, self.dimension
+            wanted = list(self.outputs)
+            if order >= 1:
+                wanted += [d(f, i) for f in self.outputs for i in range(self.inputs)]
+            if order >= 2:
+                wanted += [
+                    d(d(f, min(i, j)), max(i, j))
+                    for f in self.outputs
+                    for i in range(n)
+                    for j in range(self.inputs)
+                ]
+            self._tapes[order] = Tape(self.graph, wanted)
+        return self._tapes[order]
+
+    def evaluate(self, box: Box, order: int) -> tuple[Any, ...]:
+        """Return enclosures up to an order, for ``m`` functions of ``n`` coordinates.
+
+        Values ``[m]``; gradients ``[m][inputs]``; second derivatives ``[m][n][inputs]``, the
+        first by a coordinate, the second by any input.
+        """
+        tape = self._tape(order)
+        found = tape.run(box)
+        return self._shaped([found[slot] for slot in tape.outputs], order)
+
+    def slopes(self, box: Box) -> tuple[Any, Any]:
+        """Return how gradients and second derivatives change in a box with slopes.
+
+        Enclosures of their derivatives along each component of ``delta``: of the gradients
+        ``[m][inputs][delta]`` and of the second derivatives ``[m][n][inputs][delta]``.
+        """
+        tape, nothing = self._tape(2), [constant(Fraction(0))] * len(box.reach)
+        _, along = tape.moving(box)
+        _, turned, bent = self._shaped([along[slot] or nothing for slot in tape.outputs], 2)
+        return turned, bent
+
+    def _shaped(self, flat: list[Any], order: int) -> tuple[Any, ...]:
+        m, n, k = len(self.outputs), self.dimension, self.inputs
+        result: list[Any] = [flat[:m]]
+        if order >= 1:
+            result.append(_cut(flat[m : m + m * k], k))
+        if order >= 2:
+            result.append(_cut(_cut(flat[m + m * k :], k), n))
+        return tuple(result)
+
+
+def _cut(flat: list[Any], size: int) -> list[Any]:
+    return [flat[i : i + size] for i in range(0, len(flat), size)]

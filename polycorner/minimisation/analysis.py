@@ -1,0 +1,266 @@
+"""The analysis behind a certificate: every piece of the polyhedron at a point, put together."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.minimisation.conditions import (
+    Curvature,
+    Multipliers,
+    find_curvature,
+    find_multipliers,
+)
+from polycorner.minimisation.problem import Problem
+from polycorner.minimisation.verdicts import Entrapment, Verdict
+from polycorner.polyhedra.cones import Rows, inward_direction, null_space, rank
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.strata import distances, local_pieces
+from polycorner.spaces.manifold import Array
+
+PROBES = np.array(
+    [0.003, 0.03, -0.003, -0.03]
+)  # how far flat directions are followed, in scale units
+# Where several pieces meet, the first of these that one of them shows decides.
+DECISIVE = (
+    Verdict.NOT_STATIONARY,
+    Verdict.SADDLE,
+    Verdict.NO_MULTIPLIER,
+    Verdict.UNDECIDED,
+    Verdict.MINIMUM_ALONG_LOCUS,
+    Verdict.WEAK_MINIMUM,
+    Verdict.STRICT_MINIMUM,
+)
+PROBE_NOISE = 1e-12  # change of the energy, relative to its own size, that counts as none
+
+
+@dataclass(frozen=True)
+class Local:
+    """Derivatives at the point and what counts as small there."""
+
+    problem: Problem
+    point: Array
+    values: Array
+    gradients: Array
+    hessians: Array
+    tolerance: float
+    rank_tolerance: float
+
+    @cached_property
+    def reference(self) -> float:
+        """The energy's own size: its largest first or second derivative in scaled coordinates."""
+        return float(max(abs(self.gradients[-1]).max(), abs(self.hessians[-1]).max())) or 1.0
+
+    @property
+    def small(self) -> float:
+        """A first derivative that counts as zero."""
+        return self.tolerance * self.reference
+
+    @property
+    def sections(self) -> range:
+        """Rows of the equations."""
+        return range(self.problem.inequalities, len(self.values) - 1)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """First and second order at a point, in scaled coordinates with unit gradients.
+
+    ``active`` lists rows of the system; ``strong_positions`` are positions in ``active`` of an
+    independent set of functions with positive multipliers, ``weak`` rows with zero multipliers.
+    """
+
+    verdict: Verdict
+    active: tuple[int, ...]
+    gradients: Array
+    multipliers: Multipliers
+    independent: bool
+    strong_positions: tuple[int, ...]
+    weak: tuple[int, ...]
+    curvature: Curvature
+    reference: float
+    small_curvature: float
+    flat_verified: bool
+    flat_change: float
+    local: Local
+
+    @property
+    def signature(self) -> tuple[int, int, int]:
+        """The lemma's ``(p, q, r)``."""
+        values = self.curvature.values
+        free = int((abs(values) <= self.small_curvature).sum())
+        return len(self.strong_positions), len(values) - free, free
+
+    @cached_property
+    def entrapment(self) -> dict[str, Entrapment]:
+        """The kind of entrapment in every direction."""
+        return dict(_entrapment(self))
+
+
+def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float) -> Analysis:
+    """Analyse every piece of the polyhedron near ``q``; the least favourable verdict counts.
+
+    Where several pieces meet, a point is a minimum of the union exactly when it is a minimum of
+    each, so the analysis returned is that of the piece that decides.
+    """
+    values, gradients, hessians = problem.evaluate(q, 2)
+    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
+    pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
+    if not pieces or not np.isfinite(values[-1]):
+        return replace(_analyse_piece(local, frozenset()), verdict=Verdict.OUTSIDE)
+    analyses = [_analyse_piece(local, piece) for piece in pieces]
+    return min(analyses, key=lambda a: DECISIVE.index(a.verdict))
+
+
+def _analyse_piece(local: Local, piece: Piece) -> Analysis:
+    active = tuple(sorted(piece))
+    k, small = len(active), local.small
+    gradients = local.gradients[[*active, *local.sections]]
+    rows = Rows(gradients, local.rank_tolerance)
+    slope = local.gradients[-1]
+    most = 0.1 * float(np.linalg.norm(slope)) / local.rank_tolerance + small
+    multipliers = find_multipliers(rows, k, slope, small, most)
+    values = multipliers.values[:k]
+    strong = [*np.flatnonzero(abs(values) > small).tolist(), *range(k, len(gradients))]
+    weak = [active[i] for i in np.flatnonzero(abs(values) <= small)]
+    face = rows if len(strong) == len(gradients) else Rows(gradients[strong], local.rank_tolerance)
+    hessian = _lagrangian_hessian(local, active, gradients, multipliers)
+    small_curvature = local.tolerance * max(local.reference, float(abs(hessian).max()))
+    curvature = find_curvature(hessian, face.null_space, local.gradients[weak], small_curvature)
+    away = distances(local.values[list(active)], gradients[:k])
+    verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
+    change = 0.0
+    if verdict is Verdict.UNDECIDED and curvature.least >= -small_curvature:
+        held = frozenset(active[i] for i in strong if i < k)
+        change = _flat_change(local, held, curvature.flat, piece)
+        verdict = Verdict.MINIMUM_ALONG_LOCUS if change <= PROBE_NOISE else verdict
+    elif verdict is Verdict.STRICT_MINIMUM and weak:
+        verdict = Verdict.WEAK_MINIMUM
+    return Analysis(
+        verdict=verdict,
+        active=active,
+        gradients=gradients,
+        multipliers=multipliers,
+        independent=rows.independent,
+        strong_positions=_independent_positions(rows, np.flatnonzero(values > small), k, local),
+        weak=tuple(weak),
+        curvature=curvature,
+        reference=local.reference,
+        small_curvature=small_curvature,
+        flat_verified=not curvature.flat.shape[1] or change <= PROBE_NOISE,
+        flat_change=change,
+        local=local,
+    )
+
+
+def _lagrangian_hessian(
+    local: Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
+) -> Array:
+    sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    numbers = [*active, *local.sections]
+    result: Array = local.hessians[-1].copy()
+    for row, value, size in zip(numbers, multipliers.values, sizes, strict=True):
+        if size > 0:
+            result -= value / size * local.hessians[row]
+    return result
+
+
+def _verdict(
+    local: Local,
+    rows: Rows,
+    away: Array,
+    multipliers: Multipliers,
+    curvature: Curvature,
+    small_curvature: float,
+) -> Verdict:
+    """Return the verdict before flat directions are followed and weak functions looked at."""
+    if not multipliers.complementary(away, 10 * local.small):
+        return Verdict.NOT_STATIONARY  # so large a multiplier needs a contact that is truly closed
+    if not multipliers.exist:
+        k = len(away)
+        regular = rows.independent
+        if not regular and k:
+            _, rate = inward_direction(rows.units[:k], rows.units[k:])
+            regular = rate > local.rank_tolerance
+        return Verdict.NOT_STATIONARY if regular else Verdict.NO_MULTIPLIER
+    if curvature.decided and curvature.least < -small_curvature:
+        # Another choice of multipliers might still show a minimum where they are not unique.
+        return Verdict.SADDLE if multipliers.unique else Verdict.UNDECIDED
+    if not curvature.decided or curvature.flat.shape[1]:
+        return Verdict.UNDECIDED
+    return Verdict.STRICT_MINIMUM
+
+
+def _flat_change(local: Local, face: Piece, flat: Array, piece: Piece) -> float:
+    """Follow flat directions and generic mixtures of them both ways; return the relative change."""
+    if not flat.shape[1]:
+        return np.inf
+    left, singular, _ = np.linalg.svd(flat, full_matrices=False)
+    held = left[:, singular > 1e-6 * singular[0]].T
+    directions = flat.T
+    if flat.shape[1] > 1:
+        # Weights without rational relations: no polynomial of low degree vanishes on them all.
+        powers = np.sqrt([[2.0], [3.0], [5.0]]) ** np.arange(flat.shape[1])
+        mixed = powers @ flat.T
+        directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
+    change = local.problem.probe(face, piece, local.point, directions, held, PROBES)
+    return change / (abs(float(local.values[-1])) + local.reference)
+
+
+def _independent_positions(
+    rows: Rows, positive: NDArray[np.int64], k: int, local: Local
+) -> tuple[int, ...]:
+    """Return positions of strongly active functions that are independent, greedily in order."""
+    candidates = positive.tolist()
+    if rows.independent:
+        return tuple(candidates)
+    chosen: list[int] = []
+    sections = list(range(k, len(rows.units)))
+    reached = rank(rows.units[sections], local.rank_tolerance)
+    for i in candidates:
+        if rank(rows.units[[*chosen, i, *sections]], local.rank_tolerance) > reached:
+            chosen.append(i)
+            reached += 1
+    return tuple(chosen)
+
+
+def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
+    local, multipliers, curvature, small = a.local, a.multipliers, a.curvature, a.small_curvature
+    names = local.problem.polyhedron.names
+    for position in a.strong_positions:
+        yield names[a.active[position]], Entrapment.HALF_V
+    for position, row in enumerate(a.active):
+        if multipliers.values[position] < -local.small:
+            yield names[row], Entrapment.NONE
+    if multipliers.residual > local.small:
+        return  # the energy slopes along the face: its curvature there holds nothing
+    curved = curvature.vectors[:, curvature.values > small]
+    held: list[int] = []
+    for row in a.weak:
+        slopes = local.gradients[[*held, row]] @ curved
+        if rank(slopes, 1e-6) > len(held):
+            held.append(row)
+            yield names[row], Entrapment.HALF_U
+    inner = curved @ null_space(local.gradients[held] @ curved, 1e-6) if held else curved
+    others = (
+        (inner, Entrapment.U),
+        (curvature.vectors[:, abs(curvature.values) <= small], Entrapment.FREE),
+        (curvature.vectors[:, curvature.values < -small], Entrapment.NONE),
+    )
+    taken = dict.fromkeys((names[row] for row in a.active), 1)
+    for vectors, kind in others:
+        for vector in vectors.T:
+            label = _direction_name(vector, local.problem.polyhedron.manifold.names)
+            taken[label] = taken.get(label, 0) + 1
+            yield label if taken[label] == 1 else f"{label} ({taken[label]})", kind
+
+
+def _direction_name(vector: Array, names: tuple[str, ...]) -> str:
+    """Name a direction by the coordinates that change at least half as much as the most."""
+    top = abs(vector).max()
+    large = [i for i in range(len(vector)) if abs(vector[i]) >= 0.5 * top]
+    sign = np.sign(vector[large[0]])
+    words = [("+" if vector[i] * sign > 0 else "-") + names[i] for i in large]
+    return "".join(words).removeprefix("+")

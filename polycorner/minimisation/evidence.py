@@ -1,0 +1,66 @@
+"""What decides about a point: where the energy falls, what is implied, the least curvature."""
+
+import numpy as np
+
+from polycorner.minimisation.analysis import Analysis
+from polycorner.minimisation.conditions import find_curvature
+from polycorner.polyhedra.cones import unit_rows
+from polycorner.spaces.manifold import Array
+
+IMPLIED = 1e-9  # distance of a unit gradient to the cone of others at which it lies in it
+
+
+def steepest_descent(a: Analysis) -> tuple[float, Array]:
+    """Return the rate at which the energy falls fastest on the linearised cone, and where to.
+
+    The part of ``dE`` that no admissible combination of active gradients balances is minus the
+    direction, its length the rate (Moreau's decomposition).
+    """
+    from scipy.optimize import nnls
+
+    units, slope = unit_rows(a.gradients), a.local.gradients[-1]
+    rows = np.vstack([units, -units[len(a.active) :]])
+    rest = slope - (nnls(rows.T, slope)[0] @ rows if len(rows) else 0.0)
+    rate = float(np.linalg.norm(rest))
+    return rate, -rest / (rate or 1.0)
+
+
+def implied_functions(a: Analysis) -> list[int]:
+    """Return positions of active functions whose gradient the others' admit as a combination."""
+    from scipy.optimize import nnls
+
+    units, k = unit_rows(a.gradients), len(a.active)
+    found = []
+    for i in range(k):
+        rows = np.vstack([np.delete(units, i, axis=0), -units[k:]])
+        if len(rows) and nnls(rows.T, units[i])[1] <= IMPLIED:
+            found.append(i)
+    return found
+
+
+def least_curvature(a: Analysis) -> tuple[float, Array] | None:
+    """Return the least value of the Lagrangian's Hessian on the critical cone, and where it is.
+
+    None where the cone is the origin.  Shifted by its least value the form vanishes exactly
+    in the directions that attain it, which is how they are found.
+    """
+    values, vectors = a.curvature.values, a.curvature.vectors
+    if not len(values):
+        return None
+    if not a.weak:
+        return float(values[0]), oriented(vectors[:, 0])
+    rows = a.local.gradients[list(a.weak)]
+    least = float(values[0])
+    for _ in range(2):  # the second time with the value found, and so with its directions
+        form = (vectors * (values - least)) @ vectors.T
+        found = find_curvature(form, vectors, rows, a.small_curvature)
+        if not np.isfinite(found.least):
+            return None
+        least += found.least
+    rates = np.einsum("ik,ij,jk->k", found.flat, form, found.flat)
+    return least, found.flat[:, int(rates.argmin())]
+
+
+def oriented(direction: Array) -> Array:
+    """Return the one of two opposite directions whose largest component is positive."""
+    return np.asarray(direction * np.sign(direction[abs(direction).argmax()]))

@@ -1,0 +1,217 @@
+"""The KKT equations of a face, with the parameters of the formulas as variables.
+
+The equations
+
+- ``dE - sum lam_i df_i = 0``,
+- ``f_i = 0`` for the active functions and the equations of the set,
+
+are linearised in the point, the multipliers and the parameters at once.  All derivatives are those
+of compiled kernels whose variables are coordinates and parameters alike, so they are exact.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from polycorner.formulas.functions import Bundle, Family, SmoothFunction
+from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.conditions import NEARLY_FLAT
+from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.spaces.manifold import Array, Manifold
+
+# How fast parameters given by name move the parameters of the formulas.
+Rates = Mapping[str, Mapping[str, float]]
+
+SINGULAR = 1e-13  # reciprocal condition at which the equations determine nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The KKT equations to first order; rows are the held functions, and last the energy.
+
+    Attributes
+    ----------
+    values : (k,) array
+        The held functions.
+    gradients : (k + 1, n) array
+        Derivatives by scaled coordinates.
+    drift : (k + 1, p) array
+        Derivatives by the parameters.
+    curvature : (n, n) array
+        The Lagrangian's Hessian.
+    turning : (n, p) array
+        Derivatives of the Lagrangian's gradient by the parameters.
+    """
+
+    values: Array
+    gradients: Array
+    drift: Array
+    curvature: Array
+    turning: Array
+
+    def free_directions(self, certificate: Certificate) -> Array:
+        """Return the directions along the face in which the second order vanishes, ``(n, r)``."""
+        flat = NEARLY_FLAT * certificate.analysis.small_curvature
+        basis = null_space(self.gradients[:-1], certificate.rank_tolerance)
+        values, vectors = np.linalg.eigh(basis.T @ self.curvature @ basis)
+        return np.asarray(basis @ vectors[:, abs(values) <= flat])
+
+    def solve(self, free: Array, reference: float) -> tuple[Array, Array, Array] | None:
+        """Return derivatives of scaled coordinates and multipliers, and slopes along ``free``.
+
+        The slopes, ``(r, p)``, are relative to what they are the difference of.  Rows of gradients
+        are brought to length one and energies to units of ``reference``, so that the condition of
+        the matrix says something; None if it is singular.
+        """
+        rows, (n, p) = self.gradients[:-1], self.turning.shape
+        sizes, k = np.linalg.norm(rows, axis=1), len(rows)
+        matrix = bordered(self.curvature / reference, np.vstack([unit_rows(rows), free.T]))
+        if not np.linalg.cond(matrix) < 1 / SINGULAR:
+            return None
+        right = np.zeros((len(matrix), p))
+        right[:n] = -self.turning / reference
+        right[n : n + k] = -self.drift[:-1] / sizes[:, None]
+        found = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+        summands = abs(matrix[:n]) @ abs(found) + abs(right[:n])
+        slopes = abs(found[n + k :]) / np.maximum(summands.max(axis=0), np.finfo(float).tiny)
+        return found[:n], reference * found[n : n + k] / sizes[:, None], slopes
+
+
+def bordered(hessian: Array, rows: Array) -> Array:
+    """Return the matrix ``[[H, -A^T], [A, 0]]``."""
+    corner = np.zeros((len(rows), len(rows)))
+    return np.block([[hessian, -rows.T], [rows, corner]])
+
+
+class Lifted:
+    """Active functions, equations and energy of a certificate, parameters being variables too.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the active functions, then of the equations.
+    slots : dict from (str, float) to int
+        Where a parameter with its value stands among the additional variables.
+    """
+
+    def __init__(self, certificate: Certificate) -> None:
+        problem = certificate.problem
+        d = problem.polyhedron
+        held = (*(d.functions[i] for i in certificate.analysis.active), *d.equations)
+        self.names = tuple(f.name for f in held)
+        self.slots: dict[tuple[str, float], int] = {}
+        for f in (*held, problem.energy):
+            for slot in zip(f.family.parameters, f.parameters, strict=True):
+                self.slots.setdefault(slot, len(self.slots))
+        self._scales = problem.scales
+        self._values = np.array([value for _, value in self.slots])
+        self._bundle = self._bind((*held, problem.energy))
+
+    def _bind(self, functions: Sequence[SmoothFunction]) -> Bundle:
+        places = tuple(f"q{i}" for i in range(len(self._scales)))
+        manifold = Manifold((*places, *(f"p{j}" for j in range(len(self.slots)))))
+        used: dict[Family, set[str]] = {}
+        for f in functions:
+            used.setdefault(f.family, set()).add(f.member_name)
+        lifted = []
+        for f in functions:
+            family = lifted_family(f.family, frozenset(used[f.family]))
+            own = [self.slots[s] for s in zip(f.family.parameters, f.parameters, strict=True)]
+            reads = [*(places[i] for i in f.reads), *(f"p{j}" for j in own)]
+            lifted.append(SmoothFunction.member(family, f.member_name, manifold, reads=reads))
+        return Bundle(manifold, lifted)
+
+    def directions(self, rates: Rates) -> Array:
+        """Return how fast each of these parameters moves each slot, ``(s, p)``."""
+        rows = [[moved.get(name, 0.0) for moved in rates.values()] for name, _ in self.slots]
+        return np.array(rows, dtype=np.float64).reshape(len(self.slots), len(rates))
+
+    def linearise(self, q: Array, changes: Array, multipliers: Array, directions: Array) -> Linear:
+        """Return the equations to first order.
+
+        Parameters
+        ----------
+        q : (n,) array
+            The point.
+        changes : (s,) array
+            How far the parameters are from those of the certificate.
+        multipliers : (k,) array
+            ``dE/df``.
+        directions : (s, p) array
+            By what the parameters are differentiated.
+        """
+        n, scales = len(self._scales), self._scales
+        at = np.concatenate([q, self._values + changes])
+        values, gradients, hessians = self._bundle.evaluate(at, 2)
+        weights = np.append(-multipliers, 1.0)
+        curved = np.einsum("i,ijk->jk", weights, hessians[:, :n, :n])
+        mixed = (hessians[:, :n, n:] * scales[:, None]) @ directions
+        return Linear(
+            values=values[:-1],
+            gradients=gradients[:, :n] * scales,
+            drift=gradients[:, n:] @ directions,
+            curvature=curved * np.outer(scales, scales),
+            turning=np.einsum("i,ijp->jp", weights, mixed),
+        )
+
+
+@lru_cache(maxsize=256)
+def lifted_family(family: Family, used: frozenset[str]) -> Family:
+    """Return the used functions of a family, written in its variables and parameters alike."""
+    if not family.parameters:
+        return family
+    names = tuple(name for name in family.names if name in used)
+    source = family.key or family.program().digest()
+    key = repr(("parameters are variables", names, source))
+    return Family(names, family.variables + family.parameters, (), family.formulas, key)
+
+
+def partial_derivatives(function: SmoothFunction, point: Array, rates: Rates) -> Array:
+    """Return the derivatives ``(p,)`` of a function by parameters while the point stays."""
+    family = function.family
+    if not family.parameters:
+        return np.zeros(len(rates))
+    everything = lifted_family(family, frozenset({function.member_name}))
+    inputs = Manifold(tuple(f"u{i}" for i in range(len(everything.variables))))
+    f = SmoothFunction.member(everything, function.member_name, inputs, reads=inputs.names)
+    slopes = f.gradient([*point[list(function.reads)], *function.parameters])
+    own = dict(zip(family.parameters, slopes[len(function.reads) :].tolist(), strict=True))
+    return np.array(
+        [sum(rate * own.get(name, 0.0) for name, rate in moved.items()) for moved in rates.values()]
+    )
+
+
+def check_rates(certificate: Certificate, parameters: Iterable[str] | Rates | None) -> Rates:
+    """Return parameters as what they move, checking every name.
+
+    Names stand for themselves; None stands for all that have one value throughout the problem.
+    """
+    known: dict[str, set[float]] = {}
+    d = certificate.problem.polyhedron
+    for f in (*d.functions, *d.equations, certificate.problem.energy):
+        for name, value in zip(f.family.parameters, f.parameters, strict=True):
+            known.setdefault(name, set()).add(value)
+    if parameters is None:
+        parameters = [name for name, values in known.items() if len(values) == 1]
+    if isinstance(parameters, str):
+        msg = f"parameters: expected a list of names or a mapping; got the string {parameters!r}"
+        raise TypeError(msg)
+    if not isinstance(parameters, Mapping):
+        parameters = {name: {name: 1.0} for name in parameters}
+    if not all(isinstance(moved, Mapping) for moved in parameters.values()):
+        msg = f"parameters: expected a mapping from names to rates of each; got {parameters!r}"
+        raise TypeError(msg)
+    used = list(dict.fromkeys(name for moved in parameters.values() for name in moved))
+    unknown = [str(name) for name in used if name not in known]
+    if unknown or not used:
+        listed = ", ".join(known) or "none, since no function has a parameter"
+        msg = f"parameters: expected names among {listed}; got {', '.join(unknown) or 'none'}"
+        raise ValueError(msg)
+    for name in used:
+        if len(known[name]) > 1:
+            values = ", ".join(f"{value:g}" for value in sorted(known[name]))
+            msg = f"parameters: expected one value of {name} in all functions; it is {values}"
+            raise ValueError(msg)
+    return {name: dict(moved) for name, moved in parameters.items()}

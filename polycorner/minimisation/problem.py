@@ -1,0 +1,201 @@
+"""An energy on a polyhedron, laid out for the compiled core."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.formulas.functions import Bundle, SmoothFunction
+from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    import sympy
+
+    Energy: TypeAlias = SmoothFunction | sympy.Expr
+
+Flat = tuple[
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Minimise ``energy`` over ``polyhedron``.
+
+    Rows of the system are the inequalities, the equations, and last the energy; derivatives here
+    are in scaled coordinates ``u = q / scales``.
+    """
+
+    polyhedron: Polyhedron
+    energy: SmoothFunction
+
+    @property
+    def dimension(self) -> int:
+        """The number of coordinates ``n``."""
+        return self.polyhedron.dimension
+
+    @property
+    def inequalities(self) -> int:
+        """The number of inequalities ``m``."""
+        return len(self.polyhedron.functions)
+
+    @property
+    def rows(self) -> int:
+        """The number of rows: inequalities, equations, energy."""
+        return self.inequalities + len(self.polyhedron.equations) + 1
+
+    @cached_property
+    def scales(self) -> Array:
+        """The manifold's scales."""
+        return self.polyhedron.manifold.scale_array
+
+    @cached_property
+    def _bundle(self) -> Bundle:
+        d = self.polyhedron
+        return Bundle(d.manifold, (*d.functions, *d.equations, self.energy))
+
+    def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
+        """Return values ``(M,)``, scaled gradients ``(M, n)`` and scaled Hessians ``(M, n, n)``."""
+        results = list(self._bundle.evaluate(q, order))
+        if order >= 1:
+            results[1] = results[1] * self.scales
+        if order >= 2:
+            results[2] = results[2] * np.outer(self.scales, self.scales)
+        return tuple(results)
+
+    def check_energy(self, q: Array, argument: str) -> None:
+        """Refuse a point where the energy is not finite."""
+        value = self.energy.value(q)
+        if not np.isfinite(value):
+            msg = f"{argument}: expected a point where the energy is finite; it is {value} there"
+            raise ValueError(msg)
+
+    @cached_property
+    def flat(self) -> tuple[Flat, int]:
+        """The problem as arrays for the compiled core, and its scratch size."""
+        table: list[tuple[int, ...]] = []
+        reads: list[int] = []
+        rows: list[int] = []
+        parameters: list[float] = []
+        size = 1
+        for call in self._bundle.calls:
+            kernel = call.family.kernel
+            k, m = kernel.variables, kernel.outputs
+            curved, straight = kernel.compiled(2).point, kernel.compiled(1).point
+            for where in _layers(call.columns, call.rows):
+                table.append((curved, straight, k, m, len(reads), len(rows), len(parameters)))
+                reads += call.reads
+                rows += [where.get(column, -1) for column in range(m)]
+                parameters += call.parameters.tolist()
+            size = max(size, k + m * (1 + k + k * k))
+        arrays = (
+            np.array(table, dtype=np.int64),
+            np.array(reads, dtype=np.int64),
+            np.array(rows, dtype=np.int64),
+            np.array([*parameters, 0.0]),
+            self.scales,
+        )
+        return arrays, size
+
+    @cached_property
+    def _everything(self) -> NDArray[np.bool_]:
+        return np.ones(self.inequalities, dtype=np.bool_)
+
+    def mask(self, piece: Piece) -> NDArray[np.bool_]:
+        """Return which inequalities belong to a piece."""
+        if len(piece) == self.inequalities:
+            return self._everything
+        use = np.zeros(self.inequalities, dtype=np.bool_)
+        use[list(piece)] = True
+        return use
+
+    def descend(self, piece: Piece, q: Array, limit: int) -> tuple[int, int, Array, Array]:
+        """Run the compiled descent inside one piece; see :func:`compiled.descend`."""
+        from polycorner.minimisation import compiled
+
+        flat, size = self.flat
+        status, iterations, u, lam = compiled.descend(
+            flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size, limit
+        )
+        return status, iterations, u * self.scales, lam
+
+    def restore(self, piece: Piece, q: Array) -> tuple[bool, Array]:
+        """Return whether repeated linearisation finds a point of a piece near ``q``, and it."""
+        from polycorner.minimisation import compiled
+
+        flat, size = self.flat
+        reached, u = compiled.restore(
+            flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size
+        )
+        return reached, u * self.scales
+
+    def on_face(self, active: Piece, q: Array) -> tuple[Array, float]:
+        """Return the stationary point Newton's method finds on a face, and its last step."""
+        from polycorner.minimisation import compiled
+
+        flat, size = self.flat
+        u, _, step = compiled.on_face(
+            flat, self.mask(active), self.inequalities, self.rows, q / self.scales, size
+        )
+        return u * self.scales, step
+
+    def probe(
+        self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
+    ) -> float:
+        """Return how much the energy changes along directions; see :func:`compiled.probe`."""
+        from polycorner.minimisation import compiled
+
+        flat, size = self.flat
+        masks = self.mask(strong), self.mask(piece)
+        ways = np.ascontiguousarray(directions), np.ascontiguousarray(held)
+        change: float = compiled.probe(
+            flat, *masks, self.inequalities, self.rows, q / self.scales, *ways, steps, size
+        )
+        return change
+
+
+def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:
+    """Split (output, row) pairs so that no output occurs twice in a part: it has one place."""
+    layers: list[dict[int, int]] = []
+    for column, row in zip(columns, rows, strict=True):
+        free = next((layer for layer in layers if column not in layer), None)
+        if free is None:
+            layers.append({column: row})
+        else:
+            free[column] = row
+    return layers
+
+
+def pose(polyhedron: Polyhedron, energy: "Energy") -> Problem:
+    """Return the problem of an energy on a polyhedron, checking that they belong together."""
+    if not isinstance(polyhedron, Polyhedron):
+        msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
+        raise TypeError(msg)
+    if not isinstance(energy, Hashable):
+        msg = f"energy: expected a SmoothFunction or a SymPy expression; got {energy!r}"
+        raise TypeError(msg)
+    return _posed(polyhedron, energy)
+
+
+@lru_cache(maxsize=64)
+def _posed(polyhedron: Polyhedron, energy: Any) -> Problem:
+    """Keep the latest problems, so that one posed again is not compiled again."""
+    manifold = polyhedron.manifold
+    function: Any = energy
+    if not isinstance(energy, SmoothFunction):
+        function = SmoothFunction("energy", energy, manifold)
+    if function.manifold != manifold:
+        msg = (
+            f"energy: lives on the coordinates {', '.join(function.manifold.names)}; "
+            f"expected those of the polyhedron, {', '.join(manifold.names)}"
+        )
+        raise ValueError(msg)
+    return Problem(polyhedron, function)

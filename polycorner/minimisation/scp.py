@@ -1,0 +1,192 @@
+"""Sequential convex programming, each step stated in cvxpy and solved by Clarabel.
+
+This is the readable form of a descent step: minimise a convex model of the energy over the
+linearised polyhedron inside a trust region ([BV] ch. 4, [NW] ch. 18).
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import cvxpy as cp
+import numpy as np
+
+from polycorner.errors import SolverError
+from polycorner.minimisation.problem import Problem
+from polycorner.polyhedra.cones import unit_rows
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.strata import distances
+from polycorner.spaces.manifold import Array
+
+FIRST_RADIUS, LEAST_RADIUS = 0.25, 1e-9
+PENALTY = 10.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """The convex programme of one step, its data left open as cvxpy parameters.
+
+    ``minimise g.d + |R d|^2 / 2 + penalty * (slack)`` subject to ``A d + b + slack >= 0``,
+    ``C d + c = excess``, ``|d_i| <= radius``: slack is what the linearised set is missed by.
+    """
+
+    step: cp.Variable
+    inequality: tuple[cp.Parameter, cp.Parameter]
+    equation: tuple[cp.Parameter, cp.Parameter]
+    gradient: cp.Parameter
+    root: cp.Parameter
+    radius: cp.Parameter
+    penalty: cp.Parameter
+    programme: cp.Problem
+    contacts: cp.Constraint | None
+
+    @classmethod
+    def state(cls, n: int, inequalities: int, equations: int) -> "Model":
+        """State the programme for ``n`` coordinates."""
+        step = cp.Variable(n)
+        gradient, root, radius = cp.Parameter(n), cp.Parameter((n, n)), cp.Parameter(nonneg=True)
+        penalty = cp.Parameter(nonneg=True)
+        a, b = cp.Parameter((max(inequalities, 1), n)), cp.Parameter(max(inequalities, 1))
+        c, h = cp.Parameter((max(equations, 1), n)), cp.Parameter(max(equations, 1))
+        slack, excess = (
+            cp.Variable(max(inequalities, 1), nonneg=True),
+            cp.Variable(max(equations, 1)),
+        )
+        cost = gradient @ step + cp.sum_squares(root @ step) / 2
+        rules = [cp.norm_inf(step) <= radius]
+        contacts = None
+        if inequalities:
+            contacts = a @ step + b + slack >= 0
+            rules.append(contacts)
+            cost += penalty * cp.sum(slack)
+        if equations:
+            rules.append(c @ step + h == excess)
+            cost += penalty * cp.norm1(excess)
+        programme = cp.Problem(cp.Minimize(cost), rules)
+        return cls(step, (a, b), (c, h), gradient, root, radius, penalty, programme, contacts)
+
+    def solve(self) -> tuple[Array, Array] | None:
+        """Return the step and the multipliers of the inequalities, or None if there is no step."""
+        if cp.CLARABEL not in cp.installed_solvers():
+            msg = "cvxpy does not find the solver Clarabel; install the package clarabel"
+            raise SolverError(msg)
+        with warnings.catch_warnings():
+            # An inaccurate step is as good as any: it is taken only if the merit falls.
+            warnings.simplefilter("ignore", UserWarning)
+            try:
+                self.programme.solve(solver=cp.CLARABEL)
+            except cp.error.SolverError:
+                return None  # numerical failure on this step's data
+        if self.step.value is None:
+            return None
+        duals = np.zeros(0) if self.contacts is None else np.asarray(self.contacts.dual_value)
+        return np.asarray(self.step.value), duals
+
+
+def sequential_convex(
+    problem: Problem, piece: Piece, q: Array, limit: int
+) -> tuple[Array, int, bool]:
+    """Return the last point, the number of programmes solved, and whether the steps died out.
+
+    Rows are scaled to unit gradients and the energy to its own size.  A step is accepted when
+    energy plus penalty falls, else the trust region shrinks; the penalty grows when the
+    multipliers come near it.
+    """
+    kept = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
+    count, scales = len(piece), problem.scales
+    model = Model.state(problem.dimension, count, len(kept) - count)
+    values, gradients, hessians = problem.evaluate(q, 2)
+    size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
+    duals = np.zeros(count)
+    penalty, radius, idle = PENALTY, FIRST_RADIUS, 0
+    for iteration in range(1, limit + 1):
+        lengths = np.linalg.norm(gradients[kept], axis=1)
+        lengths[lengths == 0] = 1.0
+        rows = gradients[kept] / lengths[:, None]
+        weights = _weights(rows, gradients[-1] / size, duals)
+        penalty = max(penalty, 3 * float(abs(weights).max(initial=0.0)))
+        merit = _merit(values, gradients, kept, count, size, penalty)
+        _load(model, values, gradients, kept, lengths, size, count, radius)
+        curvature = hessians[-1] / size
+        for row, length, weight in zip(kept, lengths, weights, strict=True):
+            curvature = curvature - weight / length * hessians[row]
+        model.root.value, model.penalty.value = _square_root(curvature), penalty
+        solved = model.solve() if np.isfinite(curvature).all() else None
+        if solved is None:
+            return q, iteration, False
+        step, duals = solved
+        trial = _corrected(problem, q + step * scales, kept, count)
+        after = problem.evaluate(trial, 2)
+        new_merit = _merit(after[0], after[1], kept, count, size, penalty)
+        reach = float(abs(step).max())
+        gained = merit - new_merit
+        idle = idle + 1 if abs(gained) <= 1e-13 * (1 + abs(merit)) else 0
+        if np.isfinite(new_merit) and gained >= -1e-14 * (1 + abs(merit)):
+            q, (values, gradients, hessians) = trial, after
+            radius = min(2 * radius, 1.0) if reach > 0.9 * radius else radius
+            if reach < 1e-7 or idle > 1:
+                return q, iteration, True
+        else:
+            radius = 0.25 * min(radius, reach)
+        if radius < LEAST_RADIUS:
+            return q, iteration, True
+    return q, limit, False
+
+
+def _corrected(problem: Problem, trial: Array, kept: list[int], count: int) -> Array:
+    """Return a trial point moved, to first order, onto the functions it fails.
+
+    Without this second-order correction the curvature of the constraints makes every long step
+    along them look bad ([NW] sec. 15.5, the Maratos effect).
+    """
+    values, gradients = problem.evaluate(trial, 1)
+    away = distances(values[kept], gradients[kept])
+    failed = np.flatnonzero(np.concatenate([away[:count] < 0, away[count:] != 0]))
+    if not failed.size or not np.isfinite(away[failed]).all():
+        return trial
+    rows = unit_rows(gradients[kept][failed])
+    correction = np.linalg.lstsq(rows, -away[failed], rcond=1e-8)[0]
+    return np.asarray(trial + correction * problem.scales)
+
+
+def _weights(rows: Array, slope: Array, duals: Array) -> Array:
+    """Return multipliers of all rows: least squares over equations and contacts that push."""
+    count = len(duals)
+    chosen = [*np.flatnonzero(duals > 1e-6).tolist(), *range(count, len(rows))]
+    weights = np.zeros(len(rows))
+    if chosen:
+        weights[chosen] = np.linalg.lstsq(rows[chosen].T, slope, rcond=1e-8)[0]
+    weights[:count] = np.maximum(weights[:count], 0.0)
+    return weights
+
+
+def _load(
+    model: Model,
+    values: Array,
+    gradients: Array,
+    kept: list[int],
+    lengths: Array,
+    size: float,
+    count: int,
+    radius: float,
+) -> None:
+    rows, offsets = gradients[kept] / lengths[:, None], values[kept] / lengths
+    if count:
+        model.inequality[0].value, model.inequality[1].value = rows[:count], offsets[:count]
+    if len(kept) > count:
+        model.equation[0].value, model.equation[1].value = rows[count:], offsets[count:]
+    model.gradient.value, model.radius.value = gradients[-1] / size, radius
+
+
+def _merit(
+    values: Array, gradients: Array, kept: list[int], count: int, size: float, penalty: float
+) -> float:
+    away = distances(values[kept], gradients[kept])
+    short = np.maximum(-away[:count], 0.0).sum() + abs(away[count:]).sum()
+    return float(values[-1] / size + penalty * short)
+
+
+def _square_root(matrix: Array) -> Array:
+    """Return ``R`` with ``R^T R`` the nearest safely positive form."""
+    values, vectors = np.linalg.eigh(matrix)
+    floor = 1e-6 * max(1.0, abs(values).max())
+    return np.asarray(np.sqrt(np.maximum(values, floor))[:, None] * vectors.T)

@@ -1,0 +1,1 @@
+"""Equal hard disks on a flat torus."""

@@ -1,0 +1,358 @@
+"""Systems of the mechanics textbook, small enough for closed forms.
+
+Each function returns a :class:`~polycorner.motion.system.System`, in metres, kilograms and seconds.
+Unless said otherwise masses, radii of balls and the length of the pendulum are 1.
+
+==================  ====================================================================
+inclines            ``x`` points down the slope, ``y`` away from it, at the angle ``angle``
+belts               the substrate moves with the speed ``belt`` along ``x``
+turns in the plane  positive anticlockwise, from ``x`` to ``y``
+``a``, ``b``        turns of a ball; rolling without slip makes ``x' = r a'``, ``y' = r b'``
+==================  ====================================================================
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from polycorner.motion.convex_sets import ConvexSet
+from polycorner.motion.system import Friction, System, velocities
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.spaces.manifold import Manifold
+
+if TYPE_CHECKING:
+    import sympy
+
+GRAVITY = 9.81  # m/s^2
+END = 1000.0  # where planes end, in m
+Point = tuple[float, float]
+
+
+def bouncing_ball(restitution: float = 1.0) -> System:
+    """Return a point at the height ``y >= 0`` that falls and bounces off a ``floor``.
+
+    Dropped from ``h`` it lands after ``t = sqrt(2 h / g)``.  With ``e = 1`` it is back after
+    ``2 t``, with ``e < 1`` it comes to rest after ``t (1 + e) / (1 - e)``, having bounced
+    infinitely often.
+    """
+    M = Manifold.euclidean("y")
+    (y,), (v,) = M.symbols, velocities(M)
+    return System(Polyhedron(M, {"floor": y}), v**2 / 2, GRAVITY * y, restitution=restitution)
+
+
+def sliding_block(
+    static: ConvexSet,
+    dynamic: ConvexSet | None = None,
+    *,
+    angle: float = 0.0,
+    belt: float = 0.0,
+    stiffness: float = 0.0,
+) -> System:
+    """Return a block that slides on an incline or a belt, in ``x`` and ``y``, up to a ``stop``.
+
+    Its load is known, ``g cos(angle)``; friction acts in two directions, and a spring of the given
+    ``stiffness`` may hold the block at ``x = 0``.  With Coulomb's disc the block stays where
+    ``tan(angle) <= mu``, and slides down with ``g (sin(angle) - mu cos(angle))``.
+    """
+    M = Manifold.euclidean("x y")
+    (x, _), (vx, vy) = M.symbols, velocities(M)
+    load = GRAVITY * math.cos(angle)
+    table = Friction("table", (vx - belt, vy), static, (load,), dynamic)
+    return System(
+        Polyhedron(M, {"stop": END - x}),
+        (vx**2 + vy**2) / 2,
+        stiffness * x**2 / 2 - GRAVITY * math.sin(angle) * x,
+        friction=(table,),
+    )
+
+
+def ball_on_plane(
+    sliding: ConvexSet, rolling: ConvexSet | None = None, *, angle: float = 0.0, belt: float = 0.0
+) -> System:
+    """Return a solid ball that slides and rolls on a plane, in ``x``, ``y``, ``a``, ``b``.
+
+    Its load is known, ``g cos(angle)``.  ``rolling`` resists the turns: torques per radius and
+    load.  Down an incline the ball rolls with ``5/7 g sin(angle)``, without slip while
+    ``tan(angle) <= 7/2 mu``; pushed without spin it ends up rolling at ``5/7`` of its speed.
+    """
+    M = Manifold.euclidean("x y a b")
+    (x, _, _, _), (vx, vy, va, vb) = M.symbols, velocities(M)
+    load = GRAVITY * math.cos(angle)
+    slip = (vx - va - belt, vy - vb)
+    friction = [Friction("plane", slip, sliding, (load,))]
+    if rolling is not None:
+        turning = (va, vb)
+        friction.append(Friction("rolling", turning, rolling, (load,), kind="rolling"))
+    return System(
+        Polyhedron(M, {"stop": END - x}),
+        (vx**2 + vy**2) / 2 + (va**2 + vb**2) / 5,
+        -GRAVITY * math.sin(angle) * x,
+        friction=tuple(friction),
+    )
+
+
+def thrown_ball(friction: ConvexSet, restitution: float = 0.0) -> System:
+    """Return a solid ball that spins in the plane and bounces off a rough ``floor``; ``x y a``.
+
+    An impact at the speed ``w`` with the slip ``s = x' - r a'`` changes ``x'`` by ``-2/7 s`` if
+    that needs no more than ``mu (1 + e) w``, else by ``mu (1 + e) w`` against the slip.
+    """
+    M = Manifold.euclidean("x y a")
+    (_, y, _), (vx, vy, va) = M.symbols, velocities(M)
+    rough = Friction("rough", (vx - va,), friction, "floor")
+    return System(
+        Polyhedron(M, {"floor": y - 1}),
+        (vx**2 + vy**2) / 2 + va**2 / 5,
+        GRAVITY * y,
+        friction=(rough,),
+        restitution=restitution,
+    )
+
+
+def wall_pendulum(wall: float = 0.0, restitution: float = 1.0) -> System:
+    """Return a pendulum at the angle ``theta >= wall`` from its lowest place; ``|wall| < pi / 2``.
+
+    The wall is vertical and hit by the bob.  Amplitudes and periods follow from the energy, which
+    an impact at the angular speed ``w`` lowers by ``(1 - e^2) (l w)^2 / 2``.
+    """
+    import sympy
+
+    M = Manifold.euclidean("theta")
+    (theta,), (w,) = M.symbols, velocities(M)
+    return System(
+        Polyhedron(M, {"wall": sympy.sin(theta) - math.sin(wall)}),
+        w**2 / 2,
+        -GRAVITY * sympy.cos(theta),
+        restitution=restitution,
+    )
+
+
+def dome() -> System:
+    """Return a point on a smooth round ``dome`` about the origin, in ``x`` and ``y``.
+
+    Let go at the angle ``c`` from the top it leaves the dome where ``cos(angle) = 2/3 cos(c)``.
+    """
+    import sympy
+
+    M = Manifold.euclidean("x y")
+    (x, y), (vx, vy) = M.symbols, velocities(M)
+    gap = sympy.sqrt(x**2 + y**2) - 1
+    return System(Polyhedron(M, {"dome": gap}), (vx**2 + vy**2) / 2, GRAVITY * y)
+
+
+def bead_in_ring() -> System:
+    """Return a bead that slides without friction or weight inside a ``ring``, in ``x`` and ``y``.
+
+    Once it is on the ring it goes round at the speed it has along it.
+    """
+    import sympy as sp
+
+    M = Manifold.euclidean("x y")
+    (x, y), (vx, vy) = M.symbols, velocities(M)
+    D = Polyhedron(M, {"ring": 1 - sp.sqrt(x**2 + y**2)})
+    return System(D, (vx**2 + vy**2) / 2, sp.Integer(0))
+
+
+def row_of_balls(masses: Sequence[float] = (1.0, 1.0, 1.0), restitution: float = 1.0) -> System:
+    """Return balls in a row, on a line without forces: ``x_1 < x_2 < ...``.
+
+    Contacts that close together obey Newton's law together ([Moreau]): the first of three equal
+    balls hits two at rest that touch, and ``(1, 0, 0)`` becomes ``(-1, 2, 2) / 3``.  If they are
+    apart, however little, the impacts follow each other and ``(0, 0, 1)`` comes out.
+    """
+    M = Manifold.euclidean(" ".join(f"x{i + 1}" for i in range(len(masses))))
+    gaps = {f"{a.name}{b.name}": b - a - 1 for a, b in pairwise(M.symbols)}
+    kinetic = sum(m * v**2 for m, v in zip(masses, velocities(M), strict=True)) / 2
+    return System(Polyhedron(M, gaps), kinetic, restitution=restitution)
+
+
+def body_on_plane(
+    corners: Sequence[Point],
+    inertia: float,
+    friction: ConvexSet,
+    *,
+    restitution: float = 0.0,
+    angle: float = 0.0,
+    belt: float = 0.0,
+) -> System:
+    """Return a rigid body of mass 1 that touches a plane with its corners; ``x y theta``.
+
+    ``corners`` are seen from the centre of mass, ``inertia`` is about it.  Corner ``i`` has the
+    contact ``foot<i>``, from 1, and friction of its own.
+    """
+    import sympy
+
+    M = Manifold.euclidean("x y theta")
+    (x, y, theta), (vx, vy, w) = M.symbols, velocities(M)
+    gaps, rough = {}, []
+    for i, (along, across) in enumerate(corners, start=1):
+        up = along * sympy.sin(theta) + across * sympy.cos(theta)
+        gaps[f"foot{i}"] = y + up
+        rough.append(Friction(f"grip{i}", (vx - up * w - belt,), friction, f"foot{i}"))
+    return System(
+        Polyhedron(M, gaps),
+        (vx**2 + vy**2 + inertia * w**2) / 2,
+        GRAVITY * (math.cos(angle) * y - math.sin(angle) * x),
+        friction=tuple(rough),
+        restitution=restitution,
+    )
+
+
+def box_on_plane(
+    half_width: float,
+    half_height: float,
+    friction: ConvexSet,
+    *,
+    restitution: float = 0.0,
+    angle: float = 0.0,
+    belt: float = 0.0,
+) -> System:
+    """Return a box on its two lower corners, ``foot1`` at ``-half_width`` and ``foot2``.
+
+    It slides as a block does, without tipping where ``mu < half_width / half_height``.  A box that
+    rocks changes feet without restitution with ``w+ / w- = 1 - 3/2 sin(c)^2``, ``tan(c)`` the ratio
+    of width to height ([Housner]): what hits sticks, what stood lifts off, and the angular momentum
+    about the new foot stays.
+    """
+    feet = [(-half_width, -half_height), (half_width, -half_height)]
+    inertia = (half_width**2 + half_height**2) / 3
+    options = {"restitution": restitution, "angle": angle, "belt": belt}
+    return body_on_plane(feet, inertia, friction, **options)
+
+
+def rimless_wheel(
+    spokes: int, friction: ConvexSet, *, inertia: float = 0.1, angle: float = 0.0
+) -> System:
+    """Return a wheel of unit spokes, ``2 c = 2 pi / spokes`` apart, that falls from foot to foot.
+
+    Angular momentum about the new foot stays: ``w+ / w- = (I + cos(2 c)) / (I + 1)``.  At
+    ``theta = 0`` it stands on its first and last foot; down a slope ``theta`` falls.
+    """
+    half = math.pi / spokes
+    turns = [half - math.pi / 2 + 2 * half * i for i in range(spokes)]
+    feet = [(math.cos(turn), math.sin(turn)) for turn in turns]
+    return body_on_plane(feet, inertia, friction, angle=angle)
+
+
+def table(
+    friction: ConvexSet,
+    *,
+    legs: Sequence[Point] = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)),
+    height: float = 1.0,
+    inertia: float = 1.0,
+    angle: float = 0.0,
+) -> System:
+    """Return a table that stands on legs, for small tilts; ``x y z alpha beta gamma``.
+
+    ``legs`` are places ``(x, y)`` of the feet below the centre of mass, which is at ``height``;
+    ``alpha``, ``beta``, ``gamma`` turn about ``x``, ``y`` and ``z``, which is normal to the plane.
+    Four legs and more have more contacts than the plane can tell apart: their forces are not
+    determined, their sum and torque are.
+    """
+    M = Manifold.euclidean("x y z alpha beta gamma")
+    (x, _, z, alpha, beta, _), (vx, vy, vz, va, vb, vc) = M.symbols, velocities(M)
+    gaps, rough = {}, []
+    for i, (a, b) in enumerate(legs, start=1):
+        gaps[f"leg{i}"] = z + b * alpha - a * beta
+        slip = (vx - height * vb - b * vc, vy + height * va + a * vc)
+        rough.append(Friction(f"grip{i}", slip, friction, f"leg{i}"))
+    return System(
+        Polyhedron(M, gaps),
+        (vx**2 + vy**2 + vz**2 + inertia * (va**2 + vb**2 + vc**2)) / 2,
+        GRAVITY * (math.cos(angle) * z - math.sin(angle) * x),
+        friction=tuple(rough),
+    )
+
+
+def stack(
+    count: int,
+    friction: ConvexSet,
+    *,
+    half_width: float = 1.0,
+    half_height: float = 0.5,
+    angle: float = 0.0,
+) -> System:
+    """Return boxes on top of each other, the lowest on a plane; ``x1 y1 t1 x2 ...``.
+
+    Each stands with two corners, ``left<i>`` and ``right<i>``, on the top face of the one below.
+    """
+    import sympy
+
+    M = Manifold.euclidean(" ".join(f"x{i + 1} y{i + 1} t{i + 1}" for i in range(count)))
+    q, v = M.symbols, velocities(M)
+    gaps, rough = {}, []
+    for i in range(count):
+        x, y, t = q[3 * i : 3 * i + 3]
+        for side, along in (("left", -half_width), ("right", half_width)):
+            name = f"{side}{i + 1}"
+            foot_x = x + along * sympy.cos(t) + half_height * sympy.sin(t)
+            foot_y = y + along * sympy.sin(t) - half_height * sympy.cos(t)
+            if i:
+                foot_x, foot_y = _seen_from(q[3 * i - 3 : 3 * i], foot_x, foot_y)
+            gaps[name] = foot_y - (half_height if i else 0)
+            slip = sum(sympy.diff(foot_x, a) * b for a, b in zip(q, v, strict=True))
+            rough.append(Friction(f"grip {name}", (slip,), friction, name))
+    masses = [1, 1, (half_width**2 + half_height**2) / 3] * count
+    pull = (-GRAVITY * math.sin(angle), GRAVITY * math.cos(angle), 0)
+    return System(
+        Polyhedron(M, gaps),
+        sum(m * w**2 for m, w in zip(masses, v, strict=True)) / 2,
+        sum(force * a for force, a in zip(pull * count, q, strict=True)),
+        friction=tuple(rough),
+    )
+
+
+def _seen_from(
+    box: "Sequence[sympy.Symbol]", x: "sympy.Expr", y: "sympy.Expr"
+) -> "tuple[sympy.Expr, sympy.Expr]":
+    """Return a point in coordinates that move with a box; they change with the velocity seen."""
+    import sympy
+
+    x0, y0, t = box
+    cos, sin = sympy.cos(t), sympy.sin(t)
+    return cos * (x - x0) + sin * (y - y0), cos * (y - y0) - sin * (x - x0)
+
+
+def groove(friction: ConvexSet, *, slope: float = math.pi / 4) -> System:
+    """Return a disc in a groove whose walls ``left`` and ``right`` rise at ``slope``; ``x y a``.
+
+    Two contacts with friction are four forces on three coordinates: the disc may be wedged.
+    Without friction each wall carries ``g / (2 cos(slope))``.
+    """
+    M = Manifold.euclidean("x y a")
+    (x, y, _), (vx, vy, va) = M.symbols, velocities(M)
+    gaps, rough = {}, []
+    for name, sign in (("left", 1), ("right", -1)):
+        sin, cos = sign * math.sin(slope), math.cos(slope)
+        gaps[name] = sin * x + cos * y - 1
+        slip = cos * vx - sin * vy - va
+        rough.append(Friction(f"grip {name}", (slip,), friction, name))
+    return System(
+        Polyhedron(M, gaps),
+        (vx**2 + vy**2) / 2 + va**2 / 4,
+        GRAVITY * y,
+        friction=tuple(rough),
+    )
+
+
+def pile_of_discs() -> System:
+    """Return two smooth discs side by side between walls and a third on top; ``x1 y1 x2 ...``.
+
+    Seven contacts push on six coordinates.  The upper disc loads each lower one with
+    ``g / sqrt(3)``, the floor carries ``3/2 g`` under each; what the lower two exert on each other
+    is not determined, and the walls carry ``g / (2 sqrt(3))`` more than that.
+    """
+    import sympy
+
+    M = Manifold.euclidean("x1 y1 x2 y2 x3 y3")
+    (x1, y1, x2, y2, x3, y3), v = M.symbols, velocities(M)
+    gaps = {"floor1": y1 - 1, "floor2": y2 - 1}
+    gaps |= {"left": x1 - 1, "right": 3 - x2}
+    for name, dx, dy in (
+        ("12", x2 - x1, y2 - y1),
+        ("13", x3 - x1, y3 - y1),
+        ("23", x3 - x2, y3 - y2),
+    ):
+        gaps[name] = sympy.sqrt(dx**2 + dy**2) - 2
+    return System(Polyhedron(M, gaps), sum(w**2 for w in v) / 2, GRAVITY * (y1 + y2 + y3))

@@ -1,0 +1,1 @@
+"""Potential wells on a line: U, half-U and half-V."""

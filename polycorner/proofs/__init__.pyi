@@ -1,0 +1,6 @@
+from .proof import Proof, prove
+
+__all__ = [
+    "Proof",
+    "prove",
+]

@@ -1,0 +1,106 @@
+"""What a proof is asked for, checked at the door."""
+
+from collections.abc import Mapping
+from itertools import product
+from math import isfinite
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.enclosures import Formulas
+from polycorner.intervals.tapes import Box
+from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.problem import Problem
+
+CHECK_BITS = 128
+SAME = 1e-5  # how far, relatively, a value may lie from what it was when it was certified
+
+Interval = tuple[float, float]
+
+
+def check_whole(argument: str, value: Any, most: int) -> None:
+    """Refuse anything but a whole number from 1 to ``most``."""
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not whole or not 1 <= value <= most:
+        msg = f"{argument}: expected a whole number from 1 to {most}; got {value!r}"
+        raise ValueError(msg)
+
+
+def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
+    """Refuse a certificate whose functions no longer have the values it was made with.
+
+    The kernels that a certificate computes with are bound once; the formulas are read anew.
+    """
+    problem = certificate.problem
+    point = certificate.point
+    seen, gradients = problem.evaluate(point, 1)
+    rows = range(problem.rows)
+    with precision(CHECK_BITS):
+        now = formulas.values(Box([ball(x) for x in point.tolist()]), rows)
+    sizes = 1 + abs(seen) + np.nan_to_num(abs(gradients).max(axis=1), nan=np.inf, posinf=np.inf)
+    for name, before, value, size in zip(formulas.names, seen, now, sizes, strict=True):
+        if not (isfinite(before) and value.is_finite() and isfinite(size)):
+            continue
+        if abs(float(value.mid()) - before) > SAME * size + float(value.rad()):
+            msg = (
+                f"certificate: expected the problem it was made for; {name} was {before:g} at its "
+                f"point and is {float(value.mid()):g} now"
+            )
+            raise ValueError(msg)
+
+
+def check_parameters(problem: Problem, parameters: Any) -> tuple[dict[str, Interval], list[float]]:
+    """Return the box of parameters, and their values in the problem."""
+    if parameters is None:
+        return {}, []
+    if not isinstance(parameters, Mapping) or not parameters:
+        msg = f"parameters: expected a mapping from names to (lower, upper); got {parameters!r}"
+        raise TypeError(msg)
+    known = _bound(problem)
+    unknown = [str(name) for name in parameters if name not in known]
+    if unknown:
+        listed = ", ".join(known) or "none, since no function has a parameter"
+        msg = f"parameters: expected names among {listed}; got {', '.join(unknown)}"
+        raise ValueError(msg)
+    sides = {name: _side(name, side) for name, side in parameters.items()}
+    for name in sides:
+        if len(known[name]) > 1:
+            values = ", ".join(f"{value:g}" for value in sorted(known[name]))
+            msg = f"parameters: expected one value of {name} in all functions; it is {values}"
+            raise ValueError(msg)
+    return sides, [min(known[name]) for name in sides]
+
+
+def _bound(problem: Problem) -> dict[str, set[float]]:
+    """Return the values that every parameter of the problem's functions has."""
+    d = problem.polyhedron
+    found: dict[str, set[float]] = {}
+    for f in (*d.functions, *d.equations, problem.energy):
+        for name, value in zip(f.family.parameters, f.parameters, strict=True):
+            found.setdefault(name, set()).add(value)
+    return found
+
+
+def _side(name: str, side: Any) -> Interval:
+    pair = isinstance(side, tuple | list | np.ndarray) and len(side) == 2
+    if not pair or not all(isinstance(x, Real) and not isinstance(x, bool) for x in side):
+        msg = f"parameters: expected {name} as a pair of numbers (lower, upper); got {side!r}"
+        raise TypeError(msg)
+    lower, upper = float(side[0]), float(side[1])
+    if not (isfinite(lower) and isfinite(upper) and lower < upper):
+        msg = f"parameters: expected finite lower < upper for {name}; got ({lower:g}, {upper:g})"
+        raise ValueError(msg)
+    return lower, upper
+
+
+def check_domain(formulas: Formulas, sides: Mapping[str, Interval]) -> None:
+    """Refuse a box of parameters with a corner at which a function has no value anywhere."""
+    with precision(CHECK_BITS):
+        for corner in product(*sides.values()):
+            name = formulas.undefined([ball(x) for x in corner])
+            if name:
+                place = ", ".join(f"{p} = {x:g}" for p, x in zip(sides, corner, strict=True))
+                msg = f"parameters: expected values for which {name} is defined; got {place}"
+                raise ValueError(msg)

@@ -1,0 +1,176 @@
+"""What a certificate claims, made ready for proof: the face, its symmetries, and a start."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.enclosures import Doubt, Formulas, SmoothForms
+from polycorner.intervals.tapes import Box
+from polycorner.minimisation.certificate import Certificate
+from polycorner.polyhedra.cones import Rows, unit_rows
+from polycorner.proofs.findings import Claim, Finding, Status
+from polycorner.proofs.invariance import (
+    Generator,
+    annihilated,
+    generator,
+    slope_bounds,
+    translations,
+)
+from polycorner.proofs.kkt import FIRST_BITS, System
+
+if TYPE_CHECKING:
+    from polycorner.intervals.balls import Ball
+    from polycorner.spaces.manifold import Array
+
+MOST_SUBSETS, MOST_FACES = 1000, 8  # looked at where gradients are dependent
+DEPENDENT = 1e-6  # sine of the angle at which a field adds no direction of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A claim, unknowns to start from, and declared fields that are no symmetries.
+
+    Attributes
+    ----------
+    claim : Claim
+        What is to be proved.
+    start : list of Ball
+        Approximate unknowns of its system.
+    refused : Finding or None
+        Why a declared field is not used.
+    """
+
+    claim: Claim
+    start: "list[Ball]"
+    refused: Finding | None
+
+
+def faces(certificate: Certificate) -> Iterator[tuple[int, ...]]:
+    """Return sets of active functions that may carry the energy, the likeliest first.
+
+    Where gradients are independent there is one: the functions whose multipliers are not zero.
+    Where they are dependent, every independent set with positive multipliers is one, and the
+    functions outside it are then looked at as if they were not active.
+    """
+    analysis = certificate.analysis
+    active, k = analysis.active, len(analysis.active)
+    small = analysis.local.small
+    if analysis.independent:
+        values = analysis.multipliers.values[:k]
+        yield tuple(i for i, value in zip(active, values, strict=True) if abs(value) > small)
+        return
+    slope, units = analysis.local.gradients[-1], unit_rows(analysis.gradients)
+    found = 0
+    sections = range(k, len(units))
+    for size in range(min(k, units.shape[1]), -1, -1):
+        for chosen in islice(combinations(range(k), size), MOST_SUBSETS):
+            rows = Rows(units[[*chosen, *sections]], certificate.rank_tolerance)
+            if rows.independent and _carries(rows, size, slope, small) and found < MOST_FACES:
+                found += 1
+                yield tuple(active[i] for i in chosen)
+    if not found:
+        yield tuple(active[i] for i in analysis.strong_positions)
+
+
+def _carries(rows: Rows, size: int, slope: "Array", small: float) -> bool:
+    """Whether the energy's gradient is a combination of rows, the first ``size`` of them > 0."""
+    weights = rows.weights(slope) if len(rows.units) else np.empty(0)
+    rest = slope - weights @ rows.units
+    return bool((weights[:size] > small).all() and abs(rest).max() <= small)
+
+
+def pose_claim(
+    certificate: Certificate,
+    face: tuple[int, ...],
+    declared: Sequence[Generator],
+    formulas: Formulas,
+    parameters: Sequence[float] = (),
+) -> Posed | Doubt:
+    """Pose the KKT system of a face at a certificate's point, with gauges for its symmetries."""
+    problem = certificate.problem
+    m = problem.inequalities
+    rows = (*face, *range(m, problem.rows - 1))
+    point = tuple(certificate.point.tolist())
+    with precision(FIRST_BITS):
+        box = Box([ball(x) for x in (*point, *parameters)])
+        forms = formulas.smooth(box, (*rows, problem.rows - 1))
+        if isinstance(forms, Doubt):
+            return forms
+        kept, refused = _invariant(forms, declared, box)
+        for basis in translations(forms):
+            kept.append(generator(problem.polyhedron.manifold, basis))
+        fields, gauges = _independent(kept, box, problem.scales)
+        system = System(formulas, rows, gauges, point, _units(certificate, rows, gauges))
+        multipliers = _multipliers(certificate, rows)
+        start = [ball(x) for x in (*point, *multipliers, *[0.0] * len(gauges))]
+    return Posed(Claim(problem, system, face, fields), start, refused)
+
+
+def _units(
+    certificate: Certificate, rows: Sequence[int], gauges: Sequence[Sequence[float]]
+) -> tuple[float, ...]:
+    """Return the units of coordinates and multipliers; see :class:`System`."""
+    problem = certificate.problem
+    _, gradients = problem.evaluate(certificate.point, 1)
+    normals = [*gradients[list(rows)], *(np.array(gauge) * problem.scales for gauge in gauges)]
+    sizes = [float(np.linalg.norm(normal)) for normal in normals]
+    pull = certificate.analysis.local.reference
+    multipliers = [pull / size if 0 < size < np.inf else pull for size in sizes]
+    finite = [unit if 0 < unit < np.inf else 1.0 for unit in multipliers]
+    return (*problem.scales.tolist(), *finite)
+
+
+def _multipliers(certificate: Certificate, rows: Sequence[int]) -> list[float]:
+    _, gradients = certificate.problem.evaluate(certificate.point, 1)
+    if not rows or not np.isfinite(gradients).all():
+        return [0.0] * len(rows)
+    found, *_ = np.linalg.lstsq(gradients[list(rows)].T, gradients[-1])
+    return list(found.tolist())
+
+
+def _invariant(
+    forms: SmoothForms, declared: Sequence[Generator], box: Box
+) -> tuple[list[Generator], Finding | None]:
+    """Return the declared fields along which nothing changes, and what is wrong with another."""
+    kept: list[Generator] = []
+    refused: Finding | None = None
+    for field in declared:
+        if all(annihilated(forms, field)):
+            kept.append(field)
+        elif any(slope != 0 for slope in slope_bounds(forms, field, box)):
+            reason = f"energy or active functions change along {field}"
+            refused = Finding(Status.FAILED, reason)
+        else:
+            reason = f"exact algebra does not show that nothing changes along {field}"
+            refused = refused or Finding(Status.UNDECIDED, reason)
+    return kept, refused
+
+
+def _independent(
+    fields: Sequence[Generator], box: Box, scales: "Array"
+) -> tuple[tuple[Generator, ...], tuple[tuple[float, ...], ...]]:
+    """Return fields with independent vectors at the point, and a normal for each."""
+    chosen: list[Generator] = []
+    units: list[Array] = []
+    gauges: list[tuple[float, ...]] = []
+    for field in fields:
+        values = field.at(box.hull)
+        if isinstance(values, Doubt):
+            continue
+        vector = np.array([float(x.mid()) for x in values]) / scales
+        size = float(np.linalg.norm(vector))
+        if not 0 < size < np.inf:
+            continue
+        rest = vector / size
+        for unit in units:
+            rest = rest - (rest @ unit) * unit
+        if np.linalg.norm(rest) > DEPENDENT:
+            chosen.append(field)
+            units.append(rest / np.linalg.norm(rest))
+            normal = vector / scales
+            gauges.append(tuple((normal / abs(normal).max()).tolist()))
+    return tuple(chosen), tuple(gauges)

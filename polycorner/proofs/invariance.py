@@ -1,0 +1,334 @@
+"""Directions along which a problem is exactly invariant, by exact algebra.
+
+A vector field ``xi`` is a *generator* of a symmetry when ``sum xi_i df/dq_i`` is identically zero
+for the energy and for every function that holds the point.  That is an identity, which no
+evaluation in intervals can show; it is derived here by forward differentiation along ``xi`` in
+exact rational arithmetic, slopes being polynomials in the nodes of the functions' own graph.  What
+cancels there cancels for all arguments.  What does not may still be an identity that this algebra
+does not see: then the answer is "not shown".
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.formulas.programs import Graph
+from polycorner.intervals.balls import dot
+from polycorner.intervals.enclosures import Doubt, Formulas, SmoothForms, write
+from polycorner.intervals.tapes import Box, arguments, needed
+from polycorner.spaces.manifold import Manifold
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.intervals.balls import Ball
+
+# A sum of products of nodes: exponents are repetitions, and 1 is the empty product.
+Polynomial = dict[tuple[int, ...], Fraction]
+
+MOST_TERMS = 20_000
+
+
+class _TooLargeError(Exception):
+    """A polynomial has grown beyond what is worth expanding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Generator:
+    """A vector field on a manifold, given by one component for each coordinate.
+
+    Attributes
+    ----------
+    manifold : Manifold
+        Where it lives.
+    components : tuple of SmoothFunction
+        What it is; constants are functions, too.
+    """
+
+    manifold: Manifold
+    components: tuple[SmoothFunction, ...]
+
+    @cached_property
+    def _formulas(self) -> Formulas:
+        return Formulas(self.components, self.manifold)
+
+    def at(self, q: "Sequence[Ball]") -> "list[Ball] | Doubt":
+        """Return enclosures of the components on a box where the field is smooth, or a doubt."""
+        rows = range(len(self.components))
+        box = Box(q[: self.manifold.dimension])
+        forms = self._formulas.smooth(box, rows)
+        return forms if isinstance(forms, Doubt) else list(forms.evaluate(box, 0)[0])
+
+    def __str__(self) -> str:
+        """Return the field as a sum over coordinate directions."""
+        pairs = zip(self.manifold.names, self.components, strict=True)
+        terms = [_term(f.expression, name) for name, f in pairs]
+        return " + ".join(term for term in terms if term).replace("+ -", "- ")
+
+
+def _term(component: "sympy.Expr", name: str) -> str:
+    """Write ``component d/dname``; nothing where it is zero."""
+    import sympy
+
+    number = component.is_number
+    exact = sympy.Rational(component) if component.is_Float else component
+    if number and exact in {0, 1, -1}:
+        return {0: "", 1: f"d/d{name}", -1: f"-d/d{name}"}[int(exact)]
+    return f"{exact} d/d{name}" if number else f"({exact}) d/d{name}"
+
+
+def generator(manifold: Manifold, components: Iterable[Any]) -> Generator:
+    """Return the vector field with given components: numbers, expressions or functions."""
+    import sympy
+
+    fields = [
+        f
+        if isinstance(f, SmoothFunction)
+        else SmoothFunction(
+            name,
+            sympy.Rational(f.numerator, f.denominator) if isinstance(f, Fraction) else f,
+            manifold,
+        )
+        for name, f in zip(manifold.names, components, strict=True)
+    ]
+    return Generator(manifold, tuple(fields))
+
+
+def declared(manifold: Manifold, symmetry: Any) -> list[Generator]:
+    """Return the generators a user gave, checking them.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If one is no mapping from coordinate names and no sequence of ``n`` components.
+    """
+    if isinstance(symmetry, Mapping | str) or not isinstance(symmetry, Iterable):
+        msg = f"symmetry: expected a sequence of vector fields; got {symmetry!r}"
+        raise TypeError(msg)
+    return [_declared(manifold, field) for field in symmetry]
+
+
+def _declared(manifold: Manifold, field: Any) -> Generator:
+    names = ", ".join(manifold.names)
+    if isinstance(field, Mapping):
+        unknown = [str(name) for name in field if name not in manifold.names]
+        if unknown or not field:
+            msg = f"symmetry: expected components for some of {names}; got {', '.join(unknown)}"
+            raise ValueError(msg)
+        field = [field.get(name, 0) for name in manifold.names]
+    try:
+        components = list(field)
+    except TypeError as error:
+        msg = f"symmetry: expected a mapping or a sequence of components; got {field!r}"
+        raise TypeError(msg) from error
+    if len(components) != manifold.dimension:
+        msg = (
+            f"symmetry: expected {manifold.dimension} components, for {names}; "
+            f"got {len(components)}"
+        )
+        raise ValueError(msg)
+    return generator(manifold, components)
+
+
+def translations(forms: SmoothForms) -> list[list[Fraction]]:
+    """Return a basis of the constant vectors along which the functions visibly do not change.
+
+    Visibly: whatever enters a nonlinear operation is a linear form, with rational coefficients,
+    that the vector annihilates.
+    """
+    n = forms.dimension
+    zero = (Fraction(0),) * n
+    slopes: dict[int, tuple[Fraction, ...]] = {}
+    rows: set[tuple[Fraction, ...]] = set()
+    for a in needed(forms.graph, forms.outputs):
+        op, args = forms.graph.nodes[a]
+        children = [slopes[child] for child in arguments(forms.graph, a)]
+        slopes[a] = zero
+        if op == "var" and int(args[0]) < n:
+            slopes[a] = tuple(Fraction(int(k == args[0])) for k in range(n))
+        elif op in {"add", "sub"}:
+            sign = 1 if op == "add" else -1
+            slopes[a] = tuple(u + sign * v for u, v in zip(*children, strict=True))
+        elif op == "neg":
+            slopes[a] = tuple(-u for u in children[0])
+        elif op == "mul" and (factor := _factor(forms.graph, a)) is not None:
+            slopes[a] = tuple(factor[0] * u for u in slopes[factor[1]])
+        else:
+            rows.update(children)
+    rows.update(slopes[output] for output in forms.outputs)
+    return _null_space([list(row) for row in rows if any(row)], n)
+
+
+def _factor(graph: Graph, a: int) -> tuple[Fraction, int] | None:
+    """Return a rational factor of a product and the node of the other factor."""
+    u, v = arguments(graph, a)
+    for constant, other in ((u, v), (v, u)):
+        op, args = graph.nodes[constant]
+        if op == "const" and isinstance(args[0], Fraction):
+            return args[0], other
+    return None
+
+
+def _null_space(rows: list[list[Fraction]], n: int) -> list[list[Fraction]]:
+    """Return a basis of what rational rows annihilate, by elimination."""
+    pivots: list[int] = []
+    reduced: list[list[Fraction]] = []
+    for column in range(n):
+        found = next((row for row in rows if row[column]), None)
+        if found is None:
+            continue
+        rows = [row for row in rows if row is not found]
+        unit = [value / found[column] for value in found]
+        reduced = [_without(row, unit, column) for row in reduced]
+        rows = [_without(row, unit, column) for row in rows]
+        reduced.append(unit)
+        pivots.append(column)
+    basis = []
+    for free in (column for column in range(n) if column not in pivots):
+        vector = [Fraction(int(k == free)) for k in range(n)]
+        for pivot, row in zip(pivots, reduced, strict=True):
+            vector[pivot] = -row[free]
+        basis.append(vector)
+    return basis
+
+
+def _without(row: list[Fraction], unit: list[Fraction], column: int) -> list[Fraction]:
+    return [u - row[column] * v for u, v in zip(row, unit, strict=True)]
+
+
+def annihilated(forms: SmoothForms, field: Generator) -> list[bool]:
+    """Return for each function whether its slope along the field is shown to be zero."""
+    components = [write(forms.graph, f) for f in field.components]
+    slopes = _Slopes(forms.graph, components)
+    return [slopes.vanishes(output) for output in forms.outputs]
+
+
+def slope_bounds(forms: SmoothForms, field: Generator, box: Box) -> "list[Ball]":
+    """Return enclosures of the slopes of the functions along the field; none where it has edges."""
+    along = field.at(box.hull)
+    if isinstance(along, Doubt):
+        return []
+    _, gradients = forms.evaluate(box, 1)
+    return [dot(row[: len(along)], along) for row in gradients]
+
+
+class _Slopes:
+    """Derivatives along a vector field as polynomials in nodes."""
+
+    def __init__(self, graph: Graph, components: list[int]) -> None:
+        self.graph, self.components = graph, components
+        self._written: dict[int, Polynomial] = {}
+        self._slopes: dict[int, Polynomial] = {}
+
+    def vanishes(self, output: int) -> bool:
+        """Whether the slope of a node is identically zero; False where that is not seen."""
+        try:
+            return not self.slope(output)
+        except _TooLargeError:
+            return False
+
+    def written(self, a: int) -> Polynomial:
+        """Return a node as a polynomial in nodes that are no sums and no products."""
+        if a not in self._written:
+            self._written[a] = self._write(a)
+        return self._written[a]
+
+    def _write(self, a: int) -> Polynomial:
+        op, args = self.graph.nodes[a]
+        if op == "const" and isinstance(args[0], Fraction):
+            return {(): args[0]} if args[0] else {}
+        if op not in {"add", "sub", "neg", "mul"}:
+            return {(a,): Fraction(1)}
+        parts = [self.written(child) for child in arguments(self.graph, a)]
+        if op == "mul":
+            return _product(*parts)
+        return _sum(parts, op)
+
+    def slope(self, a: int) -> Polynomial:
+        """Return the derivative of a node along the field."""
+        if a not in self._slopes:
+            self._slopes[a] = self._slope(a)
+        return self._slopes[a]
+
+    def _slope(self, a: int) -> Polynomial:
+        op, args = self.graph.nodes[a]
+        if op == "var":
+            inside = int(args[0]) < len(self.components)
+            return self.written(self.components[int(args[0])]) if inside else {}
+        children = arguments(self.graph, a)
+        slopes = [self.slope(child) for child in children]
+        if not any(slopes):
+            return {}
+        if op in {"add", "sub", "neg"}:
+            return _sum(slopes, op)
+        if op in _DERIVATIVES:
+            twin, sign = _DERIVATIVES[op]
+            known = a if twin == op else self.graph.unary(twin, children[0])
+            return _product(slopes[0], _product({(): sign}, self.written(known)))
+        if op in {"mul", "div", "atan2", "log"}:
+            return self._rational_slope(op, a, children, slopes)
+        parts = [_product(slope, _opaque(a, k)) for k, slope in enumerate(slopes)]
+        return parts[0] if len(parts) == 1 else _sum(parts, "add")
+
+    def _rational_slope(
+        self, op: str, a: int, children: list[int], slopes: list[Polynomial]
+    ) -> Polynomial:
+        """Return the slope of a product, a quotient, an angle or a logarithm."""
+        if op == "log":
+            return _quotient(slopes[0], self.written(children[0]), a)
+        u, v = (self.written(child) for child in children)
+        first, second = _product(slopes[0], v), _product(u, slopes[1])
+        if op == "mul":
+            return _sum([first, second], "add")
+        bottom = _product(v, v)
+        if op == "atan2":
+            bottom = _sum([bottom, _product(u, u)], "add")
+        return _quotient(_sum([first, second], "sub"), bottom, a)
+
+
+# Functions whose derivative is, up to sign, a function of the same argument.
+_DERIVATIVES = {
+    "sin": ("cos", Fraction(1)),
+    "cos": ("sin", Fraction(-1)),
+    "exp": ("exp", Fraction(1)),
+    "sinh": ("cosh", Fraction(1)),
+    "cosh": ("sinh", Fraction(1)),
+}
+
+
+def _quotient(top: Polynomial, bottom: Polynomial, a: int) -> Polynomial:
+    """Return a quotient: a number where the one is a multiple of the other, else a symbol's."""
+    if top.keys() == bottom.keys() and top:
+        ratios = {top[monomial] / bottom[monomial] for monomial in top}
+        if len(ratios) == 1:
+            return {(): ratios.pop()}
+    return _product(top, _opaque(a, 0)) if top else {}
+
+
+def _opaque(a: int, position: int) -> Polynomial:
+    """Return the partial derivative of a node by an argument as a symbol of its own."""
+    return {(-1 - 3 * a - position,): Fraction(1)}
+
+
+def _sum(parts: list[Polynomial], op: str) -> Polynomial:
+    total = dict(parts[0])
+    if op == "neg":
+        return {monomial: -weight for monomial, weight in total.items()}
+    sign = 1 if op == "add" else -1
+    for monomial, weight in parts[1].items():
+        total[monomial] = total.get(monomial, Fraction(0)) + sign * weight
+    return {monomial: weight for monomial, weight in total.items() if weight}
+
+
+def _product(u: Polynomial, v: Polynomial) -> Polynomial:
+    if len(u) * len(v) > MOST_TERMS:
+        raise _TooLargeError
+    total: Polynomial = {}
+    for first, a in u.items():
+        for second, b in v.items():
+            monomial = tuple(sorted(first + second))
+            total[monomial] = total.get(monomial, Fraction(0)) + a * b
+    return {monomial: weight for monomial, weight in total.items() if weight}

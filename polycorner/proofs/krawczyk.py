@@ -1,0 +1,215 @@
+"""Krawczyk's test: boxes in which the KKT equations have exactly one solution.
+
+Without parameters, ``Y`` being near the inverse of the Jacobian at ``z0`` and ``J`` enclosing the
+Jacobian over ``z0 + W``,
+
+``K = -Y F(z0) + (I - Y J) W``
+
+inside the interior of ``W`` proves that there is exactly one solution in ``z0 + W``, that it lies
+in ``z0 + K``, and that every matrix in ``J`` is regular ([Krawczyk], [Neumaier] sec. 5.1, [Rump]).
+
+With parameters ``p = p0 + delta`` the same is said of the remainder ``w`` beside a predictor
+``z0 + Z1 delta``.  There ``F(z0)`` becomes ``F`` along the predictor: its Taylor polynomial of
+first order at ``delta = 0`` and its second derivatives over the cell.
+
+Since ``J`` is convex and all its matrices are regular, the inertia of the KKT matrix is the same at
+``z0`` and at every solution.  Whether the reduced Hessian is definite, which the inertia says
+([NW] thm 16.3), is therefore decided at ``z0``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from polycorner.intervals.balls import (
+    ball,
+    column,
+    dot,
+    entries,
+    identity,
+    matrix,
+    middle_inverse,
+    midpoints,
+)
+from polycorner.intervals.enclosures import Doubt
+from polycorner.intervals.tapes import Box
+from polycorner.proofs.kkt import SUBJECT, Linear, System
+
+if TYPE_CHECKING:
+    from polycorner.intervals.balls import Ball, Matrix
+
+MOST_INFLATIONS = 6
+SLACK_BITS = 16  # a room is never smaller than its unit's last digits but so many
+GROWTH = 1.3  # of a room, over the image it has to contain
+WIDEST = 10  # units at which a room is given up
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """Parameters ``p0 + delta``, for ``delta`` in a box that contains 0; or none."""
+
+    middle: "Sequence[Ball]" = ()
+    reach: "Sequence[Ball]" = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """Unknowns ``z0 + Z1 delta`` for the parameters of a cell.
+
+    Attributes
+    ----------
+    system : System
+        The equations.
+    cell : Cell
+        The parameters.
+    centre : list of Ball
+        ``z0``.
+    tangents : list of list of Ball
+        ``Z1``, ``[N][p]``; empty without parameters.
+    """
+
+    system: System
+    cell: Cell
+    centre: "list[Ball]"
+    tangents: "list[list[Ball]]"
+
+    def unknowns(self, remainder: "Sequence[Ball]") -> "list[Ball]":
+        """Return enclosures of all unknowns over the cell, given the remainder beside them."""
+        around = [a + b for a, b in zip(self.centre, remainder, strict=True)]
+        if not self.tangents:
+            return around
+        return [a + dot(t, self.cell.reach) for a, t in zip(around, self.tangents, strict=True)]
+
+    def box(self, remainder: "Sequence[Ball]") -> Box:
+        """Return where the point and the parameters lie together."""
+        n, cell = self.system.dimension, self.cell
+        around = [a + b for a, b in zip(self.centre[:n], remainder[:n], strict=True)]
+        if not self.tangents:
+            return Box(around)
+        own = entries_of_identity(len(cell.reach))
+        return Box.moving([*around, *cell.middle], [*self.tangents[:n], *own], cell.reach)
+
+    def part(self, reach: "Sequence[Ball]") -> "Predictor":
+        """Return the same predictor for ``delta`` in a part of the cell."""
+        start = midpoints(reach)
+        centre = [c + dot(t, start) for c, t in zip(self.centre, self.tangents, strict=True)]
+        middle = [p + s for p, s in zip(self.cell.middle, start, strict=True)]
+        cell = Cell(middle, [d - s for d, s in zip(reach, start, strict=True)])
+        return Predictor(self.system, cell, centre, self.tangents)
+
+
+def entries_of_identity(size: int) -> "list[list[Ball]]":
+    """Return the rows of the unit matrix."""
+    rows: list[list[Ball]] = identity(size).tolist()
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """A box with exactly one solution for every parameter in a cell.
+
+    Attributes
+    ----------
+    predictor : Predictor
+        What the box is taken around.
+    room : list of Ball
+        ``W``: within which the solution's remainder is the only one.
+    remainder : list of Ball
+        ``K``: where it lies, in the interior of ``W``.
+    inner : Matrix
+        ``Y``.
+    start, linear : Linear
+        The equations and their derivatives at the centre, and over the whole box.
+    """
+
+    predictor: Predictor
+    room: "list[Ball]"
+    remainder: "list[Ball]"
+    inner: "Matrix"
+    start: Linear
+    linear: Linear
+
+    @cached_property
+    def solution(self) -> "list[Ball]":
+        """Enclosures of all unknowns of the solution, over the whole cell."""
+        return self.predictor.unknowns(self.remainder)
+
+    def neighbourhood(self, part: "Sequence[Ball]" = ()) -> Box:
+        """Return a neighbourhood of the solution, for ``delta`` in a part of the cell."""
+        return (self.predictor.part(part) if part else self.predictor).box(self.room)
+
+
+def enclose(
+    system: System, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
+) -> Enclosure | Doubt:
+    """Prove that the equations have exactly one solution in a box about ``centre``.
+
+    The room starts a little larger than ``Y F`` and grows until the image lies inside; the caller
+    computes with ``bits`` binary digits.
+    """
+    cell = cell or Cell()
+    start = system.at(centre, cell.middle)
+    if isinstance(start, Doubt):
+        return start
+    inner = middle_inverse(start.jacobian)
+    if inner is None:
+        return Doubt(SUBJECT, "their Jacobian is singular")
+    tangents = (-(inner * matrix(start.drift))).mid().tolist() if cell.reach else []
+    predictor = Predictor(system, cell, centre, tangents)
+    base = _base(predictor, start, inner)
+    if isinstance(base, Doubt):
+        return base
+    least = [unit * ball(2) ** (SLACK_BITS - bits) for unit in system.units]
+    image = entries(base)
+    for _ in range(MOST_INFLATIONS):
+        grown = zip(image, least, strict=True)
+        room = [ball(0, (GROWTH * x.abs_upper() + small).upper()) for x, small in grown]
+        if not all(w.rad() < WIDEST * unit for w, unit in zip(room, system.units, strict=True)):
+            break
+        linear = system.linear(predictor.unknowns(room), predictor.box(room))
+        if isinstance(linear, Doubt):
+            return linear
+        image = entries(base + _defect(linear, inner) * column(room))
+        if all(w.contains_interior(x) for w, x in zip(room, image, strict=True)):
+            return Enclosure(predictor, room, image, inner, start, linear)
+    return Doubt(SUBJECT, "Krawczyk's operator does not map the box into itself: it is too wide")
+
+
+def _defect(linear: Linear, inner: "Matrix") -> "Matrix":
+    """Return ``I - Y J``."""
+    return identity(inner.nrows()) - inner * matrix(linear.jacobian)
+
+
+def _base(predictor: Predictor, start: Linear, inner: "Matrix") -> "Matrix | Doubt":
+    """Return ``-Y F`` along the predictor."""
+    system, tangents = predictor.system, predictor.tangents
+    value = column(start.residual)
+    if tangents:
+        nothing = [ball(0)] * system.size
+        bend = system.bend(predictor.unknowns(nothing), tangents, predictor.box(nothing))
+        if isinstance(bend, Doubt):
+            return bend
+        drift = matrix(start.jacobian) * matrix(tangents) + matrix(start.drift)
+        value = value + drift * column(predictor.cell.reach) + column(bend)
+    return -(inner * value)
+
+
+def widened(enclosure: Enclosure, attempts: int = 12) -> "list[Ball]":
+    """Return the widest room tried, without parameters, in which the solution is the only one.
+
+    If ``|I - Y J| w < w`` over the box of radii ``w``, no matrix in ``J`` is singular, and two
+    solutions in the box would contradict the mean value theorem ([Neumaier] sec. 5.1).
+    """
+    predictor = enclosure.predictor
+    for power in range(1, attempts + 1):
+        room = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
+        linear = predictor.system.linear(predictor.unknowns(room), predictor.box(room))
+        if isinstance(linear, Doubt):
+            continue
+        image = entries(_defect(linear, enclosure.inner) * column(room))
+        alone = all(x.abs_upper() < w.abs_upper() for w, x in zip(room, image, strict=True))
+        inside = zip(room, enclosure.remainder, strict=True)
+        if alone and all(w.contains(x) for w, x in inside):
+            return room
+    return enclosure.room

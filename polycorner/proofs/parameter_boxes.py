@@ -1,0 +1,259 @@
+"""A claim for a whole box of parameters, proved cell by cell."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
+from math import nextafter, prod
+from typing import TYPE_CHECKING
+
+from polycorner.intervals.balls import (
+    ball,
+    between,
+    bounds,
+    column,
+    entries,
+    matrix,
+    middle_inverse,
+    midpoints,
+    precision,
+)
+from polycorner.intervals.enclosures import Doubt
+from polycorner.proofs.findings import Claim, Finding, Status, findings, nowhere, unfounded
+from polycorner.proofs.kkt import newton
+from polycorner.proofs.krawczyk import Cell, Enclosure, enclose
+
+if TYPE_CHECKING:
+    from polycorner.intervals.balls import Ball
+
+CELL_BITS = 64
+MOST_STRIDES = 16  # into which a way through the parameters is cut
+STRIDE_STEPS = 8  # of Newton's method at the end of a stride
+FARTHEST = 0.5  # scale units that a solution may jump beyond its prediction
+
+Interval = tuple[float, float]
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class ParameterCell:
+    """A box of parameters, and what is proved for all of them.
+
+    Attributes
+    ----------
+    parameters : mapping from str to (float, float)
+        The cell's sides, exactly.
+    status : Status
+        Proved; failed (a condition is violated throughout); or undecided.
+    conditions : mapping from str to Status
+        What is said about each condition.
+    reason : str
+        Why the first condition that is not proved is not; empty where all are.
+    bounds : mapping from str to (float, float)
+        Bounds of the coordinates, of the energy (``energy``) and of the multipliers
+        (``multiplier NAME``) over the cell; empty where there is no enclosure.
+    """
+
+    parameters: Mapping[str, Interval]
+    status: Status
+    conditions: Mapping[str, Status]
+    reason: str
+    bounds: Mapping[str, Interval]
+
+    @property
+    def volume(self) -> float:
+        """The product of the sides' lengths."""
+        return prod(upper - lower for lower, upper in self.parameters.values())
+
+
+@dataclass(frozen=True, eq=False)
+class _Waiting:
+    """A cell to be tried, and a solution to start from at given parameters."""
+
+    sides: tuple[Interval, ...]
+    start: "list[Ball]"
+    at: tuple[float, ...]
+
+
+def cover(
+    claim: Claim,
+    start: "list[Ball]",
+    at: Sequence[float],
+    sides: Mapping[str, Interval],
+    *,
+    max_cells: int,
+    progress: Progress | None = None,
+) -> tuple[ParameterCell, ...]:
+    """Cut a box of parameters into cells until each is decided or ``max_cells`` are reached.
+
+    Parameters
+    ----------
+    claim : Claim
+        Whose system has the parameters as inputs, in the order of ``sides``.
+    start : list of Ball
+        The unknowns at the parameters ``at``.
+    sides : mapping from str to (float, float)
+        The box.
+    progress : callable, optional
+        Called with the decided fraction of the box.
+    """
+    names, whole = tuple(sides), prod(upper - lower for lower, upper in sides.values())
+    order = count()
+    root = _Waiting(tuple(sides.values()), start, tuple(at))
+    waiting = [(-1.0, next(order), root)]
+    done: list[ParameterCell] = []
+    decided = 0.0
+    while waiting:
+        _, _, item = heappop(waiting)
+        with precision(CELL_BITS):
+            cell, halves = _tried(claim, names, item, sides)
+        if halves and len(done) + len(waiting) + 2 <= max_cells:
+            for half in halves:
+                volume = prod(upper - lower for lower, upper in half.sides)
+                heappush(waiting, (-volume / whole, next(order), half))
+            continue
+        done.append(cell)
+        decided += cell.volume / whole
+        if progress is not None:
+            progress(min(1.0, decided))
+    return tuple(done)
+
+
+def _tried(
+    claim: Claim, names: tuple[str, ...], item: _Waiting, whole: Mapping[str, Interval]
+) -> tuple[ParameterCell, list[_Waiting]]:
+    """Return what is decided on a cell, and its halves where that is not everything."""
+    sides = dict(zip(names, item.sides, strict=True))
+    middle = tuple(lower + (upper - lower) / 2 for lower, upper in item.sides)
+    centre = follow(claim, item.start, item.at, middle)
+    if isinstance(centre, Doubt):
+        found = unfounded(claim, centre)
+        cell = _cell(sides, found, {})
+        return cell, [_Waiting(half, item.start, item.at) for half in _halves(item.sides, whole)]
+    p0 = [ball(x) for x in middle]
+    reach = [between(*side) - p for side, p in zip(item.sides, p0, strict=True)]
+    enclosure = enclose(claim.system, centre, Cell(p0, reach), bits=CELL_BITS)
+    if isinstance(enclosure, Doubt):
+        cell = _cell(sides, unfounded(claim, enclosure), {})
+    else:
+        cell = _cell(sides, findings(claim, enclosure), _bounds(claim, enclosure))
+    if cell.status is not Status.UNDECIDED:
+        return cell, []
+    return cell, [_Waiting(half, centre, middle) for half in _halves(item.sides, whole)]
+
+
+def _cell(
+    sides: Mapping[str, Interval], found: Mapping[str, Finding], where: Mapping[str, Interval]
+) -> ParameterCell:
+    conditions = {name: finding.status for name, finding in found.items()}
+    for status in (Status.FAILED, Status.UNDECIDED):
+        for name, finding in found.items():
+            if finding.status is status:
+                return ParameterCell(sides, status, conditions, f"{name}: {finding.reason}", where)
+    return ParameterCell(sides, Status.PROVED, conditions, "", where)
+
+
+def undecided_cell(sides: Mapping[str, Interval], doubt: Doubt) -> ParameterCell:
+    """Return a cell about which nothing is known."""
+    return _cell(sides, nowhere(doubt), {})
+
+
+def summary(cells: Sequence[ParameterCell]) -> dict[str, Finding]:
+    """Return what is said about each condition for all cells together."""
+    found: dict[str, Finding] = {}
+    for name in dict.fromkeys(name for cell in cells for name in cell.conditions):
+        found[name] = Finding(Status.PROVED, f"on all of the {len(cells)} cells")
+        for status in (Status.FAILED, Status.UNDECIDED):
+            some = [cell for cell in cells if cell.conditions.get(name) is status]
+            if some:
+                largest = max(some, key=lambda cell: cell.volume)
+                sides = ", ".join(
+                    f"{p} in [{a:g}, {b:g}]" for p, (a, b) in largest.parameters.items()
+                )
+                reason = f"on {len(some)} of {len(cells)} cells, the largest with {sides}"
+                found[name] = Finding(status, reason)
+                break
+    return found
+
+
+def _bounds(claim: Claim, enclosure: Enclosure) -> dict[str, Interval]:
+    d = claim.problem.polyhedron
+    n = d.dimension
+    found = dict(zip(d.manifold.names, enclosure.solution[:n], strict=True))
+    found["energy"] = enclosure.linear.energy
+    for name, value in zip(claim.names, enclosure.solution[n:], strict=False):
+        found[f"multiplier {name}"] = value
+    return {name: _outwards(value) for name, value in found.items()}
+
+
+def _outwards(value: "Ball") -> Interval:
+    lower, upper = bounds(value)
+    return nextafter(float(lower), float("-inf")), nextafter(float(upper), float("inf"))
+
+
+def _halves(
+    sides: tuple[Interval, ...], whole: Mapping[str, Interval]
+) -> Iterator[tuple[Interval, ...]]:
+    """Cut a cell across its side that is longest, relative to the whole box; if it can be cut."""
+    lengths = [
+        (upper - lower) / (last - first)
+        for (lower, upper), (first, last) in zip(sides, whole.values(), strict=True)
+    ]
+    a = lengths.index(max(lengths))
+    lower, upper = sides[a]
+    middle = lower + (upper - lower) / 2
+    if lower < middle < upper:
+        for side in ((lower, middle), (middle, upper)):
+            yield (*sides[:a], side, *sides[a + 1 :])
+
+
+def follow(
+    claim: Claim, z: "list[Ball]", at: Sequence[float], to: Sequence[float]
+) -> "list[Ball] | Doubt":
+    """Follow a solution from parameters ``at`` to parameters ``to``.
+
+    The way is cut into strides, each predicted along the tangent; a stride is halved where
+    Newton's method goes astray.  Nothing here needs to be rigorous.
+    """
+    done, stride = 0.0, 1.0
+    doubt = Doubt("the KKT equations", "the solution could not be followed to the parameters")
+    for _ in range(2 * MOST_STRIDES):
+        now = [a + done * (b - a) for a, b in zip(at, to, strict=True)]
+        nearly = done + stride >= 1.0
+        then = (
+            list(to)
+            if nearly
+            else [a + (done + stride) * (b - a) for a, b in zip(at, to, strict=True)]
+        )
+        found = _stride(claim, z, now, then)
+        if found is None:
+            stride /= 2
+            if stride * MOST_STRIDES < 1:
+                return doubt
+            continue
+        if nearly:
+            return found
+        z, done, stride = found, done + stride, 2 * stride
+    return doubt
+
+
+def _stride(
+    claim: Claim, z: "list[Ball]", now: Sequence[float], then: Sequence[float]
+) -> "list[Ball] | None":
+    system = claim.system
+    p = [ball(x) for x in now]
+    linear = system.at(z, p)
+    if isinstance(linear, Doubt):
+        return None
+    inner = middle_inverse(linear.jacobian)
+    if inner is None:
+        return None
+    change = column([ball(b) - ball(a) for a, b in zip(now, then, strict=True)])
+    moved = entries(inner * (matrix(linear.drift) * change))
+    guess = midpoints([a - b for a, b in zip(z, moved, strict=True)])
+    found = newton(system, guess, [ball(x) for x in then], bits=CELL_BITS, steps=STRIDE_STEPS)
+    if isinstance(found, Doubt):
+        return None
+    steps = zip(found, guess, system.scales, strict=False)
+    near = all(abs(a - b) <= FARTHEST * scale for a, b, scale in steps)
+    return found if near else None

@@ -1,0 +1,5 @@
+"""Corners, edges and faces of a polyhedron, and the search for them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,176 @@
+"""From what an explorer found to the frozen atlas."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from polycorner.polyhedra.strata import stratum_at
+from polycorner.polyhedra.symmetry import renamed
+from polycorner.skeletons.elements import Completeness, Corner, Edge, Face, Skeleton
+from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.faces import Flag, Forest
+from polycorner.skeletons.registry import Place
+from polycorner.skeletons.walks import End
+
+
+def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
+    """Return the atlas as it stands."""
+    faces, components = _faces(explorer)
+    corners = tuple(_corner(explorer, place) for place in explorer.places)
+    edges = tuple(
+        Edge(
+            active=_ordered(explorer, explorer.register.names(curve.active)),
+            ends=(
+                curve.start[0] if curve.start is not None else None,
+                curve.stop[0] if curve.stop is not None else None,
+            ),
+            kinds=curve.kinds,
+            polyline=curve.points,
+            length=curve.length,
+            branches=curve.branches,
+        )
+        for curve in explorer.curves
+    )
+    return Skeleton(
+        polyhedron=explorer.polyhedron,
+        corners=corners,
+        edges=edges,
+        faces=faces,
+        complete=complete,
+        notes=tuple(explorer.notes),
+        components=components,
+        whole=_whole(explorer),
+        state=explorer,
+    )
+
+
+def _whole(explorer: Explorer) -> bool:
+    """Whether faces and Euler characteristic can be trusted everywhere."""
+    if explorer.symmetry.relabels or any(curve.branches for curve in explorer.curves):
+        return False
+    for place in explorer.places:
+        star = place.star
+        flags = [(i, sector.active) for sector in star.sectors for i in sector.rays]
+        if (star.singular and star.full > 2) or max(Counter(flags).values(), default=0) > 1:
+            return False
+    return True
+
+
+def _ordered(explorer: Explorer, names: frozenset[str]) -> tuple[str, ...]:
+    return tuple(name for name in explorer.polyhedron.names if name in names)
+
+
+def _corner(explorer: Explorer, place: Place) -> Corner:
+    ends = [place.edges.get(representative) for representative in place.orbit]
+    return Corner(
+        point=explorer.manifold.wrap(place.spot.q),
+        stratum=stratum_at(explorer.polyhedron, place.spot.q, tolerance=explorer.ground.tolerance),
+        singular=place.star.singular,
+        edges=tuple(end for end in ends if end is not None),
+    )
+
+
+def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
+    """Put faces together: flags around corners and along edges, then passages across."""
+    flags = dict.fromkeys(_flags(explorer))
+    boundary, surface = Forest(), Forest()
+    broken: list[Flag] = []
+    for one, other in _joins(explorer):
+        if one in flags and other in flags:
+            boundary.join(one, other)
+            surface.join(one, other)
+        elif one in flags:
+            broken.append(one)
+    for passage in explorer.passages:
+        surface.join(passage.start, passage.stop)
+    loose = {boundary.find(flag) for flag in [*broken, *_ends(explorer, flags)]}
+    faces = []
+    groups = surface.groups(flags)
+    for group in groups:
+        curves = boundary.groups(group)
+        faces.append(
+            Face(
+                active=_ordered(explorer, group[0][2]),
+                boundary=tuple(
+                    tuple(sorted({_edge_of(explorer, flag) for flag in curve} - {-1}))
+                    for curve in curves
+                ),
+                closed=not any(boundary.find(curve[0]) in loose for curve in curves),
+            )
+        )
+    return tuple(faces), _components(explorer, flags, surface, len(faces))
+
+
+def _flags(explorer: Explorer) -> Iterator[Flag]:
+    for k, place in enumerate(explorer.places):
+        for sector in place.star.sectors:
+            for i in sector.rays:
+                yield ("half", (k, i), explorer.register.names(sector.active))
+    for k, curve in enumerate(explorer.curves):
+        if curve.start is None:
+            for face in explorer.faces_beside(curve):
+                yield explorer.flag(k, face)
+
+
+def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
+    """Yield flags that belong to one boundary curve of one face."""
+    for k, place in enumerate(explorer.places):
+        for sector in place.star.sectors:
+            face = explorer.register.names(sector.active)
+            i, j = sector.rays
+            yield ("half", (k, i), face), ("half", (k, j), face)
+            for p in place.stabiliser:
+                for ray in sector.rays:
+                    active = renamed(explorer.register.names(place.star.rays[ray].active), p)
+                    for other, twin in enumerate(place.star.rays):
+                        if explorer.register.names(twin.active) == active:
+                            image: Flag = ("half", (k, other), renamed(face, p))
+                            if p:
+                                yield ("half", (k, ray), face), image
+    for curve in explorer.curves:
+        if curve.start is not None:
+            place = explorer.places[curve.start[0]]
+            for sector in place.star.sectors:
+                if curve.start[1] in sector.rays:
+                    face = explorer.register.names(sector.active)
+                    stop: Flag = ("half", curve.stop, renamed(face, curve.relabelled))
+                    yield ("half", curve.start, face), stop
+
+
+def _ends(explorer: Explorer, flags: dict[Flag, None]) -> Iterator[Flag]:
+    """Yield flags where a boundary curve does not go on: at infinity, or not walked."""
+    for flag in flags:
+        if flag[0] == "curve":
+            if explorer.curves[flag[1]].kinds[0] is not End.CLOSED:
+                yield flag
+        elif _edge_of(explorer, flag) < 0:
+            yield flag
+
+
+def _edge_of(explorer: Explorer, flag: Flag) -> int:
+    if flag[0] == "curve":
+        return int(flag[1])
+    k, i = flag[1]
+    place = explorer.places[k]
+    found: int = place.edges.get(place.orbit[i], -1)
+    return found
+
+
+def _components(
+    explorer: Explorer, flags: dict[Flag, None], surface: Forest, faces: int
+) -> dict[int, int]:
+    spot = explorer.places[0].spot if explorer.places else None
+    if spot is None and not explorer.curves:
+        return {}
+    if spot is None:
+        spot = explorer.ground.spot(explorer.curves[0].points[0])
+    fixed = len(spot.matrix([])) - len(explorer.polyhedron.equations)
+    free = explorer.manifold.dimension - len(spot.matrix([]))
+    counts = {fixed: len(explorer.places), fixed + 1: len(explorer.curves)}
+    if free >= 2:
+        counts[fixed + 2] = faces
+    if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
+        inside = Forest()
+        for flag in flags:
+            inside.join(("edge", _edge_of(explorer, flag)), surface.find(flag))
+        counts[fixed + 3] = len(inside.groups([surface.find(flag) for flag in flags]))
+    return counts

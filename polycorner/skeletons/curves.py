@@ -1,0 +1,166 @@
+"""Points where some functions of a polyhedron vanish, and tangents there.
+
+Newton's method returns to the set with the shortest corrections, orthogonal to the orbits of the
+symmetry.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from polycorner.polyhedra.cones import independent_rows, unit_rows
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, local_pieces
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array
+
+EXACT = 1e-13
+# Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
+SINGULAR = 1e-14
+LAST = 1e-8
+NEWTON = 8
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A polyhedron with its symmetry: what walking needs.
+
+    Attributes
+    ----------
+    polyhedron : Polyhedron
+        The set.
+    symmetry : Symmetry
+        What is quotiented out.
+    tolerance : float
+        Distance, in scale units, up to which a function counts as zero.
+    extent : float
+        Length, in scale units, after which a walk counts as going to infinity.
+    """
+
+    polyhedron: Polyhedron
+    symmetry: Symmetry
+    tolerance: float
+    extent: float
+
+    @property
+    def count(self) -> int:
+        """The number of inequalities; equations have the positions after them."""
+        return len(self.polyhedron.functions)
+
+    def spot(self, q: Array) -> "Spot":
+        """Return everything that is known at a point."""
+        return Spot(self, q, *evaluated(self.polyhedron, q))
+
+
+class Spot:
+    """A point with values and scaled gradients of all functions, and the orbit through it."""
+
+    def __init__(self, ground: Ground, q: Array, values: Array, gradients: Array) -> None:
+        self.ground, self.q, self.values, self.gradients = ground, q, values, gradients
+        self.orbit = ground.symmetry.directions(ground.polyhedron.manifold, q)
+
+    @cached_property
+    def distances(self) -> Array:
+        """Signed distances ``f / |grad f|`` in scale units."""
+        return distances(self.values, self.gradients)
+
+    def active(self) -> frozenset[int] | None:
+        """Return the functions that vanish and matter here; None outside the polyhedron."""
+        ground = self.ground
+        found = local_pieces(ground.polyhedron, self.values, self.gradients, ground.tolerance)
+        return frozenset().union(*found) if found else None
+
+    def matrix(self, rows: Sequence[int]) -> Array:
+        """Return unit gradients of given functions, of all equations, and the orbit."""
+        m = self.ground.count
+        chosen = self.gradients[[*rows, *range(m, len(self.values))]]
+        return unit_rows(np.vstack([chosen, self.orbit]))
+
+    def basis(self, rows: Iterable[int]) -> list[int]:
+        """Return rows whose gradients span those of all rows, modulo equations and orbit."""
+        others = sorted(rows)
+        frame = np.linalg.qr(self.matrix([]).T)[0]
+        block = unit_rows(self.gradients[others])
+        chosen = independent_rows(block - (block @ frame) @ frame.T, RANK_TOLERANCE)
+        return sorted(others[i] for i in chosen)
+
+
+class Frame(Spot):
+    """A spot with an orthonormal frame of the held functions' gradients.
+
+    Attributes
+    ----------
+    kept : list of int
+        Inequalities that are held at zero, with independent gradients.
+    finite : bool
+        Whether values and gradients are; nothing else may be asked of the frame otherwise.
+    condition : float
+        Smallest diagonal entry of the triangular factor of the unit gradients: zero where they
+        are dependent.
+    """
+
+    def __init__(self, ground: Ground, q: Array, kept: Sequence[int]) -> None:
+        values, gradients = evaluated(ground.polyhedron, q)
+        super().__init__(ground, q, values, gradients)
+        self.kept = list(kept)
+        held = [*self.kept, *range(ground.count, len(values))]
+        rows = np.concatenate([gradients[held], self.orbit]) if len(self.orbit) else gradients[held]
+        sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+        total = float(values.sum() + sizes.sum())
+        self.finite = math.isfinite(total) and (sizes > 0).all()
+        if self.finite:
+            self._target = np.zeros(len(rows))
+            self._target[: len(held)] = -values[held] / sizes[: len(held)]
+            self._normal, self._factor = np.linalg.qr((rows / sizes[:, None]).T)
+            self.condition = float(abs(np.diagonal(self._factor)).min(initial=1.0))
+
+    def tangent(self, v: Array) -> Array:
+        """Return the unit vector nearest to ``v`` along which the held functions stay zero."""
+        t = v - self._normal @ (self._normal.T @ v)
+        return np.asarray(t / max(math.sqrt(float(t @ t)), 1e-300))
+
+    def correction(self) -> Array:
+        """Return the shortest scaled step to the zeros of the linearised held functions."""
+        return np.asarray(self._normal @ np.linalg.solve(self._factor.T, self._target))
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether the held functions leave a curve, modulo the symmetry."""
+        return len(self._target) + 1 == len(self.q)
+
+    def orientation(self, t: Array) -> float:
+        """Return the sign of the determinant of held gradients and tangent, where it is square."""
+        if not self.is_curve:
+            return 1.0
+        frame = np.vstack([self._normal.T, t])
+        return float(np.sign(np.linalg.det(frame) * np.diagonal(self._factor).prod()))
+
+
+def settle(ground: Ground, q: Array, kept: Sequence[int], reach: float) -> Frame | None:
+    """Return the frame of the nearest point where the held functions vanish.
+
+    None if Newton's method does not get there within ``reach`` scale units of ``q``, or meets
+    values that are not finite.  A step shorter than the square root of the rounding error is
+    the last: convergence is quadratic.
+    """
+    scales = ground.polyhedron.manifold.scale_array
+    moved, last = 0.0, math.inf
+    for _ in range(NEWTON):
+        frame = Frame(ground, q, kept)
+        if not frame.finite or frame.condition < SINGULAR:
+            return None
+        step = frame.correction()
+        size = math.sqrt(float(step @ step))
+        moved += size
+        if moved > reach:
+            return None
+        if size <= EXACT or (size < LAST and size > last / 2):
+            return frame
+        q, last = q + scales * step, size
+        if size < LAST * min(1.0, frame.condition):
+            frame = Frame(ground, q, kept)
+            return frame if frame.finite else None
+    return frame if size <= 1e-9 else None

@@ -1,0 +1,276 @@
+"""The atlas of a polyhedron: its corners, edges and faces, and how they hang together."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import LocalType, Stratum
+from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
+from polycorner.skeletons.walks import End
+from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+class Completeness(Enum):
+    """How complete an atlas is; the value says it in a sentence."""
+
+    EXHAUSTED = "everything that was met has been walked; what nothing led to stays unseen"
+    GAPS = "some edges could not be followed: the notes say which"
+    BUDGET = "the budget was used up: edges are left to walk"
+    INTERRUPTED = "interrupted: edges are left to walk"
+    SEEDS = "no start leads to an edge or a corner: nothing to walk"
+
+
+@dataclass(frozen=True)
+class Corner:
+    """A corner: a point that its active functions isolate, modulo the symmetry.
+
+    Attributes
+    ----------
+    point : (n,) array
+        The point, of its orbit the one that was met first.
+    stratum : Stratum
+        Active functions, rank, dimension and local type there.
+    singular : bool
+        Whether the rank falls short and second-order terms alone isolate the point.
+    edges : tuple of int
+        Edges that leave it, as positions in ``Skeleton.edges``, once for every end.
+    """
+
+    point: Array
+    stratum: Stratum
+    singular: bool
+    edges: tuple[int, ...]
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the active functions."""
+        return self.stratum.active
+
+    @property
+    def rank(self) -> int:
+        """Rank of the active gradients and equations."""
+        return self.stratum.rank
+
+    @property
+    def local_type(self) -> LocalType:
+        """What the polyhedron looks like here."""
+        return self.stratum.local_type
+
+    @property
+    def chirality(self) -> str | None:
+        """The model's ``chirality`` annotation, or None."""
+        return self.stratum.chirality
+
+
+@dataclass(frozen=True)
+class Edge:
+    """An edge: a curve on which the active functions vanish, modulo the symmetry.
+
+    Attributes
+    ----------
+    active : tuple of str
+        Functions that vanish along it.
+    ends : tuple of (int or None, int or None)
+        Corners at its ends, as positions in ``Skeleton.corners``; None where there is none.
+    kinds : tuple of (End, End)
+        How either end comes about.
+    polyline : (k, n) array
+        Points along it, in coordinates that are not wrapped.
+    length : float
+        Length of the polyline in scale units, orthogonal to the symmetry.
+    branches : int
+        How often it meets other curves on the same functions.
+    """
+
+    active: tuple[str, ...]
+    ends: tuple[int | None, int | None]
+    kinds: tuple[End, End]
+    polyline: Array
+    length: float
+    branches: int
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it is a closed curve without a corner."""
+        return self.kinds[0] is End.CLOSED
+
+    @property
+    def is_loop(self) -> bool:
+        """Whether it returns to the corner it left, or is closed without a corner."""
+        return self.is_closed or (self.ends[0] is not None and self.ends[0] == self.ends[1])
+
+
+@dataclass(frozen=True)
+class Face:
+    """A two-dimensional face, modulo the symmetry.
+
+    Attributes
+    ----------
+    active : tuple of str
+        Functions that vanish on it.
+    boundary : tuple of tuple of int
+        Its boundary curves, each as the positions of its edges.
+    closed : bool
+        Whether every boundary curve closes: no end at infinity, and no corner where the face
+        could not be followed.
+    """
+
+    active: tuple[str, ...]
+    boundary: tuple[tuple[int, ...], ...]
+    closed: bool
+
+    @property
+    def euler_characteristic(self) -> int:
+        """That of a sphere with as many holes as there are boundary curves."""
+        return 2 - len(self.boundary)
+
+
+@dataclass(frozen=True)
+class Skeleton(Printed):
+    """Corners, edges and faces of a polyhedron modulo its symmetry; see :func:`skeleton`.
+
+    Attributes
+    ----------
+    polyhedron : Polyhedron
+        The set.
+    corners, edges, faces : tuples
+        What was found.
+    complete : Completeness
+        How complete it is.
+    notes : tuple of str
+        Everything a user should know: starts outside, points too near to each other, ends of
+        charts, faces that could not be followed.
+    components : mapping from int to int
+        How many connected components the faces of each dimension have: corners, edges, faces,
+        and the interior where it comes next.
+    whole : bool
+        Whether the faces were put together everywhere and edges meet in corners only: not at
+        singular corners beyond the plane, where edges cross, where a face lies on both sides of
+        an edge, or modulo relabellings.
+    """
+
+    polyhedron: Polyhedron
+    corners: tuple[Corner, ...]
+    edges: tuple[Edge, ...]
+    faces: tuple[Face, ...]
+    complete: Completeness
+    notes: tuple[str, ...]
+    components: Mapping[int, int]
+    whole: bool = True
+    state: Any = None
+
+    def __repr__(self) -> str:
+        """Return the counts, and how complete they are."""
+        counts = f"{len(self.corners)} corners, {len(self.edges)} edges, {len(self.faces)} faces"
+        return f"Skeleton({counts}; {self.complete.value})"
+
+    def _sheet(self) -> Sheet:
+        notes = (f"Note: {note}" for note in self.notes)
+        tables = (_corner_table(self), _edge_table(self), _face_table(self))
+        return Sheet(
+            "Skeleton",
+            (facts(_counts(self)), *tables, *notes, units(self.polyhedron.manifold.periods)),
+        )
+
+    @property
+    def euler_characteristic(self) -> int | None:
+        """Corners minus edges plus the Euler characteristics of the faces.
+
+        It is that of the union of all of them: the polyhedron itself if it has dimension two,
+        its boundary if it has dimension three, provided that faces have no handles.  A closed
+        edge counts zero.  It is that of what was found: islands that no walk met are not in it.
+        None where a face is not closed, an edge runs to infinity, or not ``whole``.
+        """
+        closed = all(face.closed for face in self.faces) and self.faces
+        if (
+            not self.whole
+            or not closed
+            or any(edge.kinds[1] not in (End.CORNER, End.CLOSED) for edge in self.edges)
+        ):
+            return None
+        open_edges = sum(not edge.is_closed for edge in self.edges)
+        surfaces = sum(face.euler_characteristic for face in self.faces)
+        return len(self.corners) - open_edges + surfaces
+
+    @cached_property
+    def graph(self) -> "nx.MultiGraph":
+        """Corners as nodes, edges as edges, with ``active``, ``length`` and ``position``."""
+        import networkx as nx
+
+        graph = nx.MultiGraph()
+        for i, corner in enumerate(self.corners):
+            graph.add_node(i, active=corner.active, singular=corner.singular)
+        for k, edge in enumerate(self.edges):
+            if None not in edge.ends:
+                graph.add_edge(*edge.ends, active=edge.active, length=edge.length, position=k)
+        return graph
+
+
+MOST_COORDINATES = 6  # of a corner, in a row of its table
+
+
+def _counts(found: Skeleton) -> Iterator[tuple[str, str]]:
+    yield "corners", str(len(found.corners))
+    yield "edges", str(len(found.edges))
+    yield "faces", str(len(found.faces))
+    counts = (f"{n} of dimension {d}" for d, n in sorted(found.components.items()))
+    yield "components", ", ".join(counts) or "none"
+    if found.euler_characteristic is not None:
+        yield "Euler characteristic", str(found.euler_characteristic)
+    yield "complete", found.complete.value
+
+
+def _corner_table(found: Skeleton) -> Table:
+    manifold = found.polyhedron.manifold
+    shown = manifold.dimension if manifold.dimension <= MOST_COORDINATES else 0
+    rows = (
+        (
+            str(k),
+            names(corner.active),
+            str(corner.rank),
+            corner.local_type.name + (", singular" if corner.singular else ""),
+            *(number(x, 6) for x in corner.point[:shown]),
+        )
+        for k, corner in enumerate(found.corners)
+    )
+    coordinates = map(titled, manifold.names[:shown], manifold.periods)
+    head = ("corner", "active", "rank", "type", *coordinates)
+    return listed("Corners", head, rows, len(found.corners), (0, 2, *range(4, len(head))))
+
+
+def _edge_table(found: Skeleton) -> Table:
+    rows = (
+        (
+            str(k),
+            names(edge.active),
+            *(kind.name.lower() if at is None else str(at) for at, kind in _ends(edge)),
+            number(edge.length, 6),
+        )
+        for k, edge in enumerate(found.edges)
+    )
+    head = ("edge", "active", "from", "to", "length (scale units)")
+    return listed("Edges", head, rows, len(found.edges), (0, 4))
+
+
+def _ends(edge: Edge) -> Iterator[tuple[int | None, End]]:
+    yield from zip(edge.ends, edge.kinds, strict=True)
+
+
+def _face_table(found: Skeleton) -> Table:
+    rows = (
+        (
+            str(k),
+            names(face.active) or "-",
+            "; ".join(" ".join(map(str, curve)) for curve in face.boundary),
+            "yes" if face.closed else "no",
+        )
+        for k, face in enumerate(found.faces)
+    )
+    head = ("face", "active", "edges around it", "closed")
+    return listed("Faces", head, rows, len(found.faces), (0,))

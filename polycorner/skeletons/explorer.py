@@ -1,0 +1,362 @@
+"""An atlas that grows: falling into corners, walking edges, shooting across faces.
+
+The end of an edge at a corner is named by two positions, those of the corner and of the ray.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+
+import numpy as np
+
+from polycorner.polyhedra.cones import null_space
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.polyhedra.symmetry import Relabelling, renamed
+from polycorner.skeletons.curves import Frame, Ground, Spot, settle
+from polycorner.skeletons.elements import Completeness
+from polycorner.skeletons.faces import Flag, Passage
+from polycorner.skeletons.rays import Ray, faces_beside
+from polycorner.skeletons.registry import SAME, Place, Places
+from polycorner.skeletons.walks import End, Walk, follow
+from polycorner.spaces.manifold import Array
+
+FALLS = 6
+SHORT = 20
+ARC_SEARCH = 40
+
+Half = tuple[int, int]
+Progress = Callable[[int, int, int], None]
+
+
+@dataclass
+class Curve:
+    """An edge while the atlas grows.
+
+    ``relabelled`` carries the names along the walk to the names at the corner ``stop``.
+    """
+
+    points: Array
+    active: frozenset[int]
+    kinds: tuple[End, End]
+    start: Half | None
+    stop: Half | None
+    relabelled: Relabelling
+    length: float
+    branches: int
+    beside: dict[frozenset[int], Ray] | None = None
+
+    @property
+    def middle(self) -> Array:
+        """A point well inside."""
+        return np.asarray(self.points[len(self.points) // 2])
+
+
+class Explorer:
+    """What was found and what is left to do."""
+
+    def __init__(self, ground: Ground, seeds: Iterable[Array], rng: np.random.Generator) -> None:
+        self.ground, self.rng = ground, rng
+        self.polyhedron, self.symmetry = ground.polyhedron, ground.symmetry
+        self.manifold = self.polyhedron.manifold
+        self.scales = self.manifold.scale_array
+        self.register = Places(ground)
+        self.curves: list[Curve] = []
+        self.passages: list[Passage] = []
+        self.seeds: deque[tuple[int, Array]] = deque(enumerate(seeds))
+        self.pending: deque[Half] = deque()
+        self.shot: set[tuple[int, frozenset[int]]] = set()
+        self.crossed = 0  # edges beside which every face was crossed
+
+    # --------------------------------------------------------------------------- order of the work
+
+    def run(self, budget: int, progress: Progress | None) -> Completeness:
+        """Work until nothing is left, the budget is used up, or someone interrupts."""
+        limit = len(self.curves) + budget
+        try:
+            for task in self._tasks():
+                if len(self.curves) >= limit and (self.pending or self.seeds):
+                    return Completeness.BUDGET
+                task()
+                if progress is not None:
+                    progress(len(self.places), len(self.curves), len(self.pending))
+        except KeyboardInterrupt:
+            return Completeness.INTERRUPTED
+        if not self.curves and not self.places:
+            return Completeness.SEEDS
+        return Completeness.GAPS if self.register.lost else Completeness.EXHAUSTED
+
+    def _tasks(self) -> Iterator[Callable[[], None]]:
+        """Yield what to do next; a task leaves the lists only once it is done."""
+        while True:
+            if self.pending:
+                half = self.pending[0]
+                yield partial(self._walk, half)
+                self.pending.popleft()
+            elif self.seeds:
+                number, seed = self.seeds[0]
+                yield partial(self._fall, number, seed)
+                self.seeds.popleft()
+            else:
+                crossing = next(self._crossings(), None)
+                if crossing is None:
+                    return
+                yield partial(self._shoot, *crossing)
+                self.shot.add(crossing)
+
+    def corner(self, spot: Spot) -> tuple[int, list[Relabelling]] | None:
+        """Return the corner at a point, as :meth:`Places.find`; what leaves a new one waits."""
+        known = len(self.places)
+        found = self.register.find(spot)
+        if found is not None and found[0] == known:
+            orbit = self.places[known].orbit
+            self.pending.extend((known, i) for i, twin in enumerate(orbit) if twin == i)
+        return found
+
+    @property
+    def places(self) -> list[Place]:
+        """The corners."""
+        return self.register.places
+
+    @property
+    def notes(self) -> list[str]:
+        """Everything a user should know."""
+        return list(self.register.notes)
+
+    # ---------------------------------------------------------------------------------------- edges
+
+    def _walk(self, half: Half) -> None:
+        k, i = half
+        place = self.places[k]
+        if i in place.edges:
+            return
+        ray = place.star.rays[i]
+        walk = follow(ray.frame, ray.direction, passive=ray.active)
+        points = np.vstack([place.spot.q, walk.points])
+        stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
+        curve = Curve(
+            points, ray.active, (End.CORNER, walk.end), half, stop, carried,
+            walk.length + ray.distance, walk.branches,
+        )  # fmt: skip
+        self.curves.append(curve)
+        number = len(self.curves) - 1
+        place.edges[i] = number
+        if stop is not None:
+            there = self.places[stop[0]]
+            there.edges[there.orbit[stop[1]]] = number
+        self._remark(curve)
+
+    def _remark(self, curve: Curve) -> None:
+        label = self.register.written(curve.active)
+        for kind in curve.kinds:
+            if kind not in (End.CORNER, End.CLOSED):
+                lost = kind is End.SINGULAR
+                self.register.note(f"the edge {label} {kind.value}", lost=lost)
+        if curve.branches:
+            self.register.note(
+                f"the edge {label} meets other curves on the same functions: not followed",
+                lost=True,
+            )
+
+    def _arrive(self, walk: Walk, ray: Ray) -> tuple[Half | None, Relabelling]:
+        """Return the end of the edge at the corner a walk came to."""
+        found = self.corner(walk.frame)
+        if found is None:
+            return None, {}
+        k, carried = found
+        place = self.places[k]
+        rays = place.star.rays
+        distance = rays[0].distance if rays else 1e-3
+        back = settle(
+            self.ground,
+            walk.frame.q - distance * self.scales * walk.tangent,
+            walk.frame.kept,
+            distance,
+        )
+        sample = None if back is None else back.q
+        match = self.register.match(place, sample, ray, carried, range(len(rays)))
+        if match is None:
+            self.register.note(
+                f"the edge {self.register.written(ray.active)} arrives at a corner "
+                f"that no edge of this kind leaves",
+                lost=True,
+            )
+            return None, {}
+        return (k, match[0]), match[1]
+
+    def _edge_at(self, spot: Spot, active: frozenset[int]) -> tuple[str, Half | int] | None:
+        """Return the edge through a point: its end at a corner, or its position."""
+        here = Frame(self.ground, spot.q, spot.basis(active))
+        t = self._along(here)
+        walks = []
+        for way in (t, -t):
+            walk = follow(here, way, passive=active, home=True)
+            if walk.end is End.CORNER:
+                stop, _ = self._arrive(walk, Ray(way, active, here, 0.0))
+                return None if stop is None else ("half", stop)
+            walks.append(walk)
+            if walk.end is End.CLOSED:
+                break
+        return "curve", self._free_edge(walks, here, active)
+
+    def _free_edge(self, walks: list[Walk], here: Frame, active: frozenset[int]) -> int:
+        """Return the position of an edge without corners, new or known."""
+        for k, curve in enumerate(self.curves):
+            if curve.start is None and self._is_image(here.q, active, curve):
+                return k
+        forth = walks[0]
+        points = forth.points
+        kinds = (forth.end, forth.end)
+        if len(walks) == 2:
+            points = np.vstack([walks[1].points[::-1], points[1:]])
+            kinds = (walks[1].end, forth.end)
+        curve = Curve(
+            points, active, kinds, None, None, {},
+            sum(w.length for w in walks), sum(w.branches for w in walks),
+        )  # fmt: skip
+        self.curves.append(curve)
+        self._remark(curve)
+        return len(self.curves) - 1
+
+    def _is_image(self, q: Array, active: frozenset[int], curve: Curve) -> bool:
+        """Whether a symmetry carries a point with given active functions to a curve."""
+        names, there = self.register.names(active), self.register.names(curve.active)
+        return any(
+            renamed(names, g.names) == there and self.lies_on(g.apply(q), curve)
+            for g in self.symmetry.group
+        )
+
+    def lies_on(self, q: Array, curve: Curve) -> bool:
+        """Whether a point lies on a curve: on one of the chords' arcs beside its nearest vertex."""
+        apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
+        nearest = int(np.argmin(apart))
+        chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
+        # A closed curve has its first point twice.
+        nearest = nearest or len(chords)
+        beside = {nearest - 1, nearest % len(chords)}
+        if apart[nearest] > max(chords[k] for k in beside):
+            return False
+        return any(self._on_arc(q, curve, k) for k in beside)
+
+    def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
+        """Whether a point lies on the arc over chord ``k``, by ternary search."""
+        start, end = curve.points[k], curve.points[k + 1]
+        kept = self.ground.spot(start).basis(curve.active)
+
+        def apart(s: float) -> float:
+            at = settle(self.ground, start + s * (end - start), kept, np.inf)
+            p = start if at is None else at.q
+            return self.symmetry.separation(self.manifold, q, p)
+
+        low, high = 0.0, 1.0
+        for _ in range(ARC_SEARCH):
+            left, right = (2 * low + high) / 3, (low + 2 * high) / 3
+            low, high = (low, right) if apart(left) < apart(right) else (left, high)
+        return apart((low + high) / 2) < SAME
+
+    # ---------------------------------------------------------------------------------------- falls
+
+    def _fall(self, number: int, seed: Array) -> None:
+        """Go straight ahead, forth and back, from face to smaller face, into corners."""
+        spot = self.ground.spot(seed)
+        active = spot.active() if np.isfinite(spot.values).all() else None
+        if active is None:
+            self.register.note(f"start {number} lies outside the polyhedron: left out")
+        elif not self._land(spot, active, both=True):
+            self.register.note(
+                f"start {number}: straight walks in {FALLS} directions, forth and back, met "
+                f"nothing within {self.ground.extent:g} scale units"
+            )
+
+    def _land(self, spot: Spot, active: frozenset[int], *, both: bool) -> bool:
+        """Go on from a point of a face; return whether that led anywhere."""
+        free = self._free(spot, active)
+        if free == 0 or (free == 1 and not self._continues(spot, active)):
+            self.corner(spot)
+            return True
+        if free == 1:
+            self._edge_at(spot, active)
+            return True
+        met = False
+        for there, found in islice(self._straight(spot, active), 2 if both else 1):
+            met |= self._land(there, found, both=False)
+        return met
+
+    def _straight(
+        self, spot: Spot, active: frozenset[int]
+    ) -> Iterator[tuple[Spot, frozenset[int]]]:
+        """Yield where straight walks in random directions, forth and back, meet something.
+
+        Walks are short first; only where none of them meets anything they go all the way.
+        """
+        frame = Frame(self.ground, spot.q, spot.basis(active))
+        met = False
+        for extent in (self.ground.extent / SHORT, self.ground.extent):
+            for _ in range(0 if met else FALLS):
+                v = frame.tangent(self.rng.standard_normal(len(spot.q)))
+                for way in (v, -v):
+                    walk = follow(frame, way, passive=active, home=True, extent=extent)
+                    there = walk.frame.active() if walk.end is End.CORNER else None
+                    if there is not None:
+                        met = True
+                        yield walk.frame, there
+
+    def _free(self, spot: Spot, active: frozenset[int]) -> int:
+        fixed = null_space(spot.matrix([]), RANK_TOLERANCE)
+        return int(fixed.shape[1]) - len(spot.basis(active))
+
+    def _continues(self, spot: Spot, active: frozenset[int]) -> bool:
+        """Whether functions that depend on each other vanish together on a curve."""
+        kept = spot.basis(active)
+        if len(kept) == len(active):
+            return True
+        t = self._along(Frame(self.ground, spot.q, kept))
+        ahead = settle(self.ground, spot.q + 1e-3 * self.scales * t, kept, 1e-3)
+        return ahead is not None and ahead.active() == active
+
+    @staticmethod
+    def _along(frame: Frame) -> Array:
+        """Return the direction of the curve on which the held functions vanish."""
+        return null_space(frame.matrix(frame.kept), RANK_TOLERANCE)[:, 0]
+
+    # ---------------------------------------------------------------------------------------- faces
+
+    def _crossings(self) -> Iterator[tuple[int, frozenset[int]]]:
+        """Yield edges and faces beside them that were not crossed yet."""
+        if self.symmetry.relabels:
+            return
+        while self.crossed < len(self.curves):
+            for face in self.faces_beside(self.curves[self.crossed]):
+                if (self.crossed, face) not in self.shot:
+                    yield self.crossed, face
+            self.crossed += 1
+
+    def faces_beside(self, curve: Curve) -> dict[frozenset[int], Ray]:
+        """Return the two-dimensional faces that meet an edge, and the way into each."""
+        if curve.beside is None:
+            found = faces_beside(self.ground.spot(curve.middle), curve.active)
+            curve.beside = {ray.active: ray for ray in found}
+        return curve.beside
+
+    def _shoot(self, k: int, face: frozenset[int]) -> None:
+        """Go straight across a face from the middle of an edge and record where it ends."""
+        ray = self.faces_beside(self.curves[k])[face]
+        walk = follow(ray.frame, ray.direction, passive=face)
+        active = walk.frame.active() if walk.end is End.CORNER else None
+        if active is None or not active > face:
+            return
+        if self._free(walk.frame, active) != 1 or not self._continues(walk.frame, active):
+            return
+        edge = self._edge_at(walk.frame, active)
+        if edge is not None:
+            self.passages.append(Passage(self.flag(k, face), self._flag_of(edge, face)))
+
+    def flag(self, k: int, face: frozenset[int]) -> Flag:
+        """Return the flag of an edge and a face beside it."""
+        start = self.curves[k].start
+        names = self.register.names(face)
+        return ("half", start, names) if start is not None else ("curve", k, names)
+
+    def _flag_of(self, edge: tuple[str, Half | int], face: frozenset[int]) -> Flag:
+        return (edge[0], edge[1], self.register.names(face))

@@ -1,0 +1,320 @@
+"""The edges that leave a corner, and the two-dimensional sectors between them.
+
+At a regular corner, where the active gradients have full rank in the quotient by the symmetry,
+edges leave along lines on which all but one dimension of the gradients vanishes: the extreme rays
+of the tangent cone where the polyhedron is locally an intersection, lines of the arrangement
+that stay in the set where it is a union.  At a singular corner, where the rank falls short and
+second-order terms alone make the point isolated, breaking one contact leaves the null directions
+of the others.  Every candidate is put to the test: a point a little way along it must lie in the
+polyhedron, and what vanishes there is the edge's active set.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, islice
+
+import numpy as np
+
+from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.skeletons.curves import Frame, Spot, settle
+from polycorner.spaces.manifold import Array
+
+SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+MAX_CANDIDATES = 20_000
+MAX_BASES = 64
+FLAT = 1e-7
+
+
+@dataclass(frozen=True)
+class Ray:
+    """The beginning of an edge at a corner.
+
+    Attributes
+    ----------
+    direction : (n,) array
+        Scaled unit tangent, orthogonal to the orbit of the symmetry.
+    active : frozenset of int
+        Functions that vanish along the edge.
+    frame : Frame
+        A point of the edge ``distance`` scale units away, holding a basis of ``active``.
+    """
+
+    direction: Array
+    active: frozenset[int]
+    frame: Frame
+    distance: float
+
+
+@dataclass(frozen=True)
+class Sector:
+    """A two-dimensional face at a corner, between two rays (by position)."""
+
+    rays: tuple[int, int]
+    active: frozenset[int]
+
+
+@dataclass(frozen=True)
+class Star:
+    """What leaves a corner.
+
+    Attributes
+    ----------
+    rank, full : int
+        Rank of the active gradients in the quotient, and the dimension of the quotient.
+    rays : tuple of Ray
+    sectors : tuple of Sector
+    """
+
+    rank: int
+    full: int
+    rays: tuple[Ray, ...]
+    sectors: tuple[Sector, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def singular(self) -> bool:
+        """Whether the point is isolated by second-order terms only."""
+        return self.rank < self.full
+
+
+def star_at(spot: Spot, active: frozenset[int]) -> Star:
+    """Return the rays and sectors at a corner with the given active functions."""
+    frame = null_space(spot.matrix([]), RANK_TOLERANCE)
+    rows = sorted(active)
+    slopes = unit_rows(spot.gradients[rows]) @ frame
+    full = frame.shape[1]
+    r = rank(slopes, RANK_TOLERANCE)
+    notes: list[str] = []
+    found = _singular(spot, rows, slopes, notes) if r < full else _regular(spot, rows, slopes)
+    rays: list[Ray] = []
+    for y, tight in found:
+        known = len(rays)
+        for base in _bases(rows, slopes, tight):
+            covered = [x for x in rays if x.direction @ (frame @ y) > 1 - FLAT]
+            if not any(x.active >= base for x in covered):
+                ray = _tested(spot, active, frame @ y, base)
+                if ray is not None and all(x.active != ray.active for x in covered):
+                    rays.append(ray)
+        if len(rows) == full == r and len(rays) == known:
+            notes.append(
+                f"an edge out of the corner {_names(spot, rows)} is shorter than "
+                f"{SAMPLES[-1]:g} scale units: not followed"
+            )
+    if r == full:
+        sectors = _sectors(spot, rows, slopes, [x.direction @ frame for x in rays])
+    else:
+        sectors = _cusps(spot, frame, rays) if full == 2 else ()
+    return Star(r, full, tuple(rays), sectors, tuple(notes))
+
+
+Candidate = tuple[Array, frozenset[int]]
+
+
+def faces_beside(spot: Spot, active: frozenset[int]) -> list[Ray]:
+    """Return the two-dimensional faces that meet an edge, as rays across it.
+
+    Modulo the direction of the edge they are what edges are at a corner.
+    """
+    rows = sorted(active)
+    along = null_space(spot.matrix(rows), RANK_TOLERANCE)
+    across = null_space(np.vstack([spot.matrix([]), along.T]), RANK_TOLERANCE)
+    slopes = unit_rows(spot.gradients[rows]) @ across
+    if across.shape[1] == 0 or along.shape[1] != 1:
+        return []
+    found: list[Ray] = []
+    for y, tight in _regular(spot, rows, slopes):
+        for base in _bases(rows, slopes, tight):
+            ray = _tested(spot, active, across @ y, base)
+            if ray is not None and all(ray.active != other.active for other in found):
+                found.append(ray)
+    return found
+
+
+def _regular(spot: Spot, rows: list[int], slopes: Array) -> Iterator[Candidate]:
+    """Yield directions in the quotient and the functions that vanish along them."""
+    ground = spot.ground
+    if not ground.polyhedron.is_union:
+        for d, tight in extreme_rays(slopes, FLAT):
+            yield d, frozenset(rows[k] for k in tight)
+        return
+    n = slopes.shape[1]
+    for chosen in islice(combinations(range(len(rows)), n - 1), MAX_CANDIDATES):
+        lines = Rows(slopes[list(chosen)], RANK_TOLERANCE) if chosen else None
+        if lines is not None and lines.rank < n - 1:
+            continue
+        line = np.ones((1, 1)) if lines is None else lines.null_space
+        for d in (line[:, 0], -line[:, 0]):
+            along = _active_along(spot, rows, slopes @ d)
+            if along is not None and _rank_of(rows, slopes, along) == n - 1:
+                yield d, along
+
+
+def _active_along(spot: Spot, rows: list[int], rates: Array) -> frozenset[int] | None:
+    """Return what stays active along a direction; None where it leaves the polyhedron."""
+    away = spot.distances[: spot.ground.count].copy()
+    away[rows] = np.where(abs(rates) > FLAT, rates, 0.0)
+    pieces = spot.ground.polyhedron.signs_to_pieces(np.sign(away).astype(int).tolist())
+    return frozenset().union(*pieces) if pieces else None
+
+
+def _rank_of(rows: list[int], slopes: Array, some: frozenset[int]) -> int:
+    return rank(slopes[[rows.index(i) for i in sorted(some)]], RANK_TOLERANCE)
+
+
+def _singular(spot: Spot, rows: list[int], slopes: Array, notes: list[str]) -> Iterator[Candidate]:
+    """Break one contact and yield the null directions of the others, by second order if need be.
+
+    Where the others still have a null plane and one relation ``sum w_i a_i = 0``, their common
+    zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
+    """
+    if not _isolated(spot, rows, slopes):
+        notes.append(
+            f"{_names(spot, rows)}: rank too low, and second order does not show an isolated point"
+        )
+    for k in range(len(rows)):
+        rest = [i for i in range(len(rows)) if i != k]
+        held = Rows(slopes[rest], RANK_TOLERANCE)
+        plane = held.null_space if rest else np.eye(slopes.shape[1])
+        tight = frozenset(rows[i] for i in rest)
+        if plane.shape[1] == 1:
+            yield plane[:, 0], tight
+            yield -plane[:, 0], tight
+        elif plane.shape[1] == 2 and held.relations.shape[1] == 1:
+            for d in _null_lines(spot, [rows[i] for i in rest], held.relations[:, 0], plane):
+                yield d, tight
+                yield -d, tight
+        else:
+            notes.append(
+                f"breaking {spot.ground.polyhedron.names[rows[k]]} leaves "
+                f"{plane.shape[1]} free directions to first order: not followed"
+            )
+
+
+def _names(spot: Spot, rows: list[int]) -> str:
+    return ", ".join(spot.ground.polyhedron.names[i] for i in rows)
+
+
+def _curvature(spot: Spot, rows: list[int], weights: Array, plane: Array) -> Array:
+    """Return the weighted sum of the Hessians of unit-slope functions on a subspace."""
+    polyhedron = spot.ground.polyhedron
+    scales = polyhedron.manifold.scale_array
+    frame = null_space(spot.matrix([]), RANK_TOLERANCE) @ plane
+    hessians = polyhedron.hessians(spot.q)[rows] * np.outer(scales, scales)
+    sizes = np.linalg.norm(spot.gradients[rows], axis=1)
+    return np.asarray(frame.T @ np.einsum("i,ijk->jk", weights / sizes, hessians) @ frame)
+
+
+def _isolated(spot: Spot, rows: list[int], slopes: Array) -> bool:
+    """Whether second-order terms isolate the common zeros of the active functions.
+
+    The test of prestress stability ([CW] sec. 3): along every null direction ``d`` of the
+    gradients ``a_i`` some relation ``sum w_i a_i = 0`` has ``sum w_i d' H_i d`` not zero.
+    It suffices that one relation is definite on the null directions: tried for those of an
+    orthonormal basis.  False: not shown.
+    """
+    held = Rows(slopes, RANK_TOLERANCE)
+    for weights in held.relations.T:
+        values = np.linalg.eigvalsh(_curvature(spot, rows, weights, held.null_space))
+        if values[0] > RANK_TOLERANCE or values[-1] < -RANK_TOLERANCE:
+            return True
+    return False
+
+
+def _null_lines(spot: Spot, rows: list[int], weights: Array, plane: Array) -> list[Array]:
+    """Return the directions in a plane along which a weighted sum of Hessians vanishes."""
+    values, axes = np.linalg.eigh(_curvature(spot, rows, weights, plane))
+    if values[0] * values[1] >= 0:
+        return []
+    low, high = math.sqrt(-values[0]), math.sqrt(values[1])
+    lines = [high * axes[:, 0] + sign * low * axes[:, 1] for sign in (1, -1)]
+    return [plane @ (line / np.linalg.norm(line)) for line in lines]
+
+
+def _bases(rows: list[int], slopes: Array, tight: frozenset[int]) -> Iterator[frozenset[int]]:
+    """Yield the independent subsets that may define the curve: just one where all are needed."""
+    n = slopes.shape[1]
+    if len(tight) <= n - 1:
+        yield tight
+        return
+    for some in islice(combinations(sorted(tight), n - 1), MAX_BASES):
+        if _rank_of(rows, slopes, frozenset(some)) == n - 1:
+            yield frozenset(some)
+
+
+def _tested(
+    spot: Spot, active: frozenset[int], direction: Array, base: frozenset[int]
+) -> Ray | None:
+    """Return the ray if a point a little along the curve lies in the polyhedron."""
+    ground = spot.ground
+    scales = ground.polyhedron.manifold.scale_array
+    kept = sorted(base)
+    far = 10 * ground.tolerance
+    for h in [h for h in SAMPLES if h >= far] or [10 * far]:
+        frame = settle(ground, spot.q + h * scales * direction, kept, 0.5 * h)
+        if frame is None:
+            continue
+        there = frame.active()
+        if there is not None and there < active and there >= base:
+            return Ray(direction, there, frame, h)
+        if there is not None and there < active and ground.polyhedron.is_union:
+            kept_there = frame.basis(there)
+            if len(kept_there) == len(kept):
+                return Ray(direction, there, Frame(ground, frame.q, kept_there), h)
+    return None
+
+
+def _sectors(spot: Spot, rows: list[int], slopes: Array, rays: list[Array]) -> tuple[Sector, ...]:
+    """Return the sectors between rays that lie in a common two-dimensional flat."""
+    n = slopes.shape[1]
+    flats: dict[frozenset[int], set[int]] = {}
+    zero = [frozenset(np.flatnonzero(abs(slopes @ y) <= FLAT).tolist()) for y in rays]
+    for i, j in combinations(range(len(rays)), 2):
+        shared = zero[i] & zero[j]
+        if abs(rays[i] @ rays[j]) < 1 - FLAT and len(shared) >= n - 2:
+            matrix = slopes[sorted(shared)]
+            if rank(matrix, RANK_TOLERANCE) == n - 2:
+                flats.setdefault(shared, set()).update((i, j))
+    sectors = []
+    for members in flats.values():
+        for i, j, middle in _arcs(rays, sorted(members)):
+            active = _active_along(spot, rows, slopes @ middle)
+            if active is not None and (
+                not active if n == 2 else _rank_of(rows, slopes, active) == n - 2
+            ):
+                sectors.append(Sector((i, j), active))
+    return tuple(sectors)
+
+
+def _cusps(spot: Spot, frame: Array, rays: list[Ray]) -> tuple[Sector, ...]:
+    """Return the sectors at a singular corner of the plane, by points between the samples."""
+    ground = spot.ground
+    scales = ground.polyhedron.manifold.scale_array
+    away = [(ray.frame.q - spot.q) / scales @ frame for ray in rays]
+    turn = [math.atan2(y[1], y[0]) % math.tau for y in away]
+    ordered = sorted(range(len(rays)), key=turn.__getitem__)
+    sectors = []
+    for i, j in zip(ordered, [*ordered[1:], *ordered[:1]], strict=True):
+        gap = (turn[j] - turn[i]) % math.tau
+        angle = turn[i] + gap / 2
+        y = np.linalg.norm(away[i]) * np.array([math.cos(angle), math.sin(angle)])
+        inner = ground.spot(spot.q + scales * (frame @ y)).active()
+        if inner is not None and not inner:
+            sectors.append(Sector((i, j), inner))
+    return tuple(sectors)
+
+
+def _arcs(rays: list[Array], members: list[int]) -> Iterator[tuple[int, int, Array]]:
+    """Yield neighbours by angle in the plane of some rays, and the direction halfway."""
+    first, other = rays[members[0]], rays[members[1]]
+    if abs(first @ other) > 1 - FLAT:
+        other = rays[members[2]]
+    axis = other - (other @ first) * first
+    axis = axis / np.linalg.norm(axis)
+    angles = {k: math.atan2(rays[k] @ axis, rays[k] @ first) % math.tau for k in members}
+    ordered = sorted(members, key=angles.__getitem__)
+    for i, j in zip(ordered, [*ordered[1:], ordered[0]], strict=True):
+        gap = (angles[j] - angles[i]) % math.tau
+        middle = angles[i] + gap / 2
+        yield i, j, math.cos(middle) * first + math.sin(middle) * axis

@@ -1,0 +1,355 @@
+"""Motion on the set where some functions of a polyhedron stay zero.
+
+A step goes along the tangent and returns to the set; the tangent is carried along, so a walk on
+an edge follows it and a walk on a larger face goes straight ahead.  Functions that are not held
+are watched by their values *and* their slopes: a contact that closes and opens again between two
+points, or just touches, is not missed.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from polycorner.skeletons.curves import Frame, settle
+from polycorner.spaces.manifold import Array
+
+FIRST_STEP = 0.2
+LONGEST_STEP = 0.5
+SHORTEST_STEP = 1e-7
+TURN = 0.25
+STRAY = 0.01
+# Step below which a change of orientation is taken for a crossing of curves, not for a jump.
+FLIP = 1e-3
+# Passive functions may drift this far, in scale units, before a walk has lost its curve.
+DRIFT = 1e-6
+
+
+class End(Enum):
+    """How a walk ends; the value says it in a sentence."""
+
+    CORNER = "a corner"
+    CLOSED = "closes upon itself without a corner"
+    INFINITY = "goes on beyond the extent that was asked for"
+    CHART = "reaches the end of the chart: a function or a slope is not finite there"
+    SINGULAR = "reaches a point where the held gradients become dependent"
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A walk along a face.
+
+    Attributes
+    ----------
+    points : (k, n) array
+        Where it went, in coordinates that are not wrapped.
+    frame : Frame
+        At its end.
+    tangent : (n,) array
+        Scaled unit direction of arrival.
+    end : End
+        Why it stopped.
+    length : float
+        In scale units.
+    branches : int
+        How often other curves on the same functions were crossed.
+    """
+
+    points: Array
+    frame: Frame
+    tangent: Array
+    end: End
+    length: float
+    branches: int
+
+
+def follow(
+    start: Frame,
+    direction: Array,
+    *,
+    passive: frozenset[int] = frozenset(),
+    home: bool = False,
+    extent: float | None = None,
+) -> Walk:
+    """Walk from ``start`` in a scaled direction, holding ``start.kept``, to the first event.
+
+    Parameters
+    ----------
+    start : Frame
+        Where the held functions vanish.
+    direction : (n,) array
+        Where to go; projected to the tangent space.
+    passive : set of int
+        Functions besides ``start.kept`` that vanish all along (dependent on them).
+    home : bool
+        Whether to stop when the walk comes back to where it started.
+    extent : float, optional
+        Length after which to give up; default that of the ground.
+    """
+    return _Follower(start, direction, passive, home=home, extent=extent).run()
+
+
+class _Follower:
+    """The state of one walk."""
+
+    def __init__(
+        self,
+        start: Frame,
+        direction: Array,
+        passive: frozenset[int],
+        *,
+        home: bool,
+        extent: float | None,
+    ) -> None:
+        self.ground = ground = start.ground
+        self.scales = ground.polyhedron.manifold.scale_array
+        self.frame, self.t = start, start.tangent(direction)
+        self.out = self.t
+        self.start, self.home = start, home
+        self.extent = ground.extent if extent is None else extent
+        held = passive.union(start.kept)
+        self.watched = np.array([i for i in range(ground.count) if i not in held], dtype=np.int64)
+        self.passive = sorted(passive.difference(start.kept))
+        self.union = ground.polyhedron.is_union
+        negative = self.union & (start.values[self.watched] < 0)
+        self.signs = np.where(negative, -1.0, 1.0)
+        self.points, self.length, self.branches = [start.q], 0.0, 0
+        self.side = start.orientation(self.t)
+
+    def run(self) -> Walk:
+        """Step until something happens."""
+        h = FIRST_STEP
+        while True:
+            taken = self._step(h)
+            if isinstance(taken, End):
+                return self._walk(taken)
+            frame, t, h = taken
+            met = self._event(frame, t)
+            if met is not None:
+                self._move(*met)
+                return self._walk(End.CORNER)
+            back = self._return(frame) if self.home else None
+            if back is not None:
+                self._move(*back)
+                return self._walk(End.CLOSED)
+            self._move(frame, t)
+            if any(abs(frame.distances[self.passive]) > DRIFT):
+                return self._walk(End.SINGULAR)
+            if self.length > self.extent:
+                return self._walk(End.INFINITY)
+            h = min(1.6 * h, self._longest())
+
+    def _longest(self) -> float:
+        """Return how long a step may be: longer far out, where nothing is near.
+
+        On circles a step stays a small part of the way around.
+        """
+        away = abs(self.frame.distances[self.watched])
+        room = float(away.min(initial=self.extent))
+        manifold = self.ground.polyhedron.manifold
+        turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
+        circle = 0.05 / turning if turning > 0 else math.inf
+        far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), circle)
+        return max(LONGEST_STEP, far)
+
+    def _walk(self, end: End) -> Walk:
+        points = np.array(self.points)
+        return Walk(points, self.frame, self.t, end, self.length, self.branches)
+
+    def _move(self, frame: Frame, t: Array) -> None:
+        side = frame.orientation(t)
+        self.branches += side * self.side < 0
+        self.length += float(np.linalg.norm((frame.q - self.frame.q) / self.scales))
+        self.frame, self.t, self.side = frame, t, side
+        self.points.append(frame.q)
+
+    def _step(self, h: float) -> tuple[Frame, Array, float] | End:
+        """Return the next point, the tangent there and the step that worked."""
+        blocked = False
+        while h > SHORTEST_STEP:
+            ahead = self.frame.q + h * self.scales * self.t
+            frame = settle(self.ground, ahead, self.frame.kept, 0.3 * h)
+            if frame is None:
+                blocked |= not Frame(self.ground, ahead, self.frame.kept).finite
+            else:
+                t = frame.tangent(self.t)
+                turn = math.acos(min(1.0, float(t @ self.t)))
+                off = (frame.q - self.frame.q) / self.scales - h * self.t
+                # Farther off than the turn explains: another curve of the same functions.
+                strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + STRAY)
+                flipped = frame.orientation(t) * self.side < 0 and h > FLIP
+                if turn < TURN and not strayed and not flipped:
+                    return frame, t, h
+            h /= 2
+        return End.CHART if blocked else End.SINGULAR
+
+    # ------------------------------------------------------------------------------------ events
+
+    def _between(self, other: Frame, s: float) -> Frame:
+        """Return the point of the set a fraction ``s`` of the way to ``other``."""
+        frame = settle(self.ground, self._guess(other, s), self.frame.kept, math.inf)
+        return other if frame is None else frame
+
+    def _guess(self, other: Frame, s: float) -> Array:
+        """Return a point of the cubic through both ends with their tangents."""
+        chord = other.q - self.frame.q
+        h = self._chord(other) * self.scales
+        out, back = h * self.t - chord, h * other.tangent(self.t) - chord
+        return np.asarray(self.frame.q + s * (chord + (1 - s) * ((1 - s) * out - s * back)))
+
+    def _event(self, frame: Frame, t: Array) -> tuple[Frame, Array] | None:
+        """Return the first point of this step where the face changes, and the tangent there."""
+        found: list[tuple[float, int, Frame, bool]] = []
+        for j, sign in self._suspects(frame, t):
+            place = self._closing(frame, j, sign)
+            if place is not None:
+                found.append((place[0], j, place[1], place[2]))
+        for _, j, where, crosses in sorted(found, key=lambda item: item[:2]):
+            if self._matters(where):
+                return where, where.tangent(self.t)
+            if crosses:
+                self.signs[self.watched == j] *= -1
+        return None
+
+    def _matters(self, where: Frame) -> bool:
+        """Whether the face changes here, and not only functions that are beside the point."""
+        if not self.union:
+            return True
+        active = where.active()
+        if active is None:
+            return True
+        held = set(self.frame.kept).union(self.passive)
+        return not active <= held
+
+    def _suspects(self, frame: Frame, t: Array) -> list[tuple[int, float]]:
+        """Return functions that change sign or may dip to zero in this step.
+
+        One that falls first and rises then may, if the cubic through values and slopes does, or
+        if the slopes at both ends, kept up, would let it.
+        """
+        here, there, rows = self.frame, frame, self.watched
+        f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
+        slope0 = self.signs * (here.gradients[rows] @ self.t)
+        slope1 = self.signs * (there.gradients[rows] @ t)
+        dips = (slope0 < 0) & (slope1 >= 0)
+        crosses = f1 < 0
+        chord = self._chord(frame)
+        reach = np.maximum(self._sizes(here), self._sizes(there)) * chord
+        near = f0 + f1 < reach
+        return [
+            (int(rows[k]), float(self.signs[k]))
+            for k in np.flatnonzero(crosses | dips)
+            if crosses[k] or near[k] or _dip(f0[k], f1[k], slope0[k], slope1[k], chord)
+        ]
+
+    def _chord(self, frame: Frame) -> float:
+        return float(np.linalg.norm((frame.q - self.frame.q) / self.scales))
+
+    def _sizes(self, frame: Frame) -> Array:
+        """Return the lengths of the watched functions' gradients."""
+        rows = frame.gradients[self.watched]
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", rows, rows)))
+
+    def _closing(self, frame: Frame, j: int, sign: float) -> tuple[float, Frame, bool] | None:
+        """Return where function ``j`` first reaches zero: fraction, point, and whether it crosses.
+
+        A function that ends positive is followed to where its slope vanishes; there it touches
+        (within the tolerance), has crossed before, or was only near.
+        """
+        end, far = frame, 1.0
+        if sign * frame.values[j] >= 0:
+
+            def slope(s: float) -> tuple[float, Frame]:
+                at = self._between(frame, s)
+                return sign * float(at.gradients[j] @ at.tangent(self.t)), at
+
+            far, end = _root(slope)
+            distance = sign * end.distances[j]
+            if distance > self.ground.tolerance:
+                return None
+            if distance >= -self.ground.tolerance:
+                return far, end, False
+
+        def value(s: float) -> tuple[float, Frame]:
+            at = self._between(frame, s)
+            return sign * float(at.values[j]), at
+
+        if end is frame and self.frame.is_curve:
+            quick = self._crossing(frame, j)
+            if quick is not None:
+                return (*quick, True)
+        s, where = _root(value, far)
+        return s, where, end is frame
+
+    def _crossing(self, frame: Frame, j: int) -> tuple[float, Frame] | None:
+        """Return where ``j`` crosses zero, by Newton's method; None if that leaves the step."""
+        f0, f1 = self.frame.values[j], frame.values[j]
+        guess = self._guess(frame, f0 / (f0 - f1))
+        kept = [*self.frame.kept, j]
+        place = settle(self.ground, guess, kept, self._chord(frame))
+        if place is None or place.condition < 1e-3:
+            return None
+        chord = (frame.q - self.frame.q) / self.scales
+        s = float((place.q - self.frame.q) / self.scales @ chord / (chord @ chord))
+        return (s, Frame(self.ground, place.q, self.frame.kept)) if 0 <= s <= 1 else None
+
+    def _return(self, frame: Frame) -> tuple[Frame, Array] | None:
+        """Return where this step passes the start of the walk again, and the tangent there."""
+        near = 2 * self._chord(frame)
+        if self.length < near or abs(self._from_home(frame.q)).max() > near:
+            return None
+        ahead = self._from_home(self.start.q + 1e-6 * self.scales * self.out)
+
+        def passed(s: float) -> tuple[float, Frame]:
+            at = self._between(frame, s)
+            return float(self._from_home(at.q) @ ahead), at
+
+        if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
+            return None
+        _, nearest = _root(passed)
+        same = abs(self._from_home(nearest.q)).max() < 100 * self.ground.tolerance
+        return (nearest, nearest.tangent(self.t)) if same else None
+
+    def _from_home(self, q: Array) -> Array:
+        """Return the way from the start's orbit, by the invariants."""
+        manifold, invariants = self.ground.polyhedron.manifold, self.ground.symmetry.invariants
+        if invariants is None:
+            return manifold.difference(q, self.start.q) / self.scales
+        return invariants(q) - invariants(self.start.q)
+
+
+def _dip(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
+    """Whether the cubic through values and slopes at both ends comes near zero in between."""
+    m0, m1 = h * slope0, h * slope1
+    curve = [f0, m0, 3 * (f1 - f0) - 2 * m0 - m1, 2 * (f0 - f1) + m0 + m1]
+    flat = np.roots([3 * curve[3], 2 * curve[2], curve[1]])
+    lowest = flat.real[(abs(flat.imag) < 1e-6) & (flat.real > 0) & (flat.real < 1.01)]
+    values = np.polyval(curve[::-1], lowest)
+    return bool((values < 0.25 * min(f0, f1) + 1e-9).any())
+
+
+def _root(value: Callable[[float], tuple[float, Frame]], far: float = 1.0) -> tuple[float, Frame]:
+    """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
+    a, b = 0.0, far
+    (fa, _), (fb, at) = value(a), value(b)
+    if abs(fb) < 1e-15:
+        return b, at
+    s, side = far, 0
+    for _ in range(80):
+        if b - a < 1e-15 or fb == fa:
+            break
+        s = (a * fb - b * fa) / (fb - fa)
+        f, at = value(s)
+        if f == 0.0 or abs(f) < 1e-15:
+            break
+        if (f > 0) == (fb > 0):
+            b, fb = s, f
+            fa, side = (fa / 2 if side == 1 else fa), 1
+        else:
+            a, fa = s, f
+            fb, side = (fb / 2 if side == -1 else fb), -1
+        if b - a < 1e-14:
+            break
+    return s, at

@@ -1,0 +1,5 @@
+"""Configuration manifolds, and distances between bodies as formulas."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

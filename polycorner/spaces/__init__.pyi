@@ -1,0 +1,5 @@
+from .manifold import Manifold
+
+__all__ = [
+    "Manifold",
+]

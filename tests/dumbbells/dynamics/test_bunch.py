@@ -1,0 +1,134 @@
+"""A bunch at the bottom: starts, dyads and exits against counts by hand."""
+
+import math
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import (
+    BunchRun,
+    drum_for_bunch,
+    exit_statistics,
+    follow_bunch,
+    scattered,
+)
+from polycorner.dumbbells.dynamics.dyads import handedness
+from polycorner.dumbbells.dynamics.pairs import is_dyad
+
+SMALL = drum_for_bunch(DumbbellDrum(length=8, ball_radius=2, rod_radius=0.5), count=8)
+
+
+NOBODY = {"right": 0, "left": 0, "both": 0, "single": 0, "present": 0}
+
+
+def still(drum, q, times, present=None, exits=()):
+    """A run in which nothing moves."""
+    places = np.concatenate([q, np.zeros((len(q), 1))], axis=1)
+    shape = (len(times), len(q))
+    here = np.ones(shape, dtype=bool) if present is None else present
+    many = np.broadcast_to(places, (*shape, 4)).copy()
+    return BunchRun(drum, np.array(times), many, here, tuple(exits), 0, 0, 0.0)
+
+
+@pytest.mark.parametrize("count", [8, 60])
+@pytest.mark.parametrize("sizes", [(16, 3, 1.5), (8, 2, 0.5)])
+def test_starts_lie_on_the_bottom_without_overlap(sizes, count):
+    drum = drum_for_bunch(DumbbellDrum(*sizes), count=count)
+    q = scattered(drum, np.random.default_rng(4))
+    assert drum.placed(q).shape == (count, 4)
+    assert abs(q[:, 0]).max() <= 0.35
+    assert q[:, 1].max() < drum.top
+
+
+def test_dyads_are_those_of_all_pairs():
+    q = scattered(replace(SMALL, count=30), np.random.default_rng(0), width=0.15)
+    run = still(replace(SMALL, count=30), q, [0.0, 1.0])
+    by_hand = [
+        (i, j, int(handedness(SMALL, q[[i, j]])))
+        for i, j in combinations(range(30), 2)
+        if is_dyad(SMALL, q[[i, j]])
+    ]
+    assert run.dyads(1) == [dyad for dyad in by_hand if dyad[2]]
+    assert by_hand
+
+
+def exits_of(hand):
+    pair = SMALL.pair.nested(hand).reshape(2, 3)
+    pair[:, 1] += 298
+    alone = np.array([[0.0, 298.0, 0.1], [1.0, 30.0, 0.0]])
+    drum = replace(SMALL, count=4)
+    times = np.arange(5.0)
+    present = np.ones((5, 4), dtype=bool)
+    present[2:, 0] = present[3:, 1:3] = False
+    alone[0, 0] = -0.8
+    q = np.concatenate([pair, alone])
+    return still(drum, q, times, present, [(1.5, 0), (2.5, 1), (2.7, 2)])
+
+
+@pytest.mark.parametrize(("hand", "kind"), [("R", "right"), ("L", "left")])
+def test_both_members_of_a_dyad_leave_as_such(hand, kind):
+    """The second one is alone in the last record, but was not a moment ago."""
+    run = exits_of(hand)
+    assert run.exit_kinds == (kind, kind, "single")
+    assert run.exit_counts() == {"right": 0, "left": 0, "single": 1} | {kind: 2}
+    assert run.census(0) == NOBODY | {"single": 2, "present": 4, kind: 2}
+    assert run.census(4) == NOBODY | {"single": 1, "present": 1}
+
+
+def test_who_is_between_a_right_and_a_left_dyad_is_of_both_hands():
+    """Three side by side, the middle one shifted up against both."""
+    p, up = 2.6, 5.0
+    places = np.array([[-p, 50.0, 0.0], [0.0, 50.0 + up, 0.0], [p, 50.0, 0.0]])
+    run = still(replace(SMALL, count=3), places / [SMALL.centre_radius, 1.0, 1.0], [0.0])
+    assert {(i, j) for i, j, _ in run.dyads(0)} == {(0, 1), (1, 2)}
+    assert sum(hand for *_, hand in run.dyads(0)) == 0
+    assert run.census(0) == {"right": 1, "left": 1, "both": 1, "single": 0, "present": 3}
+
+
+def test_statistics_over_runs():
+    found = exit_statistics([exits_of("R"), exits_of("L")])
+    assert found.total.value == 3.0
+    assert found.by_kind["right"].value == 1.0
+    assert found.by_kind["right"].error == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="runs: expected at least one"):
+        exit_statistics([])
+
+
+def test_what_spins_rolls_and_what_does_not_slides():
+    q = np.array([[0.02, 40.0, 0.1], [0.2, 80.0, 0.1]])
+    run = still(replace(SMALL, count=2), q, np.arange(0, 21.0))
+    run.q[:, 0, 3] = np.where(np.arange(21) % 2, 0.0, 0.2)
+    assert run.rollers(20).tolist() == [True, False]
+    assert run.azimuths(20) == pytest.approx((0.02, 0.2))
+    assert math.isnan(run.azimuths(0)[0])
+
+
+def test_a_bunch_stays_in_the_drum_and_sorts_itself():
+    run = follow_bunch(SMALL, 1.0, seed=2, dt=2e-3)
+    assert run.present.all()
+    assert run.exits == ()
+    assert run.max_penetration < 0.01
+    low = run.q[-1, :, 1] - SMALL.length / 2 * abs(np.cos(run.q[-1, :, 2])) - SMALL.ball_radius
+    assert low.min() > -0.01
+    assert sum(run.census(-1)[k] for k in ("right", "left", "both", "single")) == 8
+
+
+def test_dumbbells_leave_at_the_top():
+    drum = replace(SMALL, top=40.0, tilt=math.radians(-40))  # steep: all slide out
+    run = follow_bunch(drum, 0.5, seed=2, interval=0.01)
+    assert len(run.exits) == 8
+    assert run.exits[0][0] > 0.02
+    assert not run.present[-1].any()
+
+
+def test_a_bunch_that_begins_above_the_top_is_refused():
+    with pytest.raises(ValueError, match=r"top: .* got 10 mm, and number \d is at 17\.2"):
+        follow_bunch(replace(SMALL, top=10.0), 1.0, seed=2)
+
+
+def test_a_drum_without_a_bottom_is_refused():
+    with pytest.raises(ValueError, match="drum: expected one with a bottom"):
+        follow_bunch(DumbbellDrum(), 1.0)

@@ -1,0 +1,143 @@
+"""Driven pairs: chirality against the model's, mirror images, strata, and the minimiser."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.dyads import (
+    follow_dyads,
+    handedness,
+    heading_at_shift,
+    minimiser_heading,
+    steady,
+)
+from polycorner.dumbbells.dynamics.pairs import is_dyad
+from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.statics.minima import dyad_minima
+from polycorner.motion.noise import Noise
+
+DRUM = DumbbellDrum()
+LEVEL = replace(DRUM, tilt=0.0)
+PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
+CHATTER = Noise(chatter=0.4, seed=11)
+
+
+@given(st.integers(0, 10**6))
+def test_chirality_is_that_of_the_model(seed):
+    pairs = PAIR.placements(np.random.default_rng(seed), 20)
+    hands = handedness(DRUM, pairs.reshape(-1, 2, 3))
+    assert [{1: "R", -1: "L", 0: None}[h] for h in hands] == [PAIR.chirality(q) for q in pairs]
+
+
+@given(st.floats(-20, 20), st.sampled_from("RL"))
+def test_nested_pairs_are_dyads_and_mirror_images_have_the_other_hand(degrees, hand):
+    q = PAIR.nested(hand, heading=math.radians(degrees)).reshape(2, 3)
+    assert is_dyad(DRUM, q)
+    assert handedness(DRUM, q) == {"R": 1, "L": -1}[hand]
+    assert handedness(DRUM, q * [-1, 1, -1]) == -handedness(DRUM, q)
+
+
+@pytest.mark.parametrize("q", [PAIR.end_to_end(), PAIR.side_by_side(clearance=4.0)])
+def test_pairs_that_are_not_nested_are_no_dyads(q):
+    assert not is_dyad(DRUM, q.reshape(2, 3))
+
+
+def test_right_pairs_climb_and_left_pairs_descend_with_opposite_headings():
+    angle = math.radians(12)
+    paths = follow_dyads(DRUM, [("R", angle), ("L", -angle)], 25.0)
+    assert np.isinf(paths.lifetimes).all()
+    right, left = paths.climb_rates(after=5.0)
+    law = DRUM.spin * DRUM.centre_radius * math.tan(angle)
+    assert right == pytest.approx(law, rel=0.5)
+    assert left == pytest.approx(-law, rel=0.5)
+    assert (paths.hand == [1, -1]).all()
+    assert sum(paths.strata().values()) == pytest.approx(1.0)
+
+
+def test_in_a_level_drum_left_pairs_are_right_pairs_upside_down():
+    """``eta -> -eta, theta -> pi - theta`` keeps the drum, its spin and the balls' numbers.
+
+    With noise too, so that sorting by chirality does not need a tilt.  Solved to 1e-6 a step, the
+    images part slowly; contacts make their order matter.
+    """
+    q = PAIR.nested("R", heading=0.2, clearance=0.05).reshape(2, 3)
+    image = q * [1, -1, -1] + [0, 0, math.pi]
+    assert handedness(DRUM, image) == -handedness(DRUM, q)
+    two = replace(LEVEL, count=2)
+    first, second = (two.simulate(place, 9.5, noise=CHATTER).q for place in (q, image))
+    moved = abs(first[-1, :, 1] - first[0, :, 1]).max()
+    assert moved > 0.02
+    back = second * [1, -1, -1, -1] + [0, 0, math.pi, 0]
+    assert abs(back[-1, :, :3] - first[-1, :, :3]).max() < 0.01 * moved
+
+
+def test_mirrored_pairs_in_a_drum_that_turns_the_other_way_are_mirrored():
+    q = PAIR.nested("R", heading=0.2, clearance=0.05).reshape(2, 3)
+    paths = []
+    for sign in (1, -1):
+        drum = replace(DRUM, count=2, spin=sign * DRUM.spin)
+        paths.append(drum.simulate(q * [sign, 1, sign], 9.5, noise=CHATTER).q)
+    moved = abs(paths[0][-1, :, 1] - paths[0][0, :, 1]).max()
+    assert moved > 0.02
+    back = paths[1] * [-1, 1, -1, -1]
+    assert abs(back[-1, :, :3] - paths[0][-1, :, :3]).max() < 0.01 * moved
+
+
+@pytest.mark.parametrize("degrees", [0.0, 3.0, 6.0])
+def test_at_any_mean_azimuth_the_same_heading_is_of_least_energy(degrees):
+    expected = dyad_minima(PAIR)[0].headings[0]
+    found = minimiser_heading(DRUM, azimuth=math.radians(degrees))
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_shaken_in_a_drum_that_stands_still_headings_go_to_that_of_least_energy():
+    """From both sides, staying in the corner; a turning drum drives them elsewhere."""
+    least = dyad_minima(PAIR)[0].headings[0]
+    starts = [("R", math.radians(2)), ("R", math.radians(14))]
+    quiet = replace(LEVEL, spin=0.0)
+    paths = follow_dyads(quiet, starts, 10.0, noise=Noise(chatter=1.0, seed=4))
+    away = abs(np.degrees(paths.heading[[0, -1]]) - least)
+    assert (away[1] < away[0] - 0.5).all()
+    assert paths.shift[-1] == pytest.approx(paths.shift[0], abs=0.3)
+
+
+@given(st.floats(0.5, 15.0))
+def test_the_heading_at_a_shift_has_the_lowest_balls(shift):
+    """Squared lateral places of four balls, over all headings, by trying them."""
+    theta = np.radians(np.linspace(-45, 45, 90_001))
+    along, across = np.sin(theta), -np.cos(theta)
+    lateral = [
+        side * (shift * along + 4.5 * across) / 2 + end * 8 * along
+        for side in (-1, 1)
+        for end in (-1, 1)
+    ]
+    best = np.degrees(theta[np.argmin(np.square(lateral).sum(axis=0))])
+    assert heading_at_shift(DRUM, shift) == pytest.approx(best, abs=0.002)
+
+
+def test_the_heading_at_the_corner_is_that_of_the_plane():
+    heading, along, _ = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5).plane_corner()
+    assert heading_at_shift(DRUM, along) == pytest.approx(math.degrees(heading), abs=1e-12)
+
+
+def test_means_are_over_pairs_that_held():
+    starts = [("R", 0.1), ("R", 0.2), ("L", -0.2)]
+    paths = follow_dyads(DRUM, starts, 2.0)
+    found = steady(paths, after=1.0)
+    assert (found.held, found.count) == (3, 3)
+    assert found.heading.value == pytest.approx(np.degrees([0.1, 0.2, 0.2]).mean(), abs=1.0)
+    assert found.minimiser == pytest.approx(dyad_minima(PAIR)[0].headings[0], abs=1e-6)
+    with pytest.raises(ValueError, match="after: expected a time before the end"):
+        steady(paths, after=3.0)
+
+
+def test_arguments_are_checked():
+    with pytest.raises(ValueError, match="starts: expected at least one"):
+        follow_dyads(DRUM, [], 1.0)
+    with pytest.raises(ValueError, match="drum: expected one without bottom"):
+        follow_dyads(replace(DRUM, floor=True), [("R", 0.1)], 1.0)

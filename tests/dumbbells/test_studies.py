@@ -1,0 +1,134 @@
+"""The studies that ship, against what they are made of, by another way."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import follow_bunch
+from polycorner.dumbbells.dynamics.dyads import follow_dyads
+from polycorner.dumbbells.statics.minima import dyad_minima
+from polycorner.dumbbells.studies import bunch, climbing, heading
+from polycorner.motion.noise import Noise
+from polycorner.sweeps.execution import sweep
+
+
+@pytest.mark.parametrize("chirality", ["R", "L"])
+def test_headings_are_those_of_the_dyads_minima(chirality):
+    grid = {"length": ([12.0, 16.0], "mm"), "rod_radius": ([1.5, 2.95], "mm")}
+    found = sweep(heading, grid, fixed={"chirality": chirality})
+    for length in found["length"].values:
+        for rod in found["rod_radius"].values:
+            at = found.sel(length=length, rod_radius=rod)
+            pair = DumbbellPair(float(length), 3.0, float(rod), 125.0)
+            right = dyad_minima(pair)["RL".index(chirality)]
+            assert at["heading"].item() == right.headings[0]
+            assert at["minimum"].item() == right.certificate.is_minimum
+            for name, value in right.multipliers.items():
+                assert at[f"multiplier_{name}"].item() == value
+            assert at["residual"].item() < 1e-12
+    assert found["minimum"].values.tolist() == [[1, 0], [1, 0]]
+
+
+@given(st.floats(12, 40), st.floats(0.1, 2.95))
+def test_in_the_plane_the_heading_is_the_closed_form_and_minima_end_at_the_critical_rod(
+    length, rod
+):
+    found = heading(length, rod, drum_radius=math.inf)
+    assert found["heading"][0] == pytest.approx(found["plane_heading"][0], abs=1e-8)
+    assert found["paper_heading"][0] == pytest.approx(math.degrees(math.atan(3 / length)))
+    critical = 6 * math.sqrt(1 - (3 / length) ** 2) - 3  # where l s = 2 r^2, docs/heading.md
+    if abs(rod - critical) > 1e-6:
+        assert found["minimum"] == (rod < critical)
+
+
+def test_pairs_that_cannot_be_are_rows_with_the_models_sentence():
+    found = sweep(heading, {"length": [5.0, 8.0, 16.0], "rod_radius": [0.75, 4.0]})
+    assert found["status"].values.tolist() == [[2, 2], [2, 2], [1, 2]]
+    message = found["message"].values
+    assert message[0, 0].startswith("ValueError: length: expected")
+    assert message[2, 1].startswith("ValueError: rod_radius: expected")
+    assert "expected a corner where A2B1 A2b aB1 touch; got none" in message[1, 0]
+
+
+def test_climb_rates_are_slopes_of_the_paths_and_noise_is_the_points_own():
+    grid = {"noise": [0.4, 0.6], "tilt": ([0.0, 7.0], "deg")}
+    found = sweep(climbing, grid, rng=3, fixed={"duration": 4.0, "pairs": 2})
+    assert (found["held"].values == 2).all()
+    child = np.random.SeedSequence(3).spawn(4)[1]
+    noise = Noise(chatter=0.4, seed=int(np.random.default_rng(child).integers(2**63)))
+    starts = [("R", math.radians(angle)) for angle in (2.0, 14.0)]
+    paths = follow_dyads(DumbbellDrum(tilt=math.radians(7)), starts, 4.0, noise=noise)
+    late = paths.times >= 2.0
+    slopes = (paths.eta[-1] - paths.eta[late][0]) / np.ptp(paths.times[late])
+    at = found.sel(noise=0.4, tilt=7.0)
+    assert at["climb_rate"].item() == pytest.approx(slopes.mean())
+    assert abs(slopes).max() > 1e-3
+    mean = np.degrees(paths.heading[late].mean())
+    assert at["heading"].item() == pytest.approx(mean)
+    assert at["law"].item() == pytest.approx(0.01 * 122 * math.tan(math.radians(mean)))
+    assert len(set(found["heading"].values.ravel())) == 4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [({"noise": -1.0}, "chatter: expected"), ({"pairs": 0}, "pairs: expected")],
+)
+def test_climbing_names_what_is_wrong(wrong, words):
+    given = {"noise": 0.1, "tilt": 7.0, "rng": np.random.default_rng(1)} | wrong
+    with pytest.raises(ValueError, match=words):
+        climbing(**given)
+
+
+def test_members_of_a_bunch_are_counted():
+    fixed = {
+        "count": 12,
+        "duration": 0.2,
+        "top": 60.0,
+        "tilt": -20.0,
+        "sliding": 0.15,
+        "noise": 0.1,
+    }
+    found = sweep(bunch, {"start": [0, 3], "rubbing": [0.1, 0.3]}, fixed=fixed)
+    drum = DumbbellDrum(
+        count=12,
+        floor=True,
+        top=60.0,
+        tilt=math.radians(-20.0),
+        sliding=(0.15, 0.1),
+        rubbing=(0.1, 0.1),
+    )
+    run = follow_bunch(drum, 0.2, seed=3, chatter=0.1, dt=0.004)
+    at = {name: values.item() for name, values in found.sel(start=3, rubbing=0.1).items()}
+    assert at["left"] == len(run.exits)
+    assert 0 < at["left"] < 12
+    assert at["left"] == at["left_right"] + at["left_left"] + at["left_single"]
+    assert at["left_left"] == run.exit_counts()["left"]
+    stayed = run.present[-1]
+    assert at["in_right"] + at["in_left"] + at["both"] + at["single"] == stayed.sum()
+    assert at["reach"] == run.q[-1, stayed, 1].mean()
+    assert at["max_penetration"] == run.max_penetration
+    assert at["missed"] == run.unconverged / run.islands
+    assert len(np.unique(found["reach"])) == 4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"start": 1.5}, r"start: expected a whole number not below 0; got 1\.5"),
+        ({"start": -1}, "start: expected"),
+        ({"noise": -1.0}, "chatter: expected"),
+        ({"count": 0}, "count: expected"),
+        ({"rubbing": -0.1}, "rubbing: expected"),
+        ({"top": 0.0}, "top: expected"),
+        ({"dt": 0.1}, "dt: expected"),
+        ({"duration": math.nan}, "duration: expected"),
+    ],
+)
+def test_bunches_name_what_is_wrong(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        bunch(**({"start": 1, "count": 3, "duration": 0.01} | wrong))

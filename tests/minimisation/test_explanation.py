@@ -1,0 +1,382 @@
+"""The sentences of ``explain`` are true: names and numbers against independent computations."""
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from oracles import CONTACTS, balls, gaps
+from oracles_minima import least_on_cone
+from polynomials import linear, quadratic
+
+from polycorner import AnyOf, Manifold, Polyhedron, Verdict, certify, minimise
+from polycorner.dumbbells import DumbbellPair
+from polycorner.models import Pinball, Tutorial
+
+NUMBER = r"(-?[\d.]+(?:e[-+]\d+)?)"
+M1, M2, M3 = (Manifold.euclidean(names) for names in ("x", "x y", "x y z"))
+x, y, z = M3.symbols
+numbers = st.floats(-2, 2).filter(lambda v: abs(v) > 0.05)
+
+
+def sentence(text, words):
+    """Return the one line that contains the words."""
+    (found,) = [line for line in text.splitlines() if words in line]
+    return found
+
+
+def figures(text, words):
+    """Return the numbers after each occurrence of the words."""
+    return [float(found) for found in re.findall(re.escape(words) + " " + NUMBER, text)]
+
+
+def direction(line, manifold):
+    """Return a direction as it is told, in the manifold's own coordinates."""
+    told = dict(re.findall(rf"d(\w+) = {NUMBER}", line))
+    return np.array([float(told.get(name, 0)) for name in manifold.names])
+
+
+def told_rates(text):
+    """Return the contacts that the energy pulls open, and how fast."""
+    found = re.findall(rf"^Leaving (\w+).* at the rate {NUMBER} per", text, re.MULTILINE)
+    return {name: float(rate) for name, rate in found}
+
+
+# ------------------------------------------------------------- programmes with known answers
+
+
+@st.composite
+def programmes(draw, multipliers=numbers):
+    """Return rows ``A``, multipliers and a form: at the origin ``dE = sum lam_i a_i``."""
+    n = draw(st.integers(2, 4))
+    k = draw(st.integers(1, n))
+    rows = np.array(draw(st.lists(numbers, min_size=k * n, max_size=k * n))).reshape(k, n)
+    scales = np.array(draw(st.lists(st.sampled_from([0.1, 1.0, 5.0]), min_size=n, max_size=n)))
+    singular = np.linalg.svd(rows * scales)[1]
+    assume(singular[-1] > 0.05 * singular[0])
+    held = np.array(draw(st.lists(multipliers, min_size=k, max_size=k)))
+    form = np.array(draw(st.lists(st.floats(-2, 2), min_size=n * n, max_size=n * n)))
+    return rows, held, form.reshape(n, n) + form.reshape(n, n).T, scales
+
+
+def posed(rows, held, form, scales):
+    n = len(scales)
+    manifold = Manifold(tuple(f"q{i}" for i in range(n)), scales=tuple(scales))
+    walls = [linear(manifold, row, 0.0, f"c{i}") for i, row in enumerate(rows)]
+    return certify(Polyhedron(manifold, walls), quadratic(manifold, form, held @ rows), [0.0] * n)
+
+
+def fastest(rows, slope):
+    """Return the greatest rate ``-slope.d`` over unit ``d`` with ``rows d >= 0``, face by face."""
+    best = 0.0
+    for size in range(len(rows) + 1):
+        for chosen in itertools.combinations(range(len(rows)), size):
+            held = rows[list(chosen)]
+            along = -slope + np.linalg.pinv(held) @ held @ slope if size else -slope
+            if (rows @ along >= -1e-9).all():
+                best = max(best, float(np.linalg.norm(along)))
+    return best
+
+
+@given(programmes())
+def test_contacts_that_the_energy_pulls_open_are_named_with_their_rates(programme):
+    rows, held, _, scales = programme
+    text = posed(*programme).explain(unit="mm")
+    negative = {f"c{i}": -value for i, value in enumerate(held) if value < 0}
+    assert told_rates(text) == pytest.approx(negative, rel=1e-5)
+    assert ("per mm" in text) == bool(negative)
+    falls = [line for line in text.splitlines() if line.startswith("The energy falls fastest")]
+    assert len(falls) == bool(negative)
+    if negative:
+        assert text.startswith("Not a minimum")
+        manifold = posed(*programme).problem.polyhedron.manifold
+        way, rate = direction(falls[0], manifold), figures(falls[0], "at the rate")[0]
+        assert rate == pytest.approx(fastest(rows * scales, held @ rows * scales), rel=1e-5)
+        assert np.linalg.norm(way / scales) == pytest.approx(1, abs=1e-5)
+        assert -(held @ rows) @ way == pytest.approx(rate, rel=1e-4)
+        assert (rows @ way >= -1e-4).all()
+
+
+@given(programmes(multipliers=st.floats(0.1, 2)))
+def test_the_least_curvature_along_the_face_is_told_with_its_direction(programme):
+    rows, held, form, scales = programme
+    c = posed(*programme)
+    text = c.explain()
+    assert "strict complementarity" in text
+    for i, value in enumerate(held):
+        assert f"{value:.6g} d(c{i})" in text
+    basis = np.linalg.svd(rows * scales)[2][len(rows) :].T
+    scaled = form * np.outer(scales, scales)
+    if not basis.shape[1]:
+        assert "No direction is left to the second order" in text
+        return
+    least = np.linalg.eigvalsh(basis.T @ scaled @ basis)[0]
+    assume(abs(least) > 1e-3)
+    (told,) = figures(text, "the least curvature is") + figures(text, "the curvature there is")
+    assert told == pytest.approx(least, rel=1e-5)
+    line = sentence(text, f"{told:.6g} per squared scale unit")
+    way = direction(line, c.problem.polyhedron.manifold) / scales
+    assert np.linalg.norm(way) == pytest.approx(1, abs=1e-5)
+    assert (rows * scales) @ way == pytest.approx(0, abs=1e-4)
+    assert way @ scaled @ way == pytest.approx(least, rel=1e-3, abs=1e-3)
+    assert text.startswith("Strict local minimum" if least > 0 else "Not a minimum: first order")
+
+
+@given(st.lists(st.floats(-2, 2), min_size=9, max_size=9), st.integers(2, 3), st.integers(1, 3))
+def test_weak_contacts_leave_the_least_value_on_their_cone(entries, n, k):
+    """What is told is attained in the cone, and no sampled direction of the cone lies lower."""
+    manifold = {2: M2, 3: M3}[n]
+    form = np.array(entries).reshape(3, 3)[:n, :n]
+    form = form + form.T
+    rows = np.eye(n)[: min(k, n)] + 0.3
+    walls = [linear(manifold, row, 0.0, f"c{i}") for i, row in enumerate(rows)]
+    text = certify(Polyhedron(manifold, walls), quadratic(manifold, form), [0.0] * n).explain()
+    least = least_on_cone(form, rows)
+    assume(abs(least) > 0.05)
+    names = ", ".join(f"c{i}" for i in range(len(rows)))
+    assert f"Weakly active, with multiplier zero: {names}." in text
+    (told,) = figures(text, "the least curvature is") + figures(text, "the curvature there is")
+    assert told <= least + 1e-5 * (1 + abs(least))
+    way = direction(sentence(text, "per squared scale unit"), manifold)
+    assert (rows @ way >= -1e-5).all()
+    assert way @ form @ way == pytest.approx(told, abs=1e-4)
+
+
+@given(programmes(), st.data())
+def test_the_worst_inequality_is_named_with_its_value(programme, data):
+    rows, _, form, scales = programme
+    n = len(scales)
+    offsets = np.array(data.draw(st.lists(numbers, min_size=len(rows), max_size=len(rows))))
+    away = offsets / np.linalg.norm(rows * scales, axis=1)
+    assume(away.min() < 0)
+    assume(len(set(away.round(6))) == len(away))
+    manifold = Manifold(tuple(f"q{i}" for i in range(n)), scales=tuple(scales))
+    walls = [
+        linear(manifold, row, f, f"c{i}")
+        for i, (row, f) in enumerate(zip(rows, offsets, strict=True))
+    ]
+    text = certify(Polyhedron(manifold, walls), quadratic(manifold, form), [0.0] * n).explain()
+    assert text.startswith("The point does not lie in the polyhedron.")
+    worst = int(away.argmin())
+    assert f"the inequality c{worst} fails: its function is {offsets[worst]:.6g}," in text
+    assert figures(text, "to first order") == pytest.approx([-away[worst]], rel=1e-5)
+    others = [f"c{i}" for i in np.flatnonzero(away < 0) if i != worst]
+    assert (f"Also violated: {', '.join(others)}." in text) == bool(others)
+    assert "first order holds" not in text
+
+
+# -------------------------------------------------------------------------- kinds of points
+
+
+def test_an_equation_that_is_not_met_is_named():
+    D = Polyhedron(M2, {"floor": y}, equations={"line": x + y - 3, "other": x - y})
+    text = certify(D, y, [1.0, 0.5]).explain(unit="mm")
+    assert "the equation line is not met: it is -1.5 mm," in text
+    assert figures(text, "to first order") == pytest.approx([1.5 / 2**0.5], rel=1e-5)
+    assert "Also violated: other." in text
+
+
+def test_of_a_union_the_branch_that_is_missed_least_counts():
+    D = Polyhedron(M2, AnyOf(linear(M2, [1, 0], -3, "right"), linear(M2, [0, 2], -2, "up")))
+    text = certify(D, x + y, [0.0, 0.0]).explain()
+    assert "the inequality up fails: its function is -2," in text
+    assert "Also violated" not in text
+
+
+def test_where_branches_meet_the_one_that_decides_is_named():
+    D = Polyhedron(M2, AnyOf(linear(M2, [1, 0], 0, "right"), linear(M2, [0, 1], 0, "up")))
+    text = certify(D, 3 * y + x**2, [0.0, 0.0]).explain()
+    assert "2 branches of the union meet (right; up)" in text
+    assert "the branch that decides, right." in text
+    assert "(dy = -1) at the rate 3 per scale unit" in text
+
+
+def test_an_interior_point_that_is_not_stationary():
+    text = certify(Polyhedron(M2, {"floor": y}), (x - 3) ** 2 + y**2, [0.0, 4.0]).explain()
+    assert "in the interior of the polyhedron" in text
+    assert "(dx = 0.6, dy = -0.8), at the rate 10 per scale unit" in text
+
+
+def test_a_slope_along_the_face_is_told_apart_from_the_contacts():
+    """At (1, 1) on the parabola dE = (1, 1) = 0.2 d(bowl) - ..., with d(bowl) = (-2, 1)."""
+    text = certify(Polyhedron(M2, {"bowl": y - x**2}), x + y, [1.0, 1.0]).explain()
+    assert told_rates(text) == {"bowl": 0.2}
+    along = sentence(text, "Along the face")
+    assert direction(along, M2) == pytest.approx([-(0.2**0.5), -(0.8**0.5)], abs=1e-6)
+    assert figures(along, "at the rate") == pytest.approx([3 / 5**0.5], rel=1e-5)
+
+
+def test_redundant_contacts_and_ranges_of_multipliers():
+    D = Polyhedron(M2, {"floor": y, "again": 2 * y, "left": y - x, "right": y + x})
+    text = certify(D, x**2 + 4 * y, [0.0, 0.0]).explain()
+    assert "The 4 gradients of floor, again, left, right are dependent, of rank 2" in text
+    ranges = re.findall(rf"(\w+) from {NUMBER} to {NUMBER}", text)
+    most = {"floor": 4, "again": 2, "left": 2, "right": 2}
+    assert {name: float(high) for name, _, high in ranges} == pytest.approx(most, abs=1e-5)
+    assert all(abs(float(low)) < 1e-5 for _, low, _ in ranges)
+    assert "each implied by the others: floor; again." in text
+
+
+def test_dependent_contacts_that_are_pulled_open():
+    D = Polyhedron(M2, {"floor": y, "again": 2 * y})
+    text = certify(D, x**2 - 3 * y, [0.0, 0.0]).explain()
+    assert "(dy = 1), at the rate 3 per scale unit" in text
+    assert not told_rates(text)  # which of the two carries it is not determined
+
+
+def test_a_cusp_decides_nothing():
+    text = certify(Polyhedron(M2, {"a": y - x**2, "b": 2 * x**2 - y}), x, [0.0, 0.0]).explain()
+    assert text.startswith("Undecided: no multiplier exists")
+    assert "The gradients of a, b are dependent and leave no inward direction" in text
+    assert "falls" not in text
+
+
+def test_a_direction_in_which_the_energy_is_constant_is_free():
+    text = certify(Polyhedron(M3, {"floor": z}), z + 2 * y**2, [1.0, 0.0, 0.0]).explain()
+    assert "The second order vanishes, or nearly so, in the direction (dx = 1)." in text
+    assert "they are free" in text
+    across = sentence(text, "Across them")
+    assert figures(across, "the least curvature is") == [4]
+    assert direction(across, M3).tolist() == [0, 1, 0]
+    assert "half-V: floor; U: y; free: x." in text
+
+
+@pytest.mark.parametrize("power", [3, 4])
+def test_a_direction_of_higher_order_is_undecided_and_not_called_free(power):
+    text = certify(Polyhedron(M2, {"floor": y}), y + x**power, [0.0, 0.0]).explain()
+    assert text.startswith("Undecided")
+    assert "nothing is decided" in text
+    assert "undecided: x." in text
+    assert "free" not in text
+
+
+def test_too_many_weak_contacts():
+    M = Manifold.euclidean([f"x{i}" for i in range(11)])
+    D = Polyhedron(M, {f"w{i}": s for i, s in enumerate(M.symbols)})
+    form = sum(s**2 for s in M.symbols) - 4 * M.symbols[0] * M.symbols[1]
+    text = certify(D, form, [0.0] * 11).explain()
+    assert "11 functions are weakly active, more than the 10" in text
+
+
+def test_a_contact_that_is_nearly_closed_under_a_large_force():
+    c = certify(Polyhedron(M1, {"wall": 1e-6 * M1.symbols[0]}), M1.symbols[0], [5e-9])
+    text = c.explain()
+    if c.verdict is Verdict.NOT_STATIONARY:
+        assert "wall counts as closed, but its gap is 5e-15" in text
+    c = certify(Polyhedron(M2, {"wall": x}), 100 * x + y**2, [9e-9, 0.0])
+    assert ("counts as closed" in c.explain()) == (c.verdict is Verdict.NOT_STATIONARY)
+
+
+def test_angles_bear_their_unit():
+    M = Manifold(("phi", "s"), periods=(2 * np.pi, np.inf), scales=(0.5, 2.0))
+    phi, s = M.symbols
+    text = certify(Polyhedron(M, {"floor": s}), s + sp.sin(phi), [0.0, 0.0]).explain()
+    assert "(dphi = -0.5 rad) at the rate 0.5 per scale unit" in text
+
+
+def test_searches_that_failed_say_so():
+    c = minimise(Polyhedron(M2, {"none": -1 - x**2 - y**2}), x**2 + y**2, [2.0, 0.5])
+    assert c.explain().startswith("No point of the polyhedron was reached from the start.")
+    assert "the inequality none fails" in c.explain()
+    c = minimise(Polyhedron(M2, {"floor": y}), x + y, [0.0, 1.0])
+    assert c.explain().startswith("The energy keeps falling")
+    assert "(dx = -1)" in c.explain()
+
+
+# ---------------------------------------------------------------------------------- models
+
+
+def test_every_corner_of_the_tutorial_region():
+    """Pulled to each side in turn: multipliers from the two walls' normals."""
+    region = Tutorial()
+    D = region.polyhedron
+    for angle in np.linspace(0, 2 * np.pi, 8, endpoint=False) + 0.1:
+        pull = np.array([np.cos(angle), np.sin(angle)])
+        energy = linear(region.manifold, pull, 0.0, "energy")
+        for point in region.corners().values():
+            c = certify(D, energy, point)
+            held = [D.names.index(name) for name in c.active]
+            lam = np.linalg.solve(D.gradients(point)[held].T, pull)
+            text = c.explain()
+            negative = {D.names[i]: -value for i, value in zip(held, lam, strict=True) if value < 0}
+            assert told_rates(text) == pytest.approx(negative, rel=1e-5)
+            assert text.startswith("Not a minimum" if negative else "Strict local minimum")
+
+
+def test_corners_of_the_pinball_board():
+    board = Pinball()
+    for point in board.corners():
+        c = certify(board.polyhedron, board.energy, point)
+        text = c.explain()
+        meet = len(c.stratum.pieces)
+        assert ("branches of the union meet" in text) == (meet > 1)
+        for piece in c.stratum.pieces:
+            assert ", ".join(piece) in text
+        fall = [line for line in text.splitlines() if line.startswith("The energy falls fastest")]
+        assert bool(fall) == (not c.is_minimum)
+        for line in fall:
+            way = direction(line, board.manifold)
+            lower = point + 1e-3 * way
+            assert board.energy.value(lower) < board.energy.value(point)
+            assert board.polyhedron.contains(lower, tolerance=2e-6)
+
+
+def slopes(f, q, step=1e-5):
+    """Return central differences of ``f`` along every coordinate, one column each."""
+    sides = step * np.eye(len(q))
+    return np.stack([(f(q + d) - f(q - d)) / (2 * step) for d in sides], axis=-1)
+
+
+def from_outside(pair, q, names):
+    """Return multipliers of contacts by least squares, from the definition of the gaps."""
+    rows = slopes(lambda p: gaps(pair, p), q)[[CONTACTS.index(name) for name in names]]
+    pull = slopes(lambda p: balls(pair, p)[:, 2].sum(), q)
+    return dict(zip(names, np.linalg.lstsq(rows.T, pull, rcond=None)[0], strict=True))
+
+
+@pytest.mark.parametrize("rod", [1.5, 2.85, 2.93, 2.96])
+def test_the_pair_below_and_beyond_the_critical_rod(rod):
+    """The critical rod radius is 2 r sqrt(1 - r^2/l^2) - r = 2.8936 mm."""
+    from polycorner.dumbbells import dyad_minima
+
+    pair = DumbbellPair(length=16, ball_radius=3, rod_radius=rod, drum_radius=125)
+    c = dyad_minima(pair)[0].certificate
+    text = c.explain(unit="mm")
+    lam = from_outside(pair, c.point, c.active)
+    assert c.active == ("A2B1", "A2b", "aB1")
+    if rod < 2.8936:
+        assert text.startswith("Local minimum, attained along a locus")
+        for name, value in lam.items():
+            (told,) = re.findall(rf"{NUMBER} d\({name}\)", text)
+            assert float(told) == pytest.approx(value, rel=1e-4)
+        assert "free: eta1+eta2." in text
+    else:
+        negative = {name: -value for name, value in lam.items() if value < 0}
+        assert negative
+        assert told_rates(text) == pytest.approx(negative, rel=1e-3)
+        assert "per mm: its multiplier is negative" in text
+
+
+def test_a_pair_near_its_corner_and_one_that_overlaps():
+    pair = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
+    c = minimise(pair.polyhedron, pair.energy, pair.nested("R"))
+    apart = c.point + np.array([0.01, 0, 0, 0, 0, 0])
+    text = certify(pair.polyhedron, pair.energy, apart).explain()
+    assert "in the interior of the polyhedron" in text
+    pull = slopes(lambda p: balls(pair, p)[:, 2].sum(), apart)
+    (rate,) = figures(sentence(text, "falls fastest"), "at the rate")
+    assert rate == pytest.approx(np.linalg.norm(pull * pair.manifold.scales), rel=1e-4)
+    inside = c.point + np.array([0, -0.5, 0, 0, 0.5, 0])
+    depth = gaps(pair, inside)
+    away = depth / np.linalg.norm(
+        slopes(lambda p: gaps(pair, p), inside) * pair.manifold.scales, axis=1
+    )
+    text = certify(pair.polyhedron, pair.energy, inside).explain(unit="mm")
+    worst = int(away.argmin())
+    (told,) = re.findall(
+        rf"the inequality {CONTACTS[worst]} fails: its function is {NUMBER} mm", text
+    )
+    assert float(told) == pytest.approx(depth[worst], rel=1e-4)

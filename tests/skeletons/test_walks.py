@@ -1,0 +1,219 @@
+"""Walks: they stay on their curve, end at the first event, and say how they end."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+from atlas_shapes import ball, half_space, space
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from oracles_atlas import arc_length, turned
+from strategies import directions
+
+from polycorner import AllOf, Manifold, Polyhedron, SmoothFunction, Symmetry
+from polycorner.formulas.functions import Family
+from polycorner.skeletons import End
+from polycorner.skeletons.curves import Frame, Ground, settle
+from polycorner.skeletons.walks import follow
+
+PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
+x, y, z = SPACE.symbols
+TAU = math.tau
+
+
+def ground(D, *, symmetry=None, extent=100.0):
+    return Ground(D, symmetry or Symmetry(), 1e-8, extent)
+
+
+ELLIPSE = Family.of(
+    {"ellipse": 1 - (x / sp.Symbol("a")) ** 2 - (y / sp.Symbol("b")) ** 2}, ("x", "y"), ("a", "b")
+)
+
+
+GATE = Family.of({"gate": 1 - 2 * sp.exp(-((x - sp.Symbol("c")) ** 2))}, ("x", "y"), ("c",))
+
+
+def ellipse(a, b):
+    function = SmoothFunction.member(ELLIPSE, "ellipse", PLANE, parameters=(a, b))
+    return Polyhedron(PLANE, function)
+
+
+def frame(D, q, held, **options):
+    """Return a frame at a point, holding functions by name."""
+    rows = [D.names.index(name) for name in held]
+    return Frame(ground(D, **options), np.asarray(q, dtype=float), rows)
+
+
+class TestStraight:
+    @given(directions(3), st.floats(0.1, 20), st.floats(0.2, 1.0))
+    def test_without_held_functions_a_walk_is_a_straight_line(self, v, distance, slope):
+        """To a plane that it meets at an angle, wherever that falls between two steps."""
+        normal = v * slope + math.sqrt(1 - slope**2) * _across(v)
+        D = Polyhedron(space(3), half_space(normal, distance * slope, "wall"))
+        walk = follow(frame(D, np.zeros(3), []), v)
+        assert walk.end is End.CORNER
+        np.testing.assert_allclose(walk.frame.q, distance * v, atol=1e-8)
+        assert walk.length == pytest.approx(distance, abs=1e-8)
+        assert np.linalg.norm(walk.points @ _across(v), ord=np.inf) < 1e-9
+        np.testing.assert_allclose(walk.tangent, v, atol=1e-9)
+        assert (np.diff(walk.points @ v) >= 0).all()
+
+    @given(st.lists(st.floats(0.1, 15), min_size=2, max_size=6, unique=True), st.randoms())
+    def test_the_first_of_several_walls_is_met(self, walls, random):
+        random.shuffle(walls)
+        planes = [half_space([1, 0], w, f"wall{k}") for k, w in enumerate(walls)]
+        walk = follow(frame(Polyhedron(space(2), planes), [0, 0], []), np.array([1.0, 0]))
+        assert walk.frame.q[0] == pytest.approx(min(walls), abs=1e-9)
+
+    @given(st.floats(0.2, 10), st.floats(1e-3, 0.5), st.floats(-0.99, 0.99))
+    def test_a_small_obstacle_on_the_way_is_not_jumped_over(self, distance, radius, off):
+        """A disc that closes and opens again between two steps."""
+        D = Polyhedron(space(2), ball((distance, off * radius), radius, "disc", inside=False))
+        assume(np.hypot(distance, off * radius) > 1.1 * radius)
+        walk = follow(frame(D, [0, 0], []), np.array([1.0, 0]))
+        assert walk.end is End.CORNER
+        exact = distance - radius * math.sqrt(1 - off**2)
+        assert walk.frame.q[0] == pytest.approx(exact, abs=1e-7)
+
+    @given(st.floats(0.2, 10), st.floats(0.05, 2))
+    @settings(max_examples=4 * settings.default.max_examples)
+    def test_an_obstacle_that_is_only_touched_is_met(self, distance, radius):
+        D = Polyhedron(space(2), ball((distance, radius), radius, "disc", inside=False))
+        walk = follow(frame(D, [0, 0], []), np.array([1.0, 0]))
+        assert walk.end is End.CORNER
+        np.testing.assert_allclose(walk.frame.q, [distance, 0], atol=1e-6)
+
+    @given(st.floats(0.2, 5), st.floats(0.5, 2))
+    def test_two_functions_that_touch_in_one_point_are_met(self, distance, steep):
+        """Along the axis of ``|y| <= steep (x - distance)^2``."""
+        bend = steep * (x - distance) ** 2
+        D = Polyhedron(PLANE, {"top": bend - y, "bottom": bend + y})
+        walk = follow(frame(D, [0, 0], []), np.array([1.0, 0]))
+        assert walk.end is End.CORNER
+        np.testing.assert_allclose(walk.frame.q, [distance, 0], atol=1e-4)
+
+    @given(st.floats(0.2, 10), st.floats(0.05, 2), st.floats(1e-6, 0.1))
+    def test_an_obstacle_that_is_passed_by_is_not_met(self, distance, radius, gap):
+        D = Polyhedron(space(2), ball((distance, radius + gap), radius, "disc", inside=False))
+        assert follow(frame(D, [0, 0], [], extent=15), np.array([1.0, 0])).end is End.INFINITY
+
+    @given(st.floats(2, 40))
+    @settings(max_examples=2 * settings.default.max_examples)
+    def test_an_obstacle_that_cannot_be_felt_from_afar_is_met(self, distance):
+        """A ridge 1.7 wide whose slope is rounded to nothing a little away from it."""
+        gate = SmoothFunction.member(GATE, "gate", PLANE, parameters=(distance,))
+        walk = follow(frame(Polyhedron(PLANE, gate), [0, 0], [], extent=60), np.array([1.0, 0]))
+        assert walk.end is End.CORNER
+        assert walk.frame.q[0] == pytest.approx(distance - math.sqrt(math.log(2)), abs=1e-7)
+
+
+def _across(v):
+    """Return a unit vector at right angles to ``v``."""
+    other = np.eye(len(v))[np.argmin(abs(v))]
+    other = other - (other @ v) * v
+    return other / np.linalg.norm(other)
+
+
+class TestAlongCurves:
+    @given(st.floats(0.2, 5), st.floats(0, TAU), st.floats(0.3, math.pi - 0.3))
+    def test_a_walk_on_a_circle_ends_at_a_line(self, radius, start, angle):
+        """The angle walked is exact, though the polyline is inscribed."""
+        normal = [-math.sin(start + angle), math.cos(start + angle)]
+        D = Polyhedron(space(2), AllOf(ball((0, 0), radius, "rim"), half_space(normal, 0, "line")))
+        q = radius * np.array([math.cos(start), math.sin(start)])
+        walk = follow(frame(D, q, ["rim"]), np.array([-math.sin(start), math.cos(start)]))
+        assert walk.end is End.CORNER
+        assert turned(walk.points, (0, 0)) == pytest.approx(angle, abs=1e-8)
+        np.testing.assert_allclose(np.linalg.norm(walk.points, axis=1), radius, rtol=1e-12)
+        assert radius * angle * math.sin(0.125) / 0.125 <= walk.length <= radius * angle
+
+    def test_steps_turn_by_at_most_a_quarter(self):
+        D = Polyhedron(PLANE, {"bowl": y - 5 * x**2, "lid": 3 - y})
+        walk = follow(frame(D, [-0.5, 1.25], ["bowl"]), np.array([1.0, 0]))
+        slopes = np.arctan(10 * walk.points[:, 0])
+        assert abs(np.diff(slopes)).max() <= 0.25 + 1e-9
+        exact = arc_length(lambda t: (t, 5 * t**2), -0.5, math.sqrt(0.6))
+        assert exact * math.sin(0.125) / 0.125 <= walk.length <= exact
+        np.testing.assert_allclose(walk.frame.q, [math.sqrt(0.6), 3], atol=1e-9)
+
+    @given(st.floats(0.1, 5), st.floats(0.1, 1), st.floats(0, TAU))
+    def test_a_closed_curve_is_walked_once_around(self, a, part, start):
+        D = ellipse(a, a * part)
+        q = np.array([a * math.cos(start), a * part * math.sin(start)])
+        here = frame(D, q, ["ellipse"])
+        walk = follow(
+            here, _across(here.gradients[0] / np.linalg.norm(here.gradients[0])), home=True
+        )
+        assert walk.end is End.CLOSED
+        np.testing.assert_allclose(walk.frame.q, q, atol=1e-6)
+        assert turned(walk.points, (0, 0)) == pytest.approx(TAU, abs=1e-6)
+        exact = arc_length(lambda t: (a * sp.cos(t), a * part * sp.sin(t)), 0, TAU)
+        assert exact * math.sin(0.125) / 0.125 <= walk.length <= exact * (1 + 1e-9)
+
+    def test_a_helix_goes_on_and_on(self):
+        """Around a cylinder the circle closes, the helix does not."""
+        M = Manifold(("phi", "h"), periods=(TAU, math.inf))
+        phi, h = M.symbols
+        D = Polyhedron(M, {"ring": h, "lid": 1 - h})
+        assert follow(frame(D, [0, 0], ["ring"]), np.array([1.0, 0]), home=True).end is End.CLOSED
+        D = Polyhedron(M, {"helix": sp.sin(phi - h)})
+        walk = follow(frame(D, [0, 0], ["helix"], extent=30), np.array([1.0, 1]), home=True)
+        assert walk.end is End.INFINITY
+        np.testing.assert_allclose(walk.points[:, 0], walk.points[:, 1], atol=1e-12)
+
+    @given(st.floats(0.02, 0.3))
+    def test_a_walk_stays_on_its_own_one_of_two_parallel_curves(self, width):
+        r = 1 + width
+        ring = (x**2 + y**2 - 1) * (sp.Float(r) ** 2 - x**2 - y**2)
+        D = Polyhedron(PLANE, {"ring": ring})
+        walk = follow(frame(D, [1, 0], ["ring"], extent=20), np.array([0, 1.0]), home=True)
+        np.testing.assert_allclose(np.linalg.norm(walk.points, axis=1), 1, atol=1e-9)
+        assert walk.end is End.CLOSED
+
+    def test_a_walk_that_runs_out_of_the_chart_says_so(self):
+        D = Polyhedron(PLANE, {"root": sp.sqrt(x) - y})
+        walk = follow(frame(D, [1, 1], ["root"]), np.array([-1.0, -0.5]))
+        assert walk.end is End.CHART
+        assert np.linalg.norm(walk.frame.q) < 1e-2
+
+    def test_dependent_gradients_end_a_walk(self):
+        """Along the cusp ``x^3 = y^2`` to its tip."""
+        D = Polyhedron(PLANE, {"cusp": x**3 - y**2})
+        walk = follow(frame(D, [1, 1], ["cusp"]), np.array([-1.0, -1.5]))
+        assert walk.end is End.SINGULAR
+        assert np.linalg.norm(walk.frame.q) < 1e-2
+
+    def test_the_extent_ends_a_walk(self):
+        D = Polyhedron(PLANE, {"floor": y})
+        walk = follow(frame(D, [0, 0], ["floor"]), np.array([1.0, 0]), extent=7.0)
+        assert walk.end is End.INFINITY
+        assert 7 < walk.length < 9
+
+
+class TestSettling:
+    @given(st.floats(-2, 2), st.floats(-2, 2))
+    def test_the_nearest_point_of_a_circle(self, a, b):
+        q = np.array([a, b])
+        assume(abs(np.linalg.norm(q) - 1) < 0.3)
+        D = Polyhedron(space(2), ball((0, 0), 1, "rim"))
+        found = settle(ground(D), q, [0], 1.0)
+        np.testing.assert_allclose(found.q, q / np.linalg.norm(q), atol=1e-12)
+
+    def test_what_is_out_of_reach_is_not_found(self):
+        D = Polyhedron(space(2), ball((0, 0), 1, "rim"))
+        assert settle(ground(D), np.array([3.0, 0]), [0], 0.5) is None
+        assert settle(ground(D), np.array([0.0, 0]), [0], 5.0) is None
+
+    def test_no_correction_moves_along_the_orbit(self):
+        """Two points of a line at a distance: both are moved by the same amount."""
+        D = Polyhedron(PLANE, {"gap": (y - x) ** 2 - 1})
+        shift = Symmetry(tangents=lambda _: np.array([[1.0, 1.0]]), invariants=np.diff)
+        found = settle(ground(D, symmetry=shift), np.array([0.2, 1.6]), [0], 1.0)
+        np.testing.assert_allclose(found.q, [0.4, 1.4], atol=1e-12)
+
+    def test_in_scale_units_the_correction_is_the_shortest(self):
+        M = Manifold(("x", "y"), scales=(1.0, 10.0))
+        D = Polyhedron(M, {"line": 1 - x - y})
+        found = settle(ground(D), np.zeros(2), [0], 5.0)
+        np.testing.assert_allclose(found.q, [1 / 101, 100 / 101], atol=1e-12)
