@@ -40,3 +40,11 @@ def tab(tmp_path_factory):
     profile = tmp_path_factory.mktemp("profile")
     with chromium.page(chromium.needed(), profile, graphics=True) as opened:
         yield opened
+
+
+@pytest.fixture(scope="module")
+def kernels_elsewhere(tmp_path_factory):
+    """Keep what is compiled in one module in a folder of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("kernels")))
+        yield

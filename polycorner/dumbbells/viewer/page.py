@@ -85,7 +85,7 @@ def write_page(page: str, path: Path) -> Path:
 
 def page_file(name: str) -> str:
     """Return a script, a style sheet or a template that is part of this package."""
-    return files("polycorner.pictures").joinpath("page", name).read_text("utf-8")
+    return files("polycorner.dumbbells.viewer").joinpath("assets", name).read_text("utf-8")
 
 
 @cache
