@@ -1,0 +1,204 @@
+"""Guards for arguments: one line a check, one sentence an error.
+
+Every error names the argument, says what was expected and shows what came.  A value of the wrong
+kind raises ``TypeError``, one of the right kind that is out of range ``ValueError``.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+
+from polycorner.errors import nearest
+
+T = TypeVar("T")
+
+
+def refuse(
+    argument: str, expected: str, got: object, kind: type[Exception] = ValueError
+) -> NoReturn:
+    """Raise an error that names the argument, what was expected and what came."""
+    msg = f"{argument}: expected {expected}; got {got!r}"
+    raise kind(msg)
+
+
+def instance(argument: str, value: object, kind: type[T], hint: str = "") -> T:
+    """Return a value of a class, or raise TypeError.
+
+    Parameters
+    ----------
+    argument : str
+        Name of the argument.
+    value : object
+    kind : type
+    hint : str, optional
+        How such a value is made, added to the error.
+
+    Examples
+    --------
+    >>> instance("name", 3, str)
+    Traceback (most recent call last):
+    TypeError: name: expected a str; got int
+    """
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
+        made = f", as {hint} makes" if hint else ""
+        msg = f"{argument}: expected {article} {kind.__name__}{made}; got {type(value).__name__}"
+        raise TypeError(msg)
+    return value
+
+
+def whole(
+    argument: str, value: object, *, least: int | None = None, most: int | None = None
+) -> int:
+    """Return a whole number in a range, or raise.
+
+    Examples
+    --------
+    >>> whole("count", 0, least=1)
+    Traceback (most recent call last):
+    ValueError: count: expected a whole number >= 1; got 0
+    """
+    bounds = _bounds((">=", least), ("<=", most))
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        refuse(argument, f"a whole number{bounds}", value, TypeError)
+    number = int(value)
+    if (least is not None and number < least) or (most is not None and number > most):
+        refuse(argument, f"a whole number{bounds}", value)
+    return number
+
+
+def real(
+    argument: str,
+    value: object,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+    most: float | None = None,
+    infinite: bool = False,
+    unit: str = "",
+) -> float:
+    """Return a real number in a range as a float, or raise.
+
+    Parameters
+    ----------
+    argument : str
+        Name of the argument.
+    value : object
+        NaN is always refused.
+    above, below : float, optional
+        Open ends of the range.
+    least, most : float, optional
+        Closed ends.
+    infinite : bool, optional
+        Whether an infinity may pass.
+    unit : str, optional
+        Unit named in the error.
+
+    Examples
+    --------
+    >>> real("restitution", 0.5, least=0, most=1)
+    0.5
+    >>> real("dt", -1.0, above=0, unit="s")
+    Traceback (most recent call last):
+    ValueError: dt: expected a number > 0 in s; got -1.0
+    """
+    bounds = _bounds((">", above), (">=", least), ("<", below), ("<=", most))
+    expected = f"a {'' if infinite or bounds else 'finite '}number{bounds}{unit and f' in {unit}'}"
+    if isinstance(value, bool) or not isinstance(value, Real):
+        refuse(argument, expected, value, TypeError)
+    number = float(value)
+    inside = (
+        (above is None or number > above)
+        and (least is None or number >= least)
+        and (below is None or number < below)
+        and (most is None or number <= most)
+        and (infinite or math.isfinite(number))
+    )
+    if not inside or math.isnan(number):
+        refuse(argument, expected, value)
+    return number
+
+
+def choice(argument: str, value: object, known: Iterable[str]) -> str:
+    """Return one of the known words, or raise with the nearest one.
+
+    Examples
+    --------
+    >>> choice("method", "slqsp", ["descent", "scp", "slsqp"])
+    Traceback (most recent call last):
+    ValueError: method: expected descent, scp or slsqp; got slqsp (did you mean slsqp?)
+    """
+    words = list(known)
+    if not isinstance(value, str):
+        refuse(argument, listed(words), value, TypeError)
+    if value not in words:
+        msg = f"{argument}: expected {listed(words)}; got {nearest(value, words)}"
+        raise ValueError(msg)
+    return value
+
+
+def names(argument: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Raise ValueError for the first given name that is not known."""
+    words = list(known)
+    for name in given:
+        if name not in words:
+            shown = nearest(name, words) if isinstance(name, str) else repr(name)
+            msg = f"{argument}: expected names among {', '.join(words) or 'none'}; got {shown}"
+            raise ValueError(msg)
+
+
+def mapping(argument: str, value: object) -> Mapping[Any, Any]:
+    """Return a mapping, or raise TypeError."""
+    if not isinstance(value, Mapping):
+        refuse(argument, "a mapping", value, TypeError)
+    return value
+
+
+def generator(argument: str, value: object) -> np.random.Generator:
+    """Return a random generator: a given one, or a new one for None or a seed.
+
+    Examples
+    --------
+    >>> generator("rng", "dice")
+    Traceback (most recent call last):
+    TypeError: rng: expected a numpy.random.Generator, a seed or None; got 'dice'
+    """
+    if isinstance(value, np.random.Generator):
+        return value
+    if value is None:
+        return np.random.default_rng(0)
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        refuse(argument, "a numpy.random.Generator, a seed or None", value, TypeError)
+    return np.random.default_rng(whole(argument, value, least=0))
+
+
+def missing_extra(package: str, extra: str) -> ImportError:
+    """Return the error that names the extra which installs a package.
+
+    The command works for an installed package; in a checkout ``.`` takes the package's place.
+    """
+    return ImportError(
+        f"{package} is not installed; expected the extra {extra!r}, as installed by "
+        f"pip install 'polycorner[{extra}]' (in a checkout: pip install '.[{extra}]')"
+    )
+
+
+def listed(words: Iterable[str]) -> str:
+    """Return words as a list in a sentence.
+
+    Examples
+    --------
+    >>> listed(["a", "b", "c"])
+    'a, b or c'
+    """
+    *first, last = list(words) or ["nothing"]
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def _bounds(*limits: tuple[str, float | None]) -> str:
+    shown = [f"{sign} {value:g}" for sign, value in limits if value is not None]
+    return f" {' and '.join(shown)}" if shown else ""

@@ -1,0 +1,71 @@
+"""Immutable values: pickled by their content alone, with read-only arrays."""
+
+from collections.abc import Mapping
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+
+
+class Value:
+    """Base of immutable values.
+
+    Cached properties are left out of pickles and copies and computed again when they are asked
+    for, so a value may cache compiled code and still be sent to another process.  Arrays are
+    read-only: those of a dataclass's fields once it is made, and all of them after unpickling.
+    A subclass with a ``__post_init__`` of its own calls this one at its end.
+    """
+
+    def __post_init__(self) -> None:
+        """Make the arrays among the attributes read-only."""
+        for name, value in vars(self).items():
+            frozen = read_only(value)
+            if frozen is not value:
+                object.__setattr__(self, name, frozen)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes without what is computed on demand."""
+        computed = _computed(type(self))
+        return {name: value for name, value in vars(self).items() if name not in computed}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Restore the attributes; NumPy forgets in pickles that an array is read-only."""
+        for name, value in state.items():
+            object.__setattr__(self, name, read_only(value))
+
+
+def read_only(value: Any) -> Any:
+    """Return a read-only view of an array; the same for arrays in tuples and mappings.
+
+    Everything else is returned as it is.  The array that is viewed stays writable for whoever
+    made it, so a caller's own array is to be copied first.
+
+    Examples
+    --------
+    >>> read_only(np.zeros(2)).flags.writeable
+    False
+    """
+    if isinstance(value, np.ndarray):
+        if not value.flags.writeable:
+            return value
+        view = value.view()
+        view.flags.writeable = False
+        return view
+    if type(value) is tuple:
+        parts = tuple(map(read_only, value))
+        return parts if any(a is not b for a, b in zip(parts, value, strict=True)) else value
+    if type(value) is dict:
+        for name, part in value.items():
+            value[name] = read_only(part)
+    return value
+
+
+@cache
+def _computed(kind: type) -> frozenset[str]:
+    """Return the names of a class's cached properties."""
+    return frozenset(
+        name
+        for base in kind.__mro__
+        for name, member in vars(base).items()
+        if isinstance(member, cached_property)
+    )
