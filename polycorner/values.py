@@ -25,7 +25,8 @@ class Value:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes without what is computed on demand."""
-        computed = _computed(type(self))
+        kind: Any = type(self)  # a class is hashable, which mypy doubts
+        computed = _computed(kind)
         return {name: value for name, value in vars(self).items() if name not in computed}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
@@ -61,7 +62,7 @@ def read_only(value: Any) -> Any:
 
 
 @cache
-def _computed(kind: type) -> frozenset[str]:
+def _computed(kind: Any) -> frozenset[str]:
     """Return the names of a class's cached properties."""
     return frozenset(
         name
