@@ -17,12 +17,10 @@ scales     (n,)
 Rows: ``m`` inequalities ``f >= 0``, then the equations ``h = 0``, then the energy.
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit
+
+from polycorner.formulas.compilation import call_kernel, never_inline
 
 CONVERGED, INFEASIBLE, UNBOUNDED, STALLED = 0, 1, 2, 3
 
@@ -35,36 +33,10 @@ CURVED = 1e-8  # relative curvature below which a stationary point is a saddle
 RANK = 1e-8  # singular values below this fraction of the largest count as zero
 
 
-@intrinsic
-def call_kernel(_: Any, address: Any, q: Any, p: Any, f: Any, J: Any, H: Any) -> Any:
-    """Call ``void point(q, p, f, J, H)`` at an address."""
-    signature = types.void(*([types.int64] * 6))
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        pointer = cgutils.voidptr_t
-        kind = cgutils.ir.FunctionType(cgutils.ir.VoidType(), [pointer] * 5)
-        function = builder.inttoptr(values[0], kind.as_pointer())
-        builder.call(function, [builder.inttoptr(v, pointer) for v in values[1:]])
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@intrinsic
-def stay_whole(_: Any) -> Any:
-    """Keep the calling function from being copied into its callers, which slows compilation."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        builder.function.attributes.add("noinline")
-        return context.get_dummy_value()
-
-    return types.void(), generate
-
-
 @njit(cache=True)
 def evaluate(problem, u, F, J, H, size, second):
     """Fill values (M,), scaled gradients (M, n) and, if asked, scaled Hessians (M, n, n)."""
-    stay_whole()
+    never_inline()
     table, reads, rows, parameters, scales = problem
     work = np.empty(size)
     start, base = work.ctypes.data, parameters.ctypes.data
@@ -95,7 +67,7 @@ def evaluate(problem, u, F, J, H, size, second):
 @njit(cache=True)
 def add_multiple(y, a, x):
     """Add ``a x`` to ``y`` in place.  Loops compile ten times faster than array expressions."""
-    stay_whole()
+    never_inline()
     for i in range(y.size):
         y[i] += a * x[i]
 
@@ -103,7 +75,7 @@ def add_multiple(y, a, x):
 @njit(cache=True)
 def plus(x, a, y):
     """Return ``x + a y``."""
-    stay_whole()
+    never_inline()
     z = np.empty(x.size)
     for i in range(x.size):
         z[i] = x[i] + a * y[i]
@@ -113,7 +85,7 @@ def plus(x, a, y):
 @njit(cache=True)
 def identity(n):
     """Return the unit matrix."""
-    stay_whole()
+    never_inline()
     eye = np.zeros((n, n))
     for i in range(n):
         eye[i, i] = 1.0
@@ -132,7 +104,7 @@ def length(v):
 @njit(cache=True)
 def largest(a):
     """Return the largest absolute entry of a vector."""
-    stay_whole()
+    never_inline()
     top = 0.0
     for x in a:
         top = max(top, abs(x))
@@ -142,7 +114,7 @@ def largest(a):
 @njit(cache=True)
 def largest_entry(A):
     """Return the largest absolute entry of a matrix."""
-    stay_whole()
+    never_inline()
     top = 0.0
     for i in range(A.shape[0]):
         for j in range(A.shape[1]):
@@ -153,7 +125,7 @@ def largest_entry(A):
 @njit(cache=True)
 def svd(A):
     """Return ``(U, s, V)`` with ``A = U diag(s) V^T``, V square, by one-sided Jacobi rotations."""
-    stay_whole()
+    never_inline()
     m, n = A.shape
     W, V = A.copy(), identity(n)
     negligible = 1e-32 * m * n * largest_entry(A) ** 2
@@ -193,7 +165,7 @@ def svd(A):
 @njit(cache=True)
 def solve_truncated(A, b, cut):
     """Return the shortest least-squares solution of ``A x = b``, singular values below cut zero."""
-    stay_whole()
+    never_inline()
     U, s, V = svd(A)
     x = np.zeros(A.shape[1])
     for j in range(s.size):
@@ -210,7 +182,7 @@ def solve_truncated(A, b, cut):
 @njit(cache=True)
 def cholesky(B, L):
     """Factor ``B = L L^T`` in place of L; return whether every pivot is safely positive."""
-    stay_whole()
+    never_inline()
     n = B.shape[0]
     floor = 1e-14 * largest_entry(B)
     for i in range(n):
@@ -230,7 +202,7 @@ def cholesky(B, L):
 @njit(cache=True)
 def forward(L, b):
     """Return the solution of ``L x = b``."""
-    stay_whole()
+    never_inline()
     x = b.copy()
     for i in range(x.size):
         for k in range(i):
@@ -242,7 +214,7 @@ def forward(L, b):
 @njit(cache=True)
 def backward(L, b):
     """Return the solution of ``L^T x = b``."""
-    stay_whole()
+    never_inline()
     x = b.copy()
     for i in range(x.size - 1, -1, -1):
         for k in range(i + 1, x.size):
@@ -254,7 +226,7 @@ def backward(L, b):
 @njit(cache=True)
 def project_out(Q, R, count, w):
     """Split ``w`` into ``Q y + rest`` over an orthonormal basis; return ``(rest, R^-1 y)``."""
-    stay_whole()
+    never_inline()
     rest, y = w.copy(), np.zeros(count)
     for _ in range(2):
         for j in range(count):
@@ -275,7 +247,7 @@ def project_out(Q, R, count, w):
 @njit(cache=True)
 def basis(W, active, count, Q, R):
     """Orthonormalise the active rows of ``W`` by Gram-Schmidt with one repetition."""
-    stay_whole()
+    never_inline()
     for j in range(count):
         rest, _, y = project_out(Q, R, j, W[active[j]])
         for k in range(j):
@@ -297,7 +269,7 @@ def slack(A, b, x, i):
 @njit(cache=True)
 def most_violated(A, b, x, is_active, start, stop, equations):
     """Return the inactive row that fails most, as inequality or equation, or -1."""
-    stay_whole()
+    never_inline()
     chosen, worst = -1, 0.0
     for i in range(start, stop):
         if is_active[i]:
@@ -320,7 +292,7 @@ def quadratic(L, g, A, b, equations):
     -------
     feasible, d (n,), multipliers (rows,)
     """
-    stay_whole()
+    never_inline()
     rows, n = A.shape
     W = np.empty((rows, n))
     for i in range(rows):
@@ -384,7 +356,7 @@ def quadratic(L, g, A, b, equations):
 @njit(cache=True)
 def violation(F, J, use, m):
     """Return the largest scaled distance by which a used constraint is missed."""
-    stay_whole()
+    never_inline()
     worst = 0.0
     for i in range(F.size - 1):
         miss = abs(F[i]) if i >= m else (-F[i] if use[i] else 0.0)
@@ -399,7 +371,7 @@ def violation(F, J, use, m):
 @njit(cache=True)
 def system(F, J, use, m):
     """Return the used rows, normalised to unit gradients: ``A``, ``b``, their numbers and sizes."""
-    stay_whole()
+    never_inline()
     total = F.size - 1
     keep = np.empty(total, np.int64)
     count = 0
@@ -419,7 +391,7 @@ def system(F, J, use, m):
 @njit(cache=True)
 def least_violation(A, b, equations):
     """Return a damped Gauss-Newton step for rows that cannot all be met to first order."""
-    stay_whole()
+    never_inline()
     n = A.shape[1]
     G, g = np.zeros((n, n)), np.zeros(n)
     for k in range(n):
@@ -436,7 +408,7 @@ def least_violation(A, b, equations):
 @njit(cache=True)
 def project(problem, use, m, u, F, J, H, size, limit):
     """Move ``u`` to the nearest feasible point by repeated linearisation; return success."""
-    stay_whole()
+    never_inline()
     n, equations = u.size, F.size - 1 - m
     eye, zero = identity(n), np.zeros(n)
     evaluate(problem, u, F, J, H, size, False)
@@ -473,7 +445,7 @@ def project(problem, use, m, u, F, J, H, size, limit):
 @njit(cache=True)
 def crosses_wall(problem, use, m, u, d, F, J, H, size):
     """Whether the straight way ``u -> u + d`` leaves the set between samples half a unit apart."""
-    stay_whole()
+    never_inline()
     samples = min(64, int(np.ceil(2.0 * largest(d))))
     for k in range(1, samples):
         evaluate(problem, plus(u, k / samples, d), F, J, H, size, False)
@@ -485,7 +457,7 @@ def crosses_wall(problem, use, m, u, d, F, J, H, size):
 @njit(cache=True)
 def lagrangian_hessian(H, lam):
     """Return the Hessian of ``E - sum lam f``."""
-    stay_whole()
+    never_inline()
     n = H.shape[1]
     L = np.empty((n, n))
     for a in range(n):
@@ -500,7 +472,7 @@ def lagrangian_hessian(H, lam):
 @njit(cache=True)
 def finite(J, H, lam, last):
     """Whether the gradients and the Hessians that count are finite, as at the end of a chart."""
-    stay_whole()
+    never_inline()
     for i in range(last + 1):
         for a in range(J.shape[1]):
             if not np.isfinite(J[i, a]):
@@ -518,7 +490,7 @@ def convexified(B, g, A, L):
     What is added across the gradients of equations does not change a step along their section;
     multiples of the identity, in a geometric sequence, are added only if that is not enough.
     """
-    stay_whole()
+    never_inline()
     n = B.shape[0]
     across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g))
     if shift < 1e-300:
@@ -541,7 +513,7 @@ def convexified(B, g, A, L):
 @njit(cache=True)
 def add_tangential_step(d, L, g, V, s, cut, reference):
     """Add to ``d`` the shortest Newton step along the face, the null space of its gradients."""
-    stay_whole()
+    never_inline()
     n, count = d.size, 0
     Z = np.empty((n, n))
     for j in range(n):
@@ -575,7 +547,7 @@ def polish(problem, on, m, held, u, F, J, H, size):
     Dependent gradients and flat directions are met by pseudo-inverses: the shortest step.
     Returns the multipliers by row and the last step's length.
     """
-    stay_whole()
+    never_inline()
     n, total = u.size, F.size - 1
     lam = np.zeros(total)
     last = np.inf
@@ -626,7 +598,7 @@ def polish(problem, on, m, held, u, F, J, H, size):
 @njit(cache=True)
 def steepest_curve(F, J, H, lam, on, m, direction):
     """Return the least curvature of the Lagrangian along the face, relative, and its direction."""
-    stay_whole()
+    never_inline()
     n, total = H.shape[1], lam.size
     A, b, _, _ = system(F, J, on, m)
     V, s = identity(n), np.zeros(n)
@@ -670,7 +642,7 @@ def finished(problem, use, on, m, u, F, J, H, size, energy):
 
     Returns that number, the point, the multipliers and the direction of least curvature.
     """
-    stay_whole()
+    never_inline()
     v, rows, direction = u.copy(), on.copy(), np.zeros(u.size)
     for _ in range(4):
         lam, step = polish(problem, rows, m, np.zeros((0, u.size)), v, F, J, H, size)
@@ -710,7 +682,7 @@ def leave(problem, use, on, m, v, direction, F, J, H, size):
 
     A straight step first; where the set bulges, which leaves it behind, along the face instead.
     """
-    stay_whole()
+    never_inline()
     evaluate(problem, v, F, J, H, size, False)
     energy = F[F.size - 1]
     along = np.zeros((1, v.size))

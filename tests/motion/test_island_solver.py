@@ -69,7 +69,7 @@ def test_barriers_are_differentiated(monkeypatch, shape):
 
 @pytest.mark.parametrize(("n", "width"), [(1, 0), (6, 5), (30, 7), (40, 0)])
 def test_band_systems_are_solved(monkeypatch, n, width):
-    monkeypatch.setattr(compiled, "stay_whole", lambda: None)
+    monkeypatch.setattr(compiled, "never_inline", lambda: None)
     rng = np.random.default_rng(n)
     near = np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= width
     A = np.where(near, rng.normal(size=(n, n)), 0) + 3 * (width + 1) * np.eye(n)
@@ -83,7 +83,7 @@ def test_band_systems_are_solved(monkeypatch, n, width):
 
 
 def test_a_matrix_without_a_pivot_is_refused(monkeypatch):
-    monkeypatch.setattr(compiled, "stay_whole", lambda: None)
+    monkeypatch.setattr(compiled, "never_inline", lambda: None)
     assert not compiled.solve_band.py_func(np.zeros(3), np.ones(3), 3, 0, np.zeros(3, dtype=int))
 
 

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from polycorner.minimisation.compiled import call_kernel, stay_whole
+from polycorner.formulas.compilation import call_kernel, never_inline
 
 # Without reference counts, which would cost more than the arithmetic: work space comes in Room.
 inner = njit(
@@ -382,7 +382,7 @@ def gaussian(seed, when, body, which):
 @inner
 def invert(upper, k, mass, out):
     """Invert a symmetric positive definite matrix given by its upper triangle, row by row."""
-    stay_whole()
+    never_inline()
     plain = True
     at = 0
     for i in range(k):
@@ -500,7 +500,7 @@ def pair_gaps(scene, room, a, b, place):
 @inner
 def solve_spd(A, b, k):
     """Solve ``A x = b`` in place by Cholesky's method; return whether ``A`` is definite."""
-    stay_whole()
+    never_inline()
     top = 0.0
     for c in range(k):
         top = max(top, A[c, c])
@@ -702,7 +702,7 @@ def stale(scene, motion, room, time):
 @inner
 def heap_sort(values, count):
     """Sort the first numbers of an array, in place."""
-    stay_whole()
+    never_inline()
     for top in range(count // 2 - 1, -count, -1):
         start, end = top, count
         if top < 0:  # the largest is on top: put it at the end
@@ -1159,7 +1159,7 @@ def solve_band(A, b, n, width, reach):
     The symmetric part of ``A`` is definite or nearly so: no rows are exchanged.  ``reach`` gets the
     envelope: row ``j`` ends, and so does column ``j`` below the diagonal, before ``reach[j]``.
     """
-    stay_whole()
+    never_inline()
     stride = 2 * width + 1
     for i in range(n):
         at = i * stride + width - i

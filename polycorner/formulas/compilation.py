@@ -1,0 +1,72 @@
+"""Building blocks shared by the folders of Numba code: calls by address and the key of a cache.
+
+Numba's disk cache notices a change only in the file of the cached function itself.  Its key holds
+the contents of the function's closure, however, so an entry point that *reads* the digest of its
+folder's sources is compiled again whenever any of these files changes::
+
+    def compiled(sources):
+        @njit(cache=True)
+        def entry(problem, u):
+            sources  # read, so that it becomes a closure cell
+            ...
+
+        return entry
+
+
+    entry = compiled(sources_digest(__package__))
+
+Only entry points are cached; what they call is compiled into them.
+"""
+
+import hashlib
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+
+def sources_digest(package: str) -> str:
+    """Return SHA-256 over names and bytes of a package's own Python files, and of this one.
+
+    Subpackages are not included.
+    """
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        msg = f"package: expected the name of an importable package; got {package!r}"
+        raise ValueError(msg)
+    folders = map(Path, spec.submodule_search_locations)
+    files = sorted(file for folder in folders for file in folder.glob("*.py"))
+    digest = hashlib.sha256()
+    for file in (Path(__file__), *files):
+        content = file.read_bytes()
+        digest.update(f"{file.name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+@intrinsic
+def call_kernel(_: Any, address: Any, q: Any, p: Any, f: Any, J: Any, H: Any) -> Any:
+    """Call ``void point(q, p, f, J, H)`` at an address, all arguments being addresses."""
+    signature = types.void(*([types.int64] * 6))
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        pointer = cgutils.voidptr_t
+        kind = cgutils.ir.FunctionType(cgutils.ir.VoidType(), [pointer] * 5)
+        function = builder.inttoptr(values[0], kind.as_pointer())
+        builder.call(function, [builder.inttoptr(v, pointer) for v in values[1:]])
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic
+def never_inline(_: Any) -> Any:
+    """Mark the calling function as never inlined, which shortens compilation."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return types.void(), generate
