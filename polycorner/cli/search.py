@@ -55,11 +55,9 @@ class Search:
         """Where an unfinished search is kept."""
         if self.out is not None:
             return self.out / "atlas-state.json"
-        from polycorner.formulas.kernels import cache_directory
+        from polycorner.formulas.cache import cache_folder
 
-        return (
-            cache_directory() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
-        )
+        return cache_folder() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
 
     def run(
         self,

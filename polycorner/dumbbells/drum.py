@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.formulas.functions import Call, Family
-from polycorner.formulas.kernels import source_key
+from polycorner.formulas.bundles import Call
+from polycorner.formulas.cache import source_key
+from polycorner.formulas.families import Family
 from polycorner.motion import formulation as equations
 from polycorner.motion.engine.layout import Body, Grip, Herd, Pairing
 from polycorner.motion.friction import Disc, Interval

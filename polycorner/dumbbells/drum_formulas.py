@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from polycorner.dumbbells import formulas as dumbbell_formulas
-from polycorner.formulas import functions, kernels
+from polycorner.formulas import cache, families, kernels
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ RATES = tuple(f"{name}{k}_dot" for k in (1, 2) for name in ("phi", "eta", "theta
 
 
 @lru_cache(maxsize=1)
-def grip() -> functions.Family:
+def grip() -> families.Family:
     """Return how a dumbbell slips on the drum and how it loads it; parameters as below.
 
     ``slip1_r``, ``slip1_s``, ``slip2_r``, ``slip2_s`` are the velocities of the balls' lowest
@@ -58,7 +58,7 @@ def grip() -> functions.Family:
 
 
 @lru_cache(maxsize=1)
-def weight() -> functions.Family:
+def weight() -> families.Family:
     """Return the ``potential`` energy of a dumbbell, zero on the axis of the drum at ``eta = 0``.
 
     Reads ``phi eta theta``; parameters ``l rho weight pull`` with ``weight = m g cos alpha`` and
@@ -69,7 +69,7 @@ def weight() -> functions.Family:
 
 
 @lru_cache(maxsize=1)
-def kinetic() -> functions.Family:
+def kinetic() -> families.Family:
     """Return the ``kinetic`` energy of a dumbbell with a massless rod.
 
     Reads ``phi_dot eta_dot theta_dot psi_dot``; parameters ``l r rho m``, ``m`` of one ball.
@@ -78,7 +78,7 @@ def kinetic() -> functions.Family:
 
 
 @lru_cache(maxsize=1)
-def floors() -> functions.Family:
+def floors() -> families.Family:
     """Return the gaps ``floor1``, ``floor2`` between the balls and the bottom ``eta = 0``.
 
     Reads ``eta theta``; parameters ``l r``.
@@ -87,7 +87,7 @@ def floors() -> functions.Family:
 
 
 @lru_cache(maxsize=3)
-def rubs(kind: Rub) -> functions.Family:
+def rubs(kind: Rub) -> families.Family:
     """Return the velocity with which the surface of body 1 rubs along that of body 2.
 
     ``tangential`` is the component along ``t = (-n_y, n_x)`` in the developed plane, ``n`` the
@@ -135,10 +135,10 @@ def _family(
     parameters: tuple[str, ...],
     formulas: "Callable[[], Formulas]",
     kind: str = "",
-) -> functions.Family:
-    source = kernels.source_key(dumbbell_formulas.__name__, __name__)
+) -> families.Family:
+    source = cache.source_key(dumbbell_formulas.__name__, __name__)
     key = repr((source, kind, names, variables, parameters))
-    return functions.Family(names, variables, parameters, formulas, key)
+    return families.Family(names, variables, parameters, formulas, key)
 
 
 def _symbols(*names: str) -> "list[sympy.Symbol]":

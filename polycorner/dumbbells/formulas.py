@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from polycorner.formulas import functions, kernels
+from polycorner.formulas import cache, families
 from polycorner.spaces import distances as bodies
 
 if TYPE_CHECKING:
@@ -31,19 +31,19 @@ def variables(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=1)
-def drum_gaps() -> functions.Family:
+def drum_gaps() -> families.Family:
     """Return the nine gaps in the drum; parameters ``l r t rho``."""
     return _family(CONTACTS, DRUM, ("l", "r", "t", "rho"), lambda: _gaps(_drum_centres()))
 
 
 @lru_cache(maxsize=1)
-def plane_gaps() -> functions.Family:
+def plane_gaps() -> families.Family:
     """Return the nine gaps in the developed plane; parameters ``l r t``."""
     return _family(CONTACTS, PLANE, ("l", "r", "t"), lambda: _gaps(_plane_centres()))
 
 
 @lru_cache(maxsize=1)
-def drum_energy() -> functions.Family:
+def drum_energy() -> families.Family:
     """Return the weighted height of centres above the floor, in mm; parameters ``l R rho w``.
 
     Each ball counts once and each rod ``w`` times, at the middle of its chord.
@@ -52,7 +52,7 @@ def drum_energy() -> functions.Family:
 
 
 @lru_cache(maxsize=1)
-def plane_energy() -> functions.Family:
+def plane_energy() -> families.Family:
     """Return half the weighted sum of squared lateral positions, in mm^2; parameters ``l w``.
 
     It is the limit of ``rho`` times the height above the lowest as the drum grows.
@@ -61,10 +61,10 @@ def plane_energy() -> functions.Family:
 
 
 @lru_cache(maxsize=1)
-def mean_heading() -> functions.Family:
+def mean_heading() -> families.Family:
     """Return ``sin((theta1 + theta2)/2 - h)``; parameter ``h``, in radians."""
-    key = repr((kernels.source_key(__name__), "heading"))
-    return functions.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key)
+    key = repr((cache.source_key(__name__), "heading"))
+    return families.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key)
 
 
 def _mean_heading() -> "Formulas":
@@ -79,9 +79,9 @@ def _family(
     coordinates: tuple[str, ...],
     parameters: tuple[str, ...],
     formulas: "Callable[[], Formulas]",
-) -> functions.Family:
-    key = repr((kernels.source_key(bodies.__name__, __name__), names, coordinates, parameters))
-    return functions.Family(names, variables(coordinates), parameters, formulas, key)
+) -> families.Family:
+    key = repr((cache.source_key(bodies.__name__, __name__), names, coordinates, parameters))
+    return families.Family(names, variables(coordinates), parameters, formulas, key)
 
 
 def _symbols(names: str) -> "list[sympy.Symbol]":

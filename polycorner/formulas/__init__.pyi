@@ -1,4 +1,5 @@
-from .functions import Family, SmoothFunction
+from .families import Family
+from .functions import SmoothFunction
 
 __all__ = [
     "Family",

@@ -23,9 +23,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from numba import types
+from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from polycorner.formulas.cache import cache_folder
+
+if not config.CACHE_DIR:  # what is cached after this import goes to the one cache folder
+    config.CACHE_DIR = str(cache_folder() / "numba")
 
 
 def sources_digest(package: str) -> str:

@@ -15,7 +15,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from polycorner.formulas.functions import Family, SmoothFunction
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph, Payload, Program
 from polycorner.formulas.translate import UNARY, compile_expressions
 from polycorner.intervals.balls import ANALYTIC, constant, operations

@@ -15,7 +15,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from polycorner.formulas.functions import Bundle, Family, SmoothFunction
+from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.conditions import NEARLY_FLAT
 from polycorner.polyhedra.cones import null_space, unit_rows

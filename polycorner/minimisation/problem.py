@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.formulas.functions import Bundle, SmoothFunction
+from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.spaces.manifold import Array
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.formulas.functions import Family, SmoothFunction
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
 from polycorner.spaces.manifold import Array, Manifold, finite, reals
@@ -179,7 +180,7 @@ def _double_area(corners: Array) -> float:
 @lru_cache(maxsize=1)
 def _heights() -> Family:
     """Return the height; parameter ``s``, the sine of the tilt."""
-    from polycorner.formulas.kernels import source_key
+    from polycorner.formulas.cache import source_key
 
     return Family(("height",), ("x", "y"), ("s",), _height_formula, source_key(__name__))
 

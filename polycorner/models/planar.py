@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.formulas.functions import Family, SmoothFunction
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
@@ -128,7 +129,7 @@ class Wall:
 @lru_cache(maxsize=1)
 def wall_family() -> Family:
     """Return the function of a wall; parameters ``mx my nx ny k``."""
-    from polycorner.formulas.kernels import source_key
+    from polycorner.formulas.cache import source_key
 
     parameters = ("mx", "my", "nx", "ny", "k")
     return Family(("wall",), ("x", "y"), parameters, _wall_formula, source_key(__name__))

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.formulas import kernels
-from polycorner.formulas.functions import Family, SmoothFunction
+from polycorner.formulas import cache
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.polyhedra.symmetry import Relabelling, Symmetry
 from polycorner.spaces.manifold import Array, Manifold
@@ -30,7 +31,7 @@ VARIABLES = ("x1", "y1", "z1", "x2", "y2", "z2")
 @lru_cache(maxsize=1)
 def _gap() -> Family:
     """Return the gap of two spheres of unit diameter, ``|x_2 - x_1|^2 - 1``."""
-    return Family(("gap",), VARIABLES, (), _formulas, kernels.source_key(__name__))
+    return Family(("gap",), VARIABLES, (), _formulas, cache.source_key(__name__))
 
 
 def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:

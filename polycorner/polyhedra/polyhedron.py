@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.formulas.functions import Bundle, Family, SmoothFunction
+from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.spaces.manifold import Array, Manifold, scalar
 
 if TYPE_CHECKING:

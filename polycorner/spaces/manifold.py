@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.values import Value, read_only
+
 if TYPE_CHECKING:
     import sympy
 
@@ -21,7 +23,7 @@ _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 
 
 @dataclass(frozen=True)
-class Manifold:
+class Manifold(Value):
     """The configuration manifold ``X``: a product of lines and circles with one chart.
 
     Parameters
@@ -99,7 +101,8 @@ class Manifold:
     @cached_property
     def scale_array(self) -> Array:
         """The scales as an array."""
-        return np.array(self.scales)
+        scales: Array = read_only(np.array(self.scales))
+        return scales
 
     @cached_property
     def _circles(self) -> tuple[list[int], Array]:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from strategies import vectors
 
 from polycorner import Manifold, SmoothFunction
-from polycorner.formulas.functions import Bundle, Family
+from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.families import Family
 
 SPACE = Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols

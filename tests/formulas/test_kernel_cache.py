@@ -13,14 +13,14 @@ import sympy as sp
 
 import polycorner
 from polycorner import Manifold, SmoothFunction
-from polycorner.formulas.kernels import cache_directory, one_at_a_time
+from polycorner.formulas.cache import cache_folder, cache_size, clear_cache, one_at_a_time
 
 ROOT = Path(polycorner.__file__).parents[1]
 LINE = Manifold.euclidean("x")
 
 KERNEL = """
 import sympy
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 x = sympy.Symbol("x", real=True)
 kernel = Family.of({"f": sympy.sin(x) + x**2}, ("x",)).kernel
 print(*(kernel.compiled(order).origin for order in range(3)))
@@ -101,15 +101,15 @@ def test_a_forgotten_kernel_leaves_the_others_alone(tmp_path, monkeypatch):
 
 def test_the_folder_can_be_chosen(tmp_path, monkeypatch):
     monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path / "deep" / "folder"))
-    assert cache_directory() == tmp_path / "deep" / "folder"
+    assert cache_folder() == tmp_path / "deep" / "folder"
     assert made()[1] == "compiled"
-    assert len(list(cache_directory().iterdir())) == 1, "one file for one kernel, nothing left over"
+    assert len(list(cache_folder().rglob("*.*"))) == 1, "one file for one kernel, nothing left over"
     assert made()[1] == "loaded"
 
 
 def test_without_a_choice_it_is_the_users_cache(monkeypatch):
     monkeypatch.delenv("POLYCORNER_CACHE_DIR", raising=False)
-    assert "polycorner" in cache_directory().parts
+    assert "polycorner" in cache_folder().parts
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_without_a_choice_it_is_the_users_cache(monkeypatch):
 def test_a_spoilt_file_is_compiled_again(tmp_path, monkeypatch, spoil):
     monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path))
     f, _ = made()
-    (file,) = tmp_path.iterdir()
+    (file,) = tmp_path.rglob("*.o")
     code = file.read_bytes()
     file.write_bytes(spoil(code))
     again, origin = made()
@@ -176,8 +176,28 @@ def test_a_mistake_lets_the_next_one_in(tmp_path, monkeypatch):
         assert list(tmp_path.iterdir()) == [tmp_path / "slow.lock"]
 
 
-def test_where_no_lock_can_be_kept_nobody_waits(tmp_path, monkeypatch):
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path / "file"))
-    with one_at_a_time("slow"), one_at_a_time("slow"):
-        assert [path.name for path in tmp_path.iterdir()] == ["file"]
+def test_where_the_folder_cannot_be_written_a_temporary_one_serves(tmp_path, monkeypatch):
+    named = tmp_path / "file"
+    named.write_text("")
+    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(named))
+    with pytest.warns(RuntimeWarning, match="POLYCORNER_CACHE_DIR"):
+        folder = cache_folder()
+    assert folder != named
+    assert cache_folder() == folder  # and no second warning
+    _, first = made()
+    _, second = made()
+    assert (first, second) == ("compiled", "loaded")
+    with one_at_a_time("slow"):
+        assert named.read_text() == ""
+
+
+def test_the_size_counts_what_clearing_deletes(tmp_path, monkeypatch):
+    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path / "new"))
+    assert cache_size() == (0, 0)
+    made()
+    files, size = cache_size()
+    assert files == 1
+    assert size > 1000
+    assert clear_cache() == (files, size)
+    assert cache_size() == (0, 0)
+    assert made()[1] == "compiled"

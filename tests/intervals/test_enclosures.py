@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from strategies import smooth_expressions
 
 from polycorner import Manifold, SmoothFunction
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 from polycorner.intervals.balls import ball, between, bounds, precision
 from polycorner.intervals.enclosures import Doubt, Formulas
 from polycorner.intervals.tapes import Box

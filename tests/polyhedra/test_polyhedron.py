@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from strategies import group, leaves_of, trees, vectors
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 
 PLANE = Manifold.euclidean("x y")
 x, y = PLANE.symbols

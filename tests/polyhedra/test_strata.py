@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, stratum_at
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 from polycorner.polyhedra import LocalType
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")

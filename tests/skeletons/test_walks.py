@@ -12,7 +12,7 @@ from oracles_atlas import arc_length, turned
 from strategies import directions
 
 from polycorner import AllOf, Manifold, Polyhedron, SmoothFunction, Symmetry
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 from polycorner.skeletons import End
 from polycorner.skeletons.curves import Frame, Ground, settle
 from polycorner.skeletons.walks import follow

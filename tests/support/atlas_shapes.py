@@ -9,7 +9,7 @@ import sympy as sp
 from networkx.algorithms.isomorphism import categorical_multiedge_match
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 from polycorner.skeletons import End
 
 # ------------------------------------------------------------------------------------------ shapes

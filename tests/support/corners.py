@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from polycorner import AllOf, Manifold, Polyhedron, SmoothFunction, certify, minimise
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 
 LARGEST = 4
 

@@ -20,7 +20,7 @@ import sympy as sp
 from exact_algebra import ZERO
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, certify, minimise
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 
 UNBOUNDED = ("saddle", "faint curvature", "beyond second order")
 BEYOND = ("third", "fourth", "kink", "edge")

@@ -6,7 +6,7 @@ import numpy as np
 import sympy as sp
 
 from polycorner import SmoothFunction
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 
 
 @lru_cache

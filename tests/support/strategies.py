@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from polycorner import AllOf, AnyOf, Manifold, SmoothFunction
 from polycorner.dumbbells import DumbbellPair
-from polycorner.formulas.functions import Bundle, Family
+from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.families import Family
 
 TAU = math.tau
 

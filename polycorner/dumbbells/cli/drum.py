@@ -194,10 +194,10 @@ def _folder(
         return out / "drum-state"
     from polycorner.dumbbells.dynamics.checkpoints import Checkpoint
     from polycorner.dumbbells.dynamics.runs import parameters
-    from polycorner.formulas.kernels import cache_directory
+    from polycorner.formulas.cache import cache_folder
 
     chosen = parameters(model, q, values["duration"], values["dt"], noise)
-    return cache_directory() / f"drum-{Checkpoint('', chosen).key[:16]}"
+    return cache_folder() / f"drum-{Checkpoint('', chosen).key[:16]}"
 
 
 def _run(

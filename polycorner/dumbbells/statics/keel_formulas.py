@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
-from polycorner.formulas import functions, kernels
+from polycorner.formulas import cache, families, kernels
 from polycorner.spaces.manifold import Array, reals, scalar
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def _torques() -> "tuple[sympy.Expr, sympy.Expr]":
 
 
 @lru_cache(maxsize=1)
-def family() -> functions.Family:
+def family() -> families.Family:
     """Return ``ratio_r``, ``ratio_s``, ``gravity``, ``lever`` of ``phi theta``, compiled.
 
     Parameters ``alpha kappa``; see :class:`Derivation`.
@@ -118,13 +118,13 @@ def family() -> functions.Family:
     names = ("ratio_r", "ratio_s", "gravity", "lever")
     variables, parameters = ("phi", "theta"), ("alpha", "kappa")
     modules = (dumbbell_formulas.__name__, drum_formulas.__name__, __name__)
-    key = repr((kernels.source_key(*modules), names))
+    key = repr((cache.source_key(*modules), names))
 
     def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
         d = derivation()
         return {}, dict(zip(names, (*d.ratio, d.gravity, d.lever), strict=True))
 
-    return functions.Family(names, variables, parameters, formulas, key)
+    return families.Family(names, variables, parameters, formulas, key)
 
 
 def force_ratio(phi: ArrayLike, theta: ArrayLike, tilt: float) -> Array:

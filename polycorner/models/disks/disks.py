@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.formulas.functions import Bundle, SmoothFunction
+from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.disks.critical import (
     SAME,
     CriticalConfiguration,

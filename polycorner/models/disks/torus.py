@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.formulas.functions import Family
+from polycorner.formulas.families import Family
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _family(
     parameters: tuple[str, ...],
     formulas: "Callable[[], Formulas]",
 ) -> Family:
-    from polycorner.formulas.kernels import source_key
+    from polycorner.formulas.cache import source_key
 
     key = repr((source_key(__name__), names, variables, parameters))
     return Family(names, variables, parameters, formulas, key)

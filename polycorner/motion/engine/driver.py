@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.formulas.kernels import one_at_a_time
+from polycorner.formulas.cache import one_at_a_time
 from polycorner.motion.engine.layout import Herd, lay_out
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise, Solver

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.formulas.functions import Call, Family
+from polycorner.formulas.bundles import Call
+from polycorner.formulas.families import Family
 from polycorner.motion.formulation import Formulation, moment
 from polycorner.motion.friction import ConvexSet
 from polycorner.motion.noise import Noise, Solver

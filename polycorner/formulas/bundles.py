@@ -1,0 +1,149 @@
+"""Functions on one manifold evaluated together in as few calls of kernels as possible."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from polycorner.formulas.families import Family
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
+
+
+class Member(Protocol):
+    """A function of a family, bound to coordinates and parameters."""
+
+    @property
+    def family(self) -> Family:
+        """The family."""
+
+    @property
+    def member_name(self) -> str:
+        """The function's name in it."""
+
+    @property
+    def reads(self) -> tuple[int, ...]:
+        """Positions of the coordinates it reads."""
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Values of the parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class Call(Value):
+    """One call of a family's kernel: which coordinates go in, which rows come out."""
+
+    family: Family
+    reads: tuple[int, ...]
+    parameters: Array
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+
+class _Batch:
+    """Calls of one kernel that differ only in what they read: one call over all of them."""
+
+    def __init__(self, calls: Sequence[Call]) -> None:
+        first = calls[0]
+        self.kernel, self.parameters = first.family.kernel, first.parameters
+        self.address = self.parameters.ctypes.data  # of an array that this value keeps alive
+        self.reads = np.array([call.reads for call in calls])
+        everything = first.columns == tuple(range(len(first.family.names)))
+        self.columns: Any = np.s_[:] if everything else list(first.columns)
+        rows, reads = np.array([call.rows for call in calls]), self.reads
+        self.places: tuple[tuple[Any, ...], ...] = (
+            (rows,),
+            (rows[:, :, None], reads[:, None, :]),
+            (rows[:, :, None, None], reads[:, None, :, None], reads[:, None, None, :]),
+        )
+
+    def scatter(self, q: Array, results: tuple[Array, ...]) -> None:
+        """Evaluate at every row of ``q`` ``(N, n)`` and put what comes out in its place."""
+        count, order = len(self.reads), len(results) - 1
+        inputs = q[:, self.reads].reshape(len(q) * count, self.reads.shape[1])
+        parts = self.kernel.over(inputs, self.address, order)
+        for result, part, place in zip(results, parts, self.places, strict=False):
+            shaped = part.reshape(len(q), count, *part.shape[1:])
+            result[(slice(None), *place)] = shaped[:, :, self.columns]
+
+    def scatter_point(self, q: Array, results: tuple[Array, ...]) -> None:
+        """Evaluate at the point ``q`` ``(n,)`` and put what comes out in its place."""
+        order = len(results) - 1
+        if len(self.reads) == 1:
+            single = self.kernel.at(q[self.reads[0]], self.address, order)
+            parts = tuple([part[None] for part in single])
+        else:
+            parts = self.kernel.over(q[self.reads], self.address, order)
+        for result, part, place in zip(results, parts, self.places, strict=False):
+            result[place] = part[:, self.columns]
+
+
+class Bundle(Value):
+    """Several functions on one manifold, evaluated together in as few calls as possible.
+
+    Attributes
+    ----------
+    calls : list of Call
+        One call for each family, choice of coordinates and choice of parameters.
+    """
+
+    def __init__(self, manifold: Manifold, functions: Sequence[Member]) -> None:
+        self.manifold, self.functions = manifold, tuple(functions)
+        grouped: dict[tuple[int, tuple[int, ...], tuple[float, ...]], list[int]] = {}
+        for row, f in enumerate(self.functions):
+            grouped.setdefault((id(f.family), f.reads, f.parameters), []).append(row)
+        self.calls = [self._call(rows) for rows in grouped.values()]
+        only = self.calls[0] if len(self.calls) == 1 else None
+        self._direct = only if only is not None and self._is_direct(only) else None
+
+    def _call(self, rows: list[int]) -> Call:
+        first = self.functions[rows[0]]
+        columns = [first.family.names.index(self.functions[row].member_name) for row in rows]
+        numbers = np.array(first.parameters, dtype=np.float64)
+        return Call(first.family, first.reads, numbers, tuple(rows), tuple(columns))
+
+    def _is_direct(self, call: Call) -> bool:
+        n, m = self.manifold.dimension, len(call.family.names)
+        return call.reads == tuple(range(n)) and call.columns == tuple(range(m))
+
+    @cached_property
+    def _batches(self) -> list[_Batch]:
+        grouped: dict[tuple[int, bytes, tuple[int, ...]], list[Call]] = {}
+        for call in self.calls:
+            key = (id(call.family), call.parameters.tobytes(), call.columns)
+            grouped.setdefault(key, []).append(call)
+        return [_Batch(calls) for calls in grouped.values()]
+
+    def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
+        """Return values ``(..., m)``, gradients ``(..., m, n)``, Hessians ``(..., m, n, n)``.
+
+        ``q`` must be a float64 array ``(..., n)``; nothing is checked here.
+        """
+        if q.ndim == 1:
+            return self._at(q, order)
+        flat = q.reshape(-1, q.shape[-1])
+        if self._direct is not None:
+            call = self._direct
+            results = call.family.kernel.over(flat, call.parameters.ctypes.data, order)
+        else:
+            results = tuple([np.zeros((len(flat), *shape)) for shape in self._shapes(order)])
+            for batch in self._batches:
+                batch.scatter(flat, results)
+        outer = q.shape[:-1]
+        return tuple([result.reshape(outer + result.shape[1:]) for result in results])
+
+    def _at(self, q: Array, order: int) -> tuple[Array, ...]:
+        if self._direct is not None:
+            batch = self._batches[0]
+            return batch.kernel.at(q, batch.address, order)
+        results = tuple([np.zeros(shape) for shape in self._shapes(order)])
+        for batch in self._batches:
+            batch.scatter_point(q, results)
+        return results
+
+    def _shapes(self, order: int) -> tuple[tuple[int, ...], ...]:
+        m, n = len(self.functions), self.manifold.dimension
+        return ((m,), (m, n), (m, n, n))[: order + 1]

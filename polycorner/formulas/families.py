@@ -1,0 +1,165 @@
+"""Families of formulas that are compiled together and bound to numbers late."""
+
+import pickle
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from polycorner.formulas.programs import Program
+from polycorner.formulas.translate import compile_expressions
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.formulas.kernels import Kernel
+
+    Expressions = Mapping[str, sympy.Expr]
+
+
+class Written:
+    """Definitions and expressions that were given, not computed.
+
+    They are pickled as bytes of their own, so that a process which finds the machine code on disk
+    reads them back, and imports SymPy, only when a formula itself is asked for.
+    """
+
+    def __init__(self, definitions: "Expressions", expressions: "Expressions") -> None:
+        self._content: Any = (definitions, expressions)
+
+    def __call__(self) -> "tuple[Expressions, Expressions]":
+        """Return definitions and expressions."""
+        if isinstance(self._content, bytes):
+            self._content = pickle.loads(self._content)
+        definitions, expressions = self._content
+        return definitions, expressions
+
+    def __getstate__(self) -> bytes:
+        """Return the content as bytes."""
+        content = self._content
+        return content if isinstance(content, bytes) else pickle.dumps(content)
+
+    def __setstate__(self, content: bytes) -> None:
+        """Keep the bytes until the content is asked for."""
+        self._content = content
+
+
+@dataclass(frozen=True, eq=False)
+class Family(Value):
+    """Functions written in the same variables and parameters, compiled together once.
+
+    Parameters are bound late: a thousand contacts of one type are one family.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the functions.
+    variables, parameters : tuple of str
+        Names of the symbols they read.
+    formulas : callable
+        Returns ``(definitions, expressions)``, two mappings from names to SymPy expressions;
+        a definition may be used in later definitions and in the expressions.
+    key : str
+        Identifies the formulas between processes.  With a key, SymPy is not even imported
+        once the kernels are on disk; without one, it is computed from the expressions.
+    """
+
+    names: tuple[str, ...]
+    variables: tuple[str, ...]
+    parameters: tuple[str, ...]
+    formulas: "Callable[[], tuple[Expressions, Expressions]]"
+    key: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        expressions: "Mapping[str, Any]",
+        variables: Iterable[str],
+        parameters: Iterable[str] = (),
+        definitions: "Mapping[str, Any] | None" = None,
+    ) -> "Family":
+        """Return the family of given expressions, checking every symbol at once."""
+        variables, parameters = tuple(variables), tuple(parameters)
+        _check_new("parameters", parameters, variables)
+        _check_new("definitions", tuple(definitions or ()), variables + parameters)
+        given = {name: _sympified(name, e) for name, e in expressions.items()}
+        known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
+        family = cls(tuple(given), variables, parameters, Written(known, given))
+        return replace(family, key=family.program().digest())
+
+    def program(self) -> Program:
+        """Return the straight-line program of the values."""
+        definitions, expressions = self.formulas()
+        ordered = [expressions[name] for name in self.names]
+        return compile_expressions(
+            ordered, self.variables, self.parameters, definitions, self.names
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes, with formulas that a pickle cannot name written out."""
+        state = super().__getstate__()
+        if not (isinstance(self.formulas, Written) or _is_importable(self.formulas)):
+            state["formulas"] = Written(*self.formulas())
+        return state
+
+    @cached_property
+    def kernel(self) -> "Kernel":
+        """The compiled functions."""
+        from polycorner.formulas.kernels import Kernel
+
+        return Kernel(
+            self.key,
+            self.program,
+            variables=len(self.variables),
+            parameters=len(self.parameters),
+            outputs=len(self.names),
+        )
+
+    def expression(self, name: str) -> "sympy.Expr":
+        """Return one function with all definitions written out."""
+        import sympy
+
+        definitions, expressions = self.formulas()
+        written: dict[str, sympy.Expr] = {}
+
+        def expand(e: "sympy.Expr") -> "sympy.Expr":
+            return e.xreplace({s: written[s.name] for s in e.free_symbols if s.name in written})
+
+        for definition, e in definitions.items():
+            written[definition] = expand(e)
+        return expand(expressions[name])
+
+
+def _is_importable(function: Any) -> bool:
+    """Return whether a function is found under its name in its module."""
+    module = sys.modules.get(getattr(function, "__module__", ""))
+    return getattr(module, getattr(function, "__qualname__", ""), None) is function
+
+
+def _check_new(argument: str, names: Sequence[str], taken: Sequence[str]) -> None:
+    hidden = [name for name in names if name in taken]
+    if hidden:
+        msg = f"{argument}: expected names other than {', '.join(taken)}; got {', '.join(hidden)}"
+        raise ValueError(msg)
+
+
+def _sympified(name: str, expression: object) -> "sympy.Expr":
+    import sympy
+
+    if isinstance(expression, str):
+        msg = f"{name}: expected a SymPy expression; got the string {expression!r}"
+        raise TypeError(msg)
+    try:
+        result = sympy.sympify(expression, strict=True)
+    except sympy.SympifyError as error:
+        msg = f"{name}: expected a SymPy expression; got {expression!r}"
+        raise TypeError(msg) from error
+    if isinstance(result, sympy.core.relational.Relational):
+        msg = f"{name}: expected f, meaning f >= 0, instead of an inequality; got {result}"
+        raise TypeError(msg)
+    if not isinstance(result, sympy.Expr):
+        msg = f"{name}: expected a SymPy expression; got {type(expression).__name__}"
+        raise TypeError(msg)
+    return result

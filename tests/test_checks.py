@@ -1,0 +1,59 @@
+"""Guards: every refusal names the argument, and nothing in range is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner import checks
+
+REFUSED = {
+    "whole-float": (checks.whole, (2.0,), {}, TypeError),
+    "whole-bool": (checks.whole, (True,), {}, TypeError),
+    "whole-low": (checks.whole, (0,), {"least": 1}, ValueError),
+    "whole-high": (checks.whole, (9,), {"most": 8}, ValueError),
+    "real-text": (checks.real, ("1",), {}, TypeError),
+    "real-bool": (checks.real, (False,), {}, TypeError),
+    "real-complex": (checks.real, (1j,), {}, TypeError),
+    "real-nan": (checks.real, (math.nan,), {"infinite": True}, ValueError),
+    "real-inf": (checks.real, (math.inf,), {}, ValueError),
+    "real-open": (checks.real, (0.0,), {"above": 0.0}, ValueError),
+    "real-closed": (checks.real, (1.1,), {"most": 1.0}, ValueError),
+    "choice": (checks.choice, ("slsq", ["slsqp", "scp"]), {}, ValueError),
+    "choice-kind": (checks.choice, (3, ["slsqp", "scp"]), {}, TypeError),
+    "names": (checks.names, (["z"], ["x", "y"]), {}, ValueError),
+    "mapping": (checks.mapping, ([],), {}, TypeError),
+    "instance": (checks.instance, ("x", np.ndarray), {}, TypeError),
+    "generator-text": (checks.generator, ("x",), {}, TypeError),
+    "generator-negative": (checks.generator, (-1,), {}, ValueError),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_refusal_is_one_sentence_that_names_the_argument(case):
+    guard, values, options, kind = REFUSED[case]
+    with pytest.raises(kind, match=r"^thing: expected .*; got ") as refused:
+        guard("thing", *values, **options)
+    assert "\n" not in str(refused.value)
+
+
+@given(st.integers(), st.floats(allow_nan=False))
+def test_what_is_in_range_passes_unchanged(number, value):
+    assert checks.whole("n", np.int64(0) + 3) == 3
+    assert checks.whole("n", number, least=number, most=number) == number
+    assert checks.real("x", value, least=value, most=value, infinite=True) == value
+
+
+def test_a_seed_and_nothing_make_reproducible_generators():
+    own = np.random.default_rng(5)
+    assert checks.generator("rng", own) is own
+    assert checks.generator("rng", 5).random() == np.random.default_rng(5).random()
+    assert checks.generator("rng", None).random() == checks.generator("rng", None).random()
+
+
+def test_the_sentence_for_a_missing_extra_fits_a_package_and_a_checkout():
+    words = str(checks.missing_extra("tornado", "view"))
+    assert "polycorner[view]" in words
+    assert "'.[view]'" in words
