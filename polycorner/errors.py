@@ -1,7 +1,8 @@
-"""The two exceptions of the package, and how its sentences name a misspelt word.
+"""The exceptions of the package, and suggestions for misspelt words.
 
-Wrong use raises ``ValueError`` or ``TypeError`` at the door.  A numerical outcome is a
-:class:`~polycorner.minimisation.certificate.Verdict`.  What is left is a back end that breaks.
+Wrong use raises ``ValueError`` or ``TypeError`` at once; a numerical outcome is a
+:class:`~polycorner.minimisation.verdicts.Verdict`.  The exceptions here are for the rest: a
+numerical back end that fails.
 """
 
 from collections.abc import Iterable
@@ -16,7 +17,7 @@ class SolverError(PolycornerError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return a misspelt name and the right one it is nearest to, if any is near.
+    """Return a misspelt name with the known name closest to it, if any is close.
 
     Examples
     --------

@@ -25,7 +25,7 @@ class Value:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes without what is computed on demand."""
-        kind: Any = type(self)  # a class is hashable, which mypy doubts
+        kind: Any = type(self)  # mypy does not know that classes are hashable
         computed = _computed(kind)
         return {name: value for name, value in vars(self).items() if name not in computed}
 

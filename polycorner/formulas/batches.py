@@ -101,7 +101,7 @@ def _emit_body(
             leaves[op, position] = _gather(b, q if op == "var" else p, position, stride, lanes)
         return leaves[op, position]
 
-    # All leaves first: nothing that is stored may seem to change what is still to be read.
+    # All leaves are loaded first, since LLVM must assume that stores may alias later loads.
     for i in range(program.variables):
         leaf("var", i)
     for i in range(program.parameters):

@@ -61,7 +61,7 @@ class _Batch:
         )
 
     def scatter(self, q: Array, results: tuple[Array, ...]) -> None:
-        """Evaluate at every row of ``q`` ``(N, n)`` and put what comes out in its place."""
+        """Evaluate at every row of ``q`` ``(N, n)`` and scatter the results."""
         count, order = len(self.reads), len(results) - 1
         inputs = q[:, self.reads].reshape(len(q) * count, self.reads.shape[1])
         parts = self.kernel.over(inputs, self.address, order)
@@ -70,7 +70,7 @@ class _Batch:
             result[(slice(None), *place)] = shaped[:, :, self.columns]
 
     def scatter_point(self, q: Array, results: tuple[Array, ...]) -> None:
-        """Evaluate at the point ``q`` ``(n,)`` and put what comes out in its place."""
+        """Evaluate at the point ``q`` ``(n,)`` and scatter the results."""
         order = len(results) - 1
         if len(self.reads) == 1:
             single = self.kernel.at(q[self.reads[0]], self.address, order)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Written:
-    """Definitions and expressions that were given, not computed.
+    """Definitions and expressions given as SymPy objects.
 
     They are pickled as bytes of their own, so that a process which finds the machine code on disk
     reads them back, and imports SymPy, only when a formula itself is asked for.

@@ -22,11 +22,11 @@ class SmoothFunction(Value):
     Parameters
     ----------
     name : str
-        What the function is called in strata and certificates.
+        The function's name in strata and certificates.
     expression : sympy.Expr
         Written in the manifold's coordinates (or in ``variables``) and in parameters.
     manifold : Manifold
-        Where it lives.
+        Its domain.
     parameters : mapping from str to float, optional
         Values of the expression's other symbols.
     variables : sequence of str, optional

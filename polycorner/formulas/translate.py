@@ -25,13 +25,13 @@ def compile_expressions(
     Parameters
     ----------
     expressions : sequence of sympy.Expr
-        What the program computes.
+        The outputs of the program.
     variables, parameters : sequence of str
         Names of the symbols it reads, in order.
     definitions : mapping from str to sympy.Expr, optional
         Intermediate quantities by name, in an order in which each uses only earlier ones.
     names : sequence of str, optional
-        What the expressions are called in error messages.
+        Names of the expressions in error messages.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def compile_expressions(
 
 
 class _Translator:
-    """Walks SymPy trees once, sharing whatever it has seen."""
+    """Translator of SymPy trees that visits each shared subexpression once."""
 
     def __init__(self, variables: Sequence[str], parameters: Sequence[str]) -> None:
         self.graph = Graph()

@@ -1,8 +1,8 @@
-"""Ball arithmetic: numbers with an error bound, and what each operation does to them.
+"""Ball arithmetic: numbers with an error bound, their operations and derivatives.
 
 A ball is a midpoint and a radius; an operation on balls returns a ball that contains all its
-results for arguments in the given balls, rounding included ([Johansson]).  This is the only module
-that knows the library behind it, FLINT.
+results for arguments in the given balls, rounding included ([Johansson]).  No other module
+imports the library behind it, FLINT.
 """
 
 import operator
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 Ball: TypeAlias = "arb"
 Matrix: TypeAlias = "arb_mat"
-# What a comparison of balls says: None where both answers are possible.
+# Result of a comparison of balls: None where both answers are possible.
 Truth: TypeAlias = bool | None
 
 
 @contextmanager
 def precision(bits: int) -> Iterator[None]:
-    """Compute with ``bits`` binary digits inside the block."""
+    """Set the working precision to ``bits`` binary digits inside the block."""
     from flint import ctx
 
     with ctx.workprec(bits):
@@ -34,7 +34,7 @@ def precision(bits: int) -> Iterator[None]:
 
 
 def current_precision() -> int:
-    """Return the number of binary digits that are computed with."""
+    """Return the working precision in binary digits."""
     from flint import ctx
 
     return int(ctx.prec)
@@ -208,7 +208,7 @@ def _select(condition: Truth, yes: Ball, no: Ball) -> Ball:
 
 @lru_cache(maxsize=1)
 def operations() -> dict[str, Callable[..., Any]]:
-    """Return what every operation of a program does with balls."""
+    """Return the ball operation for each operation of a program."""
     from flint import arb
 
     return {
@@ -234,8 +234,8 @@ def _whole(number: Ball) -> bool:
     return bool(number.is_exact() and number.is_integer())
 
 
-# Where each operation is analytic on a whole box, and what is wrong elsewhere; operations that are
-# not listed are analytic everywhere.
+# For each operation that is not analytic everywhere: the reason it may fail to be on a box, and the
+# condition on its arguments under which it is analytic on the whole box.
 ANALYTIC: dict[str, tuple[str, Callable[..., bool]]] = {
     "sqrt": ("the argument of a square root may reach 0", lambda x: x > 0),
     "log": ("the argument of a logarithm may reach 0", lambda x: x > 0),
@@ -250,8 +250,8 @@ ANALYTIC: dict[str, tuple[str, Callable[..., bool]]] = {
     "atan2": ("the arguments of atan2 may reach its cut", lambda y, x: x > 0 or y != 0),
 }
 
-# Partial derivatives of each operation by its arguments, from the arguments and the value; they are
-# not finite where the operation has none, except for atan2 on its cut.
+# Partial derivatives of each operation with respect to its arguments, from the arguments and the
+# value.  They are not finite where the operation is not differentiable, except atan2 on its cut.
 PARTIALS: dict[str, tuple[Callable[..., Any], ...]] = {
     "neg": (lambda *_: -1,),
     "add": (lambda *_: 1, lambda *_: 1),
@@ -280,5 +280,5 @@ PARTIALS: dict[str, tuple[Callable[..., Any], ...]] = {
 
 
 def narrower(x: Ball, y: Ball) -> Ball:
-    """Return the better of two enclosures of the same quantity."""
+    """Return the narrower of two enclosures of the same quantity."""
     return y if y.is_finite() and (not x.is_finite() or y.rad() < x.rad()) else x

@@ -1,12 +1,12 @@
 """Formulas in ball arithmetic: enclosures of values and derivatives over whole boxes.
 
-What is evaluated is the graph of :mod:`~polycorner.formulas.programs`, the one that the compiled
-kernels come from, with its constants exact: fractions, pi and e are enclosed, and a floating-point
-number that a user gave is the dyadic fraction it is.
+The evaluated graph is the one from which the kernels are compiled
+(:mod:`~polycorner.formulas.programs`), with exact constants: fractions, pi and e are enclosed, and
+a floating-point number given by the user stands for the dyadic fraction it represents.
 
 Derivatives are taken only where a function is smooth on the whole box: every branch that matters
-is decided there, and no root, quotient, logarithm, power or angle comes to the edge of the domain
-on which it is analytic.
+is decided there, and no root, quotient, logarithm, power or angle reaches the boundary of its
+domain of analyticity.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """Why something is undecided: what it is about, and the reason."""
+class Undecided:
+    """A question that a box does not decide: its subject and the reason."""
 
     name: str
     reason: str
 
     def __str__(self) -> str:
-        """Return both."""
+        """Return subject and reason as one phrase."""
         return f"{self.name}: {self.reason}"
 
 
@@ -107,9 +107,9 @@ class Formulas:
     Parameters
     ----------
     functions : sequence of SmoothFunction
-        What is evaluated.
+        The functions to evaluate.
     manifold : Manifold
-        Where they live; its coordinates are the first inputs.
+        Their domain; its coordinates are the first inputs.
     free : sequence of str, optional
         Names of parameters that are inputs too, after the coordinates.
     """
@@ -137,11 +137,11 @@ class Formulas:
         found = tape.run(box)
         return [found[slot] for slot in tape.outputs]
 
-    def smooth(self, box: Box, rows: Sequence[int]) -> "SmoothForms | Doubt":
-        """Return some functions as they are on a box, free of branches, or why that is undecided.
+    def smooth(self, box: Box, rows: Sequence[int]) -> "SmoothForms | Undecided":
+        """Return functions without branches that agree with the given ones on a box.
 
         The functions returned equal the given ones at every point of the box and are analytic in a
-        neighbourhood of it.
+        neighbourhood of it; ``Undecided`` where the box does not determine the branches taken.
         """
         rows = tuple(rows)
         tape = self._tape(rows)
@@ -150,16 +150,16 @@ class Formulas:
         for row in rows:
             reason = self._follow(self.outputs[row], tape, found, taken)
             if reason:
-                return Doubt(self.names[row], reason)
+                return Undecided(self.names[row], reason)
         key = (rows, tuple(sorted(taken.items())))
         if key not in self._smooth:
             self._smooth[key] = self._pruned(rows, taken)
         return self._smooth[key]
 
     def undefined(self, parameters: "Sequence[Ball]") -> str:
-        """Return a function that has no value for some parameters, wherever the point is.
+        """Return the name of a function that is undefined for some parameters at every point.
 
-        Only what is computed from parameters alone, on no branch, is looked at; empty for none.
+        Only subexpressions of the parameters alone, outside branches, are examined; empty for none.
         """
         anywhere = [constant(Fraction(0))] * self.dimension
         for name, output in zip(self.names, self.outputs, strict=True):
@@ -188,7 +188,7 @@ class Formulas:
         return fixed
 
     def _follow(self, output: int, tape: Tape, found: list[Any], taken: dict[int, int]) -> str:
-        """Follow the branches taken from an output; return what prevents it from being smooth."""
+        """Follow the branches taken from an output; return the reason it may not be smooth."""
         waiting = [output]
         while waiting:
             a = waiting.pop()
@@ -257,7 +257,7 @@ class SmoothForms:
         return self._shaped([found[slot] for slot in tape.outputs], order)
 
     def slopes(self, box: Box) -> tuple[Any, Any]:
-        """Return how gradients and second derivatives change in a box with slopes.
+        """Return the derivatives of gradients and Hessians along a box with slopes.
 
         Enclosures of their derivatives along each component of ``delta``: of the gradients
         ``[m][inputs][delta]`` and of the second derivatives ``[m][n][inputs][delta]``.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """Where formulas are evaluated: balls for all inputs, or a parallelotope.
+    """Domain of an evaluation: balls for all inputs, or a parallelotope.
 
     With ``slopes`` the inputs are ``middle + slopes delta``, for a common ``delta`` in ``reach``;
     a quantity is then also enclosed by its value at ``delta = 0`` plus its slopes times
@@ -35,7 +35,7 @@ class Box:
     middle : sequence of Ball
         The inputs at ``delta = 0``.
     slopes : sequence of sequence of Ball
-        The derivatives of each input by each component of ``delta``.
+        The derivatives of each input with respect to each component of ``delta``.
     reach : sequence of Ball
         Contains each component of ``delta``, and 0.
     """
@@ -108,10 +108,11 @@ class Tape:
         return values
 
     def moving(self, box: Box) -> tuple[list[Any], list[Any]]:
-        """Return the same in a box with slopes, and the derivatives of all nodes along ``delta``.
+        """Return enclosures in a box with slopes, and derivatives of all nodes along ``delta``.
 
         Every node is evaluated naturally and in mean value form; the narrower is kept.
-        Derivatives are ``()`` where nothing moves, and None where there may be none.
+        Derivatives are ``()`` for nodes independent of ``delta``, and None for nodes that may
+        not be differentiable.
         """
         values, middle = self._leaves(box.hull), self._leaves(box.middle)
         slopes: list[Any] = [()] * len(values)
@@ -176,7 +177,7 @@ def _slope(op: str, given: list[Any], value: Any, inner: list[Any]) -> Any:
 
 
 def _branch_slope(op: str, given: list[Any], inner: list[Any]) -> Any:
-    """Return the same where a branch is taken, or an argument has no derivatives."""
+    """Return the derivatives of a selection, or None where an argument has none."""
     if op != "select":
         return None
     condition, slope = given[0], inner[1:]

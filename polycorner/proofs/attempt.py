@@ -6,7 +6,7 @@ from math import ceil
 from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import ball, precision
-from polycorner.intervals.enclosures import Doubt, Formulas
+from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.verdicts import Entrapment
 from polycorner.proofs.claims import Posed, faces, pose_claim
@@ -31,17 +31,17 @@ class Attempt:
     ----------
     face : tuple of int
         The active functions.
-    posed : Posed or Doubt
+    posed : Posed or Undecided
         The claim that they hold a minimum, or why it could not be posed.
-    enclosure : Enclosure or Doubt
+    enclosure : Enclosure or Undecided
         Its KKT point enclosed, or why not.
     bits : int
         Binary digits that were computed with.
     """
 
     face: tuple[int, ...]
-    posed: Posed | Doubt
-    enclosure: Enclosure | Doubt
+    posed: Posed | Undecided
+    enclosure: Enclosure | Undecided
     bits: int
 
 
@@ -58,7 +58,7 @@ def attempt(
         result, decided = _on_face(certificate, face, fields, formulas, digits)
         if decided:
             return result
-        if first is None or isinstance(first.enclosure, Doubt):
+        if first is None or isinstance(first.enclosure, Undecided):
             first = result
     assert first is not None
     return first
@@ -79,11 +79,11 @@ def _on_face(
     active = certificate.analysis.active
     while True:
         posed = pose_claim(certificate, face, fields, formulas)
-        if isinstance(posed, Doubt):
+        if isinstance(posed, Undecided):
             return Attempt(face, posed, posed, bits_for(digits)), False
         enclosure, bits = _enclosed(certificate, posed, digits)
         result = Attempt(face, posed, enclosure, bits)
-        if isinstance(enclosure, Doubt):
+        if isinstance(enclosure, Undecided):
             return result, False
         others = [i for i in active if i not in face]
         with precision(bits):
@@ -99,18 +99,20 @@ def bits_for(digits: int) -> int:
     return ceil(digits * BITS_PER_DIGIT) + GUARD_BITS
 
 
-def _enclosed(certificate: Certificate, posed: Posed, digits: int) -> tuple[Enclosure | Doubt, int]:
+def _enclosed(
+    certificate: Certificate, posed: Posed, digits: int
+) -> tuple[Enclosure | Undecided, int]:
     """Enclose the solution, with more precision where the first does not suffice."""
     system = posed.claim.system
     bits = bits_for(digits)
     for last in (False, True):
         centre = newton(system, posed.start, bits=bits)
-        if isinstance(centre, Doubt):
+        if isinstance(centre, Undecided):
             return _explained(certificate, centre), bits
         away = _distance(certificate, centre)
         if not away <= NEARBY:
             reason = f"the nearest solution found is {away:.1e} scale units from the point"
-            return Doubt(SUBJECT, reason), bits
+            return Undecided(SUBJECT, reason), bits
         with precision(bits):
             found = enclose(system, centre, bits=bits)
             if isinstance(found, Enclosure) and (last or _sharp(found, digits)):
@@ -118,7 +120,7 @@ def _enclosed(certificate: Certificate, posed: Posed, digits: int) -> tuple[Encl
         if last:
             break
         bits = 2 * bits + GUARD_BITS
-    return _explained(certificate, found) if isinstance(found, Doubt) else found, bits
+    return _explained(certificate, found) if isinstance(found, Undecided) else found, bits
 
 
 def _distance(certificate: Certificate, z: "list[Ball]") -> float:
@@ -137,7 +139,7 @@ def _sharp(enclosure: Enclosure, digits: int) -> bool:
     )
 
 
-def _explained(certificate: Certificate, doubt: Doubt) -> Doubt:
+def _explained(certificate: Certificate, undecided: Undecided) -> Undecided:
     """Add what the certificate knows about why the equations may be singular."""
     hints = []
     if not certificate.licq:
@@ -145,4 +147,4 @@ def _explained(certificate: Certificate, doubt: Doubt) -> Doubt:
     flat = [label for label, kind in certificate.entrapment().items() if kind is Entrapment.FREE]
     if flat:
         hints.append(f"the energy is flat along {', '.join(flat)}")
-    return Doubt(doubt.name, "; ".join([doubt.reason, *hints]))
+    return Undecided(undecided.name, "; ".join([undecided.reason, *hints]))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.intervals.balls import ball, precision
-from polycorner.intervals.enclosures import Doubt, Formulas, SmoothForms
+from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation.certificate import Certificate
 from polycorner.polyhedra.cones import Rows, unit_rows
@@ -89,7 +89,7 @@ def pose_claim(
     declared: Sequence[Generator],
     formulas: Formulas,
     parameters: Sequence[float] = (),
-) -> Posed | Doubt:
+) -> Posed | Undecided:
     """Pose the KKT system of a face at a certificate's point, with gauges for its symmetries."""
     problem = certificate.problem
     m = problem.inequalities
@@ -98,7 +98,7 @@ def pose_claim(
     with precision(FIRST_BITS):
         box = Box([ball(x) for x in (*point, *parameters)])
         forms = formulas.smooth(box, (*rows, problem.rows - 1))
-        if isinstance(forms, Doubt):
+        if isinstance(forms, Undecided):
             return forms
         kept, refused = _invariant(forms, declared, box)
         for basis in translations(forms):
@@ -159,7 +159,7 @@ def _independent(
     gauges: list[tuple[float, ...]] = []
     for field in fields:
         values = field.at(box.hull)
-        if isinstance(values, Doubt):
+        if isinstance(values, Undecided):
             continue
         vector = np.array([float(x.mid()) for x in values]) / scales
         size = float(np.linalg.norm(vector))

@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import bounds, decimals, dot, matrix
-from polycorner.intervals.enclosures import Doubt
+from polycorner.intervals.enclosures import Undecided
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.proofs.definite import pivots, tangent_form
@@ -73,16 +73,16 @@ class Claim:
         return (*(d.names[i] for i in self.active), *d.equation_names)
 
 
-def unfounded(claim: Claim, doubt: Doubt) -> dict[str, Finding]:
+def unfounded(claim: Claim, undecided: Undecided) -> dict[str, Finding]:
     """Return the findings where no enclosure was found: nothing is decided."""
-    return nowhere(doubt, symmetric=bool(claim.fields))
+    return nowhere(undecided, symmetric=bool(claim.fields))
 
 
-def nowhere(doubt: Doubt, *, symmetric: bool = False) -> dict[str, Finding]:
+def nowhere(undecided: Undecided, *, symmetric: bool = False) -> dict[str, Finding]:
     """Return the findings where there is nothing to check them on."""
     others = [INDEPENDENT, *([SYMMETRIC] if symmetric else []), POSITIVE, INACTIVE, CURVED]
     nothing = Finding(Status.UNDECIDED, "there is no enclosure of a solution to check it on")
-    return {UNIQUE: Finding(Status.UNDECIDED, str(doubt)), **dict.fromkeys(others, nothing)}
+    return {UNIQUE: Finding(Status.UNDECIDED, str(undecided)), **dict.fromkeys(others, nothing)}
 
 
 def findings(claim: Claim, enclosure: Enclosure) -> dict[str, Finding]:
@@ -135,7 +135,7 @@ def _symmetric(claim: Claim, enclosure: Enclosure) -> Finding:
     sections = []
     for gauge in claim.system.gauges:
         fields = [field.at(box.hull) for field in claim.fields]
-        sections.append([dot(gauge, f) if not isinstance(f, Doubt) else f for f in fields])
+        sections.append([dot(gauge, f) if not isinstance(f, Undecided) else f for f in fields])
     listed = "; ".join(map(str, claim.fields))
     if _regular(sections):
         reason = f"energy and active functions are constant along {listed}, across the section"
@@ -143,8 +143,8 @@ def _symmetric(claim: Claim, enclosure: Enclosure) -> Finding:
     return Finding(Status.UNDECIDED, f"{listed} may touch the section chosen across it")
 
 
-def _regular(rows: "list[list[Ball | Doubt]]") -> bool:
-    if any(isinstance(x, Doubt) for row in rows for x in row):
+def _regular(rows: "list[list[Ball | Undecided]]") -> bool:
+    if any(isinstance(x, Undecided) for row in rows for x in row):
         return False
     try:
         matrix(rows).inv()

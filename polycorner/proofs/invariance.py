@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph
 from polycorner.intervals.balls import dot
-from polycorner.intervals.enclosures import Doubt, Formulas, SmoothForms, write
+from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided, write
 from polycorner.intervals.tapes import Box, arguments, needed
 from polycorner.spaces.manifold import Manifold
 
@@ -55,12 +55,12 @@ class Generator:
     def _formulas(self) -> Formulas:
         return Formulas(self.components, self.manifold)
 
-    def at(self, q: "Sequence[Ball]") -> "list[Ball] | Doubt":
-        """Return enclosures of the components on a box where the field is smooth, or a doubt."""
+    def at(self, q: "Sequence[Ball]") -> "list[Ball] | Undecided":
+        """Return enclosures of the components on a box, or why smoothness is undecided."""
         rows = range(len(self.components))
         box = Box(q[: self.manifold.dimension])
         forms = self._formulas.smooth(box, rows)
-        return forms if isinstance(forms, Doubt) else list(forms.evaluate(box, 0)[0])
+        return forms if isinstance(forms, Undecided) else list(forms.evaluate(box, 0)[0])
 
     def __str__(self) -> str:
         """Return the field as a sum over coordinate directions."""
@@ -209,7 +209,7 @@ def annihilated(forms: SmoothForms, field: Generator) -> list[bool]:
 def slope_bounds(forms: SmoothForms, field: Generator, box: Box) -> "list[Ball]":
     """Return enclosures of the slopes of the functions along the field; none where it has edges."""
     along = field.at(box.hull)
-    if isinstance(along, Doubt):
+    if isinstance(along, Undecided):
         return []
     _, gradients = forms.evaluate(box, 1)
     return [dot(row[: len(along)], along) for row in gradients]

@@ -23,7 +23,7 @@ from polycorner.intervals.balls import (
     precision,
     square,
 )
-from polycorner.intervals.enclosures import Doubt, Formulas, SmoothForms
+from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 
 if TYPE_CHECKING:
@@ -103,15 +103,15 @@ class System:
         """The number of unknowns ``N``."""
         return self.dimension + len(self.held) + len(self.gauges)
 
-    def at(self, z: "Sequence[Ball]", p: "Sequence[Ball]" = ()) -> Linear | Doubt:
+    def at(self, z: "Sequence[Ball]", p: "Sequence[Ball]" = ()) -> Linear | Undecided:
         """Return the equations and their derivatives on boxes of unknowns and parameters."""
         return self.linear(z, Box([*z[: self.dimension], *p]))
 
-    def linear(self, z: "Sequence[Ball]", box: Box) -> Linear | Doubt:
+    def linear(self, z: "Sequence[Ball]", box: Box) -> Linear | Undecided:
         """Return the same for a point and parameters that lie in ``box`` together."""
         n, k = self.dimension, len(self.held)
         forms = self._smooth(box)
-        if isinstance(forms, Doubt):
+        if isinstance(forms, Undecided):
             return forms
         values, gradients, hessians = forms.evaluate(box, 2)
         weights = [*(-lam for lam in z[n : n + k]), ball(1)]
@@ -142,7 +142,7 @@ class System:
 
     def bend(
         self, z: "Sequence[Ball]", tangents: "Sequence[Sequence[Ball]]", box: Box
-    ) -> "list[Ball] | Doubt":
+    ) -> "list[Ball] | Undecided":
         """Return how far the equations bend away from their tangents along a predictor.
 
         On the predictor, which ``z`` and ``box`` enclose, unknowns have the constant slopes
@@ -150,7 +150,7 @@ class System:
         """
         n, k, count = self.dimension, len(self.held), len(box.reach)
         forms = self._smooth(box)
-        if isinstance(forms, Doubt):
+        if isinstance(forms, Undecided):
             return forms
         turned, bent = forms.slopes(box)
         weights = [*(-lam for lam in z[n : n + k]), ball(1)]
@@ -167,7 +167,7 @@ class System:
                 total[n + r] += share * dot([x[b] for x in turned[r]], along)
         return total
 
-    def _smooth(self, box: Box) -> SmoothForms | Doubt:
+    def _smooth(self, box: Box) -> SmoothForms | Undecided:
         return self.formulas.smooth(box, (*self.held, len(self.formulas.names) - 1))
 
 
@@ -188,35 +188,35 @@ def newton(
     *,
     bits: int,
     steps: int = MOST_STEPS,
-) -> "list[Ball] | Doubt":
+) -> "list[Ball] | Undecided":
     """Return an approximate solution near ``z``, correct to nearly ``bits`` binary digits."""
     working = min(bits, FIRST_BITS)
     while True:
         with precision(working):
             found = _settled(system, z, p, ball(2) ** (-working // 2), steps)
-        if isinstance(found, Doubt) or working >= bits:
+        if isinstance(found, Undecided) or working >= bits:
             return found
         z, working = found, min(2 * working, bits)
 
 
 def _settled(
     system: System, z: "Sequence[Ball]", p: "Sequence[Ball]", small: "Ball", steps: int
-) -> "list[Ball] | Doubt":
+) -> "list[Ball] | Undecided":
     """Take Newton steps until one is relatively small, and one more."""
     last = False
     for _ in range(steps):
         linear = system.at(z, p)
-        if isinstance(linear, Doubt):
+        if isinstance(linear, Undecided):
             return linear
         backwards = middle_inverse(linear.jacobian)
         if backwards is None:
-            return Doubt(SUBJECT, "their Jacobian is singular")
+            return Undecided(SUBJECT, "their Jacobian is singular")
         step = midpoints(entries(backwards * column(linear.residual)))
         if not all(dx.is_finite() for dx in step):
-            return Doubt(SUBJECT, "Newton's method left the domain of the functions")
+            return Undecided(SUBJECT, "Newton's method left the domain of the functions")
         z = midpoints([x - dx for x, dx in zip(z, step, strict=True)])
         if last:
             return list(z)
         sizes = zip(step, system.units, strict=True)
         last = all(abs(dx) <= small * unit for dx, unit in sizes)
-    return Doubt(SUBJECT, "Newton's method found no solution near the point")
+    return Undecided(SUBJECT, "Newton's method found no solution near the point")

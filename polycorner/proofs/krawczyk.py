@@ -32,7 +32,7 @@ from polycorner.intervals.balls import (
     middle_inverse,
     midpoints,
 )
-from polycorner.intervals.enclosures import Doubt
+from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import SUBJECT, Linear, System
 
@@ -142,7 +142,7 @@ class Enclosure:
 
 def enclose(
     system: System, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
-) -> Enclosure | Doubt:
+) -> Enclosure | Undecided:
     """Prove that the equations have exactly one solution in a box about ``centre``.
 
     The room starts a little larger than ``Y F`` and grows until the image lies inside; the caller
@@ -150,15 +150,15 @@ def enclose(
     """
     cell = cell or Cell()
     start = system.at(centre, cell.middle)
-    if isinstance(start, Doubt):
+    if isinstance(start, Undecided):
         return start
     inner = middle_inverse(start.jacobian)
     if inner is None:
-        return Doubt(SUBJECT, "their Jacobian is singular")
+        return Undecided(SUBJECT, "their Jacobian is singular")
     tangents = (-(inner * matrix(start.drift))).mid().tolist() if cell.reach else []
     predictor = Predictor(system, cell, centre, tangents)
     base = _base(predictor, start, inner)
-    if isinstance(base, Doubt):
+    if isinstance(base, Undecided):
         return base
     least = [unit * ball(2) ** (SLACK_BITS - bits) for unit in system.units]
     image = entries(base)
@@ -168,12 +168,14 @@ def enclose(
         if not all(w.rad() < WIDEST * unit for w, unit in zip(room, system.units, strict=True)):
             break
         linear = system.linear(predictor.unknowns(room), predictor.box(room))
-        if isinstance(linear, Doubt):
+        if isinstance(linear, Undecided):
             return linear
         image = entries(base + _defect(linear, inner) * column(room))
         if all(w.contains_interior(x) for w, x in zip(room, image, strict=True)):
             return Enclosure(predictor, room, image, inner, start, linear)
-    return Doubt(SUBJECT, "Krawczyk's operator does not map the box into itself: it is too wide")
+    return Undecided(
+        SUBJECT, "Krawczyk's operator does not map the box into itself: it is too wide"
+    )
 
 
 def _defect(linear: Linear, inner: "Matrix") -> "Matrix":
@@ -181,14 +183,14 @@ def _defect(linear: Linear, inner: "Matrix") -> "Matrix":
     return identity(inner.nrows()) - inner * matrix(linear.jacobian)
 
 
-def _base(predictor: Predictor, start: Linear, inner: "Matrix") -> "Matrix | Doubt":
+def _base(predictor: Predictor, start: Linear, inner: "Matrix") -> "Matrix | Undecided":
     """Return ``-Y F`` along the predictor."""
     system, tangents = predictor.system, predictor.tangents
     value = column(start.residual)
     if tangents:
         nothing = [ball(0)] * system.size
         bend = system.bend(predictor.unknowns(nothing), tangents, predictor.box(nothing))
-        if isinstance(bend, Doubt):
+        if isinstance(bend, Undecided):
             return bend
         drift = matrix(start.jacobian) * matrix(tangents) + matrix(start.drift)
         value = value + drift * column(predictor.cell.reach) + column(bend)
@@ -205,7 +207,7 @@ def widened(enclosure: Enclosure, attempts: int = 12) -> "list[Ball]":
     for power in range(1, attempts + 1):
         room = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
         linear = predictor.system.linear(predictor.unknowns(room), predictor.box(room))
-        if isinstance(linear, Doubt):
+        if isinstance(linear, Undecided):
             continue
         image = entries(_defect(linear, enclosure.inner) * column(room))
         alone = all(x.abs_upper() < w.abs_upper() for w, x in zip(room, image, strict=True))

@@ -18,7 +18,7 @@ from polycorner.intervals.balls import (
     midpoints,
     precision,
 )
-from polycorner.intervals.enclosures import Doubt
+from polycorner.intervals.enclosures import Undecided
 from polycorner.proofs.findings import Claim, Finding, Status, findings, nowhere, unfounded
 from polycorner.proofs.kkt import newton
 from polycorner.proofs.krawczyk import Cell, Enclosure, enclose
@@ -126,14 +126,14 @@ def _tried(
     sides = dict(zip(names, item.sides, strict=True))
     middle = tuple(lower + (upper - lower) / 2 for lower, upper in item.sides)
     centre = follow(claim, item.start, item.at, middle)
-    if isinstance(centre, Doubt):
+    if isinstance(centre, Undecided):
         found = unfounded(claim, centre)
         cell = _cell(sides, found, {})
         return cell, [_Waiting(half, item.start, item.at) for half in _halves(item.sides, whole)]
     p0 = [ball(x) for x in middle]
     reach = [between(*side) - p for side, p in zip(item.sides, p0, strict=True)]
     enclosure = enclose(claim.system, centre, Cell(p0, reach), bits=CELL_BITS)
-    if isinstance(enclosure, Doubt):
+    if isinstance(enclosure, Undecided):
         cell = _cell(sides, unfounded(claim, enclosure), {})
     else:
         cell = _cell(sides, findings(claim, enclosure), _bounds(claim, enclosure))
@@ -153,9 +153,9 @@ def _cell(
     return ParameterCell(sides, Status.PROVED, conditions, "", where)
 
 
-def undecided_cell(sides: Mapping[str, Interval], doubt: Doubt) -> ParameterCell:
+def undecided_cell(sides: Mapping[str, Interval], undecided: Undecided) -> ParameterCell:
     """Return a cell about which nothing is known."""
-    return _cell(sides, nowhere(doubt), {})
+    return _cell(sides, nowhere(undecided), {})
 
 
 def summary(cells: Sequence[ParameterCell]) -> dict[str, Finding]:
@@ -209,14 +209,16 @@ def _halves(
 
 def follow(
     claim: Claim, z: "list[Ball]", at: Sequence[float], to: Sequence[float]
-) -> "list[Ball] | Doubt":
+) -> "list[Ball] | Undecided":
     """Follow a solution from parameters ``at`` to parameters ``to``.
 
     The way is cut into strides, each predicted along the tangent; a stride is halved where
     Newton's method goes astray.  Nothing here needs to be rigorous.
     """
     done, stride = 0.0, 1.0
-    doubt = Doubt("the KKT equations", "the solution could not be followed to the parameters")
+    undecided = Undecided(
+        "the KKT equations", "the solution could not be followed to the parameters"
+    )
     for _ in range(2 * MOST_STRIDES):
         now = [a + done * (b - a) for a, b in zip(at, to, strict=True)]
         nearly = done + stride >= 1.0
@@ -229,12 +231,12 @@ def follow(
         if found is None:
             stride /= 2
             if stride * MOST_STRIDES < 1:
-                return doubt
+                return undecided
             continue
         if nearly:
             return found
         z, done, stride = found, done + stride, 2 * stride
-    return doubt
+    return undecided
 
 
 def _stride(
@@ -243,7 +245,7 @@ def _stride(
     system = claim.system
     p = [ball(x) for x in now]
     linear = system.at(z, p)
-    if isinstance(linear, Doubt):
+    if isinstance(linear, Undecided):
         return None
     inner = middle_inverse(linear.jacobian)
     if inner is None:
@@ -252,7 +254,7 @@ def _stride(
     moved = entries(inner * (matrix(linear.drift) * change))
     guess = midpoints([a - b for a, b in zip(z, moved, strict=True)])
     found = newton(system, guess, [ball(x) for x in then], bits=CELL_BITS, steps=STRIDE_STEPS)
-    if isinstance(found, Doubt):
+    if isinstance(found, Undecided):
         return None
     steps = zip(found, guess, system.scales, strict=False)
     near = all(abs(a - b) <= FARTHEST * scale for a, b, scale in steps)

@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.balls import between, bounds, decimals, exact, precision
-from polycorner.intervals.enclosures import Doubt, Formulas
+from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation.certificate import Certificate
 from polycorner.printing import Printed, Sheet
@@ -249,7 +249,7 @@ def prove(
     moving = Formulas(functions, d.manifold, tuple(sides))
     check_domain(moving, sides)
     posed = pose_claim(certificate, tried.face, fields, moving, values)
-    if isinstance(posed, Doubt):
+    if isinstance(posed, Undecided):
         cells: tuple[ParameterCell, ...] = (undecided_cell(sides, posed),)
     else:
         cells = cover(
@@ -263,10 +263,10 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
     d = certificate.problem.polyhedron
     active = tuple(d.names[i] for i in tried.face)
     posed, enclosure = tried.posed, tried.enclosure
-    if isinstance(posed, Doubt):
+    if isinstance(posed, Undecided):
         return _proof(certificate, digits, active, (), nowhere(posed))
     symmetry = tuple(map(str, posed.claim.fields))
-    if isinstance(enclosure, Doubt):
+    if isinstance(enclosure, Undecided):
         found = unfounded(posed.claim, enclosure)
         return _proof(certificate, digits, active, symmetry, _refused(found, posed))
     with precision(tried.bits):
@@ -336,7 +336,7 @@ def _many(
     """Return the proof for a box of parameters."""
     found, posed = summary(cells), tried.posed
     symmetry: tuple[str, ...] = ()
-    if not isinstance(posed, Doubt):
+    if not isinstance(posed, Undecided):
         found, symmetry = _refused(found, posed), tuple(map(str, posed.claim.fields))
     active = tuple(certificate.problem.polyhedron.names[i] for i in tried.face)
     proved = [cell.bounds for cell in cells if cell.status is Status.PROVED]

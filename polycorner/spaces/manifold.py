@@ -33,8 +33,8 @@ class Manifold(Value):
     periods : sequence of float, optional
         Period of each coordinate: a positive number for a circle, ``inf`` (default) for a line.
     scales : sequence of float, optional
-        What counts as a unit displacement of each coordinate (default 1), so that millimetres
-        and angles can share a vector.  Every tolerance of the package is measured in it.
+        Unit displacement of each coordinate (default 1), so that millimetres and angles can
+        share a vector.  Every tolerance of the package is measured in these units.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def scalar(values: Any) -> Any:
 
 def finite(array: Array, argument: str) -> Array:
     """Return ``array`` unchanged, refusing NaN and infinities."""
-    # For a single point Python's own loop is quicker than two passes of NumPy.
+    # For a single point a Python loop is faster than two passes of NumPy.
     few = array.size <= FEW
     if not (all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()):
         msg = f"{argument}: expected finite numbers; got {_first_bad(array)}"

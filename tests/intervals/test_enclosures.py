@@ -16,7 +16,7 @@ from strategies import smooth_expressions
 from polycorner import Manifold, SmoothFunction
 from polycorner.formulas.families import Family
 from polycorner.intervals.balls import ball, between, bounds, precision
-from polycorner.intervals.enclosures import Doubt, Formulas
+from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 
 DIGITS = 50
@@ -72,7 +72,7 @@ def test_values_and_derivatives_land_in_their_enclosures(expression, middle, wid
     truth = exactly(expression)
     with precision(100), mpmath.workdps(DIGITS):
         forms = f.smooth(box(*sides), [0])
-        assume(not isinstance(forms, Doubt))
+        assume(not isinstance(forms, Undecided))
         values, gradients, hessians = forms.evaluate(box(*sides), 2)
         assert inside(truth, at, values[0])
         for i, s in enumerate((x, y)):
@@ -100,7 +100,7 @@ def test_in_a_moving_box_everything_lands_in_its_enclosure(expression, middle, w
     with precision(100), mpmath.workdps(DIGITS):
         moving = Box.moving([ball(m) for m in middle], [[ball(w)] for w in way], [ball(0, reach)])
         forms = f.smooth(moving, [0])
-        assume(not isinstance(forms, Doubt))
+        assume(not isinstance(forms, Undecided))
         values, gradients, hessians = forms.evaluate(moving, 2)
         turned, bent = forms.slopes(moving)
         assert inside(truth, at, values[0])
@@ -201,16 +201,16 @@ def test_an_undecided_branch_gives_both_values_and_no_derivatives():
     lower, upper = bounds(f.values(box((0.5, 1.25)), [0])[0])
     assert lower <= 0.5
     assert upper >= 2
-    doubt = f.smooth(box((0.5, 1.25)), [0])
-    assert isinstance(doubt, Doubt)
-    assert str(doubt) == "f0: the box does not decide which branch is taken"
+    undecided = f.smooth(box((0.5, 1.25)), [0])
+    assert isinstance(undecided, Undecided)
+    assert str(undecided) == "f0: the box does not decide which branch is taken"
     beside = box((1.01, 1.25))
     assert [bounds(g)[0] for g in f.smooth(beside, [0]).evaluate(beside, 1)[1][0]] == [-1]
 
 
 def test_a_step_is_not_taken_for_a_constant():
     f = formulas(sp.Piecewise((1, x < 0), (2, True)) + y)
-    assert isinstance(f.smooth(box((-1, 1), (0, 1)), [0]), Doubt)
+    assert isinstance(f.smooth(box((-1, 1), (0, 1)), [0]), Undecided)
     moving = Box.moving([ball(0), ball(0)], [[ball(1)], [ball(0)]], [ball(0, 1)])
     lower, upper = bounds(f.values(moving, [0])[0])
     assert lower <= 1
@@ -233,7 +233,7 @@ def test_branches_are_told_apart_by_what_they_take():
 def test_a_branch_not_taken_may_be_undefined():
     f = formulas(sp.Piecewise((sp.sqrt(x - 5), x > 6), (1 / (x - 9), x > 8), (x**2, True)))
     forms = f.smooth(box((-0.5, 0.5), (0, 0)), [0])
-    assert not isinstance(forms, Doubt)
+    assert not isinstance(forms, Undecided)
     assert bounds(f.values(box((2, 2), (0, 0)), [0])[0]) == (4, 4)
 
 
@@ -255,10 +255,10 @@ def test_a_branch_not_taken_may_be_undefined():
     ],
 )
 def test_where_a_function_is_not_smooth_it_is_named_with_the_reason(expression, sides, reason):
-    doubt = formulas(y, expression).smooth(box(sides, (0, 0.5)), [0, 1])
-    assert isinstance(doubt, Doubt)
-    assert doubt.name == "f1"
-    assert reason in doubt.reason
+    undecided = formulas(y, expression).smooth(box(sides, (0, 0.5)), [0, 1])
+    assert isinstance(undecided, Undecided)
+    assert undecided.name == "f1"
+    assert reason in undecided.reason
 
 
 def test_an_angle_has_no_mean_value_form_across_its_cut():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, SmoothFunction
 from polycorner.intervals.balls import ball, between, bounds, exact, precision
-from polycorner.intervals.enclosures import Doubt, Formulas
+from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.proofs.definite import pivots, tangent_form
 from polycorner.proofs.kkt import System, newton
 from polycorner.proofs.krawczyk import Cell, Enclosure, enclose, widened
@@ -35,7 +35,7 @@ def system(manifold, functions, energy, held, anchor, gauges=(), free=(), parame
 
 def solved(s, start, bits=120, cell=None, p=()):
     z = newton(s, [ball(v) for v in start], p, bits=bits)
-    if isinstance(z, Doubt):
+    if isinstance(z, Undecided):
         return z
     with precision(bits):
         return enclose(s, z, cell, bits=bits)
@@ -130,7 +130,7 @@ def test_the_widest_box_holds_one_of_two_solutions(a, side):
 def test_a_double_root_is_never_enclosed_as_one(power):
     gap = sp.Rational(1, 2**power)
     exactly = system(M1, {"far": x + 100}, x**3 / 3, (), (0.0,))
-    assert isinstance(solved(exactly, [1e-9]), Doubt)
+    assert isinstance(solved(exactly, [1e-9]), Undecided)
     beside = system(M1, {"far": x + 100}, x**3 / 3 - gap**2 * x, (), (0.0,))
     found = solved(beside, [float(gap)], bits=400)
     assert isinstance(found, Enclosure)
@@ -142,7 +142,7 @@ def test_a_double_root_is_never_enclosed_as_one(power):
 
 def test_no_solution_is_found_where_there_is_none():
     s = system(M1, {"far": x + 100}, sp.exp(x), (), (0.0,))
-    assert isinstance(solved(s, [0.0]), Doubt)
+    assert isinstance(solved(s, [0.0]), Undecided)
 
 
 @given(st.lists(whole, min_size=6, max_size=6))
@@ -164,7 +164,7 @@ def test_a_linear_system_is_enclosed_about_its_exact_solution(numbers):
 def test_a_gauge_makes_a_locus_a_point_and_has_no_multiplier():
     energy = (x - y) ** 2 + x - y
     free = system(M2, {"far": x - y + 9}, energy, (), (1.0, 0.0))
-    assert isinstance(solved(free, [1.0, 0.0]), Doubt)
+    assert isinstance(solved(free, [1.0, 0.0]), Undecided)
     held = system(M2, {"far": x - y + 9}, energy, (), (1.0, 0.0), gauges=((1.0, 1.0),))
     found = solved(held, [1.0, 0.0, 0.0])
     assert [float(v) for v in found.solution] == pytest.approx([0.25, 0.75, 0.0], abs=1e-20)
@@ -228,4 +228,4 @@ def test_a_cell_that_reaches_a_fold_is_not_enclosed():
         return solved(s, [1.0], bits=64, cell=Cell([ball(1)], [ball(0, half)]), p=[ball(1)])
 
     assert isinstance(cell(0.3), Enclosure)
-    assert isinstance(cell(1.0), Doubt)
+    assert isinstance(cell(1.0), Undecided)
