@@ -1,9 +1,8 @@
 """Dumbbells in the turning drum: polycorner beside MuJoCo, speed, memory, and what they do.
 
 The same drum, sizes, friction and starts, at steps of a millisecond, one thread.  MuJoCo's cost is
-given for the model as `polycorner.dumbbells.dynamics.mjcf` writes it, for a drum of half as many
-boxes (faster, coarser), and for rolling resistance in a joint (three dimensions a contact, not
-six).
+given for the model as `mjcf` writes it, for a drum of half as many boxes (faster, coarser), and
+for rolling resistance in a joint (three dimensions a contact, not six).
 """
 
 import math
@@ -16,11 +15,11 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from mjcf import GRAVITY, DrumScene
+from mujoco_drum import MujocoDrum
 from side_by_side import interleave, peak, print_table, ratio, write
 
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair
-from polycorner.dumbbells.dynamics.mjcf import GRAVITY, DrumScene
-from polycorner.dumbbells.dynamics.mujoco_drum import MujocoDrum
 from polycorner.dumbbells.dynamics.starts import scatter
 from polycorner.motion.noise import Noise
 
@@ -88,7 +87,7 @@ def engines(count: int, seconds: float) -> dict[str, Task]:
     """Return every engine's task, polycorner's first."""
     tasks: dict[str, Task] = {OURS: ours(count, seconds)}
     if find_spec("mujoco") is None:
-        print("MuJoCo is left out: it is not installed; `pip install polycorner[mujoco]`.")
+        print("MuJoCo is left out: it is not installed; `pip install '.[bench]'`.")
     else:
         tasks |= {name: theirs(count, seconds, **changes) for name, changes in THEIRS.items()}
     return tasks

@@ -1,6 +1,6 @@
 """Dumbbells in the turning drum moved by MuJoCo, to compare engines ([MuJoCo]).
 
-MuJoCo is optional: ``pip install polycorner[mujoco]``.
+MuJoCo comes with the extra ``bench``: ``pip install '.[bench]'``.
 """
 
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from mjcf import DrumScene, mjcf
 from numpy.typing import ArrayLike
 
-from polycorner.dumbbells.dynamics.mjcf import DrumScene, mjcf
 from polycorner.spaces.manifold import Array
 
 AXIS, UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -25,7 +25,7 @@ class MujocoDrum:
     the dumbbell rolls towards ``u_r = (-cos theta, sin theta)``.
 
     The dumbbells first lie in the scene's
-    :meth:`~polycorner.dumbbells.dynamics.mjcf.DrumScene.rows`.
+    :meth:`~mjcf.DrumScene.rows`.
 
     Raises
     ------
@@ -48,7 +48,7 @@ class MujocoDrum:
         return data
 
     def step(self, count: int = 1) -> None:
-        """Go ``count`` time steps on."""
+        """Advance by ``count`` time steps."""
         _mujoco().mj_step(self.model, self.data, count)
 
     def placements(self) -> Array:
@@ -65,7 +65,7 @@ class MujocoDrum:
         return np.stack([middle[:, 0] if plane else phi, middle[:, 1], theta, psi], axis=-1)
 
     def set_placements(self, placements: ArrayLike) -> None:
-        """Put the dumbbells somewhere, at rest on the drum, which turns at full speed.
+        """Place the dumbbells at rest on the drum, which turns at full speed.
 
         Parameters
         ----------
@@ -148,6 +148,6 @@ def _mujoco() -> Any:
     try:
         import mujoco
     except ImportError as exc:
-        msg = "MuJoCo is not installed: install polycorner[mujoco]"
+        msg = "MuJoCo is not installed; expected the extra 'bench': pip install '.[bench]'"
         raise ImportError(msg) from exc
     return mujoco

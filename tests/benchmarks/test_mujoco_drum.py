@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mjcf import GRAVITY, DrumScene, mjcf
+from mujoco_drum import MujocoDrum
 
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.dynamics.mjcf import GRAVITY, DrumScene, mjcf
-from polycorner.dumbbells.dynamics.mujoco_drum import MujocoDrum
 
 SIZES = (16.0, 3.0, 1.5)
 DRUM = 125.0
@@ -98,7 +98,7 @@ class TestDocument:
 
 def test_without_mujoco_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(ImportError, match=r"install polycorner\[mujoco\]"):
+    with pytest.raises(ImportError, match=r"the extra 'bench'"):
         MujocoDrum(plane()).placements()
 
 
