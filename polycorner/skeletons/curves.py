@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from polycorner.polyhedra.cones import independent_rows, unit_rows
+from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
@@ -22,6 +22,10 @@ EXACT = 1e-13
 SINGULAR = 1e-14
 LAST = 1e-8
 NEWTON = 8
+# Tolerances within which a gradient must keep its direction.
+VICINITY = 10.0
+# Smallest diagonal entry of the triangular factor for which orbits count as independent.
+DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -82,10 +86,28 @@ class Spot:
     def basis(self, rows: Iterable[int]) -> list[int]:
         """Return rows whose gradients span those of all rows, modulo equations and orbit."""
         others = sorted(rows)
-        frame = np.linalg.qr(self.matrix([]).T)[0]
-        block = unit_rows(self.gradients[others])
-        chosen = independent_rows(block - (block @ frame) @ frame.T, RANK_TOLERANCE)
+        free = null_space(self.matrix([]), RANK_TOLERANCE)
+        chosen = independent_rows(unit_rows(self.gradients[others]) @ free, RANK_TOLERANCE)
         return sorted(others[i] for i in chosen)
+
+    def vanishing(self, rows: Iterable[int]) -> list[int]:
+        """Return which of some functions have no direction here.
+
+        Their gradients vanish, or change by more than their own lengths within a few tolerances,
+        so that rounding decides the direction.
+        """
+        ground, others = self.ground, sorted(rows)
+        steps = VICINITY * ground.tolerance * unit_rows(self.gradients[others])
+        steps[~steps.any(axis=1)] = VICINITY * ground.tolerance
+        nearby = self.q + steps * ground.polyhedron.manifold.scale_array
+        moved = [
+            evaluated(ground.polyhedron, q)[1][row] for row, q in zip(others, nearby, strict=True)
+        ]
+        return [
+            row
+            for row, gradient in zip(others, moved, strict=True)
+            if np.linalg.norm(gradient - self.gradients[row]) >= np.linalg.norm(self.gradients[row])
+        ]
 
 
 class Frame(Spot):
@@ -106,14 +128,23 @@ class Frame(Spot):
         values, gradients = evaluated(ground.polyhedron, q)
         super().__init__(ground, q, values, gradients)
         self.kept = list(kept)
-        held = [*self.kept, *range(ground.count, len(values))]
-        rows = np.concatenate([gradients[held], self.orbit]) if len(self.orbit) else gradients[held]
+        self._target = np.zeros(0)
+        self._factorise()
+        if len(self.orbit) and not self.condition > DEPENDENT:
+            # Orbits are smaller at some points: motions about a line do not move what lies on it.
+            self.orbit = self.orbit[independent_rows(unit_rows(self.orbit), RANK_TOLERANCE)]
+            self._factorise()
+
+    def _factorise(self) -> None:
+        held = [*self.kept, *range(self.ground.count, len(self.values))]
+        rows = self.gradients[held]
+        rows = np.concatenate([rows, self.orbit]) if len(self.orbit) else rows
         sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-        total = float(values.sum() + sizes.sum())
-        self.finite = math.isfinite(total) and (sizes > 0).all()
+        total = float(self.values.sum() + sizes.sum())
+        self.finite, self.condition = math.isfinite(total) and bool((sizes > 0).all()), 0.0
         if self.finite:
             self._target = np.zeros(len(rows))
-            self._target[: len(held)] = -values[held] / sizes[: len(held)]
+            self._target[: len(held)] = -self.values[held] / sizes[: len(held)]
             self._normal, self._factor = np.linalg.qr((rows / sizes[:, None]).T)
             self.condition = float(abs(np.diagonal(self._factor)).min(initial=1.0))
 

@@ -18,7 +18,7 @@ from polycorner.skeletons.curves import Frame, Ground, Spot, settle
 from polycorner.skeletons.elements import Completeness
 from polycorner.skeletons.faces import Flag, Passage
 from polycorner.skeletons.rays import Ray, faces_beside
-from polycorner.skeletons.registry import SAME, Place, Places
+from polycorner.skeletons.registry import SAME, Place, Places, written_point
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
 
@@ -186,7 +186,10 @@ class Explorer:
         return (k, match[0]), match[1]
 
     def _edge_at(self, spot: Spot, active: frozenset[int]) -> tuple[str, Half | int] | None:
-        """Return the edge through a point: its end at a corner, or its position."""
+        """Return the edge through a point: its end at a corner, or its position.
+
+        None where there is none, or where it cannot be followed; the notes say so.
+        """
         here = Frame(self.ground, spot.q, spot.basis(active))
         t = self._along(here)
         walks = []
@@ -198,6 +201,11 @@ class Explorer:
             walks.append(walk)
             if walk.end is End.CLOSED:
                 break
+        if all(len(walk.points) == 1 for walk in walks):
+            self.register.note(
+                f"the edge {self.register.written(active)} {walks[0].end.value}", lost=True
+            )
+            return None
         return "curve", self._free_edge(walks, here, active)
 
     def _free_edge(self, walks: list[Walk], here: Frame, active: frozenset[int]) -> int:
@@ -271,13 +279,16 @@ class Explorer:
 
     def _land(self, spot: Spot, active: frozenset[int], *, both: bool) -> bool:
         """Go on from a point of a face; return whether that led anywhere."""
-        free = self._free(spot, active)
+        undirected = self._undirected(spot, active)
+        free = self._free(spot, active.difference(undirected))
+        if free > 0 and undirected:
+            self._note_undirected(spot, undirected)
+            return False
         if free == 0 or (free == 1 and not self._continues(spot, active)):
             self.corner(spot)
             return True
         if free == 1:
-            self._edge_at(spot, active)
-            return True
+            return self._edge_at(spot, active) is not None
         met = False
         for there, found in islice(self._straight(spot, active), 2 if both else 1):
             met |= self._land(there, found, both=False)
@@ -302,6 +313,18 @@ class Explorer:
                         met = True
                         yield walk.frame, there
 
+    def _undirected(self, spot: Spot, active: frozenset[int]) -> list[int]:
+        """Return the active functions and equations whose gradients have no direction."""
+        return spot.vanishing([*active, *range(self.ground.count, len(spot.values))])
+
+    def _note_undirected(self, spot: Spot, rows: list[int]) -> None:
+        every = (*self.polyhedron.names, *self.polyhedron.equation_names)
+        self.register.note(
+            f"the gradient of {', '.join(every[i] for i in rows)} vanishes at "
+            f"{written_point(spot.q)}: not followed from there",
+            lost=True,
+        )
+
     def _free(self, spot: Spot, active: frozenset[int]) -> int:
         fixed = null_space(spot.matrix([]), RANK_TOLERANCE)
         return int(fixed.shape[1]) - len(spot.basis(active))
@@ -318,7 +341,10 @@ class Explorer:
     @staticmethod
     def _along(frame: Frame) -> Array:
         """Return the direction of the curve on which the held functions vanish."""
-        return null_space(frame.matrix(frame.kept), RANK_TOLERANCE)[:, 0]
+        matrix = frame.matrix(frame.kept)
+        if not len(matrix):
+            return np.ones(1)
+        return np.asarray(np.linalg.svd(matrix)[2][-1])
 
     # ---------------------------------------------------------------------------------------- faces
 
@@ -335,9 +361,18 @@ class Explorer:
     def faces_beside(self, curve: Curve) -> dict[frozenset[int], Ray]:
         """Return the two-dimensional faces that meet an edge, and the way into each."""
         if curve.beside is None:
-            found = faces_beside(self.ground.spot(curve.middle), curve.active)
+            found = faces_beside(self._vantage(curve), curve.active)
             curve.beside = {ray.active: ray for ray in found}
         return curve.beside
+
+    def _vantage(self, curve: Curve) -> Spot:
+        """Return the point of a curve nearest to its middle where gradients have a direction."""
+        middle = len(curve.points) // 2
+        for k in sorted(range(len(curve.points)), key=lambda k: abs(k - middle)):
+            spot = self.ground.spot(curve.points[k])
+            if not self._undirected(spot, curve.active):
+                return spot
+        return self.ground.spot(curve.middle)
 
     def _shoot(self, k: int, face: frozenset[int]) -> None:
         """Go straight across a face from the middle of an edge and record where it ends."""
@@ -345,6 +380,10 @@ class Explorer:
         walk = follow(ray.frame, ray.direction, passive=face)
         active = walk.frame.active() if walk.end is End.CORNER else None
         if active is None or not active > face:
+            return
+        undirected = self._undirected(walk.frame, active)
+        if undirected:
+            self._note_undirected(walk.frame, undirected)
             return
         if self._free(walk.frame, active) != 1 or not self._continues(walk.frame, active):
             return

@@ -203,6 +203,7 @@ def _curvature(spot: Spot, rows: list[int], weights: Array, plane: Array) -> Arr
     frame = null_space(spot.matrix([]), RANK_TOLERANCE) @ plane
     hessians = polyhedron.hessians(spot.q)[rows] * np.outer(scales, scales)
     sizes = np.linalg.norm(spot.gradients[rows], axis=1)
+    sizes[sizes == 0] = 1.0  # a gradient that vanishes is a relation by itself
     return np.asarray(frame.T @ np.einsum("i,ijk->jk", weights / sizes, hessians) @ frame)
 
 

@@ -67,7 +67,7 @@ class Places:
         """
         active = spot.active()
         if active is None:
-            self.note(f"a walk ended outside the polyhedron at {_written(spot.q)}", lost=True)
+            self.note(f"a walk ended outside the polyhedron at {written_point(spot.q)}", lost=True)
             return None
         spot = self._polished(spot, active)
         key = self._key(spot.q)
@@ -156,5 +156,6 @@ class Places:
         return None
 
 
-def _written(q: Array) -> str:
+def written_point(q: Array) -> str:
+    """Return a point for a sentence."""
     return "(" + ", ".join(f"{x:.6g}" for x in q) + ")"

@@ -1,4 +1,4 @@
-"""What goes wrong is said: bad starts, open ends, near misses, interruptions, wrong arguments."""
+"""Diagnostics: bad starts, open ends, near misses, interruptions, wrong arguments."""
 
 import itertools
 import math
