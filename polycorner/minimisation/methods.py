@@ -192,13 +192,13 @@ def _energy(problem: Problem, q: Array) -> float:
 
 
 def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
-    from polycorner.minimisation import compiled
+    from polycorner.minimisation.descent import sqp
 
     status, iterations, point, _ = problem.descend(piece, q, limit)
     failures = {
-        compiled.INFEASIBLE: Verdict.INFEASIBLE,
-        compiled.UNBOUNDED: Verdict.UNBOUNDED,
-        compiled.STALLED: Verdict.NOT_CONVERGED,
+        sqp.INFEASIBLE: Verdict.INFEASIBLE,
+        sqp.UNBOUNDED: Verdict.UNBOUNDED,
+        sqp.STALLED: Verdict.NOT_CONVERGED,
     }
     return Rest(point, iterations, failures.get(status))
 

@@ -119,31 +119,31 @@ class Problem:
         return use
 
     def descend(self, piece: Piece, q: Array, limit: int) -> tuple[int, int, Array, Array]:
-        """Run the compiled descent inside one piece; see :func:`compiled.descend`."""
-        from polycorner.minimisation import compiled
+        """Run the compiled descent inside one piece; see :func:`entry_points.descend`."""
+        from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
-        status, iterations, u, lam = compiled.descend(
+        status, iterations, u, lam = entry_points.descend(
             flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size, limit
         )
         return status, iterations, u * self.scales, lam
 
     def restore(self, piece: Piece, q: Array) -> tuple[bool, Array]:
         """Return whether repeated linearisation finds a point of a piece near ``q``, and it."""
-        from polycorner.minimisation import compiled
+        from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
-        reached, u = compiled.restore(
+        reached, u = entry_points.restore(
             flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size
         )
         return reached, u * self.scales
 
     def on_face(self, active: Piece, q: Array) -> tuple[Array, float]:
         """Return the stationary point Newton's method finds on a face, and its last step."""
-        from polycorner.minimisation import compiled
+        from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
-        u, _, step = compiled.on_face(
+        u, _, step = entry_points.on_face(
             flat, self.mask(active), self.inequalities, self.rows, q / self.scales, size
         )
         return u * self.scales, step
@@ -151,13 +151,13 @@ class Problem:
     def probe(
         self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
     ) -> float:
-        """Return how much the energy changes along directions; see :func:`compiled.probe`."""
-        from polycorner.minimisation import compiled
+        """Return how much the energy changes along directions; see :func:`entry_points.probe`."""
+        from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
         masks = self.mask(strong), self.mask(piece)
         ways = np.ascontiguousarray(directions), np.ascontiguousarray(held)
-        change: float = compiled.probe(
+        change: float = entry_points.probe(
             flat, *masks, self.inequalities, self.rows, q / self.scales, *ways, steps, size
         )
         return change

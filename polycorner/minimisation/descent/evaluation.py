@@ -1,0 +1,104 @@
+"""Values and derivatives of a problem at a point, its normalised rows and their violation."""
+
+import numpy as np
+from numba import njit
+
+from polycorner.formulas.compilation import call_kernel, never_inline
+from polycorner.minimisation.descent.linear_algebra import length
+
+FEASIBLE = 1e-10  # scaled constraint violation allowed during the descent
+
+
+@njit
+def evaluate(problem, u, F, J, H, size, second):
+    """Fill values (M,), scaled gradients (M, n) and, if asked, scaled Hessians (M, n, n)."""
+    never_inline()
+    table, reads, rows, parameters, scales = problem
+    work = np.empty(size)
+    start, base = work.ctypes.data, parameters.ctypes.data
+    for call in range(table.shape[0]):
+        curved, straight, k, m, r0, w0, p0 = table[call]
+        address = curved if second else straight
+        for i in range(k):
+            c = reads[r0 + i]
+            work[i] = u[c] * scales[c]
+        j0 = k + m
+        h0 = j0 + m * k
+        call_kernel(address, start, base + 8 * p0, start + 8 * k, start + 8 * j0, start + 8 * h0)
+        for o in range(m):
+            row = rows[w0 + o]
+            if row < 0:
+                continue
+            F[row] = work[k + o]
+            for i in range(k):
+                a = reads[r0 + i]
+                J[row, a] = work[j0 + o * k + i] * scales[a]
+                if second:
+                    for j in range(k):
+                        b = reads[r0 + j]
+                        H[row, a, b] = work[h0 + (o * k + i) * k + j] * scales[a] * scales[b]
+    work[0] = 0.0
+
+
+@njit
+def violation(F, J, use, m):
+    """Return the largest scaled violation of the constraints in use."""
+    never_inline()
+    worst = 0.0
+    for i in range(F.size - 1):
+        miss = abs(F[i]) if i >= m else (-F[i] if use[i] else 0.0)
+        if np.isnan(F[i]) and (i >= m or use[i]):
+            return np.inf
+        if miss > 0.0:
+            size = length(J[i])
+            worst = max(worst, miss / size if size > 0.0 else np.inf)
+    return worst
+
+
+@njit
+def normalised_rows(F, J, use, m):
+    """Return the rows in use, scaled to unit gradients: ``A``, ``b``, row numbers and lengths."""
+    never_inline()
+    total = F.size - 1
+    keep = np.empty(total, np.int64)
+    count = 0
+    for i in range(total):
+        if (i >= m or use[i]) and length(J[i]) > 0.0:
+            keep[count] = i
+            count += 1
+    A, b, sizes = np.empty((count, J.shape[1])), np.empty(count), np.empty(count)
+    for j in range(count):
+        sizes[j] = length(J[keep[j]])
+        for k in range(J.shape[1]):
+            A[j, k] = J[keep[j], k] / sizes[j]
+        b[j] = F[keep[j]] / sizes[j]
+    return A, b, keep, sizes
+
+
+@njit
+def lagrangian_hessian(H, lam):
+    """Return the Hessian of ``E - sum lam f``."""
+    never_inline()
+    n = H.shape[1]
+    L = np.empty((n, n))
+    for a in range(n):
+        for c in range(n):
+            L[a, c] = H[lam.size, a, c]
+            for i in range(lam.size):
+                if lam[i] != 0.0:
+                    L[a, c] -= lam[i] * H[i, a, c]
+    return L
+
+
+@njit
+def all_finite(J, H, lam, last):
+    """Whether all gradients, and the Hessians with a nonzero multiplier, are finite."""
+    never_inline()
+    for i in range(last + 1):
+        for a in range(J.shape[1]):
+            if not np.isfinite(J[i, a]):
+                return False
+            for b in range(J.shape[1]):
+                if (i == last or lam[i] != 0.0) and not np.isfinite(H[i, a, b]):
+                    return False
+    return True

@@ -1,0 +1,152 @@
+"""Descent by sequential quadratic programming with feasible iterates ([NW] ch. 18)."""
+
+import numpy as np
+from numba import njit
+
+from polycorner.formulas.compilation import never_inline
+from polycorner.minimisation.descent.evaluation import (
+    FEASIBLE,
+    all_finite,
+    evaluate,
+    lagrangian_hessian,
+    normalised_rows,
+)
+from polycorner.minimisation.descent.feasibility import crosses_wall, project
+from polycorner.minimisation.descent.linear_algebra import cholesky, largest, largest_entry, plus
+from polycorner.minimisation.descent.quadratic_programme import solve_quadratic
+from polycorner.minimisation.descent.stationarity import (
+    MINIMUM,
+    REJECTED,
+    SADDLE,
+    classify,
+    leave_saddle,
+)
+
+CONVERGED, INFEASIBLE, UNBOUNDED, STALLED = 0, 1, 2, 3
+FIRST_CAP = 0.5  # longest first step, in scale units
+PATIENCE = 20  # steps after which convexification may use the active inequalities, too
+FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
+
+
+@njit
+def convexified(B, g, A, L):
+    """Fill ``L`` with the Cholesky factor of ``B`` made positive definite.
+
+    First a multiple of ``A^T A`` is added, which does not change a step tangential to the rows of
+    ``A``; then, only if needed, multiples of the identity in a geometric sequence.
+    """
+    never_inline()
+    n = B.shape[0]
+    across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g))
+    if shift < 1e-300:
+        shift = 1e-300 if shift > 0.0 else 1.0
+    while True:
+        C = B.copy()
+        for i in range(n):
+            C[i, i] += shift
+            for k in range(n):
+                for j in range(A.shape[0]):
+                    C[i, k] += across * A[j, i] * A[j, k]
+        if cholesky(C, L):
+            return
+        if across == 0.0 and A.shape[0] > 0:
+            across = 10.0 * n * largest_entry(B)
+        else:
+            shift *= 8.0
+
+
+@njit
+def descend(problem, use, m, rows, u, size, limit):
+    """Descend from ``u`` inside the piece given by ``use``, never through a wall.
+
+    Every iterate is feasible and lower than the one before: a step of sequential quadratic
+    programming is limited in length, projected onto the set and halved until the energy decreases.
+    Once the active set is stable, Newton's method on its KKT equations finishes the descent.
+
+    Returns
+    -------
+    status, iterations, u, multipliers
+    """
+    n = u.size
+    F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
+    L = np.zeros((n, n))
+    lam, on, before = np.zeros(rows - 1), np.zeros(m, np.bool_), np.zeros(m, np.bool_)
+    u = u.copy()
+    origin = u.copy()
+    if not project(problem, use, m, u, F, J, H, size, np.int64(100)) or not np.isfinite(
+        F[rows - 1]
+    ):
+        return INFEASIBLE, 0, u, lam
+    nothing, section = np.zeros(m, np.bool_), np.zeros((0, n))
+    cap = FIRST_CAP
+    for iteration in range(1, limit + 1):
+        evaluate(problem, u, F, J, H, size, True)
+        energy, g = F[rows - 1], J[rows - 1].copy()
+        if not all_finite(J, H, lam, rows - 1):
+            return STALLED, iteration, u, lam
+        if rows - 1 > m or iteration > PATIENCE:
+            section, _, _, _ = normalised_rows(F, J, on if iteration > PATIENCE else nothing, m)
+        convexified(lagrangian_hessian(H, lam), g, section, L)
+        A, b, keep, sizes = normalised_rows(F, J, use, m)
+        for j in range(b.size):
+            if abs(b[j]) < FEASIBLE:
+                b[j] = 0.0
+        _, d, mult = solve_quadratic(L, g, A, b, rows - 1 - m)
+        for i in range(rows - 1):
+            lam[i] = 0.0
+        for i in range(m):
+            before[i], on[i] = on[i], False
+        for j in range(b.size):
+            lam[keep[j]] = mult[j] / sizes[j]
+            if keep[j] < m and mult[j] > 0.0:
+                on[keep[j]] = True
+        reach = largest(d)
+        settled = True
+        for i in range(m):
+            settled = settled and on[i] == before[i]
+        if reach < 1e-9 or (reach < 0.5 and settled):
+            outcome, v, exact, way = classify(problem, use, on, m, u, F, J, H, size, energy)
+            if outcome == MINIMUM:
+                return CONVERGED, iteration, v, exact
+            if outcome == SADDLE and leave_saddle(problem, use, on, m, v, way, F, J, H, size):
+                for k in range(n):
+                    u[k] = v[k]
+                continue
+            if reach < 1e-9:
+                return STALLED, iteration, v if outcome != REJECTED else u, lam
+        slope = 0.0
+        for k in range(n):
+            slope += g[k] * d[k]
+        factor = min(1.0, cap / reach)
+        accepted = False
+        for _ in range(40):
+            trial = plus(u, factor, d)
+            blocked = factor * reach > 0.5 and crosses_wall(
+                problem, use, m, u, plus(trial, -1.0, u), F, J, H, size
+            )
+            if not blocked and project(problem, use, m, trial, F, J, H, size, np.int64(6)):
+                rounding = 1e-15 * (abs(energy) + largest(g))
+                if F[rows - 1] <= energy + 1e-4 * factor * slope + rounding:
+                    accepted = True
+                    break
+            factor *= 0.5
+        if not accepted:
+            outcome, v, exact, way = classify(problem, use, on, m, u, F, J, H, size, energy)
+            if outcome == SADDLE and leave_saddle(problem, use, on, m, v, way, F, J, H, size):
+                for k in range(n):
+                    u[k] = v[k]
+                continue
+            return (
+                (CONVERGED if outcome >= SADDLE else STALLED),
+                iteration,
+                v if outcome != REJECTED else u,
+                exact,
+            )
+        if factor * reach >= 0.99 * cap:
+            cap *= 2.0
+        else:
+            cap = max(FIRST_CAP, factor * reach)
+        u = trial
+        if largest(plus(u, -1.0, origin)) > FAR:
+            return UNBOUNDED, iteration, u, lam
+    return STALLED, limit, u, lam

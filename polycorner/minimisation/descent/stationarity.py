@@ -1,0 +1,142 @@
+"""Classification of stationary points: minima, saddles and the way off a saddle."""
+
+import numpy as np
+from numba import njit
+
+from polycorner.formulas.compilation import never_inline
+from polycorner.minimisation.descent.evaluation import (
+    FEASIBLE,
+    evaluate,
+    lagrangian_hessian,
+    normalised_rows,
+    violation,
+)
+from polycorner.minimisation.descent.feasibility import project
+from polycorner.minimisation.descent.linear_algebra import (
+    add_multiple,
+    identity,
+    largest,
+    largest_entry,
+    length,
+    plus,
+    svd,
+)
+from polycorner.minimisation.descent.newton import RANK, polish
+
+EXACT = 1e-13  # scaled violation allowed after Newton's method
+MINIMUM, SADDLE, MOVING, REJECTED = 3, 2, 1, 0  # outcomes of `classify`
+CURVED = 1e-8  # relative curvature below which a stationary point is a saddle
+
+
+@njit
+def least_curvature(F, J, H, lam, on, m, direction):
+    """Fill the direction of least curvature along the face; return the relative curvature."""
+    never_inline()
+    n, total = H.shape[1], lam.size
+    A, b, _, _ = normalised_rows(F, J, on, m)
+    V, s = identity(n), np.zeros(n)
+    cut = 0.0
+    if b.size:
+        _, s, V = svd(A)
+        cut = RANK * largest(s)
+    L = lagrangian_hessian(H, lam)
+    reference = max(largest_entry(L), largest_entry(H[total])) + 1e-300
+    M = np.zeros((n, n))
+    for a in range(n):
+        for c in range(n):
+            if s[a] <= cut and s[c] <= cut:
+                for i in range(n):
+                    for k in range(n):
+                        M[a, c] += V[i, a] * L[i, k] * V[k, c]
+        # Shifted to be definite, so that singular vectors are eigenvectors; off the face, large.
+        M[a, a] += 2.0 * n * reference
+        if s[a] > cut:
+            M[a, a] += 2.0 * n * reference
+    _, _, W = svd(M)
+    least, chosen = np.inf, 0
+    for j in range(n):
+        value = 0.0
+        for a in range(n):
+            for c in range(n):
+                value += W[a, j] * M[a, c] * W[c, j]
+        value -= 2.0 * n * reference
+        if value < least:
+            least, chosen = value, j
+    for i in range(n):
+        direction[i] = 0.0
+        for a in range(n):
+            direction[i] += V[i, a] * W[a, chosen]
+    return least / reference
+
+
+@njit
+def classify(problem, use, on, m, u, F, J, H, size, energy):
+    """Apply Newton's method on the face to a copy of ``u`` and classify where it ends.
+
+    Returns
+    -------
+    outcome
+        ``MINIMUM``, ``SADDLE``, ``MOVING`` (not stationary) or ``REJECTED`` (not reached, outside
+        the set, or not below ``energy``).
+    v, multipliers, direction
+        The point, its multipliers and the direction of least curvature.
+    """
+    never_inline()
+    v, rows, direction = u.copy(), on.copy(), np.zeros(u.size)
+    for _ in range(4):
+        lam, step = polish(problem, rows, m, np.zeros((0, u.size)), v, F, J, H, size)
+        if not step < 1e-8 or largest(plus(v, -1.0, u)) > 0.5:
+            return REJECTED, v, lam, direction
+        added = False
+        for i in range(m):
+            if use[i] and not rows[i] and F[i] < -EXACT * length(J[i]):
+                rows[i] = added = True
+        if not added:
+            break
+    last = F.size - 1
+    reference = max(largest(J[last]), largest_entry(H[last]))
+    pull = J[last].copy()
+    stationary = True
+    for i in range(F.size - 1):
+        add_multiple(pull, -lam[i], J[i])
+        if i < m and rows[i] and lam[i] * length(J[i]) < -1e-9 * reference:
+            stationary = False
+    higher = F[last] > energy + 1e-9 * (abs(energy) + reference)
+    if higher or violation(F, J, use, m) > FEASIBLE:
+        return REJECTED, v, lam, direction
+    if not (stationary and largest(pull) <= 1e-9 * reference):
+        return MOVING, v, lam, direction
+    for i in range(m):
+        # A contact without a multiplier does not constrain descent: it may open.
+        rows[i] = rows[i] and lam[i] * length(J[i]) > 1e-9 * reference
+    if least_curvature(F, J, H, lam, rows, m, direction) >= -CURVED:
+        return MINIMUM, v, lam, direction
+    # Returning to a saddle that was left must be impossible, even by a rounding error.
+    return (SADDLE if F[last] <= energy else REJECTED), v, lam, direction
+
+
+@njit
+def leave_saddle(problem, use, on, m, v, direction, F, J, H, size):
+    """Move ``v`` off a saddle to a lower feasible point along ``direction``; return success.
+
+    For each length a straight step is projected onto the set; if the set's curvature defeats it,
+    the step follows the face instead.
+    """
+    never_inline()
+    evaluate(problem, v, F, J, H, size, False)
+    energy = F[F.size - 1]
+    along = np.zeros((1, v.size))
+    along[0] = direction / length(direction)
+    for k in range(48):
+        step = 0.1 * 0.5 ** (k // 4) * (1.0 - 2.0 * (k % 2))
+        trial = plus(v, step, direction)
+        if k % 4 < 2:
+            reached = project(problem, use, m, trial, F, J, H, size, np.int64(6))
+        else:
+            _, last = polish(problem, on, m, along, trial, F, J, H, size)
+            reached = last < 1e-8 and violation(F, J, use, m) <= FEASIBLE
+        if reached and F[F.size - 1] < energy:
+            for i in range(v.size):
+                v[i] = trial[i]
+            return True
+    return False

@@ -1,0 +1,89 @@
+"""Cached entry points over several files of compiled code."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import polycorner
+from polycorner.formulas.compilation import sources_digest
+
+LEAF = """
+from numba import njit
+
+@njit
+def scaled(x):
+    return {factor} * x
+"""
+ENTRY = """
+from numba import njit
+from polycorner.formulas.compilation import sources_digest
+from stages import leaf
+
+def compiled(sources):
+    @njit(cache=True)
+    def entry(x):
+        _ = sources
+        return leaf.scaled(x)
+    return entry
+
+entry = compiled(sources_digest("stages"))
+"""
+START = """
+from stages.entries import entry
+print(entry(5), sum(entry.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def stages(tmp_path):
+    """Write a package of two compiled files."""
+    folder = tmp_path / "stages"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "leaf.py").write_text(LEAF.format(factor=2))
+    (folder / "entries.py").write_text(ENTRY)
+    return folder
+
+
+def start(folder):
+    done = subprocess.run(
+        [sys.executable, "-c", START],
+        env={
+            **os.environ,
+            "NUMBA_CACHE_DIR": str(folder.parent / "cache"),
+            "PYTHONPATH": os.pathsep.join(
+                [str(folder.parent), str(Path(polycorner.__file__).parents[1])]
+            ),
+        },
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    result, hits = map(int, done.stdout.split())
+    return result, hits
+
+
+def test_an_entry_point_is_compiled_again_when_any_stage_changes(stages):
+    assert start(stages) == (10, 0)
+    assert start(stages) == (10, 1)
+    (stages / "leaf.py").write_text(LEAF.format(factor=3))
+    assert start(stages) == (15, 0)
+    assert start(stages) == (15, 1)
+
+
+def test_the_digest_depends_on_names_and_bytes(stages, monkeypatch):
+    monkeypatch.syspath_prepend(str(stages.parent))
+    digests = [sources_digest("stages")]
+    (stages / "leaf.py").write_text(LEAF.format(factor=4))
+    digests.append(sources_digest("stages"))
+    (stages / "leaf.py").rename(stages / "twig.py")
+    digests.append(sources_digest("stages"))
+    assert len(set(digests)) == 3
+
+
+def test_only_packages_have_a_digest():
+    with pytest.raises(ValueError, match="package: expected the name of an importable package"):
+        sources_digest("json.decoder")
