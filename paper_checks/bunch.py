@@ -113,7 +113,7 @@ def encounters(count: int, duration: float, chatter: float) -> tuple[DumbbellDru
     q *= [1 / DRUM.centre_radius, 1.0, math.pi / 180]
     many = replace(DRUM, count=2 * count)
     engine = many.engine(q.reshape(-1, 3), dt=2e-3, noise=Noise(chatter=chatter, seed=9))
-    path = run(engine, round(duration / 2e-3), 500).trajectory(engine.herd)
+    path = run(engine, round(duration / 2e-3), 500).trajectory(engine.bodies)
     return replace(DRUM, count=2), path.q.reshape(len(path), count, 2, 4)
 
 

@@ -60,7 +60,7 @@ def pairs(
     places[:, 1] += offset
     noise = Noise(chatter=chatter, seed=3)
     engine = replace(two, count=2 * count).engine(places, dt=2e-3, noise=noise, solver=SOLVER)
-    path = run(engine, round(duration / 2e-3), 50).trajectory(engine.herd)
+    path = run(engine, round(duration / 2e-3), 50).trajectory(engine.bodies)
     q = path.q.copy()
     q[..., 1] -= offset
     kinds: tuple[tuple[Chirality, float], ...] = (("R", 0.0),) * count

@@ -123,7 +123,7 @@ def nudged(azimuth: Callable[[Array], Array], headings: Array) -> Trajectory:
     spin = np.full(count, NUDGE / drum.ball_radius)
     v = np.stack([across, NUDGE * np.sin(headings), 0 * headings, spin], axis=-1)
     engine = drum.engine(q, v)
-    return run(engine, 1500, 10).trajectory(engine.herd)
+    return run(engine, 1500, 10).trajectory(engine.bodies)
 
 
 def middle(headings: Array) -> Array:

@@ -23,7 +23,7 @@ from polycorner.formulas.bundles import Call
 from polycorner.formulas.cache import source_key
 from polycorner.formulas.families import Family
 from polycorner.motion import formulation as equations
-from polycorner.motion.engine.layout import Body, Grip, Herd, Pairing
+from polycorner.motion.bodies import Body, ContactFamily, FrictionContact, IdenticalBodies
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulation import check_step, run, whole_steps, whole_stride
@@ -134,16 +134,16 @@ class DumbbellDrum:
         return self.drum_radius - self.ball_radius
 
     @cached_property
-    def herd(self) -> Herd:
+    def bodies(self) -> IdenticalBodies:
         """The dumbbells as bodies, for the engine."""
         reach = self.length + 2 * self.ball_radius + 0.05 * self.ball_radius
-        return Herd(
+        return IdenticalBodies(
             self._body,
             count=self.count,
-            pairing=self._pairing(reach) if self.count > 1 else None,
-            place=(0, 1),
-            carried=self.spin * self.centre_radius,
-            exit_place=1 if math.isfinite(self.top) else -1,
+            contacts=self._contact_family(reach) if self.count > 1 else None,
+            position=(0, 1),
+            substrate_speed=self.spin * self.centre_radius,
+            exit_coordinate=1 if math.isfinite(self.top) else -1,
             exit_limit=self.top if math.isfinite(self.top) else 0.0,
         )
 
@@ -154,34 +154,38 @@ class DumbbellDrum:
         weight, pull = m * g * math.cos(self.tilt), m * g * math.sin(self.tilt)
         numbers = np.array([length, r, rho, m, self.spin * rho, weight, pull])
         slide, roll = self.sliding, self.rolling
-        grips = (
+        friction = (
             *(
-                Grip(f"ball {i + 1}", 2, Disc(slide[0]), Disc(slide[1]), -1, (i,), "sliding")
+                FrictionContact(
+                    f"ball {i + 1}", 2, Disc(slide[0]), Disc(slide[1]), -1, (i,), "sliding"
+                )
                 for i in range(2)
             ),
-            Grip("rolling", 1, Interval(roll[0]), Interval(roll[1]), -1, (0, 1), "rolling"),
+            FrictionContact(
+                "rolling", 1, Interval(roll[0]), Interval(roll[1]), -1, (0, 1), "rolling"
+            ),
         )
         names = ("floor1", "floor2") if self.floor else ()
         gaps = [Call(drum_formulas.floors(), (1, 2), np.array([length, r]), (0, 1), (0, 1))]
-        unit = np.array([rho, 1.0, length / 2, r])
+        units = np.array([rho, 1.0, length / 2, r])
         return Body(
             dumbbell_motion(),
             numbers,
-            grips,
+            friction,
             gaps if self.floor else [],
             names,
             np.full(len(names), float(self.restitution)),
-            unit,
+            units,
             1.0,
         )
 
-    def _pairing(self, reach: float) -> Pairing:
+    def _contact_family(self, reach: float) -> ContactFamily:
         names = ("length", "ball_radius", "rod_radius", "centre_radius")
         length, r, t, rho = (float(getattr(self, name)) for name in names)
         gaps = dumbbell_formulas.drum_gaps()
         reads = tuple((int(name[-1]) - 1, COORDINATES.index(name[:-1])) for name in gaps.variables)
         values = {"l": length, "r": r, "t": t, "rho": rho}
-        return Pairing(
+        return ContactFamily(
             gaps,
             tuple(values[name] for name in gaps.parameters),
             reads,
@@ -240,7 +244,7 @@ class DumbbellDrum:
                 raise ValueError(msg)
             sticking[:] = (speeds == [self.spin, 0, 0, 0]).all(axis=1)[:, None]
         return Engine(
-            self.herd,
+            self.bodies,
             places,
             speeds,
             sticking,
@@ -267,7 +271,7 @@ class DumbbellDrum:
         """
         engine = self.engine(q, dt=dt, noise=noise)
         steps = whole_steps(duration, dt)
-        return run(engine, steps, whole_stride(every, steps), progress).trajectory(self.herd)
+        return run(engine, steps, whole_stride(every, steps), progress).trajectory(self.bodies)
 
     def placed(self, q: ArrayLike) -> Array:
         """Return placements ``(count, 4)``, refusing what overlaps or does not lie in the drum."""

@@ -6,8 +6,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.motion.engine.layout import Herd, herd_of
+from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.recorder import WORK
+from polycorner.motion.system import bodies_of
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
 
@@ -27,8 +28,8 @@ def motion_fault(path: Trajectory) -> str:
 
 
 def _faults(path: Trajectory) -> Iterator[str]:
-    herd = herd_of(path.system)
-    expected = (len(path.times), herd.count, herd.coordinates)
+    system = bodies_of(path.system)
+    expected = (len(path.times), system.count, system.dimension)
     for name, values, shape in (
         ("q", path.q, expected),
         ("v", path.v, expected),
@@ -40,9 +41,9 @@ def _faults(path: Trajectory) -> Iterator[str]:
         if not np.isfinite(values).all():
             yield f"{name} has numbers that are not finite"
     yield from _time_faults(path)
-    yield from _name_faults(path, herd)
-    yield from _energy_faults(path, herd)
-    yield from _overlap_faults(path, herd)
+    yield from _name_faults(path, system)
+    yield from _energy_faults(path, system)
+    yield from _overlap_faults(path, system)
 
 
 def _time_faults(path: Trajectory) -> Iterator[str]:
@@ -60,15 +61,15 @@ def _time_faults(path: Trajectory) -> Iterator[str]:
         yield f"an event at {late[0].time:g} is outside of the motion"
 
 
-def _name_faults(path: Trajectory, herd: Herd) -> Iterator[str]:
-    if tuple(path.dissipated) != herd.causes:
-        yield f"causes of dissipation: written {', '.join(path.dissipated)}, found {herd.causes}"
-    left = ("left",) if herd.exit_place >= 0 else ()
+def _name_faults(path: Trajectory, system: IdenticalBodies) -> Iterator[str]:
+    if tuple(path.dissipated) != system.causes:
+        yield f"causes of dissipation: written {', '.join(path.dissipated)}, found {system.causes}"
+    left = ("left",) if system.exit_coordinate >= 0 else ()
     if tuple(path.work) != (*WORK, *left):
         yield f"kinds of work: written {', '.join(path.work)}"
     for bodies, contact in _met(path):
-        known = herd.body.contacts if len(bodies) == 1 else _pair_contacts(herd)
-        if not all(0 <= i < herd.count for i in bodies) or (contact and contact not in known):
+        known = system.body.contacts if len(bodies) == 1 else system.pair_contacts
+        if not all(0 <= i < system.count for i in bodies) or (contact and contact not in known):
             yield f"contact {contact!r} of the bodies {bodies} is not there"
 
 
@@ -78,25 +79,21 @@ def _met(path: Trajectory) -> Iterator[tuple[tuple[int, ...], str]]:
     yield from ((event.bodies, event.contact) for event in path.events)
 
 
-def _pair_contacts(herd: Herd) -> tuple[str, ...]:
-    return () if herd.pairing is None else herd.pairing.gaps.names
-
-
 # ----------------------------------------------------------------------------------------- energies
 
 
-def recomputed_energies(path: Trajectory, herd: Herd) -> Array:
+def recomputed_energies(path: Trajectory, system: IdenticalBodies) -> Array:
     """Return kinetic and potential energy of the bodies that are present, ``(T, 2)``."""
-    kernel = herd.body.formulation.energies.kernel
-    numbers = np.array([*herd.body.parameters, 0.0])
-    at = np.concatenate([path.q, path.v], axis=2).reshape(-1, 2 * herd.coordinates)
+    kernel = system.body.formulation.energies.kernel
+    numbers = np.array([*system.body.parameters, 0.0])
+    at = np.concatenate([path.q, path.v], axis=2).reshape(-1, 2 * system.dimension)
     (values,) = kernel.over(at, numbers.ctypes.data, 0)
     each = values.reshape(*path.present.shape, 2)
     return np.asarray(np.where(path.present[..., None], each, 0.0).sum(axis=1))
 
 
-def _energy_faults(path: Trajectory, herd: Herd) -> Iterator[str]:
-    anew = recomputed_energies(path, herd)
+def _energy_faults(path: Trajectory, system: IdenticalBodies) -> Iterator[str]:
+    anew = recomputed_energies(path, system)
     size = float(abs(anew).max())
     for name, written, found in zip(
         ("kinetic", "potential"), (path.kinetic, path.potential), anew.T, strict=True
@@ -111,9 +108,9 @@ def _energy_faults(path: Trajectory, herd: Herd) -> Iterator[str]:
 # ----------------------------------------------------------------------------------------- overlaps
 
 
-def _overlap_faults(path: Trajectory, herd: Herd) -> Iterator[str]:
-    for names, present, gaps, moves in (*_own_gaps(path, herd), *_pair_gaps(path, herd)):
-        allowed = path.max_penetration + DEPTH * herd.body.scale + path.dt * moves
+def _overlap_faults(path: Trajectory, system: IdenticalBodies) -> Iterator[str]:
+    for names, present, gaps, moves in (*_own_gaps(path, system), *_pair_gaps(path, system)):
+        allowed = path.max_penetration + DEPTH * system.body.gap_unit + path.dt * moves
         deep = (-gaps > allowed) & present[:, None]
         if deep.any():
             t, g = np.argwhere(deep)[0]
@@ -127,34 +124,34 @@ def _overlap_faults(path: Trajectory, herd: Herd) -> Iterator[str]:
 Gaps = tuple[tuple[str, ...], NDArray[np.bool_], Array, Array]
 
 
-def _own_gaps(path: Trajectory, herd: Herd) -> Iterator[Gaps]:
-    for i in range(herd.count):
-        for call in herd.body.gaps:
+def _own_gaps(path: Trajectory, system: IdenticalBodies) -> Iterator[Gaps]:
+    for i in range(system.count):
+        for call in system.body.gaps:
             reads = list(call.reads)
             at, speed = path.q[:, i, reads], path.v[:, i, reads]
             kernel, address = call.family.kernel, call.parameters.ctypes.data
             values, gradients = kernel.over(np.ascontiguousarray(at), address, 1)
             moves = (abs(gradients) * abs(speed)[:, None]).sum(axis=2)
-            names = tuple(herd.body.contacts[row] for row in call.rows)
+            names = tuple(system.body.contacts[row] for row in call.rows)
             columns = list(call.columns)
             yield names, path.present[:, i], values[:, columns], moves[:, columns]
 
 
-def _pair_gaps(path: Trajectory, herd: Herd) -> Iterator[Gaps]:
+def _pair_gaps(path: Trajectory, system: IdenticalBodies) -> Iterator[Gaps]:
     """Yield the gaps of all pairs that are near along the second of the coordinates of a place."""
-    pairing = herd.pairing
-    if pairing is None:
+    family = system.contacts
+    if family is None:
         return
-    where, numbers = herd.place[1], np.array([*pairing.parameters, 0.0])
-    along = path.q[..., where] * herd.body.unit[where]
-    body, column = (list(part) for part in zip(*pairing.reads, strict=True))
-    for pair in combinations(range(herd.count), 2):
-        near = np.flatnonzero(abs(along[:, pair[0]] - along[:, pair[1]]) <= pairing.reach)
+    where, numbers = system.position[1], np.array([*family.parameters, 0.0])
+    along = path.q[..., where] * system.body.units[where]
+    body, column = (list(part) for part in zip(*family.reads, strict=True))
+    for pair in combinations(range(system.count), 2):
+        near = np.flatnonzero(abs(along[:, pair[0]] - along[:, pair[1]]) <= family.reach)
         if not near.size:
             continue
         bodies = [pair[b] for b in body]
         at, speed = (np.ascontiguousarray(x[near][:, bodies, column]) for x in (path.q, path.v))
-        values, gradients = pairing.gaps.kernel.over(at, numbers.ctypes.data, 1)
+        values, gradients = family.gaps.kernel.over(at, numbers.ctypes.data, 1)
         moves = (abs(gradients) * abs(speed)[:, None]).sum(axis=2)
         present = path.present[near][:, pair[0]] & path.present[near][:, pair[1]]
-        yield pairing.gaps.names, present, values, moves
+        yield family.gaps.names, present, values, moves

@@ -19,7 +19,7 @@ from polycorner.spaces.manifold import Array
 if TYPE_CHECKING:
     import xarray as xr
 
-    from polycorner.motion.engine.layout import Herd
+    from polycorner.motion.bodies import IdenticalBodies
     from polycorner.motion.system import System
 
 EFFORT = tuple(field.name for field in fields(Effort))
@@ -162,7 +162,9 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def read_motion(content: "xr.Dataset", system: "System | Herd", q: Array, v: Array) -> Trajectory:
+def read_motion(
+    content: "xr.Dataset", system: "System | IdenticalBodies", q: Array, v: Array
+) -> Trajectory:
     """Return the motion in a dataset."""
     at, names = content.attrs, _contacts(str(content.attrs["contacts"]))
 

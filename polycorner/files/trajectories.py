@@ -150,7 +150,7 @@ def _system(trajectory: Trajectory) -> System:
         raise TypeError(msg)
     if not isinstance(trajectory.system, System):
         msg = (
-            "trajectory: expected that of a System; got one of a "
+            "trajectory: expected that of a System; got one of "
             f"{type(trajectory.system).__name__}: save_run keeps runs in the drum"
         )
         raise TypeError(msg)

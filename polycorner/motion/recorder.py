@@ -9,7 +9,7 @@ from polycorner.motion.events import Event, EventKind
 from polycorner.motion.trajectory import Touch, Trajectory
 
 if TYPE_CHECKING:
-    from polycorner.motion.engine.layout import Herd
+    from polycorner.motion.bodies import IdenticalBodies
     from polycorner.motion.system import System
 
 WORK = ("substrate", "applied", "noise")
@@ -49,12 +49,12 @@ class Recorder:
             if event.kind == EventKind.EXIT:
                 self.gone -= self.engine.energy_of(event.bodies[0])
 
-    def trajectory(self, system: "System | Herd") -> Trajectory:
+    def trajectory(self, system: "System | IdenticalBodies") -> Trajectory:
         """Return what was recorded."""
-        herd, columns = self.engine.herd, self.columns
+        bodies, columns = self.engine.bodies, self.columns
         sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
         work = {name: sums[:, i] for i, name in enumerate(WORK)}
-        if herd.exit_place >= 0:
+        if bodies.exit_coordinate >= 0:
             work["left"] = np.array(self.left)
         return Trajectory(
             system=system,
@@ -67,7 +67,7 @@ class Recorder:
             touching=tuple(self.touching),
             kinetic=energies[:, 0],
             potential=energies[:, 1],
-            dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(herd.causes)},
+            dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(bodies.causes)},
             work=work,
             events=tuple(self.events),
             max_penetration=float(self.engine.motion.sums[3]),

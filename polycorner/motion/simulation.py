@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.errors import SolverError
-from polycorner.motion.engine.layout import herd_of
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.system import State, System
+from polycorner.motion.system import State, System, bodies_of
 
 if TYPE_CHECKING:
     from polycorner.motion.engine.driver import Engine
@@ -142,7 +141,7 @@ def start(
         msg = f"kicks: expected coordinates {', '.join(system.manifold.names)}; got {unknown}"
         raise ValueError(msg)
     return Engine(
-        herd_of(system),
+        bodies_of(system),
         state.q[None],
         state.v[None],
         state.sticking[None],

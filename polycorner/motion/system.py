@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
 from polycorner.motion.formulation import Formulation, Laws, dotted, energies
 from polycorner.motion.friction import ConvexSet
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -289,3 +290,26 @@ def coefficient(value: Any) -> float:
         msg = f"restitution: expected a number from 0 to 1; got {number:g}"
         raise ValueError(msg)
     return number
+
+
+def bodies_of(system: System | IdenticalBodies) -> IdenticalBodies:
+    """Return a system as the engine's description: one body that is not repeated."""
+    if isinstance(system, IdenticalBodies):
+        return system
+    friction = tuple(
+        FrictionContact(f.name, len(f.slip), f.static, f.moving, gap, loads, f.kind)
+        for f, gap, loads in zip(system.friction, system.owners, system.load_sources, strict=True)
+    )
+    scales = system.manifold.scale_array
+    return IdenticalBodies(
+        Body(
+            system.formulation,
+            system.parameters,
+            friction,
+            system.polyhedron.bundle.calls,
+            system.contacts,
+            system.restitutions,
+            1 / scales,
+            float(scales.min()),
+        )
+    )

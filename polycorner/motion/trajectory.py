@@ -13,7 +13,7 @@ from polycorner.printing import Printed, Sheet, Table, facts, listed, number, ti
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
-    from polycorner.motion.engine.layout import Herd
+    from polycorner.motion.bodies import IdenticalBodies
     from polycorner.motion.system import System
     from polycorner.polyhedra.strata import Stratum
 
@@ -27,7 +27,7 @@ class Trajectory(Printed):
 
     Attributes
     ----------
-    system : System or Herd
+    system : System or IdenticalBodies
         What moves: ``N`` bodies (one, for a system) of ``k`` coordinates.
     dt : float
         The step, in s.
@@ -51,7 +51,7 @@ class Trajectory(Printed):
     effort : Effort
     """
 
-    system: "System | Herd"
+    system: "System | IdenticalBodies"
     dt: float
     times: Array
     q: Array

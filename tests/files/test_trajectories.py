@@ -125,9 +125,11 @@ def test_wrong_arguments_get_a_sentence(path, saved, tmp_path):
         load_trajectory(saved, BALL.polyhedron)
     with pytest.raises(TypeError, match=r"^trajectory: expected a Trajectory"):
         save_trajectory(BALL, tmp_path / "a.nc")
-    herd = replace(path, system=DumbbellDrum().herd)
-    with pytest.raises(TypeError, match=r"got one of a Herd: save_run keeps runs in the drum"):
-        save_trajectory(herd, tmp_path / "a.nc")
+    other = replace(path, system=DumbbellDrum().bodies)
+    with pytest.raises(
+        TypeError, match=r"got one of IdenticalBodies: save_run keeps runs in the drum"
+    ):
+        save_trajectory(other, tmp_path / "a.nc")
     for units in ({"z": "m"}, {"y": ""}):
         with pytest.raises(ValueError, match=r"^units: expected"):
             save_trajectory(path, tmp_path / "a.nc", units=units)

@@ -27,7 +27,7 @@ def moved(drum, places, *, leaves=None):
         drum,
         Noise(),
         Trajectory(
-            system=drum.herd,
+            system=drum.bodies,
             dt=0.1,
             times=0.1 * np.arange(count),
             q=q,
@@ -37,7 +37,7 @@ def moved(drum, places, *, leaves=None):
             touching=tuple(touches(drum, instant) for instant in places),
             kinetic=np.zeros(count),
             potential=np.where(present, heights(drum, places), 0.0).sum(axis=1),
-            dissipated={cause: np.zeros(count) for cause in drum.herd.causes},
+            dissipated={cause: np.zeros(count) for cause in drum.bodies.causes},
             work={cause: np.zeros(count) for cause in WORK},
             events=(),
             max_penetration=0.0,

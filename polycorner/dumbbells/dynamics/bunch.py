@@ -159,7 +159,7 @@ def follow_bunch(
     noise = Noise(chatter=chatter, seed=seed)
     engine = drum.engine(q, dt=dt, noise=noise)
     steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
-    path = run(engine, steps, stride, progress).trajectory(engine.herd)
+    path = run(engine, steps, stride, progress).trajectory(engine.bodies)
     left = tuple((e.time, e.bodies[0]) for e in path.of_kind(EventKind.EXIT))
     effort = path.effort
     return BunchRun(

@@ -27,7 +27,7 @@ ENGINE = "engine."
 
 def contact_names(engine: Engine) -> tuple[str, ...]:
     """Return the names of all contacts that can occur; files have numbers instead."""
-    return (*engine.herd.body.contacts, *engine.pair_contacts)
+    return (*engine.bodies.body.contacts, *engine.bodies.pair_contacts)
 
 
 def _write_arrays(path: Path, arrays: dict[str, Any]) -> None:

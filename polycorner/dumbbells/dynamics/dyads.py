@@ -165,10 +165,10 @@ def follow_dyads(
     places = np.concatenate([nest.reshape(2, 3) for nest in nests])
     offset = APART * np.repeat(np.arange(len(starts)), 2)
     places[:, 1] += offset
-    herd = replace(drum, count=len(places))
-    engine = herd.engine(places, dt=dt, noise=noise, solver=SOLVER)
+    drum = replace(drum, count=len(places))
+    engine = drum.engine(places, dt=dt, noise=noise, solver=SOLVER)
     steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
-    path = run(engine, steps, stride).trajectory(engine.herd)
+    path = run(engine, steps, stride).trajectory(engine.bodies)
     q = path.q.copy()
     q[..., 1] -= offset
     q = q.reshape(len(path), len(starts), 2, 4)

@@ -68,9 +68,8 @@ def dataset(run: DrumRun) -> "xr.Dataset":
 
 
 def _contacts(run: DrumRun) -> list[str]:
-    herd = run.drum.herd
-    between = () if herd.pairing is None else herd.pairing.gaps.names
-    return [*herd.body.contacts, *between]
+    bodies = run.drum.bodies
+    return [*bodies.body.contacts, *bodies.pair_contacts]
 
 
 def _attributes(run: DrumRun, names: list[str]) -> dict[str, Any]:
@@ -142,5 +141,5 @@ def _read(content: "xr.Dataset") -> DrumRun:
     rate = float(at["steps_per_second"])
     q = np.stack([content[name].values for name in COORDINATES], axis=-1)
     v = np.stack([content[f"{name}_dot"].values for name in COORDINATES], axis=-1)
-    path = read_motion(content, drum.herd, q, v)
+    path = read_motion(content, drum.bodies, q, v)
     return DrumRun(drum, noise, path, float(at["duration"]), int(at["every"]), rate)

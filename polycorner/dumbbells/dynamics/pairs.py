@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from polycorner.dumbbells.drum import PARAMETERS, DumbbellDrum
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
-from polycorner.motion.engine.layout import Herd
+from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.events import EventKind
 from polycorner.spaces.manifold import Array
 
@@ -44,11 +44,14 @@ class Sizes:
     def of(cls, trajectory: "Trajectory") -> "Sizes":
         """Return those of the dumbbells of a trajectory in the drum."""
         system = trajectory.system
-        if not isinstance(system, Herd) or system.body.formulation.parameters != PARAMETERS:
+        if (
+            not isinstance(system, IdenticalBodies)
+            or system.body.formulation.parameters != PARAMETERS
+        ):
             msg = f"trajectory: expected one of dumbbells in a drum; got one of {system!r}"
             raise TypeError(msg)
         numbers = dict(zip(PARAMETERS, system.body.parameters.tolist(), strict=True))
-        between = system.pairing
+        between = system.contacts
         if between is not None:
             numbers |= dict(zip(between.gaps.parameters, between.parameters, strict=True))
         return cls(numbers["l"], numbers["r"], numbers["rho"], numbers.get("t", math.nan))

@@ -147,7 +147,7 @@ def run(
         recorder.instant()
     often = SAVING if saving is None else saving.every
     rate = _follow(recorder, steps, stride, book, often, progress)
-    path = recorder.trajectory(drum.herd)
+    path = recorder.trajectory(drum.bodies)
     return DrumRun(drum, noise, path, float(duration), stride, rate)
 
 

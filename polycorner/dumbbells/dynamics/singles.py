@@ -142,7 +142,7 @@ def follow(
     theta = np.atleast_1d(reals(headings, "headings"))
     q = np.stack([np.full_like(theta, azimuth), APART * np.arange(len(theta)), theta], axis=-1)
     engine = replace(drum, count=len(theta)).engine(q, dt=dt, noise=noise, solver=Solver())
-    return run(engine, whole_steps(duration, dt), STRIDE).trajectory(engine.herd)
+    return run(engine, whole_steps(duration, dt), STRIDE).trajectory(engine.bodies)
 
 
 def zigzags(trajectory: Trajectory, spin: float) -> tuple[Zigzag, ...]:

@@ -62,8 +62,8 @@ def herd_engine(
         For starts that overlap, a step that is too long, or noise on unknown coordinates.
     """
     from polycorner.motion.engine.driver import Engine
-    from polycorner.motion.engine.layout import herd_of
     from polycorner.motion.simulation import start
+    from polycorner.motion.system import bodies_of
 
     places = system.manifold.points(q)
     speeds = np.zeros_like(places) if v is None else np.broadcast_to(v, places.shape)
@@ -71,9 +71,9 @@ def herd_engine(
     for place in places[system.polyhedron.values(places).min(axis=-1) < 0]:
         system.check_placement(place)
     sticking = np.array([system.sticks(a, b) for a, b in zip(places, speeds, strict=True)])
-    herd = replace(herd_of(system), count=len(places))
+    bodies = replace(bodies_of(system), count=len(places))
     sticking = sticking.reshape(len(places), -1)
-    return Engine(herd, places, speeds, sticking, dt, noise=noise or Noise())
+    return Engine(bodies, places, speeds, sticking, dt, noise=noise or Noise())
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.formulas.cache import one_at_a_time
-from polycorner.motion.engine.layout import Herd, lay_out
+from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.engine.layout import lay_out
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise, Solver
 from polycorner.spaces.manifold import Array
@@ -44,11 +45,11 @@ class Effort:
 
 
 class Engine:
-    """A herd in motion.
+    """Identical bodies in motion.
 
     Parameters
     ----------
-    herd : Herd
+    bodies : IdenticalBodies
     q, v : (N, k) array
     sticking : (N, F) array of bool
         Which friction contacts stick.
@@ -62,7 +63,7 @@ class Engine:
 
     def __init__(
         self,
-        herd: Herd,
+        bodies: IdenticalBodies,
         q: Array,
         v: Array,
         sticking: NDArray[np.bool_],
@@ -72,11 +73,11 @@ class Engine:
         noise: Noise,
         solver: Solver | None = None,
     ) -> None:
-        self.herd, self.dt, self.start, self.noise = herd, float(dt), float(start), noise
-        self.scene = lay_out(herd, noise, solver or Solver())
-        self.capacity = max(16, CONTACTS_PER_BODY * herd.count)
-        self.motion = _still(herd, q, v, sticking, self.capacity)
-        self.room = _room(herd, self.capacity)
+        self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
+        self.scene = lay_out(bodies, noise, solver or Solver())
+        self.capacity = max(16, CONTACTS_PER_BODY * bodies.count)
+        self.motion = _still(bodies, q, v, sticking, self.capacity)
+        self.room = _room(bodies, self.capacity)
         self._events = np.empty((EVENTS + 4 * self.capacity, 4), dtype=np.int64)
         self._numbers = np.empty((len(self._events), 2))
 
@@ -123,7 +124,7 @@ class Engine:
         return compiled
 
     def _read(self, count: int) -> list[Event]:
-        contacts, names = self.herd.body.contacts, self.pair_contacts
+        contacts, names = self.bodies.body.contacts, self.bodies.pair_contacts
         events = []
         for (kind, i, j, which), (time, value) in zip(
             self._events[:count].tolist(), self._numbers[:count].tolist(), strict=True
@@ -132,11 +133,6 @@ class Engine:
             bodies = (i,) if j < 0 else (i, j)
             events.append(Event(self.start + time, EventKind(kind), bodies, contact, value))
         return events
-
-    @property
-    def pair_contacts(self) -> tuple[str, ...]:
-        """Names of the contacts between two bodies."""
-        return () if self.herd.pairing is None else self.herd.pairing.gaps.names
 
     def _grow(self) -> None:
         self.capacity *= 2
@@ -152,13 +148,13 @@ class Engine:
         while self.capacity < needed:
             self.capacity *= 2
         empty = _still(
-            self.herd, arrays["q"], arrays["v"], arrays["stick"].astype(np.bool_), self.capacity
+            self.bodies, arrays["q"], arrays["v"], arrays["stick"].astype(np.bool_), self.capacity
         )
         for name, array in empty._asdict().items():
             saved = arrays[name]
             array[: min(len(array), len(saved))] = saved[: len(array)]
         self.motion = empty
-        self.room = _room(self.herd, self.capacity)
+        self.room = _room(self.bodies, self.capacity)
         self._events = np.empty((EVENTS + 4 * self.capacity, 4), dtype=np.int64)
         self._numbers = np.empty((len(self._events), 2))
 
@@ -172,7 +168,7 @@ class Engine:
         return float(self._energies()[body].sum())
 
     def _energies(self) -> Array:
-        kernel = self.herd.body.formulation.energies.kernel
+        kernel = self.bodies.body.formulation.energies.kernel
         at = np.concatenate([self.motion.q, self.motion.v], axis=1)
         (values,) = kernel.over(at, self.scene.numbers.ctypes.data, 0)
         return values
@@ -181,25 +177,27 @@ class Engine:
         """Return the contacts that touch: bodies, name, and the force that presses."""
         motion, h = self.motion, self.dt
         own: list[tuple[tuple[int, ...], str, float]] = [
-            ((int(i),), self.herd.body.contacts[g], float(motion.lam[i, g]) / h)
+            ((int(i),), self.bodies.body.contacts[g], float(motion.lam[i, g]) / h)
             for i, g in np.argwhere(motion.touch != 0)
             if motion.alive[i]
         ]
         count = int(motion.counts[0])
-        gaps = len(self.pair_contacts)
+        gaps = len(self.bodies.pair_contacts)
         for s in np.flatnonzero(motion.flags[:count, 1]):
             pair, g = divmod(int(motion.keys[s]), gaps)
-            bodies = divmod(pair, self.herd.count)
-            own.append((bodies, self.pair_contacts[g], float(motion.press[s, 0]) / h))
+            bodies = divmod(pair, self.bodies.count)
+            own.append((bodies, self.bodies.pair_contacts[g], float(motion.press[s, 0]) / h))
         return own
 
 
-def _still(herd: Herd, q: Array, v: Array, sticking: NDArray[np.bool_], capacity: int) -> "Motion":
-    """Return the state of a herd that has not moved yet."""
+def _still(
+    bodies: IdenticalBodies, q: Array, v: Array, sticking: NDArray[np.bool_], capacity: int
+) -> "Motion":
+    """Return the state of bodies that have not moved yet."""
     from polycorner.motion.engine.compiled import Motion
 
-    N, k = herd.count, herd.coordinates
-    F, m = len(herd.body.grips), len(herd.body.contacts)
+    N, k = bodies.count, bodies.dimension
+    F, m = len(bodies.body.friction), len(bodies.body.contacts)
 
     def flags(*shape: int) -> Any:
         return np.zeros(shape, dtype=np.int64)
@@ -223,20 +221,20 @@ def _still(herd: Herd, q: Array, v: Array, sticking: NDArray[np.bool_], capacity
         shove=np.zeros((capacity, 2 * k)),
         flags=flags(capacity, 2),
         counts=flags(8),
-        sums=np.zeros(5 + len(herd.causes)),
+        sums=np.zeros(5 + len(bodies.causes)),
     )
 
 
-def _room(herd: Herd, capacity: int) -> "Room":
-    """Return the work space of a herd."""
+def _room(bodies: IdenticalBodies, capacity: int) -> "Room":
+    """Return the work space for bodies."""
     from polycorner.motion.engine.compiled import Room
 
-    N, k = herd.count, herd.coordinates
-    F, m = len(herd.body.grips), len(herd.body.contacts)
-    rows = sum(grip.rows for grip in herd.body.grips)
-    families = [herd.body.formulation.forces, *(call.family for call in herd.body.gaps)]
-    if herd.pairing is not None:
-        families += [herd.pairing.gaps, *(family for family, _, _ in herd.pairing.rubs)]
+    N, k = bodies.count, bodies.dimension
+    F, m = len(bodies.body.friction), len(bodies.body.contacts)
+    rows = sum(contact.rows for contact in bodies.body.friction)
+    families = [bodies.body.formulation.forces, *(call.family for call in bodies.body.gaps)]
+    if bodies.contacts is not None:
+        families += [bodies.contacts.gaps, *(family for family, _, _ in bodies.contacts.slips)]
     outputs = [len(f.names) * (1 + len(f.variables)) + len(f.variables) for f in families]
     B = N * (F + m) + 2 * capacity
     pairs = min(N * (N - 1) // 2, 64 * N) if N > 1 else 0
@@ -259,7 +257,7 @@ def _room(herd: Herd, capacity: int) -> "Room":
         ahead=np.zeros((N, k)),
         gap_then=np.zeros((N, m)),
         normal_then=np.zeros((N, m, k)),
-        pair_then=np.zeros(0 if herd.pairing is None else len(herd.pairing.gaps.names)),
+        pair_then=np.zeros(len(bodies.pair_contacts)),
         awake=whole(N),
         asked=whole(N),
         speed=np.zeros(N),

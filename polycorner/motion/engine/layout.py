@@ -1,197 +1,54 @@
 """A system laid out as arrays for the compiled core."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.formulas.bundles import Call
-from polycorner.formulas.families import Family
-from polycorner.motion.formulation import Formulation, moment
+from polycorner.motion.bodies import RUBBING, Body, IdenticalBodies
+from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexSet
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.system import System
-from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from polycorner.motion.engine.compiled import Scene
 
-IMPACT = "impact"
 
-
-@dataclass(frozen=True)
-class Grip:
-    """One friction contact of a body: which rows slip, what holds it, what presses."""
-
-    name: str
-    rows: int
-    static: ConvexSet
-    dynamic: ConvexSet
-    owner: int
-    sources: tuple[int, ...]
-    kind: str
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The description of one body, or of a whole system without repetition.
-
-    Attributes
-    ----------
-    formulation, parameters
-        Its equations of motion and the values of their parameters.
-    grips : tuple of Grip
-    gaps : sequence of Call
-        Kernels of its own gaps.
-    contacts : tuple of str
-        Names of these gaps.
-    restitution : (m,) array
-    unit : (k,) array
-        Length of a unit of each coordinate: it turns velocities into comparable speeds.
-    scale : float
-        Unit of gaps.
-    """
-
-    formulation: Formulation
-    parameters: Array
-    grips: tuple[Grip, ...]
-    gaps: Sequence[Call]
-    contacts: tuple[str, ...]
-    restitution: Array
-    unit: Array
-    scale: float
-
-
-@dataclass(frozen=True, eq=False)
-class Pairing:
-    """The contacts between any two bodies of a herd.
-
-    Attributes
-    ----------
-    gaps : Family
-        Gaps of a pair.
-    parameters : sequence of float
-    reads : tuple of (int, int)
-        For each variable the body, 0 or 1, and its coordinate.
-    rubs : tuple of (Family, bool, sequence of float)
-        For each gap the slip at its contact (two rows; variables: the coordinates the gaps read,
-        then all velocities of both bodies), whether the bodies are exchanged in it, and its
-        parameters.
-    static, dynamic : ConvexSet
-        Friction at these contacts.
-    restitution : float
-    reach : float
-        Distance of places beyond which bodies cannot touch.
-    """
-
-    gaps: Family
-    parameters: tuple[float, ...]
-    reads: tuple[tuple[int, int], ...]
-    rubs: "tuple[tuple[Family, bool, tuple[float, ...]], ...]"
-    static: ConvexSet
-    dynamic: ConvexSet
-    restitution: float
-    reach: float
-
-
-@dataclass(frozen=True, eq=False)
-class Herd:
-    """``count`` equal bodies that may touch each other.
-
-    Attributes
-    ----------
-    body : Body
-    count : int
-    pairing : Pairing, optional
-        Contacts between bodies; none by default.
-    place : (int, int)
-        The two coordinates that say where a body is.
-    carried : float
-        Speed of the substrate along the first of them, as a length per time.
-    exit_place, exit_limit : int, float
-        A body leaves when this coordinate passes the limit; -1: never.
-    """
-
-    body: Body
-    count: int = 1
-    pairing: Pairing | None = None
-    place: tuple[int, int] = (0, 0)
-    carried: float = 0.0
-    exit_place: int = -1
-    exit_limit: float = 0.0
-    causes: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        kinds = [IMPACT, *(grip.kind for grip in self.body.grips)]
-        if self.pairing is not None and self.pairing.rubs:
-            kinds.append("rubbing")
-        object.__setattr__(self, "causes", tuple(dict.fromkeys(kinds)))
-
-    @property
-    def coordinates(self) -> int:
-        """Coordinates of a body, ``k``."""
-        return len(self.body.formulation.coordinates)
-
-
-def herd_of(system: "System | Herd") -> Herd:
-    """Return a system as a herd of one body."""
-    if isinstance(system, Herd):
-        return system
-    grips = tuple(
-        Grip(f.name, len(f.slip), f.static, f.moving, owner, sources, f.kind)
-        for f, owner, sources in zip(
-            system.friction, system.owners, system.load_sources, strict=True
-        )
-    )
-    scales = system.manifold.scale_array
-    body = Body(
-        system.formulation,
-        system.parameters,
-        grips,
-        system.polyhedron.bundle.calls,
-        system.contacts,
-        system.restitutions,
-        1 / scales,
-        float(scales.min()),
-    )
-    return Herd(body)
-
-
-def lay_out(herd: Herd, noise: Noise, solver: Solver) -> "Scene":
+def lay_out(bodies: IdenticalBodies, noise: Noise, solver: Solver) -> "Scene":
     """Return the arrays that :func:`polycorner.motion.engine.compiled.advance` reads."""
     from polycorner.motion.engine.compiled import Scene
 
-    body, k = herd.body, herd.coordinates
+    body, k = bodies.body, bodies.dimension
     numbers = list(body.parameters)
     tables = _gap_tables(body.gaps, len(body.contacts), numbers)
     shapes = _Shapes()
-    grips = body.grips
-    source = np.zeros((len(grips), max(1, body.formulation.loads)), dtype=np.int64)
-    for f, grip in enumerate(grips):
-        source[f, list(grip.sources)] = 1
-    shape = [[shapes.add(grip.static), shapes.add(grip.dynamic)] for grip in grips]
-    pair = _pair_entries(herd, numbers, shapes)
+    friction = body.friction
+    source = np.zeros((len(friction), max(1, body.formulation.loads)), dtype=np.int64)
+    for f, contact in enumerate(friction):
+        source[f, list(contact.loads)] = 1
+    shape = [[shapes.add(contact.static), shapes.add(contact.dynamic)] for contact in friction]
+    pair = _pair_entries(bodies, numbers, shapes)
     kicks = [float(noise.kicks.get(name, 0.0)) for name in body.formulation.coordinates]
     return Scene(
-        bodies=herd.count,
+        bodies=bodies.count,
         size=k,
         force_at=body.formulation.forces.kernel.compiled(0).point,
-        slip_at=body.formulation.slip.kernel.compiled(1).point if grips else 0,
+        slip_at=body.formulation.slip.kernel.compiled(1).point if friction else 0,
         loads=body.formulation.loads,
-        row=_whole(np.cumsum([0, *(grip.rows for grip in grips)])),
+        row=_whole(np.cumsum([0, *(contact.rows for contact in friction)])),
         shape=_whole(shape).reshape(-1, 2),
-        owner=_whole([grip.owner for grip in grips]),
+        owner=_whole([contact.gap for contact in friction]),
         source=source,
-        cause=_whole([herd.causes.index(grip.kind) for grip in grips]),
+        cause=_whole([bodies.causes.index(contact.cause) for contact in friction]),
         bounce=np.asarray(body.restitution, dtype=np.float64),
-        place=_whole(herd.place),
-        unit=np.asarray(body.unit, dtype=np.float64),
-        carried=float(herd.carried),
-        exit_place=herd.exit_place,
-        exit_limit=float(herd.exit_limit),
-        scale=float(body.scale),
+        place=_whole(bodies.position),
+        unit=np.asarray(body.units, dtype=np.float64),
+        carried=float(bodies.substrate_speed),
+        exit_place=bodies.exit_coordinate,
+        exit_limit=float(bodies.exit_limit),
+        scale=float(body.gap_unit),
         chatter=float(noise.chatter),
         chatter_time=float(noise.correlation_time),
         kicks=np.array(kicks),
@@ -240,8 +97,10 @@ def _gap_tables(calls: Sequence[Call], rows: int, numbers: list[float]) -> dict[
     }
 
 
-def _pair_entries(herd: Herd, numbers: list[float], shapes: "_Shapes") -> dict[str, Any]:
-    pairing = herd.pairing
+def _pair_entries(
+    bodies: IdenticalBodies, numbers: list[float], shapes: "_Shapes"
+) -> dict[str, Any]:
+    family = bodies.contacts
     entries: dict[str, Any] = {
         "pair_at": 0,
         "pair_number": len(numbers),
@@ -253,21 +112,21 @@ def _pair_entries(herd: Herd, numbers: list[float], shapes: "_Shapes") -> dict[s
         "pair_bounce": 0.0,
         "reach": 0.0,
     }
-    if pairing is None or herd.count < 2:
+    if family is None or bodies.count < 2:
         return entries
-    numbers += pairing.parameters
+    numbers += family.parameters
     rubs = []
-    for family, swapped, values in pairing.rubs:
-        rubs.append((family.kernel.compiled(1).point, int(swapped), len(numbers)))
+    for slip, swapped, values in family.slips:
+        rubs.append((slip.kernel.compiled(1).point, int(swapped), len(numbers)))
         numbers += values
-    entries["pair_at"] = pairing.gaps.kernel.compiled(1).point
-    entries["pair_reads"] = _whole(pairing.reads)
-    entries["pair_gaps"] = len(pairing.gaps.names)
+    entries["pair_at"] = family.gaps.kernel.compiled(1).point
+    entries["pair_reads"] = _whole(family.reads)
+    entries["pair_gaps"] = len(family.gaps.names)
     entries["rub_table"] = _whole(rubs).reshape(-1, 3)
-    entries["rub_shape"] = _whole([shapes.add(pairing.static), shapes.add(pairing.dynamic)])
-    entries["rub_cause"] = herd.causes.index("rubbing") if pairing.rubs else 0
-    entries["pair_bounce"] = float(pairing.restitution)
-    entries["reach"] = float(pairing.reach)
+    entries["rub_shape"] = _whole([shapes.add(family.static), shapes.add(family.dynamic)])
+    entries["rub_cause"] = bodies.causes.index(RUBBING) if family.slips else 0
+    entries["pair_bounce"] = float(family.restitution)
+    entries["reach"] = float(family.reach)
     return entries
 
 

@@ -1,0 +1,152 @@
+"""Descriptions of bodies and of their contacts: what the engine needs to know of a system."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from polycorner.formulas.bundles import Call
+from polycorner.formulas.families import Family
+from polycorner.motion.convex_sets import ConvexSet
+from polycorner.motion.formulation import Formulation
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+IMPACT, RUBBING = "impact", "rubbing"  # causes of dissipation
+
+
+@dataclass(frozen=True)
+class FrictionContact(Value):
+    """One friction contact of a body.
+
+    Attributes
+    ----------
+    name : str
+    rows : int
+        Components of its slip velocity, 1 or 2.
+    static, dynamic : ConvexSet
+        Admissible forces per unit load while it sticks and while it slips.
+    gap : int
+        Number of the unilateral contact whose normal force is the load, or -1: the load is known.
+    loads : tuple of int
+        Numbers of the known loads whose sum is the load; empty if a contact presses.
+    cause : str
+        Cause under which its dissipation is booked.
+    """
+
+    name: str
+    rows: int
+    static: ConvexSet
+    dynamic: ConvexSet
+    gap: int
+    loads: tuple[int, ...]
+    cause: str
+
+
+@dataclass(frozen=True, eq=False)
+class Body(Value):
+    """One body, or a whole system that is not repeated.
+
+    Attributes
+    ----------
+    formulation, parameters
+        Its equations of motion and the values of their parameters.
+    friction : tuple of FrictionContact
+    gaps : sequence of Call
+        Kernels of the gaps between the body and its surroundings.
+    contacts : tuple of str
+        Names of these gaps.
+    restitution : (m,) array
+        Coefficient of restitution of each of them.
+    units : (k,) array
+        Length that a unit of each coordinate stands for; it turns velocities into speeds that can
+        be compared.
+    gap_unit : float
+        Length by which gaps are scaled.
+    """
+
+    formulation: Formulation
+    parameters: Array
+    friction: tuple[FrictionContact, ...]
+    gaps: Sequence[Call]
+    contacts: tuple[str, ...]
+    restitution: Array
+    units: Array
+    gap_unit: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFamily(Value):
+    """The contacts between any two of several identical bodies.
+
+    Attributes
+    ----------
+    gaps : Family
+        Gaps of a pair.
+    parameters : sequence of float
+    reads : tuple of (int, int)
+        For each variable of the gaps the body, 0 or 1, and its coordinate.
+    slips : tuple of (Family, bool, sequence of float)
+        For each gap the slip velocity at its contact (two rows; variables: the coordinates that
+        the gaps read, then all velocities of both bodies), whether the bodies are exchanged in
+        it, and its parameters; empty without friction.
+    static, dynamic : ConvexSet
+        Admissible friction forces per unit normal force.
+    restitution : float
+    reach : float
+        Distance of body positions beyond which two bodies cannot touch.
+    """
+
+    gaps: Family
+    parameters: tuple[float, ...]
+    reads: tuple[tuple[int, int], ...]
+    slips: "tuple[tuple[Family, bool, tuple[float, ...]], ...]"
+    static: ConvexSet
+    dynamic: ConvexSet
+    restitution: float
+    reach: float
+
+
+@dataclass(frozen=True, eq=False)
+class IdenticalBodies(Value):
+    """``count`` identical bodies that may touch each other.
+
+    Attributes
+    ----------
+    body : Body
+    count : int
+    contacts : ContactFamily, optional
+        Contacts between the bodies; none by default.
+    position : (int, int)
+        The two coordinates that are a body's position.
+    substrate_speed : float
+        Speed of the substrate along the first of them, as a length per time.
+    exit_coordinate, exit_limit : int, float
+        A body leaves when this coordinate exceeds the limit; -1: never.
+    causes : tuple of str
+        Causes of dissipation.
+    """
+
+    body: Body
+    count: int = 1
+    contacts: ContactFamily | None = None
+    position: tuple[int, int] = (0, 0)
+    substrate_speed: float = 0.0
+    exit_coordinate: int = -1
+    exit_limit: float = 0.0
+    causes: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        causes = [IMPACT, *(contact.cause for contact in self.body.friction)]
+        if self.contacts is not None and self.contacts.slips:
+            causes.append(RUBBING)
+        object.__setattr__(self, "causes", tuple(dict.fromkeys(causes)))
+        super().__post_init__()
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of one body, ``k``."""
+        return len(self.body.formulation.coordinates)
+
+    @property
+    def pair_contacts(self) -> tuple[str, ...]:
+        """Names of the contacts between two bodies."""
+        return () if self.contacts is None else self.contacts.gaps.names
