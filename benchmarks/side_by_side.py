@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from polycorner.files.atomic import write_atomically
+
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 
@@ -69,9 +71,8 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
 
 def write(name: str, figures: Mapping[str, Any]) -> None:
     """Write figures, and what they were measured on, to ``benchmarks/results/<name>.json``."""
-    RESULTS.mkdir(exist_ok=True)
     content = {"measured on": machine(), **figures}
-    (RESULTS / f"{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    write_atomically(RESULTS / f"{name}.json", json.dumps(content, indent=2) + "\n")
 
 
 def machine() -> dict[str, str]:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from PIL import Image
 
 from paper_checks.figures.style import styled
+from polycorner.files.atomic import atomic
 
 DPI = 200
 SHADES = 128  # of a PNG
@@ -58,12 +59,12 @@ class Figure:
 
     def write(self, folder: Path) -> list[Path]:
         """Write ``name.png`` and ``name.svg``; text in them needs no fonts where they are shown."""
-        folder.mkdir(parents=True, exist_ok=True)
         drawing = self.draw()
         paths = [folder / f"{self.name}.{ending}" for ending in ("png", "svg")]
         with styled():
             _save_png(drawing, paths[0])
-            drawing.savefig(paths[1], metadata={"Date": None, "Title": self.title})
+            with atomic(paths[1]) as temporary:
+                drawing.savefig(temporary, metadata={"Date": None, "Title": self.title})
         return paths
 
 
@@ -74,4 +75,5 @@ def _save_png(drawing: Drawing, path: Path) -> None:
     drawing.savefig(raw, format="png", dpi=DPI)
     with Image.open(raw) as image:
         few = image.convert("RGB").quantize(SHADES, dither=Image.Dither.NONE)
-        few.save(path, optimize=True, dpi=(DPI, DPI))
+        with atomic(path) as temporary:
+            few.save(temporary, optimize=True, dpi=(DPI, DPI))

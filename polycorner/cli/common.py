@@ -19,6 +19,7 @@ from polycorner.cli.manner import (
     timed,
 )
 from polycorner.errors import nearest
+from polycorner.files.atomic import write_atomically
 
 # What is about one call, not about what is computed, has no place in a file.
 NO_SETTINGS = frozenset({"config", "help", "json", "out", "quiet", "resume", "verbose"})
@@ -256,25 +257,30 @@ def writing(path: Path, option: str = "--out") -> Iterator[None]:
 
 def write_answer(answer: dict[str, Any], out: Path, name: str) -> Path:
     """Write an answer as JSON into the folder of ``--out`` and return the file."""
-    file = out / name
-    prepare(out)
     with writing(out):
-        file.write_text(json_text(answer) + "\n", encoding="utf-8")
-    return file
+        return write_atomically(out / name, json_text(answer) + "\n")
 
 
 def deliver(
     answer: dict[str, Any] | list[Any],
     show: Callable[[], object],
-    written: Iterable[Path] = (),
+    write: Callable[[], Iterable[Path]] = tuple,
     *,
     as_json: bool,
 ) -> None:
-    """Print an answer as JSON, or as ``show`` does and with the files that were written."""
-    if as_json:
-        click.echo(json_text(answer))
-    else:
-        show()
+    """Print an answer, as JSON or as ``show`` does, then write its files and name them.
+
+    The answer is printed first, so that a full disk does not swallow it; and the files are written
+    also where nobody reads the answer, as in a broken pipe.
+    """
+    try:
+        if as_json:
+            click.echo(json_text(answer))
+        else:
+            show()
+        sys.stdout.flush()
+    finally:
+        written = list(write())
     for path in written:
         if as_json:
             tell(f"wrote {path}")

@@ -184,12 +184,14 @@ class Search:
         draw: Callable[[Path], list[Path]] | None = None,
     ) -> None:
         """Print the answer, write the files, and end the process if it was interrupted."""
-        written = []
-        if self.out is not None:
-            file = write_answer(answer, self.out, "atlas.json")
-            with writing(self.out), timed("drawing"):
-                written = [file, *(draw(self.out) if draw is not None and self.drawn else [])]
-        deliver(answer, lambda: print_answer(answer), written, as_json=as_json)
+
+        def write() -> Iterator[Path]:
+            if self.out is not None:
+                yield write_answer(answer, self.out, "atlas.json")
+                with writing(self.out), timed("drawing"):
+                    yield from draw(self.out) if draw is not None and self.drawn else []
+
+        deliver(answer, lambda: print_answer(answer), write, as_json=as_json)
         if not self.finished:
             unfinished(self.state)
         if self.interrupted:

@@ -16,6 +16,7 @@ from polycorner.cli.common import (
     prepare,
     progress_bar,
     write_answer,
+    writing,
 )
 from polycorner.cli.manner import console, remark
 
@@ -69,8 +70,11 @@ def sweep(
         _say_interrupted(out)
         raise click.exceptions.Exit(130) from None
     answer = _answer(plan, found, store)
-    written = [] if out is None else _write(plan, found, answer, out)
-    deliver(answer, lambda: _print(answer), written, as_json=as_json)
+
+    def write() -> list[Path]:
+        return [] if out is None else _write(plan, found, answer, out)
+
+    deliver(answer, lambda: _print(answer), write, as_json=as_json)
     if answer["interrupted"]:
         _say_interrupted(out)
         raise click.exceptions.Exit(130)
@@ -254,7 +258,10 @@ def _write(plan: "StudyFile", found: "xr.Dataset", answer: dict[str, Any], out: 
 
     written = [out / STORE, write_answer(answer, out, "sweep.json")]
     figure = sweeps.draw_study(plan.study, found) if answer["done"] else None
-    return written if figure is None else [*written, plots.save(figure, out / f"{plan.study}.png")]
+    if figure is not None:
+        with writing(out):
+            written.append(plots.save(figure, out / f"{plan.study}.png"))
+    return written
 
 
 def _print(answer: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.files.atomic import number, read_number
+from polycorner.files.container import number, read_number
 from polycorner.files.models import Units
 from polycorner.minimisation.certificate import Certificate
 from polycorner.polyhedra.polyhedron import Polyhedron

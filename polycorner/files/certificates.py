@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.files.atomic import Kind, load_json, read_number, save_json
 from polycorner.files.certificate_entries import (
     Entries,
     difference,
@@ -16,6 +15,7 @@ from polycorner.files.certificate_entries import (
     entries,
     other_names,
 )
+from polycorner.files.container import Kind, load_json, read_number, save_json
 from polycorner.files.models import described, rebuilt, units_of
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.problem import Problem, pose

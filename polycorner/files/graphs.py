@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from polycorner.files.atomic import put, versions
+from polycorner.files.atomic import write_atomically
+from polycorner.files.container import versions
 from polycorner.files.models import units_of
 from polycorner.skeletons.elements import Corner, Edge, Skeleton
 from polycorner.skeletons.walks import End
@@ -95,7 +96,7 @@ def save_graph(
 
     lines = nx.generate_graphml(skeleton_graph(atlas, units=units))
     text = "\n".join(['<?xml version="1.0" encoding="utf-8"?>', *lines, ""])
-    return put(path, text.encode())
+    return write_atomically(path, text)
 
 
 def _corner(corner: Corner) -> dict[str, Any]:

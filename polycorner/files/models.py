@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from polycorner.files.atomic import WORDS, number
+from polycorner.files.container import WORDS, number
 
 if TYPE_CHECKING:
     from polycorner.formulas.functions import SmoothFunction

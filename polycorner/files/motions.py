@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.files.atomic import SEALED, Kind, put, sealed, unsealed, versions
+from polycorner.files.atomic import write_atomically
+from polycorner.files.container import SEALED, Kind, sealed, unsealed, versions
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.trajectory import Touch, Trajectory
@@ -215,7 +216,8 @@ def save_dataset(kind: Kind, path: str | os.PathLike[str], content: "xr.Dataset"
     packed = {"zlib": True, "complevel": 4}
     encoding = {name: packed for name in marked.data_vars if marked[name].size > 1}
     # HDF5 may bring the process down when a disk is full; bytes that are complete cannot.
-    return put(path, sealed(bytes(marked.to_netcdf(engine="h5netcdf", encoding=encoding))))
+    written = bytes(marked.to_netcdf(engine="h5netcdf", encoding=encoding))
+    return write_atomically(path, sealed(written))
 
 
 def load_dataset(

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.files.atomic import number, read_number
+from polycorner.files.container import number, read_number
 from polycorner.polyhedra.strata import distances
 from polycorner.skeletons.explorer import Curve, Explorer
 from polycorner.skeletons.registry import Place

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.files.atomic import Kind, load_json, number, read_number, save_json
+from polycorner.files.container import Kind, load_json, number, read_number, save_json
 from polycorner.files.models import units_of
 from polycorner.files.skeleton_checks import corner_entry, fault, symmetry_entry
 from polycorner.polyhedra.polyhedron import Polyhedron

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.files.atomic import Kind
+from polycorner.files.container import Kind
 from polycorner.files.models import check_stated, coordinate_units
 from polycorner.files.motion_checks import motion_fault
 from polycorner.files.motions import (

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.errors import SolverError
+from polycorner.files.atomic import atomic
 from polycorner.pictures.grids import (
     AXES,
     Bounds,
@@ -201,8 +202,8 @@ def write_mesh(
             scene.add_geometry(drawn, geom_name=f"{name} {number + 1}")
     if len(marks):
         scene.add_geometry(made.PointCloud(marks * factors), geom_name="points")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    (scene if suffix == ".glb" else solid).export(path)
+    with atomic(path) as temporary:
+        (scene if suffix == ".glb" else solid).export(temporary)
     return path
 
 

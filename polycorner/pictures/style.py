@@ -5,6 +5,8 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from polycorner.files.atomic import atomic
+
 # Colours that stay apart for colour-blind readers (Okabe and Ito).
 BODIES = ("#0072B2", "#D55E00")
 SHADES = ("#56B4E9", "#0072B2", "#CC79A7", "#D55E00", "#E69F00", "#009E73")
@@ -13,6 +15,6 @@ SHADES = ("#56B4E9", "#0072B2", "#CC79A7", "#D55E00", "#E69F00", "#009E73")
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG and return its path."""
     FigureCanvasAgg(figure)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=150)
+    with atomic(path) as temporary:
+        figure.savefig(temporary, dpi=150)
     return path

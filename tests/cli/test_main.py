@@ -280,14 +280,21 @@ def test_an_unexpected_error_is_one_sentence_and_verbose_shows_where(capsys, mon
 
 
 @pytest.mark.parametrize("name", ["atlas tutorial", "minima pinball", "dyad"])
-def test_a_full_disk_is_one_sentence(capsys, monkeypatch, tmp_path, name):
+def test_a_full_disk_costs_neither_the_answer_nor_the_old_file(capsys, monkeypatch, tmp_path, name):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(Path, "write_text", full)
-    err = one_line(*run(capsys, name, *QUICK[name], "--out", str(tmp_path)))
+    words = (name, *QUICK[name], "--json")
+    _, answer, _ = run(capsys, *words)
+    old = tmp_path / f"{name.split()[0]}.json"
+    old.write_text("what was computed before")
+    monkeypatch.setattr("os.fsync", full)
+    code, out, err = run(capsys, *words, "--out", str(tmp_path))
+    assert (code, out, err.count("\n")) == (2, answer, 1)
     assert err.startswith("polycorner: --out: ")
     assert os.strerror(errno.ENOSPC) in err
+    assert old.read_text() == "what was computed before"
+    assert list(tmp_path.iterdir()) == [old]
 
 
 def process(*words, **streams):

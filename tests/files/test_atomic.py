@@ -1,148 +1,16 @@
-"""Files that appear whole or not at all, and that tell when they were changed."""
+"""Atomic writing: whole or untouched on a full disk, in a read-only folder, after a kill."""
 
 import errno
-import hashlib
-import json
 import os
+import re
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from polycorner import __version__
-from polycorner.files.atomic import (
-    Kind,
-    load_json,
-    number,
-    put,
-    read_number,
-    save_json,
-    sealed,
-    unsealed,
-)
-
-KIND = Kind("a thing", "save_thing", "polycorner thing", schema=3, unsealed=1)
-CONTENT = {"name": "x", "values": [1.5, -0.0, 1e-300], "nested": {"deep": None}}
-
-
-def test_what_is_saved_is_loaded(tmp_path):
-    path = save_json(KIND, tmp_path / "new" / "folder" / "thing.json", CONTENT)
-    read = load_json(KIND, path)
-    assert {name: read[name] for name in CONTENT} == CONTENT
-    assert read["polycorner thing"] == 3
-    assert read["written by"]["polycorner"] == __version__
-    assert [entry.name for entry in path.parent.iterdir()] == ["thing.json"]
-
-
-def test_the_layout_may_change_and_nothing_else(tmp_path):
-    path = save_json(KIND, tmp_path / "thing.json", CONTENT, indent=2)
-    read = json.loads(path.read_text())
-    path.write_text(json.dumps(dict(reversed(read.items()))))
-    assert load_json(KIND, path) == read
-    path.write_text(json.dumps(read | {"name": "y"}))
-    with pytest.raises(
-        ValueError, match=r"thing\.json was changed after it was written \(digest\)"
-    ):
-        load_json(KIND, path)
-
-
-@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, '{"a": 1', "[]", "3", '{"other": 1}'])
-def test_what_is_something_else_is_refused(tmp_path, text):
-    path = tmp_path / "thing.json"
-    path.write_text(text)
-    with pytest.raises(ValueError, match=r"^path: expected a thing that save_thing wrote; .* is "):
-        load_json(KIND, path)
-
-
-@pytest.mark.parametrize("schema", [0, -1, True, None, "3", 2.0])
-def test_a_version_is_a_positive_whole_number(tmp_path, schema):
-    path = save_json(KIND, tmp_path / "thing.json", CONTENT | {KIND.key: schema})
-    with pytest.raises(ValueError, match="is something else"):
-        load_json(KIND, path)
-
-
-def test_a_newer_file_is_refused_with_both_versions(tmp_path):
-    later = Kind(KIND.words, KIND.writer, KIND.key, schema=4)
-    path = save_json(later, tmp_path / "thing.json", CONTENT)
-    expected = f"has version 4 of polycorner {__version__}, and polycorner {__version__} reads up"
-    with pytest.raises(ValueError, match=f"{expected} to version 3"):
-        load_json(KIND, path)
-
-
-def test_a_digest_may_be_missing_in_old_files_only(tmp_path):
-    path = tmp_path / "thing.json"
-    path.write_text(json.dumps({KIND.key: 1, "name": "x"}))
-    assert load_json(KIND, path)["name"] == "x"
-    for entries in ({KIND.key: 2}, {KIND.key: 1, "sha256": "0" * 64}):
-        path.write_text(json.dumps(entries))
-        with pytest.raises(ValueError, match="digest"):
-            load_json(KIND, path)
-
-
-@pytest.mark.parametrize("written", ["NaN", "Infinity", "1e999"])
-def test_numbers_that_json_does_not_have_are_refused(tmp_path, written):
-    path = save_json(KIND, tmp_path / "thing.json", CONTENT)
-    path.write_text(path.read_text().replace("1.5", written))
-    with pytest.raises(ValueError, match="digest"):
-        load_json(KIND, path)
-
-
-@given(st.floats())
-def test_every_number_survives(x):
-    again = read_number(json.loads(json.dumps(number(x), allow_nan=False)))
-    assert repr(again) == repr(x)  # nan and the sign of zero as well
-
-
-@pytest.mark.parametrize("written", ["word", True, None, [1.0]])
-def test_what_is_no_number_is_none(written):
-    with pytest.raises((KeyError, TypeError)):
-        read_number(written)
-
-
-# -------------------------------------------------------------------------------------------- bytes
-
-
-@given(st.binary(max_size=200))
-def test_a_seal_is_the_digest_of_what_is_before_it(tmp_path_factory, content):
-    path = tmp_path_factory.mktemp("sealed") / "thing"
-    path.write_bytes(sealed(content))
-    assert path.read_bytes().endswith(hashlib.sha256(content).hexdigest().encode() + b"\n")
-    assert unsealed(KIND, path) == (content, True)
-
-
-MARKED = b"polycorner_sealed and more"
-
-
-@given(st.integers(0, len(sealed(MARKED)) - 1), st.integers(1, 255))
-def test_a_byte_that_was_changed_is_noticed(tmp_path_factory, position, change):
-    path = tmp_path_factory.mktemp("sealed") / "thing"
-    whole = bytearray(sealed(MARKED))
-    whole[position] ^= change
-    path.write_bytes(bytes(whole))
-    with pytest.raises(ValueError, match="was changed after it was written"):
-        unsealed(KIND, path)
-
-
-@pytest.mark.parametrize("length", range(len(b"polycorner_sealed"), len(sealed(MARKED)) + 2))
-def test_a_file_that_was_cut_or_grew_is_noticed(tmp_path, length):
-    path = tmp_path / "thing"
-    whole = sealed(MARKED)
-    path.write_bytes((whole + b"..")[:length])
-    if length == len(whole):
-        assert unsealed(KIND, path) == (MARKED, True)
-    else:
-        with pytest.raises(ValueError, match="was changed after it was written"):
-            unsealed(KIND, path)
-
-
-def test_bytes_that_never_had_a_seal_have_none(tmp_path):
-    path = tmp_path / "thing"
-    path.write_bytes(b"something")
-    assert unsealed(KIND, path) == (b"something", False)
-
-
-# ----------------------------------------------------------------------------------------- the disk
+from polycorner.files.atomic import PART, atomic, write_atomically
 
 
 def full(*_, **__):
@@ -155,6 +23,19 @@ def half(path, content):
     full()
 
 
+def test_a_file_replaces_another_and_leaves_nothing_else(tmp_path):
+    path = write_atomically(tmp_path / "new" / "thing.txt", "first")
+    assert write_atomically(path, b"second") == path
+    assert path.read_bytes() == b"second"
+    with atomic(path) as temporary:
+        assert temporary.suffix == ".txt"
+        assert temporary.parent == path.parent
+        temporary.write_text("third")
+        assert path.read_bytes() == b"second"
+    assert path.read_text() == "third"
+    assert [entry.name for entry in path.parent.iterdir()] == ["thing.txt"]
+
+
 @pytest.mark.parametrize(
     ("name", "instead"),
     [
@@ -164,30 +45,115 @@ def half(path, content):
         ("pathlib.Path.mkdir", full),
     ],
 )
-def test_a_full_disk_is_one_sentence_and_leaves_what_was_there(
-    tmp_path, monkeypatch, name, instead
-):
-    path = put(tmp_path / "thing", b"before")
+def test_a_full_disk_leaves_the_old_file(tmp_path, monkeypatch, name, instead):
+    path = write_atomically(tmp_path / "thing", b"before")
     with monkeypatch.context() as patch:
         patch.setattr(name, instead)
         with pytest.raises(
             OSError, match=r"No space left on device: nothing was written to .*thing$"
         ) as told:
-            put(path, b"something much longer")
+            write_atomically(path, b"something much longer")
     assert told.value.errno == errno.ENOSPC
     assert path.read_bytes() == b"before"
     assert [entry.name for entry in tmp_path.iterdir()] == ["thing"]
 
 
+@pytest.mark.parametrize("error", [RuntimeError("drawing"), KeyboardInterrupt()])
+def test_an_exception_while_writing_passes_and_leaves_the_old_file(tmp_path, error):
+    path = write_atomically(tmp_path / "thing", b"before")
+
+    def write():
+        with atomic(path) as temporary:
+            temporary.write_bytes(b"half")
+            raise error
+
+    with pytest.raises(type(error)):
+        write()
+    assert path.read_bytes() == b"before"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["thing"]
+
+
+def test_an_error_without_a_number_keeps_its_words(tmp_path):
+    message = "the encoder failed"
+    with (
+        pytest.raises(OSError, match=r"^the encoder failed: nothing was written to .*film$"),
+        atomic(tmp_path / "film"),
+    ):
+        raise OSError(message)
+
+
 def test_a_folder_that_is_a_file_is_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="nothing was written to"):
-        put(tmp_path / "file" / "thing", b"")
+        write_atomically(tmp_path / "file" / "thing", b"")
 
 
-def test_what_is_written_may_be_read_by_others(tmp_path):
-    """It has the permissions of any new file, not those of a temporary one."""
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder_is_one_sentence(tmp_path):
+    path = write_atomically(tmp_path / "thing", b"before")
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(PermissionError, match="nothing was written to"):
+            write_atomically(path, b"after")
+    finally:
+        tmp_path.chmod(0o700)
+    assert path.read_bytes() == b"before"
+
+
+KILLED = """
+import os, signal, sys
+from polycorner.files.atomic import atomic
+with atomic(sys.argv[1]) as temporary:
+    temporary.write_bytes(b"half of it")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no SIGKILL here")
+def test_a_killed_process_leaves_the_old_file(tmp_path):
+    path = write_atomically(tmp_path / "thing.nc", b"before")
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert path.read_bytes() == b"before"
+    assert all(PART in entry.name for entry in tmp_path.iterdir() if entry != path)
+
+
+def test_a_symbolic_link_keeps_pointing_to_its_file(tmp_path):
+    write_atomically(tmp_path / "real", b"before")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    write_atomically(tmp_path / "link", b"after")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_bytes() == b"after"
+
+
+def test_permissions_are_those_of_any_new_file(tmp_path):
     usual = tmp_path / "usual"
     usual.touch()
-    path = put(tmp_path / "thing", b"")
+    path = write_atomically(tmp_path / "thing", b"")
     assert Path(path).stat().st_mode == usual.stat().st_mode
+
+
+def test_a_required_suffix_is_checked(tmp_path):
+    with pytest.raises(ValueError, match=r"^path: expected a name ending in \.html; got 'a\.txt'"):
+        write_atomically(tmp_path / "a.txt", "", suffix=".html")
+
+
+WRITES = re.compile(
+    r"\.write_text\(|\.write_bytes\(|\.to_netcdf\([^)]*path|open\([^)]*[\"'][wax]b?[\"']"
+    r"|\.(?:savefig|export|save)\((?:path|file_name|folder|out|target)\b|\.replace\((?:path|target)\)"
+)
+OTHERS = ("files/atomic.py", "formulas/cache.py", "formulas/kernels.py")  # the latter are caches
+
+
+@pytest.mark.parametrize("package", ["polycorner", "paper_checks"])
+def test_every_file_is_written_atomically(package):
+    """Nothing in the packages opens a file for writing, or saves under the final name."""
+    root = Path(__file__).parents[2]
+    found = [
+        f"{path.relative_to(root)}: {line.strip()}"
+        for path in sorted((root / package).rglob("*.py"))
+        if not path.as_posix().endswith(OTHERS)
+        for line in path.read_text().splitlines()
+        if WRITES.search(line)
+    ]
+    assert found == []

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from polycorner.files import atomic as sealed
+from polycorner.files import container as sealed
 
 
 def same_certificate(one, other):

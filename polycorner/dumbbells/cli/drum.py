@@ -247,10 +247,14 @@ def _finish(
     *, as_json: bool,
 ) -> None:  # fmt: skip
     """Print the answer, write the files, and end the process if the run was stopped."""
-    written = _write(run, answer, out) if out is not None else []
-    if film is not None:
-        written.append(_write_film(run, film))
-    deliver(answer, lambda: print_drum(answer), written, as_json=as_json)
+
+    def write() -> Iterator[Path]:
+        if out is not None:
+            yield from _write(run, answer, out)
+        if film is not None:
+            yield _write_film(run, film)
+
+    deliver(answer, lambda: print_drum(answer), write, as_json=as_json)
     if not run.finished:
         unfinished(folder)
         raise click.exceptions.Exit(130)

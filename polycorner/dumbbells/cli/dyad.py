@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from polycorner.dumbbells import DumbbellPair, DyadMinimum
 
+DRAWING = "drawing"
 WORDS = "finding and certifying (the first run on a machine compiles for about 20 seconds)"
 EPILOG = """\b
 Examples:
@@ -35,8 +36,14 @@ def dyad(as_json: bool, out: Path | None, **options: float | None) -> None:
 
         entries = dyad_minima(pair)
         answer = _answer(pair, entries)
-        written = _write(pair, entries, answer, out) if out is not None else []
-    deliver(answer, lambda: _print_tables(pair, entries, answer), written, as_json=as_json)
+
+    def write() -> list[Path]:
+        if out is None:
+            return []
+        with patience(DRAWING):
+            return _write(pair, entries, answer, out)
+
+    deliver(answer, lambda: _print_tables(pair, entries, answer), write, as_json=as_json)
 
 
 def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[str, Any]:

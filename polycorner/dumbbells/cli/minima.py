@@ -118,8 +118,11 @@ def _report(
         "completeness": found.completeness,
         "interrupted": found.interrupted,
     }
-    written = [write_answer(answer, out, "minima.json")] if out is not None else []
-    deliver(answer, lambda: _print(answer), written, as_json=as_json)
+
+    def write() -> list[Path]:
+        return [] if out is None else [write_answer(answer, out, "minima.json")]
+
+    deliver(answer, lambda: _print(answer), write, as_json=as_json)
     if found.interrupted:
         raise click.exceptions.Exit(130)
 

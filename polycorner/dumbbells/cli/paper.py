@@ -18,6 +18,7 @@ from polycorner.cli.common import (
     writing,
 )
 from polycorner.cli.manner import manner, timed
+from polycorner.files.atomic import write_atomically
 
 if TYPE_CHECKING:
     from paper_checks.running import Run
@@ -65,9 +66,17 @@ def paper(
     from paper_checks import table
     from paper_checks.records import records
 
-    written, undrawn = _write(run, out, slow=slow) if out is not None else ([], [])
+    undrawn: list[str] = []
+
+    def write() -> list[Path]:
+        if out is None:
+            return []
+        written, found = _write(run, out, slow=slow)
+        undrawn.extend(found)
+        return written
+
     shown = records(run)
-    deliver(shown, lambda: table.print_run(run, quiet=manner().quiet), written, as_json=as_json)
+    deliver(shown, lambda: table.print_run(run, quiet=manner().quiet), write, as_json=as_json)
     problems = [*table.problems(run), *undrawn]
     for problem in problems:
         click.echo(f"polycorner: {problem}", err=True)
@@ -110,7 +119,7 @@ def _write(run: "Run", out: Path, *, slow: bool) -> tuple[list[Path], list[str]]
     }
     with writing(out):
         for name, text in texts.items():
-            (out / name).write_text(text, encoding="utf-8")
+            write_atomically(out / name, text)
     problems = [f"figure {f.name}: {f.problem}" for f in figures.values() if f.problem]
     return [out / name for name in texts], problems
 
@@ -139,4 +148,4 @@ def _draw(
                 change(completed=len(drawn))
 
         written = write(out, names or None, slow=slow, progress=progress)
-    deliver([str(path) for path in written], lambda: None, written, as_json=as_json)
+    deliver([str(path) for path in written], lambda: None, lambda: written, as_json=as_json)

@@ -71,8 +71,11 @@ def prove(
             "box": {name: list(sides) for name, sides in region.items()},
             **_answer(proof),
         }
-    written = _write(proof, answer, out) if out is not None else []
-    deliver(answer, lambda: _print(answer, proof), written, as_json=as_json)
+
+    def write() -> list[Path]:
+        return [] if out is None else _write(proof, answer, out)
+
+    deliver(answer, lambda: _print(answer, proof), write, as_json=as_json)
 
 
 def _print(answer: dict[str, Any], proof: "Proof") -> None:

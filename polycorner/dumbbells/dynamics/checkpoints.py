@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.files.atomic import write_whole
+from polycorner.files.atomic import PART, atomic
 from polycorner.files.motions import event_table, read_events, read_touches, touch_table
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.recorder import Recorder
@@ -31,11 +31,8 @@ def contact_names(engine: Engine) -> tuple[str, ...]:
 
 
 def _write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    def write(part: Path) -> None:
-        with part.open("wb") as file:  # np.savez would add a suffix to a name
-            np.savez(file, **arrays)
-
-    write_whole(path, write)
+    with atomic(path) as temporary:
+        np.savez(temporary, **arrays)
 
 
 def _read_arrays(path: Path) -> dict[str, Any]:
@@ -76,7 +73,7 @@ class Checkpoint:
         self.chunks = self._frames = self._events = 0
 
     def _parts(self) -> Iterable[Path]:
-        return self.folder.glob("*.part.npz")
+        return self.folder.glob(f".*{PART}.npz")
 
     def _chunk(self, number: int) -> Path:
         return self.folder / f"chunk-{number:06d}.npz"

@@ -10,7 +10,7 @@ import numpy as np
 
 from polycorner.dumbbells.drum import COORDINATES, DumbbellDrum
 from polycorner.dumbbells.dynamics.runs import DrumRun
-from polycorner.files.atomic import Kind
+from polycorner.files.container import Kind
 from polycorner.files.motion_checks import motion_fault
 from polycorner.files.motions import (
     MotionUnits,

@@ -29,7 +29,7 @@ from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, LIT
 from polycorner.dumbbells.pictures.solid import KINDS as WORDS
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.files.atomic import put
+from polycorner.files.atomic import write_atomically
 from polycorner.pictures.style import BODIES
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, finite, reals
@@ -177,7 +177,7 @@ def write_scene(scene: "trimesh.Scene", path: Path) -> Path:
     OSError
         If it cannot be written.
     """
-    return put(path, glb(scene), suffix=".glb")
+    return write_atomically(path, glb(scene), suffix=".glb")
 
 
 # ------------------------------------------------------------------------------------- materials

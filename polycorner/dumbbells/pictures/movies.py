@@ -16,6 +16,7 @@ from PIL import Image
 
 from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.dumbbells.pictures.drum import DrumView
+from polycorner.files.atomic import atomic
 
 Picture = NDArray[np.uint8]
 FRAMES = 300  # at most
@@ -90,10 +91,9 @@ def write_movie(
     """
     check_movie(path)
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
     numbers = chosen_frames(len(run.trajectory), frames)
     suffix = target.suffix.lower()
-    part = target.with_name(f"{target.stem}-{os.getpid()}.part{suffix}")
+    write = _write_mp4 if suffix == ".mp4" else _write_gif
 
     def pictures() -> Iterator[Picture]:
         for done, picture in enumerate(_pictures(DrumView(run), numbers), 1):
@@ -101,12 +101,8 @@ def write_movie(
             if progress is not None:
                 progress(done, len(numbers))
 
-    try:
-        (_write_mp4 if suffix == ".mp4" else _write_gif)(pictures(), part, rate)
-        part.replace(target)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with atomic(target) as temporary:
+        write(pictures(), temporary, rate)
     return target
 
 

@@ -15,6 +15,7 @@ from polycorner.dumbbells.pictures.placements import (
     relative_gaps,
 )
 from polycorner.dumbbells.statics.skeleton import PairAtlas
+from polycorner.files.atomic import write_atomically
 from polycorner.pictures.meshes import write_mesh
 from polycorner.pictures.sharp import SharpSurface
 from polycorner.pictures.sharp_strata import Chart
@@ -218,6 +219,5 @@ def write_solid(atlas: PairAtlas, folder: Path, *, resolution: int = 96) -> list
         scale=(1.0, 1.0, atlas.pair.length / 2),
         facts=facts,
     )
-    numbers = folder / "solid.json"
-    numbers.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
+    numbers = write_atomically(folder / "solid.json", json.dumps(facts, indent=2) + "\n")
     return [save(figure, folder / "solid.png"), mesh, numbers]

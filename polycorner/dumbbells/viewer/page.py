@@ -30,7 +30,7 @@ from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, WORDS
 from polycorner.dumbbells.pictures.solid import KINDS as KIND_WORDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.errors import PolycornerError
-from polycorner.files.atomic import put
+from polycorner.files.atomic import write_atomically
 
 END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # what follows is trimesh's own page
 KEYS = " Space plays, ← and → step, Home and End go to the ends."
@@ -77,7 +77,7 @@ def write_page(page: str, path: Path) -> Path:
     OSError
         If it cannot be written.
     """
-    return put(path, page.encode(), suffix=".html")
+    return write_atomically(path, page, suffix=".html")
 
 
 # ----------------------------------------------------------------------------------- the scripts

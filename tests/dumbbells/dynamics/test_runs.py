@@ -24,7 +24,7 @@ from polycorner.dumbbells.dynamics.pairs import Sizes
 from polycorner.dumbbells.dynamics.runs import Saving, run
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.files import atomic as sealed
+from polycorner.files import atomic as writing
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise
 
@@ -393,7 +393,7 @@ class Killed(BaseException):
 @pytest.mark.parametrize("moment", range(1, 30, 3))
 def test_a_run_killed_while_a_file_is_written_goes_on(whole, tmp_path, monkeypatch, moment):
     """Every saving synchronises two files and their folder twice; the run dies at one of these."""
-    usual, seen = sealed._synchronise, itertools.count(1)
+    usual, seen = writing._synchronise, itertools.count(1)
 
     def dying(path):
         if next(seen) == moment:
@@ -402,7 +402,7 @@ def test_a_run_killed_while_a_file_is_written_goes_on(whole, tmp_path, monkeypat
 
     saving = Saving(tmp_path / "state", 60)
     with monkeypatch.context() as patch:
-        patch.setattr(sealed, "_synchronise", dying)
+        patch.setattr(writing, "_synchronise", dying)
         patch.setattr("pathlib.Path.unlink", lambda *_, **__: None)  # nor does it tidy up
         with pytest.raises(Killed):
             followed(saving=saving)
