@@ -3,36 +3,27 @@
 from itertools import chain
 
 from paper_checks import (
-    conclusion,
-    dyads,
-    dyads_moving,
-    energetics,
-    friction,
-    geometry,
-    minimisation,
-    observed,
-    polyhedra,
-    strata,
+    appendixA,
+    appendixB,
+    appendixC,
+    section2,
+    section3,
+    section4,
+    section5,
+    section6,
+    section7,
+    section8,
 )
-from paper_checks.claims import Claim, Finding, Means, Verdict
-from paper_checks.records import SECTIONS
+from paper_checks.framework.claims import Claim, Finding, Means, Verdict
+from paper_checks.framework.records import SECTIONS
 
 ORDER = tuple(SECTIONS)  # the paper's sections, then its appendices
+PARTS = (section2, section3, section4, section5, section6, section7, section8)
+APPENDICES = (appendixA, appendixB, appendixC)
 
 CLAIMS: tuple[Claim, ...] = tuple(
     sorted(
-        chain(
-            geometry.CLAIMS,
-            observed.CLAIMS,
-            strata.CLAIMS,
-            energetics.CLAIMS,
-            dyads.CLAIMS,
-            dyads_moving.CLAIMS,
-            conclusion.CLAIMS,
-            friction.CLAIMS,
-            polyhedra.CLAIMS,
-            minimisation.CLAIMS,
-        ),
+        chain.from_iterable(part.CLAIMS for part in (*PARTS, *APPENDICES)),
         key=lambda claim: ORDER.index(claim.section),
     )
 )

@@ -4,7 +4,7 @@ import re
 from html import escape
 from typing import Any
 
-from paper_checks.typesetting import mathml
+from paper_checks.framework.typesetting import mathml
 
 BOXED = re.compile(r"\\boxed\{(.*)\}", re.DOTALL)
 APART = re.compile(r"\\qquad")

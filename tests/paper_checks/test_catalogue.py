@@ -10,8 +10,8 @@ import pytest
 import paper_checks
 from paper_checks import CLAIMS, Claim, Verdict
 from paper_checks.figures import FIGURES
-from paper_checks.records import SECTIONS
-from paper_checks.typesetting import html, plain, sentence
+from paper_checks.framework.records import SECTIONS
+from paper_checks.framework.typesetting import html, plain, sentence
 
 TABLE = Path(paper_checks.__file__).parents[1] / "docs" / "paper_table.md"
 ROW = re.compile(r"^\| ([A-Z]\d+[a-z]?) \| (.*) \| ([a-z]+) \| ([a-z ]+) \|$", re.MULTILINE)

@@ -4,7 +4,7 @@ import os
 import time
 from functools import partial
 
-from paper_checks.claims import Claim, Finding, Means, Verdict
+from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 
 
 def found(verdict=Verdict.HOLDS, correction=""):

@@ -21,7 +21,7 @@ from polycorner.cli.manner import manner, timed
 from polycorner.files.atomic import write_atomically
 
 if TYPE_CHECKING:
-    from paper_checks.running import Run
+    from paper_checks.framework.running import Run
 
 EPILOG = """\b
 Examples:
@@ -63,8 +63,8 @@ def paper(
         _draw(words[1:], out, sections, slow=slow, as_json=as_json)
         return
     run = _checked(words, sections, slow=slow, workers=workers)
-    from paper_checks import table
-    from paper_checks.records import records
+    from paper_checks.framework import table
+    from paper_checks.framework.records import records
 
     undrawn: list[str] = []
 
@@ -88,7 +88,7 @@ def _checked(ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers
     from dataclasses import replace
 
     from paper_checks import CLAIMS
-    from paper_checks.running import run, select
+    from paper_checks.framework.running import run, select
 
     try:
         claims, left_out = select(CLAIMS, sections, ids, slow=slow)
@@ -106,9 +106,9 @@ def _checked(ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers
 
 def _write(run: "Run", out: Path, *, slow: bool) -> tuple[list[Path], list[str]]:
     """Write the report and return its files, and why figures of it could not be drawn."""
-    from paper_checks.embedding import embedded_figures
-    from paper_checks.records import markdown, records
-    from paper_checks.report import html_report
+    from paper_checks.figures.embedding import embedded_figures
+    from paper_checks.framework.records import markdown, records
+    from paper_checks.framework.report import html_report
 
     with patience("drawing the figures"):
         figures = embedded_figures(run, slow=slow)

@@ -10,9 +10,9 @@ import pytest
 import small_catalogue
 
 import paper_checks
-from paper_checks import running
 from paper_checks.figures import FIGURES
-from paper_checks.running import Result, Run
+from paper_checks.framework import running
+from paper_checks.framework.running import Result, Run
 
 ROOT = Path(paper_checks.__file__).parents[1]
 A, B, C = small_catalogue.CLAIMS[:3]

@@ -1,0 +1,1 @@
+"""Claims, running them, and reports on them."""

@@ -1,0 +1,95 @@
+"""What became of the claims, as JSON has it and as a table in Markdown."""
+
+from collections import Counter
+from typing import Any
+
+from paper_checks.framework.claims import Means, Verdict
+from paper_checks.framework.running import Result, Run
+from paper_checks.framework.typesetting import sentence
+
+VERDICTS = (*(verdict.value for verdict in Verdict), "error")
+# What there is to do for an author.
+TO_DO = ("To correct", "Not found in simulations", "Conditions to state")
+# What the sections of the paper are about; A, B and C are its appendices.
+SECTIONS = {
+    "2": "The experiment and its coordinates",
+    "3": "What was observed",
+    "4": "Why a single dumbbell moves as it does",
+    "5": "The configuration space of a pair",
+    "6": "Where the energy rests",
+    "7": "How a dyad moves",
+    "8": "Conclusion",
+    "A": "Friction of a single dumbbell",
+    "B": "Curvilinear polyhedra",
+    "C": "Minimising an energy on a polyhedron",
+}
+
+
+def section_name(section: str) -> str:
+    """Return the number of a section, as in a heading, and what it is about."""
+    kind = "Appendix" if section.isalpha() else "Section"
+    return f"{kind} {section}: {SECTIONS[section]}"
+
+
+def counts(run: Run) -> dict[str, int]:
+    """Return how many claims came to each verdict, in the order of the verdicts."""
+    counted = Counter(result.verdict for result in run.results)
+    return {verdict: counted[verdict] for verdict in VERDICTS if counted[verdict]}
+
+
+def to_act_on(run: Run) -> dict[str, tuple[Result, ...]]:
+    """Return what an author would act on, by what there is to do, in the order of the paper."""
+    groups: dict[str, list[Result]] = {title: [] for title in TO_DO}
+    for result in run.results:
+        if (title := _to_do(result)) is not None:
+            groups[title].append(result)
+    return {title: tuple(group) for title, group in groups.items() if group}
+
+
+def _to_do(result: Result) -> str | None:
+    correct, simulate, state = TO_DO
+    verdict = None if result.finding is None else result.finding.verdict
+    if verdict is Verdict.HOLDS_UNDER:
+        return state
+    if verdict in (Verdict.REFUTED, Verdict.CORRECTED):
+        return simulate if result.claim.means is Means.SIMULATION else correct
+    return None
+
+
+def records(run: Run) -> list[dict[str, Any]]:
+    """Return one object for each claim that was checked."""
+    return [_record(result) for result in run.results]
+
+
+def _record(result: Result) -> dict[str, Any]:
+    claim, finding = result.claim, result.finding
+    return {
+        "id": claim.id,
+        "section": claim.section,
+        "claim": claim.statement,
+        "means": claim.means.value,
+        "verdict": result.verdict,
+        "evidence": result.error if finding is None else finding.evidence,
+        "correction": "" if finding is None else finding.correction,
+        "place": claim.place,
+        "numbers": {} if finding is None else dict(finding.numbers),
+        "figure": claim.figure,
+        "seconds": round(result.seconds, 3),
+    }
+
+
+def markdown(run: Run) -> str:
+    """Return a table of the claims, section by section, for the documentation."""
+    lines: list[str] = []
+    section = ""
+    for result in run.results:
+        claim = result.claim
+        if claim.section != section:
+            section = claim.section
+            lines += ["", f"## {section_name(section)}", "", *_HEAD]
+        statement = sentence(claim.statement).replace("|", r"\vert ")
+        lines.append(f"| {claim.id} | {statement} | {claim.means.value} | {result.verdict} |")
+    return "\n".join(lines[1:]) + "\n"
+
+
+_HEAD = ("| | claim | means | verdict |", "|---|---|---|---|")

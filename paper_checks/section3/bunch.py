@@ -1,0 +1,304 @@
+"""Section 3.2: a bunch of dumbbells at the bottom of the turning drum, as observed.
+
+The model is that of :mod:`paper_checks.section3.singles`; the coefficient of friction between
+dumbbells that touch is 0.3.  Bunches are computed without noise, which would take several times
+as long.
+"""
+
+import math
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from paper_checks.appendixA.forces import judged
+from paper_checks.appendixA.torque import DRUM
+from paper_checks.framework.claims import Claim, Finding, Means, Verdict
+from paper_checks.section7.driven import one_dyad
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import (
+    BunchRun,
+    drum_for_bunch,
+    exit_statistics,
+    follow_bunch,
+)
+from polycorner.dumbbells.dynamics.dyads import handedness
+from polycorner.dumbbells.dynamics.pairs import is_dyad
+from polycorner.dumbbells.pair import Chirality
+from polycorner.motion.events import EventKind
+from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import run
+from polycorner.spaces.manifold import Array
+
+PICTURE = (8.0, 2.0, 0.5)  # l, r, t of the paper's picture of a bunch
+LARGER = (16.0, 3.0, 1.5)  # of its dyads
+OBSERVED_TIME = 1200.0  # s, twenty minutes
+LEAVING = (60, 40)  # dumbbells of the bunch, and how many leave
+TOP = 300.0  # mm; the paper does not give the length of its drum
+STARTS, STEP = 2, 4e-3  # number of starts, and s, of the check of those that leave
+APART = 1e4  # mm along the drum, between encounters
+
+
+@cache
+def bunch(
+    sizes: tuple[float, float, float],
+    duration: float,
+    seed: int = 0,
+    top: float = TOP,
+    dt: float = 2e-3,
+) -> BunchRun:
+    """Follow a bunch without noise; ``sizes`` are ``l, r, t``."""
+    length, r, t = sizes
+    drum = replace(DRUM, length=length, ball_radius=r, rod_radius=t)
+    drum = drum_for_bunch(drum, count=LEAVING[0], top=top)
+    return follow_bunch(drum, duration, seed=seed, dt=dt)
+
+
+def partitions(
+    sizes: tuple[float, float, float] = LARGER, starts: int = 3, apart: bool = True
+) -> Finding:
+    """Check that, from 15 to 30 s, rollers are at smaller positive azimuths than sliders.
+
+    A roller has turned by more than 30 degrees about its axis in 10 s; azimuths count as smaller
+    if they are so by a degree or more in each start.  ``apart = False``: that they are not.
+    """
+    listed, found, lost = [], [], 0.0
+    numbers: dict[str, float] = {}
+    for seed in range(starts):
+        followed = bunch(sizes, 30.0, seed)
+        late = np.flatnonzero(followed.times >= 15.0)
+        azimuths = np.degrees([followed.azimuths(int(i)) for i in late])
+        count = float(np.mean([followed.rollers(int(i)).sum() for i in late]))
+        rolls, slides = np.nanmean(azimuths[~np.isnan(azimuths[:, 0])], axis=0)
+        found.append(0 < rolls < slides - 1.0)
+        listed.append(f"{count:.1f} roll at {rolls:.1f}° and the others slide at {slides:.1f}°")
+        numbers |= {f"rolling_{seed}": float(rolls), f"sliding_{seed}": float(slides)}
+        lost = max(lost, followed.unconverged / followed.islands)
+    return Finding(
+        Verdict.HOLDS_UNDER if all(found) == apart else Verdict.REFUTED,
+        f"{LEAVING[0]} dumbbells of {sizes[0]:g} mm, no noise, means from 15 to 30 s in {starts} "
+        f"start(s): {'; '.join(listed)}; {100 * lost:.0f} % of the groups in contact were not "
+        "solved to the tolerance",
+        numbers,
+        "in half a minute without noise; most dumbbells are still carried up and slump together",
+    )
+
+
+def both_hands_form(least: int = 2, duration: float = 30.0) -> Finding:
+    """Check that right- and left-handed dyads form that were not there at the start."""
+    followed = bunch(LARGER, duration)
+    first = {pair[:2] for pair in followed.dyads(0)}
+    new = [pair for pair in followed.dyads(-1) if pair[:2] not in first]
+    hands = {name: sum(1 for *_, h in new if h == sign) for name, sign in (("R", 1), ("L", -1))}
+    return Finding(
+        Verdict.HOLDS_UNDER if min(hands.values()) >= least else Verdict.REFUTED,
+        f"after {duration:g} s a bunch of {LEAVING[0]} has {hands['R']} right-handed and "
+        f"{hands['L']} left-handed nested pairs that it had not at the start",
+        {"right": float(hands["R"]), "left": float(hands["L"])},
+        f"{LEAVING[0]} dumbbells of {LARGER[0]:g} mm, one start, no noise",
+    )
+
+
+@cache
+def encounters(count: int, duration: float, chatter: float) -> tuple[DumbbellDrum, Array]:
+    """Follow climbing dumbbells with another of heading about 0 above each, ``(T, n, 2, 4)``."""
+    rng = np.random.default_rng(7)
+    lower = np.stack(
+        [rng.uniform(-6, 6, count), np.zeros(count), rng.uniform(6, 16, count)], axis=-1
+    )
+    upper = np.stack(
+        [np.zeros(count), rng.uniform(22.1, 26, count), rng.uniform(-3, 3, count)], axis=-1
+    )
+    q = np.stack([lower, upper], axis=1)
+    q[..., 1] += APART * np.arange(count)[:, None]
+    q *= [1 / DRUM.centre_radius, 1.0, math.pi / 180]
+    many = replace(DRUM, count=2 * count)
+    engine = many.engine(q.reshape(-1, 3), dt=2e-3, noise=Noise(chatter=chatter, seed=9))
+    path = run(engine, round(duration / 2e-3), 500).trajectory(engine.bodies)
+    return replace(DRUM, count=2), path.q.reshape(len(path), count, 2, 4)
+
+
+def meetings_make_dyads(least: float = 0.1, count: int = 8, chatter: float = 0.3) -> Finding:
+    """Let climbing dumbbells meet others of heading about 0 and count the dyads.
+
+    ``least`` share of encounters that are dyads at the end.
+    """
+    drum, q = encounters(count, 120.0, chatter)
+    made = is_dyad(drum, q)
+    hands = np.where(made[-1], handedness(drum, q[-1]), 0)
+    right, left = int((hands == 1).sum()), int((hands == -1).sum())
+    ever = int(made.any(axis=0).sum())
+    return Finding(
+        Verdict.HOLDS_UNDER if right + left >= least * count else Verdict.REFUTED,
+        f"of {count} dumbbells that climb under another, {ever} form a dyad within 120 s and "
+        f"{right + left} are one then, {right} right-handed and {left} left-handed",
+        {"ever": float(ever), "right": float(right), "left": float(left)},
+        "headings of 6° to 16° below others within 3° of 0, sideways up to 6 mm off, chatter A = "
+        f"{chatter:g}",
+    )
+
+
+# ------------------------------------------------------------------------------------- who leaves
+
+
+def leaves_at(end: str = "top", hand: Chirality = "R", duration: float = 150.0) -> Finding:
+    """Follow a dyad that starts half-way in a drum 60 mm long."""
+    path = one_dyad(hand, 12.0 if hand == "R" else -12.0, duration, height=35.0, top=60.0)
+    left = [event.time for event in path.of_kind(EventKind.EXIT)]
+    low = float(path.q[-1, :, 1].mean())
+    reached = len(left) == 2 if end == "top" else not left and low < 12.0
+    times = ", ".join(f"{t:.0f} s" for t in left) if left else "never"
+    return Finding(
+        Verdict.HOLDS_UNDER if reached else Verdict.REFUTED,
+        f"without noise, from 35 mm, a dyad {hand} leaves a drum 60 mm long at {times}; after "
+        f"{duration:g} s its middle was last at {low:.1f} mm",
+        {"left": float(len(left)), "height": low},
+        "noise so small that slippage does not outweigh the climb; here none",
+    )
+
+
+def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding:
+    """Check that a left-handed dyad that has come to the bottom is a dyad no longer, or still."""
+    path = one_dyad("L", -12.0, duration, height=35.0, top=60.0)
+    drum = replace(DRUM, count=2)
+    still = bool(is_dyad(drum, path.q[-1])) and handedness(drum, path.q[-1]) == -1
+    steep = float(np.degrees(path.q[-1, :, 2]).mean())
+    touched = any(event.contact.startswith("floor") for event in path.events)
+    return Finding(
+        judged(touched and still != apart),
+        f"{duration:g} s after a start at 35 mm the left-handed dyad "
+        + ("touches" if touched else "does not touch")
+        + " the bottom, has turned to a mean heading of "
+        f"{steep:.0f}° and " + ("is still nested" if still else "is not nested any more"),
+        {"heading": steep},
+        "alone, a left-handed dyad lies down along the bottom, still nested; others that collide "
+        "with it may break it",
+    )
+
+
+def can_leave_in_time(length: float = 300.0, heading: float = 15.0) -> Finding:
+    """Compare the length of a drum with how far a dyad climbs in twenty minutes."""
+    speed = DRUM.spin * DRUM.centre_radius * math.tan(math.radians(heading))
+    reach = speed * OBSERVED_TIME
+    angles = (math.degrees(math.atan(3 / 16)), 7.94)
+    other = [DRUM.spin * DRUM.centre_radius * math.tan(math.radians(a)) for a in angles]
+    return Finding(
+        Verdict.HOLDS_UNDER if length <= reach else Verdict.REFUTED,
+        f"at {heading:g}° a dyad climbs at most {speed:.3f} mm/s and {reach:.0f} mm in twenty "
+        f"minutes, at {angles[0]:.1f}° {other[0] * OBSERVED_TIME:.0f} mm and at {angles[1]:.1f}° "
+        f"{other[1] * OBSERVED_TIME:.0f} mm; taken is a drum of {length:g} mm",
+        {"reach": reach, "length": length},
+        f"a drum shorter than {reach:.0f} mm; its length is not given",
+    )
+
+
+def of_sixty_leave(leaving: int = LEAVING[1], starts: int = STARTS, top: float = TOP) -> Finding:
+    """Follow bunches for the twenty minutes observed."""
+    runs = [bunch(LARGER, OBSERVED_TIME, seed, top, STEP) for seed in range(starts)]
+    found = exit_statistics(runs)
+    last = [one.census(-1) for one in runs]
+    right, left = (float(np.mean([c[k] for c in last])) for k in ("right", "left"))
+    error = 0.0 if math.isnan(found.total.error) else found.total.error
+    near = abs(found.total.value - leaving) <= max(10.0, 2 * error)
+    by_right = found.by_kind["right"].value
+    good = near and by_right >= found.total.value / 2
+    return Finding(
+        Verdict.HOLDS_UNDER if good else Verdict.REFUTED,
+        f"{starts} starts of {LEAVING[0]} dumbbells of {LARGER[0]:g} mm in a drum {top:g} mm long, "
+        f"no noise, {OBSERVED_TIME:g} s: {found.total.value:.1f} ± {error:.1f} left, "
+        f"{by_right:.1f} of them in right-handed dyads; at the end {right:.1f} are in "
+        f"right-handed dyads and {left:.1f} in left-handed ones",
+        {"left": found.total.value, "right_handed": by_right, "in_right": right, "in_left": left},
+        f"a drum {top:g} mm long, no noise; neither is given",
+    )
+
+
+CLAIMS = (
+    Claim(
+        "B1a",
+        "3",
+        "observation (i) on a bunch",
+        "a bunch parts into rollers at small, mostly positive azimuths and interlocked sliders at "
+        "larger ones",
+        Means.SIMULATION,
+        partitions,
+        partial(partitions, apart=False),
+        slow=True,
+    ),
+    Claim(
+        "B1b",
+        "3",
+        "observation (i) on a bunch, picture of the bunch",
+        "dumbbells of 8 mm do so very soon after the start",
+        Means.SIMULATION,
+        partial(partitions, PICTURE, 1),
+        partial(partitions, PICTURE, 1, apart=False),
+        slow=True,
+    ),
+    Claim(
+        "B2c",
+        "3",
+        "observation (iii) on a bunch",
+        "dyads of both hands form in a bunch",
+        Means.SIMULATION,
+        both_hands_form,
+        partial(both_hands_form, 1000),
+        slow=True,
+    ),
+    Claim(
+        "B10",
+        "3",
+        "observation (iii) on a bunch, formation of dyads in section 7",
+        "climbing dumbbells that meet descending ones occasionally form dyads",
+        Means.SIMULATION,
+        meetings_make_dyads,
+        partial(meetings_make_dyads, 1.1),
+        slow=True,
+    ),
+    Claim(
+        "B6a",
+        "3",
+        "observation (vi) on a bunch",
+        "right-handed dyads climb to the top and fall out",
+        Means.SIMULATION,
+        leaves_at,
+        partial(leaves_at, hand="L"),
+    ),
+    Claim(
+        "B6b",
+        "3",
+        "observation (vi) on a bunch",
+        "left-handed dyads go to the bottom",
+        Means.SIMULATION,
+        partial(leaves_at, "bottom", "L"),
+        partial(leaves_at, "bottom"),
+    ),
+    Claim(
+        "B6c",
+        "3",
+        "observation (vi) on a bunch",
+        "at the bottom left-handed dyads break apart",
+        Means.SIMULATION,
+        breaks_at_the_bottom,
+        partial(breaks_at_the_bottom, apart=False),
+    ),
+    Claim(
+        "B7a",
+        "3",
+        "observation (vi) on a bunch",
+        "right-handed dyads can climb the drum within twenty minutes",
+        Means.NUMERICAL,
+        can_leave_in_time,
+        partial(can_leave_in_time, 500.0),
+    ),
+    Claim(
+        "B7b",
+        "3",
+        "observation (vi) on a bunch",
+        "of 60 dumbbells about 40 leave within twenty minutes, as right-handed dyads",
+        Means.SIMULATION,
+        of_sixty_leave,
+        partial(of_sixty_leave, 0),
+        slow=True,
+    ),
+)

@@ -1,0 +1,304 @@
+"""Section 7: how pairs move in the turning drum.
+
+The model is that of :mod:`paper_checks.section3.singles`; the coefficient of friction between
+dumbbells that touch is 0.3.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from paper_checks.appendixA.forces import judged
+from paper_checks.framework.claims import Claim, Finding, Means, Verdict
+from paper_checks.section7.driven import CLEARANCE, LASTING, LATE, TWO, Starts, dyads, pairs
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, handedness, minimiser_heading
+from polycorner.motion.noise import Noise
+from polycorner.spaces.manifold import Array
+
+BOTH: Starts = (("R", 8.0), ("L", -8.0))
+FOUR: Starts = (("R", 2.0), ("R", 6.0), ("R", 10.0), ("R", 14.0))
+MILD, STRONG = 0.3, 0.4  # chatter under which right-handed pairs climb, and no longer do
+
+
+def rates(paths: DyadPaths, after: float = 5.0) -> Array:
+    return np.asarray(paths.climb_rates(after=after))
+
+
+def pairs_go(
+    sign: int = 1, *, tilt: float = 0.0, chatter: float = 0.0, duration: float = 40.0
+) -> Finding:
+    """Check that right-handed pairs climb, left-handed ones descend, and what ``G`` does.
+
+    In a level drum pairs in ``G`` have to stay, in a tilted one to descend.
+    """
+    right, left = rates(dyads(BOTH, duration, chatter=chatter, tilt=tilt))
+    both = pairs("end_to_end", 2, duration, chatter=chatter, tilt=tilt)
+    moved = (both.eta[-1] - both.eta[0]) / duration
+    ends = bool((moved < -1e-6).all()) if tilt else bool((np.abs(moved) < 1e-6).all())
+    holds = sign * right > 0 > sign * left and ends
+    under = Verdict.HOLDS_UNDER if chatter else Verdict.HOLDS
+    how = f"with chatter A = {chatter:g}" if chatter else "without noise"
+    return Finding(
+        under if holds else Verdict.REFUTED,
+        f"{how}, tilted by {tilt:g}°, in mm/s: a right-handed pair {right:.4f}, a left-handed one "
+        f"{left:.4f}, pairs end to end {moved[0]:.4f} and {moved[1]:.4f}",
+        {"right": float(right), "left": float(left), "end_to_end": float(moved.max())},
+        f"noise of about A = {chatter:g}: enough for pairs in $G$ to slip, not so much that "
+        "slippage outweighs the climb of right-handed pairs"
+        if chatter
+        else "",
+    )
+
+
+def stays_at_its_heading(
+    chatter: float = 0.0, within: float = 2.0, width: tuple[float, float] = (4.0, 6.0)
+) -> Finding:
+    """Check the spread of the heading and the width of the zigzag of a right-handed pair."""
+    paths = dyads((("R", 8.0),), 60.0, chatter=chatter)
+    late = paths.times > 15.0
+    heading, azimuth = (np.degrees(x[late, 0]) for x in (paths.heading, paths.azimuth))
+    spread = float(np.abs(heading - heading.mean()).max())
+    reach = float(np.ptp(azimuth))
+    holds = spread <= within and width[0] <= reach <= width[1]
+    return Finding(
+        Verdict.HOLDS_UNDER if holds else Verdict.REFUTED,
+        f"with chatter A = {chatter:g} the heading of a pair stays within {spread:.3g}° of its "
+        f"mean in 45 s and its azimuth varies by {reach:.2f}°",
+        {"spread": spread, "width": reach},
+        "without noise: the heading is then the one with which it was formed, whatever that is; "
+        "with noise that turns it, zigzags are narrower",
+    )
+
+
+def stays_close_to_the_corner(measure: str = "gaps") -> Finding:
+    """Compare a zigzag with the corner: in the contacts of the pair, or also in its azimuth."""
+    paths = dyads((("R", 8.0),), 60.0)
+    late = paths.times > 15.0
+    shift = float(np.abs(paths.shift[late] - paths.shift[0]).max())
+    off = TWO.centre_radius * float(np.abs(paths.azimuth[late]).min())
+    far = TWO.centre_radius * float(np.abs(paths.azimuth[late]).max())
+    near = shift < 0.1 if measure == "gaps" else far < TWO.ball_radius
+    return Finding(
+        Verdict.HOLDS_UNDER if near else Verdict.REFUTED,
+        f"without noise the dumbbells of a pair shift by {shift:.4f} mm against each other, while "
+        f"its middle is {off:.1f} to {far:.1f} mm from the lowest line",
+        {"shift": shift, "least": off, "largest": far},
+        "close in the placement of one dumbbell relative to the other; the azimuths of "
+        "$\\delta_R$ themselves are not visited by the zigzag",
+    )
+
+
+def sorting_needs_no_chirality(
+    image: Sequence[float] = (1, -1, -1), turned: bool = True
+) -> Finding:
+    """Follow a right-handed pair and its image in a level drum under the same noise.
+
+    ``image``: signs of ``phi, eta, theta``; ``turned``: headings by half a turn, so that the balls
+    keep their numbers and their noise.
+    """
+    two = replace(TWO, tilt=0.0)
+    half = np.array([0, 0, math.pi * turned])
+    q = two.pair.nested("R", heading=0.2, clearance=CLEARANCE).reshape(2, 3)
+    place = q * image + half
+    noise = Noise(chatter=STRONG, seed=11)
+    first, second = (two.simulate(p, 9.5, noise=noise).q[..., :3] for p in (q, place))
+    moved = float(np.abs(first[-1, :, 1] - first[0, :, 1]).max())
+    apart = float(np.abs(second * image + half - first)[-1].max())
+    hands = [int(handedness(two, p)) for p in (q, place)]
+    holds = hands[0] == -hands[1] and apart < 0.01 * moved
+    return Finding(
+        judged(holds),
+        f"handedness {hands[0]} and {hands[1]}; under the same noise the image's motion differs "
+        f"from the image of the motion by {apart:.1e}, after both have moved {moved:.2f} mm",
+        {"apart": apart, "moved": moved},
+    )
+
+
+def spin_decides_who_climbs(sign: int = 1) -> Finding:
+    """Follow pairs in level drums that turn with ``sign`` times the usual spin."""
+    right, left = rates(dyads(BOTH, 30.0, tilt=0.0, spin=0.01 * sign))
+    return Finding(
+        judged(right > 0 > left),
+        f"with $\\omega = {0.01 * sign:g}$ rad/s right-handed pairs of 8° move with {right:.4f} "
+        f"mm/s and left-handed ones of -8° with {left:.4f} mm/s",
+        {"right": float(right), "left": float(left)},
+    )
+
+
+def noise_leads_to_the_corner(spin: float = 0.0, chatter: float = 1.0) -> Finding:
+    """Check that shaken pairs stay in the corner and approach the heading of least energy."""
+    paths = dyads((("R", 2.0), ("R", 14.0)), 100.0, chatter=chatter, tilt=0.0, spin=spin)
+    least = minimiser_heading(TWO)
+    start, end = np.degrees(paths.heading[[0, -1]])
+    shifted = float(np.abs(paths.shift[-1] - paths.shift[0]).max())
+    closer = bool((np.abs(end - least) < np.abs(start - least) - 1.0).all())
+    return Finding(
+        Verdict.HOLDS_UNDER if closer and shifted < 0.5 else Verdict.REFUTED,
+        f"in a level drum of spin {spin:g} rad/s under A = {chatter:g} headings of "
+        f"{start[0]:.0f}° and {start[1]:.0f}° become {end[0]:.2f}° and {end[1]:.2f}° in 100 s, "
+        f"the least energy being at {least:.2f}°; the dumbbells shift by up to {shifted:.2f} mm",
+        {"first": float(end[0]), "second": float(end[1]), "least": least, "shift": shifted},
+        "in a drum that stands still. In the turning one, noise strong enough to turn a pair "
+        "takes it out of the corner along the rods, towards balls side by side",
+    )
+
+
+def driven_leave_the_corner(
+    chatter: float = STRONG, least: float = 0.5, tilts: Sequence[float] = (7.0, 0.0)
+) -> Finding:
+    """Check that driven pairs under noise keep the shift of the corner to within ``least`` mm."""
+    listed, worst = [], 0.0
+    for tilt in tilts:
+        paths = dyads(FOUR, LASTING, chatter=chatter, tilt=tilt)
+        shift, kept = paths.shift, int(np.isinf(paths.lifetimes).sum())
+        worst = max(worst, float(np.abs(shift[-1] - shift[0]).max()))
+        listed.append(
+            f"tilted by {tilt:g}°, from {shift[0].mean():.2f} to {shift[-1].mean():.2f} mm, "
+            f"{kept} of {len(FOUR)} pairs holding together"
+        )
+    return Finding(
+        judged(worst < least),
+        f"with chatter A = {chatter:g}, in {LASTING:g} s, the mean shift goes {'; '.join(listed)}",
+        {"largest_change": worst},
+        "in the model pairs hold, but under noise the drive takes them from the corner along the "
+        "rods; without noise they stay in it",
+    )
+
+
+def tilting_keeps_heading(tolerance: float = 1.0) -> Finding:
+    """Compare the mean headings of driven pairs, from 150 to 300 s, tilted and level."""
+    means = []
+    for tilt in (7.0, 0.0):
+        paths = dyads(FOUR, LASTING, chatter=STRONG, tilt=tilt)
+        late = np.degrees(paths.heading[paths.times >= LATE])
+        means.append(late.mean(axis=0))
+    tilted, level = (float(m.mean()) for m in means)
+    errors = [float(m.std(ddof=1) / math.sqrt(len(m))) for m in means]
+    return Finding(
+        judged(abs(tilted - level) <= tolerance),
+        f"with chatter A = {STRONG:g} headings of driven pairs are {tilted:.2f} ± "
+        f"{errors[0]:.2f}° tilted by 7° and {level:.2f} ± {errors[1]:.2f}° level (means from "
+        f"{LATE:g} to {LASTING:g} s of four starts from 2° to 14°)",
+        {"tilted": tilted, "level": level},
+        "in the model the tilt lowers the heading of driven pairs, through slippage; only the "
+        "minimum of the energy does not depend on it",
+    )
+
+
+def colours_agree(
+    caption: tuple[str, str] = ("blue", "green"), text: tuple[str, str] = ("green", "blue")
+) -> Finding:
+    """Compare the colours of right- and left-handed pairs in caption and text."""
+    same = caption == text
+    swapped = caption == text[::-1]
+    return Finding(
+        judged(same, Verdict.CORRECTED if swapped else Verdict.REFUTED),
+        f"right-handed, left-handed: {', '.join(caption)} in the caption, {', '.join(text)} in "
+        "the text",
+        correction="exchange the colours in one of them, best in the text: in the figures of the "
+        "drum's coordinates and of the boundary of $A$ blue goes with positive headings",
+    )
+
+
+CLAIMS = (
+    Claim(
+        "T3",
+        "7",
+        "pairs in a level drum",
+        "near $\\delta_R$ a pair climbs, near $\\delta_L$ it descends, near $G$ it stays",
+        Means.SIMULATION,
+        pairs_go,
+        partial(pairs_go, -1),
+        figure="dyad_history",
+    ),
+    Claim(
+        "T5a",
+        "7",
+        "pairs in a tilted drum, end",
+        "a right-handed pair keeps its heading within 2° in zigzags of about 5°",
+        Means.SIMULATION,
+        stays_at_its_heading,
+        partial(stays_at_its_heading, STRONG),
+        figure="dyad_history",
+    ),
+    Claim(
+        "T5b",
+        "7",
+        "pairs in a tilted drum, end",
+        "its zigzag stays close to $\\delta_R$",
+        Means.SIMULATION,
+        stays_close_to_the_corner,
+        partial(stays_close_to_the_corner, "azimuth"),
+    ),
+    Claim(
+        "T6a",
+        "7",
+        "chiral sorting",
+        "the level turning drum is achiral and sorts by chirality all the same",
+        Means.SIMULATION,
+        sorting_needs_no_chirality,
+        partial(sorting_needs_no_chirality, (-1, 1, -1), turned=False),
+    ),
+    Claim(
+        "T6b",
+        "7",
+        "chiral sorting",
+        "right-handed pairs go towards positive $\\eta$, for the sense of rotation in the paper",
+        Means.SIMULATION,
+        spin_decides_who_climbs,
+        partial(spin_decides_who_climbs, -1),
+    ),
+    Claim(
+        "T7",
+        "7",
+        "pairs in a tilted drum",
+        "near $\\delta_R$ a pair climbs to the top; near $\\delta_L$ and $G$ it goes down",
+        Means.SIMULATION,
+        partial(pairs_go, tilt=7.0, chatter=MILD, duration=80.0),
+        partial(pairs_go, tilt=7.0, chatter=STRONG, duration=80.0),
+        figure="dyad_history",
+    ),
+    Claim(
+        "T10",
+        "7",
+        "caption of the figure of pairs near $\\delta$, against the text",
+        "the colours of right-handed and left-handed pairs agree",
+        Means.NUMERICAL,
+        colours_agree,
+        partial(colours_agree, text=("blue", "green")),
+    ),
+    Claim(
+        "T9a",
+        "7",
+        "pairs in a level drum",
+        "noise takes a pair to the neighbourhood of $\\delta$, if it is small and rotation slow",
+        Means.SIMULATION,
+        noise_leads_to_the_corner,
+        partial(noise_leads_to_the_corner, 0.01, STRONG),
+        slow=True,
+    ),
+    Claim(
+        "T9b",
+        "7",
+        "pairs in a turning drum",
+        "driven pairs stay close to the corner $\\delta$",
+        Means.SIMULATION,
+        driven_leave_the_corner,
+        partial(driven_leave_the_corner, 0.0),
+        slow=True,
+    ),
+    Claim(
+        "T4b",
+        "7",
+        "pairs in a tilted drum",
+        "tilting by 7° hardly changes the heading of driven pairs",
+        Means.SIMULATION,
+        tilting_keeps_heading,
+        partial(tilting_keeps_heading, 10.0),
+        slow=True,
+        figure="heading_length",
+    ),
+)

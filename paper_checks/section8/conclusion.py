@@ -1,0 +1,335 @@
+"""Section 8: corners that hold and corners that part, limits on velocities, and cusps."""
+
+from collections.abc import Callable
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from paper_checks.framework.claims import Claim, Finding, Means, Verdict
+from polycorner import (
+    AllOf,
+    AnyOf,
+    Manifold,
+    Polyhedron,
+    SmoothFunction,
+    certify,
+    skeleton,
+    stratum_at,
+)
+from polycorner.models import Pinball
+from polycorner.polyhedra import LocalType
+
+if TYPE_CHECKING:
+    from polycorner.spaces.manifold import Array
+
+BOARD = Pinball()
+ASIDE = 1e-3  # how far from a corner balls are let go
+STEP, STEPS = 5e-3, 40
+FOOTING, GRAZING = 1e-9, 2e-5  # how far above a wall a ball slides; how deep a chord of a pin goes
+APART = 0.1  # distance of two balls, after they ran, from which on their ways have parted
+
+CONVEX, CONCAVE = LocalType.QUADRANT, LocalType.UNION
+
+
+# ------------------------------------------------------------------------------- the pinball board
+
+
+@cache
+def corners(kind: LocalType) -> "tuple[Array, ...]":
+    """Return the corners of the board where it is locally a quadrant, or a union of them."""
+    D = BOARD.polyhedron
+    return tuple(p for p in BOARD.corners() if stratum_at(D, p).local_type is kind)
+
+
+def corners_hold(kind: LocalType = CONVEX) -> Finding:
+    """Count the corners of a kind at which the height has a certified local minimum."""
+    found = [certify(BOARD.polyhedron, BOARD.energy, p) for p in corners(kind)]
+    held = [certificate for certificate in found if certificate.is_minimum]
+    words = "convex" if kind is CONVEX else "concave"
+    return Finding(
+        Verdict.HOLDS if held else Verdict.REFUTED,
+        f"On a board with pins, wedges and cups the height has a certified minimum at {len(held)} "
+        f"of {len(found)} locally {words} corners; at the others it falls along a side.",
+        {"corners": len(found), "minima": len(held)},
+    )
+
+
+def ways_part(kind: LocalType = CONCAVE) -> Finding:
+    """Let balls go close to a corner, on all its sides, and see whether they stay together."""
+    parting = [p for p in corners(kind) if _part(p)]
+    free, round_tops = pins_that_part()
+    total = len(corners(kind))
+    words = "convex" if kind is CONVEX else "concave"
+    return Finding(
+        Verdict.HOLDS_UNDER if parting else Verdict.REFUTED,
+        f"Balls that are let go {ASIDE:g} around a corner run more than "
+        f"{APART:g} apart at {len(parting)} of {total} locally {words} corners. They also do at "
+        f"the tops of {round_tops} of {free} round pins, which have no corner.",
+        {"corners": total, "parting": len(parting), "pins": free, "parting_pins": round_tops},
+        correction=(
+            "A locally concave corner is a bifurcation where the energy falls away from it along "
+            "both sides; at one that hangs down the ways stay together. It is not needed for a "
+            "bifurcation: the smooth top of a pin is one, too."
+        )
+        if parting
+        else "",
+    )
+
+
+@cache
+def pins_that_part() -> tuple[int, int]:
+    """Return how many pins have no corner near their tops, and at how many of these balls part."""
+    tops = [np.array([x, y + r]) for x, y, r in BOARD.pins]
+    free = [p for p in tops if not corners_near(p)]
+    return len(free), sum(map(_part, free))
+
+
+def corners_near(point: "Array", distance: float = 0.05) -> bool:
+    """Whether a corner of the board is close to a point."""
+    return bool((np.linalg.norm(BOARD.corners() - point, axis=1) < distance).any())
+
+
+def _part(place: "Array") -> bool:
+    """Whether balls that are let go around a place of the boundary end up apart."""
+    ends = [_run(start) for start in _around(place)]
+    return max(float(np.linalg.norm(p - q)) for p in ends for q in ends) > APART
+
+
+def _around(place: "Array") -> "list[Array]":
+    """Return the points of a small circle between which it lies in the board, and one midway."""
+    angles = np.linspace(-np.pi, np.pi, 3600, endpoint=False)
+    circle = place + ASIDE * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    inside = np.asarray(BOARD.polyhedron.contains(circle))
+    first = int(np.flatnonzero(inside & ~np.roll(inside, 1))[0])
+    arc = np.roll(circle, -first, axis=0)[: int(inside.sum())]
+    return [arc[0], arc[len(arc) // 2], arc[-1]]
+
+
+def _run(start: "Array") -> "Array":
+    """Follow the height downwards, falling freely or sliding along walls, for a while."""
+    p = start
+    for _ in range(STEPS):
+        reached = _reached(p)
+        lowest = reached[np.argmin(reached[:, 1])]
+        if lowest[1] > p[1] - 1e-6 * STEP:
+            break
+        p = lowest
+    return p
+
+
+def _reached(p: "Array") -> "Array":
+    """Return where one step may lead: straight down, along walls that are close, or nowhere."""
+    D = BOARD.polyhedron
+    values, gradients = D.evaluate(p, 1)
+    sizes = np.linalg.norm(gradients, axis=1)
+    close = abs(values) < 2 * STEP * sizes
+    along = (gradients / sizes[:, None])[close] @ np.array([[0.0, -1.0], [1.0, 0.0]])
+    ahead = p + STEP * np.vstack([[(0.0, -1.0)], along, -along])
+    values, gradients = (part[:, close] for part in D.evaluate(ahead, 1))
+    squares = (gradients**2).sum(axis=-1)
+    feet = ahead[:, None] - ((values - FOOTING) / squares)[..., None] * gradients
+    reached = np.vstack([ahead, feet.reshape(-1, 2)])
+    between = p + np.array([0.5, 1.0])[:, None, None] * (reached - p)
+    allowed = np.asarray(D.contains(between, tolerance=GRAZING)).all(axis=0)
+    return np.vstack([p[None], reached[allowed]])
+
+
+# ---------------------------------------------------------------------------- limits on velocities
+
+PHASES = Manifold.euclidean("x v")  # along a road, in m, and the speed, in m/s
+TOWN, FAST, SLOW = (100.0, 200.0), 30.0, 14.0
+
+
+def speed_limits(x: Any, v: Any) -> Any:
+    """Return what a limit of ``FAST`` that is ``SLOW`` in a town allows."""
+    return AllOf(v, FAST - v, AnyOf(SLOW - v, TOWN[0] - x, x - TOWN[1]))
+
+
+def cusped(x: Any, v: Any) -> Any:
+    """Return a constraint on velocities whose derivative vanishes where its sides meet."""
+    return AllOf(x**3 - v**2, 1 - x)
+
+
+def limits_carve_a_polyhedron(limits: Callable[[Any, Any], Any] = speed_limits) -> Finding:
+    """Walk along the set that inequalities in positions and velocities leave in phase space."""
+    D = Polyhedron(PHASES, limits(*PHASES.symbols))
+    atlas = skeleton(D, [[0.5, 0.25], [0.5, 10.0], [150.0, 10.0]], extent=1e4)
+    types = [corner.local_type for corner in atlas.corners]
+    quadrants, unions = types.count(CONVEX), types.count(CONCAVE)
+    singular = [p for f in D.functions for p in _singular(f) if D.contains(p, tolerance=1e-9)]
+    degenerate = types.count(LocalType.DEGENERATE) + len(singular)
+    return Finding(
+        Verdict.REFUTED if degenerate else Verdict.HOLDS_UNDER,
+        f"A limit of {FAST:g} m/s that is {SLOW:g} m/s between {TOWN[0]:g} and {TOWN[1]:g} m cuts "
+        f"out of the plane of $x$ and $v$ a set with {quadrants} locally convex and {unions} "
+        f"locally concave corners, and {degenerate} where the derivatives are dependent. To "
+        f"enter the town at {FAST:g} m/s no braking is enough: the way to {SLOW:g} m/s at "
+        f"{BRAKES:g} m/s² takes {braking():.4g} m.",
+        {"convex": quadrants, "concave": unions, "degenerate": degenerate, "braking": braking()},
+        correction=(
+            "The derivatives of the active functions have to be independent, as they are for "
+            r"limits $u(x) - v \ge 0$, where $\partial f/\partial v = -1$. Unlike a wall such a "
+            "constraint exerts no force: what keeps a motion inside has to be said in addition."
+        ),
+    )
+
+
+def _singular(f: SmoothFunction) -> "list[Array]":
+    """Return the real points where a function vanishes together with its derivative."""
+    import sympy
+
+    symbols = PHASES.symbols
+    system = [f.expression, *(f.expression.diff(s) for s in symbols)]
+    solutions = sympy.solve([g for g in system if g != 0], symbols, dict=True)
+    return [np.array([float(point[s]) for s in symbols]) for point in solutions]
+
+
+BRAKES = 5.0
+
+
+def braking() -> float:
+    """Return the way from ``FAST`` to ``SLOW`` at constant deceleration."""
+    return (FAST**2 - SLOW**2) / (2 * BRAKES)
+
+
+# -------------------------------------------------------------------------------------------- cusps
+
+
+def algebraic_set_has_a_cusp(power: int = 3) -> Finding:
+    """Compare the width of ``y^2 <= x^power`` with the distance from its tip."""
+    import sympy
+
+    x = sympy.Symbol("x", positive=True)
+    width = 2 * sympy.sqrt(x**power)
+    opening = sympy.limit(width / x, x, 0, "+")
+    area = sympy.integrate(width, (x, 0, 1))
+    plane = Manifold.euclidean("x y")
+    a, b = plane.symbols
+    D = Polyhedron(plane, AllOf(a**power - b**2, a))
+    kind = stratum_at(D, [0.0, 0.0]).local_type
+    cusp = opening == 0 and area > 0
+    return Finding(
+        Verdict.HOLDS if cusp else Verdict.REFUTED,
+        f"The set $0 \\le x$, $y^2 \\le x^{power}$ has the width ${sympy.latex(width)}$ at the "
+        f"distance $x$ from its tip, and their quotient goes to {opening}. A polyhedron with "
+        "interior points arbitrarily near to a point contains a cone there, in any coordinates, "
+        f"where the quotient has a positive limit. Of the tip the library says: {kind.value}.",
+        {"opening": float(opening), "area": float(area)},
+    )
+
+
+Tool = Literal["lemma", "multipliers"]
+
+
+def stops_at_the_cusp(tool: Tool = "lemma") -> Finding:
+    """Try a tool of appendix C on the energy ``x + b y`` at the tip of ``y^2 <= x^3``."""
+    works, told = lemma_at_the_cusp() if tool == "lemma" else multipliers_at_the_cusp()
+    other_works, other = multipliers_at_the_cusp() if tool == "lemma" else lemma_at_the_cusp()
+    return Finding(
+        Verdict.HOLDS if not works else Verdict.REFUTED if other_works else Verdict.CORRECTED,
+        f"{told} {other}",
+        correction=(
+            r"The lemma asks only that $x_1, \ldots, x_p \ge 0$ on $C$, not that $C$ is a "
+            r"quadrant; with $p = 1$ and $x_1 = E - E_0 - x_2^2 - \ldots - x_n^2$ it covers every "
+            "place from which $E$ grows at least as fast as the distance. What needs a quadrant, "
+            "or at least a polyhedron, is to read off the conditions from multipliers."
+        )
+        if works
+        else "",
+    )
+
+
+def lemma_at_the_cusp() -> tuple[bool, str]:
+    """Whether the lemma's hypotheses hold in the coordinates ``E - y^2`` and ``y``."""
+    import sympy
+
+    x, b = sympy.symbols("x b", positive=True)
+    u, w = sympy.symbols("u w", real=True)
+    # Points of the set are (x, s x^(3/2)) with |s| <= 1; b y is least at s = -1, -y^2 at |s| = 1.
+    least = (x + b * y_on_set(x, -1)) - y_on_set(x, -1) ** 2
+    slope = sympy.limit(least / x, x, 0, "+")
+    f = u + w**2
+    at = {u: 0, w: 0}
+    first, flat, second = (g.subs(at) for g in (f.diff(u), f.diff(w), f.diff(w, 2)))
+    works = bool(slope > 0 and first > 0 and flat == 0 and second > 0)
+    return works, (
+        f"With $x_1 = E - y^2$ and $x_2 = y$ the energy $E = x + by$ is ${sympy.latex(f)}$ for "
+        f"$u = x_1$, $w = x_2$, with derivatives {first}, {flat} and second derivative {second}; "
+        f"on the set $x_1 \\ge {sympy.latex(sympy.simplify(least))}$, which over $x$ goes to "
+        f"{slope}: it is not negative near the tip."
+    )
+
+
+def y_on_set(x: Any, share: float) -> Any:
+    """Return ``y`` at a share of the half-width of the cusp."""
+    import sympy
+
+    return share * sympy.sqrt(x**3)
+
+
+def multipliers_at_the_cusp() -> tuple[bool, str]:
+    """Whether ``dE`` is a combination of the derivatives of what bounds the set."""
+    plane = Manifold.euclidean("x y")
+    x, y = plane.symbols
+    D = Polyhedron(plane, {"cusp": x**3 - y**2})
+    E = x + y / 2
+    rows = D.gradients([0.0, 0.0]).T
+    slope = np.array([float(E.diff(s)) for s in (x, y)])
+    rest = float(np.linalg.norm(slope - rows @ np.linalg.lstsq(rows, slope, rcond=None)[0]))
+    certificate = certify(D, E, [0.0, 0.0])
+    return rest < 1e-9 and certificate.is_minimum, (
+        f"The derivative of $x^3 - y^2$ at the tip is {rows.ravel().tolist()}, so that no "
+        f"multiplier makes up $dE$: {rest:.4g} of it is left."
+    )
+
+
+CLAIMS = (
+    Claim(
+        "C1a",
+        "8",
+        "on locally convex corners",
+        "Locally convex corners of a pinball machine can entrap.",
+        Means.NUMERICAL,
+        corners_hold,
+        partial(corners_hold, CONCAVE),
+    ),
+    Claim(
+        "C1b",
+        "8",
+        "on locally concave corners",
+        "Locally concave corners, as in a pinball machine, result in bifurcations.",
+        Means.NUMERICAL,
+        ways_part,
+        partial(ways_part, CONVEX),
+    ),
+    Claim(
+        "C2",
+        "8",
+        "on constraints that involve velocities",
+        r"Constraints $f(q, \dot q) \ge 0$, such as a speed limit that depends on the place, carve "
+        "polyhedra out of phase space.",
+        Means.NUMERICAL,
+        limits_carve_a_polyhedron,
+        partial(limits_carve_a_polyhedron, cusped),
+    ),
+    Claim(
+        "C3a",
+        "8",
+        "on sets defined by algebraic functions",
+        "Among semi-algebraic sets there are cusps, which no polyhedron has.",
+        Means.SYMBOLIC,
+        algebraic_set_has_a_cusp,
+        partial(algebraic_set_has_a_cusp, power=2),
+    ),
+    Claim(
+        "C3b",
+        "8",
+        "on entrapment in more general corners",
+        "For corners that are no quadrants the minimisation lemma of appendix C has to be "
+        "generalised first.",
+        Means.SYMBOLIC,
+        stops_at_the_cusp,
+        partial(stops_at_the_cusp, "multipliers"),
+    ),
+)
