@@ -1,7 +1,6 @@
 from .events import Event, EventKind
 from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
 from .noise import Noise, Solver
-from .reference import reference_step
 from .simulation import simulate, step
 from .system import Friction, State, System, velocities
 from .trajectory import Trajectory
@@ -21,7 +20,6 @@ __all__ = [
     "State",
     "System",
     "Trajectory",
-    "reference_step",
     "simulate",
     "step",
     "velocities",

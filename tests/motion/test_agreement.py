@@ -1,6 +1,6 @@
 """The compiled step against the readable one, and against the inclusion written out here.
 
-Both solve the step of :mod:`polycorner.motion.assembly`, the one by convex programmes, the other by
+Both solve the step of :mod:`step_inclusion`, the one by convex programmes, the other by
 sweeps and Newton's method on impulses: nothing but the assembly is common to them.  For dumbbells
 in the drum the inclusion is put together below from the model's formulas.
 """
@@ -12,6 +12,15 @@ from functools import lru_cache, partial
 import numpy as np
 import pytest
 import sympy
+from reference_step import reference_step, solve_step
+from step_inclusion import (
+    FrictionBlock,
+    StepProblem,
+    assemble,
+    bent_shut,
+    turned_back,
+)
+from step_residual import natural_residual, speed
 
 from polycorner import Manifold, Polyhedron, minimise
 from polycorner.dumbbells import drum_formulas
@@ -19,18 +28,9 @@ from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.errors import SolverError
 from polycorner.models import textbook as scenes
-from polycorner.motion.assembly import (
-    FrictionBlock,
-    StepProblem,
-    assemble,
-    bent_shut,
-    turned_back,
-)
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
 from polycorner.motion.noise import Solver
-from polycorner.motion.reference import reference_step, solve_step
-from polycorner.motion.residual import natural_residual, speed
 from polycorner.motion.simulation import start, step
 from polycorner.motion.system import Friction, State, System, velocities
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from step_inclusion import assemble
 
 from polycorner import minimise
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.models import textbook as scenes
-from polycorner.motion.assembly import assemble
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.noise import Solver

@@ -849,7 +849,7 @@ def finish_block(scene, room, b):
 
 @inner
 def bend_of(gap, before, then, h, scale):
-    """Return what curvature adds to a gap that bodies slide or roll along; see ``assembly``."""
+    """Return what curvature adds to a gap that bodies slide or roll along; see ``simulation``."""
     bend = then - gap - h * before
     if abs(bend) <= CLOSED * scale or abs(h * before) > 4.0 * abs(bend):
         return 0.0
@@ -858,7 +858,7 @@ def bend_of(gap, before, then, h, scale):
 
 @inner
 def bound_of(gap, before, free, bend, bounce, h, scale):
-    """Return the least closing-free speed a contact must leave with; see ``assembly``."""
+    """Return the least closing-free speed a contact must leave with; see ``simulation``."""
     if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(free - before):
         return -bounce * before
     reached = gap + bend
@@ -2041,7 +2041,7 @@ def solve_islands(scene, motion, room, blocks, h):
 def look_ahead(scene, motion, room, blocks, h):
     """Raise the bounds of gaps that close more than their slopes say; return whether any does.
 
-    See ``assembly.bent_shut``.  Between bodies it is asked only if they move fast enough.
+    See ``simulation``.  Between bodies it is asked only if they move fast enough.
     """
     k, u, found = scene.size, room.two, False
     for i in range(scene.bodies):

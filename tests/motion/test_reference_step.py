@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, reject
 from hypothesis import strategies as st
+from reference_step import reference_step, solve_step
+from step_inclusion import FrictionBlock, StepProblem, assemble
+from step_residual import natural_residual
 from strategies import reals, vectors
 
 from polycorner import Manifold, Polyhedron
 from polycorner.errors import SolverError
-from polycorner.motion.assembly import FrictionBlock, StepProblem, assemble
 from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
-from polycorner.motion.reference import reference_step, solve_step
-from polycorner.motion.residual import natural_residual
 from polycorner.motion.system import Friction, System, velocities
 
 G = 9.81

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
+from step_inclusion import StepProblem
 
-from polycorner.motion.assembly import StepProblem
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.spaces.manifold import Array
 
@@ -16,7 +16,7 @@ def natural_residual(
 ) -> float:
     """Return the largest part by which a step's inclusion fails, relative to the step's speed.
 
-    The parts are the natural maps of the three lines of :mod:`polycorner.motion.assembly`, as
+    The parts are the natural maps of the three lines of :mod:`step_inclusion`, as
     square roots of energies:
 
     .. code-block:: text

@@ -1,40 +1,4 @@
-"""What one step asks, written out in NumPy: the inclusion that both step functions solve.
-
-From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the half step
-``q_M = q + h v / 2``, find the velocity after the step and the impulses with ([Moreau], [AB])
-
-.. code-block:: text
-
-    M (v+ - v_free) = sum_i J_i' lam_i + sum_b B_b' p_b,      v_free = v + h M^-1 F
-    0 <= lam_i   perp   J_i v+ - bound_i >= 0
-    p_b in L_b C_b   and   -(B_b v+ + d_b) normal to L_b C_b at p_b
-
-======================================  =====================================================
-``bound_i = -e_i J_i v``                contact ``i`` closes in this step and bounces
-``bound_i = -(gap_i + c_i) / h``        otherwise: it may just be reached ([StewartTrinkle]);
-                                        what overlaps is pushed out no faster than what forces
-                                        and curvature do within a step, ``|J_i (v_free - v)|``
-                                        and ``|c_i| / h``
-``c_i = gap_i(q_M + h v)``              what curvature adds to a gap where bodies slide or roll
-``- gap_i - h J_i v``                   along each other, ``h |J_i v| <= 4 |c_i|``; else 0
-``L_b = h N_b(q_M)``                    known normal force
-``L_b = lam_i``                         friction on the unilateral contact ``i``
-``C_b``                                 static set if the contact stuck before, else dynamic
-======================================  =====================================================
-
-Without ``c`` a bead that circles in a ring would leave it, step by step.  Where velocities change
-much within a step it is not the curvature met: where at ``q_M + h v+``, the next half step if
-nothing more happens, a gap is short of what was promised, ``min(0, gap_i + h bound_i + c_i)``, by
-more than ``BEND``, the step is solved once more with the bound raised by what is missing, a step
-of Newton's method for the gap itself (:func:`bent_shut`).
-
-Slip that reverses within a step was zero within it, and there it is the static set that decides
-whether it starts again: such a step is solved anew with the static set (:func:`turned_back`).
-
-A contact bounces if it approaches and would leave faster than the forces bring it back within
-the step, ``e |J v| > |J (v_free - v)|``; what bounces more slowly than that is at rest within
-the resolution of the step, and Zeno's infinitely many bounces end there.
-"""
+"""One step of :mod:`polycorner.motion.simulation` as an inclusion, written out in NumPy."""
 
 from dataclasses import dataclass, replace
 
@@ -75,7 +39,7 @@ class FrictionBlock:
 
 @dataclass(frozen=True)
 class StepProblem:
-    """One step as an inclusion; see the head of the module.
+    """One step as an inclusion; see :mod:`polycorner.motion.simulation`.
 
     Attributes
     ----------

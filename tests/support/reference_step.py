@@ -1,4 +1,4 @@
-"""The step of :mod:`polycorner.motion.assembly` as a convex programme, to be read.
+"""The step of :mod:`step_inclusion` as a convex programme, to be read.
 
 With the loads given, the velocity after the step is the only minimiser of
 
@@ -21,18 +21,18 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-
-from polycorner.errors import SolverError
-from polycorner.motion.assembly import (
+from step_inclusion import (
     FrictionBlock,
     StepProblem,
     assemble,
     bent_shut,
     turned_back,
 )
+from step_residual import NO_LOAD, compliance, natural_residual, nearest, speed
+
+from polycorner.errors import SolverError
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.friction import CutDisc, Disc, Ellipse, Interval
-from polycorner.motion.residual import NO_LOAD, compliance, natural_residual, nearest, speed
 from polycorner.motion.system import State, System
 from polycorner.spaces.manifold import Array
 
@@ -61,7 +61,7 @@ class StepSolution:
     friction : tuple of (d,) array
         Impulses ``p_b`` of the friction blocks.
     residual : float
-        Their :func:`~polycorner.motion.residual.natural_residual`.
+        Their :func:`~step_residual.natural_residual`.
     rounds : int
         How many convex programmes were solved.
     """
