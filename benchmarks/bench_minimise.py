@@ -80,7 +80,7 @@ def is_at(pair: DumbbellPair, q: np.ndarray, corner: Certificate) -> bool:
 
 def residual(pair: DumbbellPair, q: np.ndarray) -> float:
     """Return the largest KKT residual at ``q``, contacts within ``SAME`` taken as active."""
-    return certify(pair.polyhedron, pair.energy, q, tolerance=SAME).residuals().worst
+    return certify(pair.polyhedron, pair.energy, q, tolerance=SAME).residuals.worst
 
 
 def race(

@@ -38,7 +38,7 @@ def draw(rest: Certificate, path: Path) -> Path:
         ("ramp", np.array([[-1.5, 2.5], [GOLDEN, GOLDEN**2]])),
         ("bowl", np.stack([bowl, bowl**2], axis=1)),
     ]
-    held = ", ".join(f"{name}: {kind.value}" for name, kind in rest.entrapment().items())
+    held = ", ".join(f"{name}: {kind.value}" for name, kind in rest.entrapment.items())
     bounds = (-1.6, 1.6, 0.0, 2.6)
     return save(draw_region(WEDGE, bounds, edges=sides, rests=[(held, rest.point)]), path)
 

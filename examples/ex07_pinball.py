@@ -60,11 +60,11 @@ def main() -> Result:
 def held_by(rest: Certificate) -> str:
     """Name what carries the ball: the walls that hold it, but for those that it merely touches."""
     touched = (Entrapment.HALF_V, Entrapment.HALF_U)
-    return " ".join(name for name, kind in rest.entrapment().items() if kind in touched)
+    return " ".join(name for name, kind in rest.entrapment.items() if kind in touched)
 
 
 def held_as(rest: Certificate) -> str:
-    counts = rest.entrapment_counts()
+    counts = rest.entrapment_counts
     return " + ".join(f"{n} {kind}" if n > 1 else kind for kind, n in counts.items() if n)
 
 

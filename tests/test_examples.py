@@ -52,7 +52,7 @@ def test_own_polyhedron():
     certificate = ex02_own_polyhedron.main()
     golden = ex02_own_polyhedron.GOLDEN
     np.testing.assert_allclose(certificate.point, [golden, golden**2], atol=1e-12)
-    assert certificate.signature() == (2, 0, 0)
+    assert certificate.signature == (2, 0, 0)
 
 
 def test_ridge():

@@ -174,7 +174,7 @@ def captured(path: tuple[Any, Any]) -> float:
 def _caption() -> str:
     after = [captured(path) for path in motions()]
     words = [f"after {time:.1f}" if time < math.inf else f"not within {TIME:g}" for time in after]
-    counts = dyad_minima(style.PAIR)[0].certificate.entrapment_counts()
+    counts = dyad_minima(style.PAIR)[0].certificate.entrapment_counts
     held = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     return (
         "A point mass m on a line in wells of the same depth D and rim a. (a)–(c) Energy, the "

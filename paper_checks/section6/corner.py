@@ -215,7 +215,7 @@ def held_by(
     """Count directions by how they are held, and ask when the printed counts would be right."""
     claimed = dict(zip(KINDS, (half_v, half_u, full_u, free), strict=True))
     entry, found = rests(pair)["delta_R"], proof(pair, "delta_R")
-    counts = entry.certificate.entrapment_counts()
+    counts = entry.certificate.entrapment_counts
     complete = {kind: counts.get(kind, 0) for kind in KINDS}
     presses = {name: multiplier(found, name) for name in CORNER}
     proved = found.proved and all(low > 0 for low, _ in presses.values())
@@ -232,7 +232,7 @@ def held_by(
         Verdict.HOLDS if holds else Verdict.CORRECTED if proved else Verdict.REFUTED,
         f"Proved: all three contacts press, with $dE = \\sum\\lambda_i\\,df_i$ and $\\lambda$ = "
         f"{listed}; so {', '.join(f'{n} {k}' for k, n in complete.items())}. Ball-rod contacts "
-        f"without pressure, signature {at_edge.signature()}, occur at $t = "
+        f"without pressure, signature {at_edge.signature}, occur at $t = "
         f"{edge.rod_radius:.6f}$ mm, and there the corner is "
         f"{'a' if at_edge.is_minimum else 'no'} minimum.",
         {f"multiplier_{name}": middle(side) for name, side in presses.items()},

@@ -69,7 +69,7 @@ def heading(
         why = certificate.verdict.value
         msg = f"expected a corner where {' '.join(CORNER)} touch; got none: {why}"
         raise ArithmeticError(msg)
-    residuals = certificate.residuals()
+    residuals = certificate.residuals
     multipliers = found.multipliers
     return {
         "heading": (found.headings[0], "deg"),

@@ -197,25 +197,29 @@ class Certificate(Printed):
         """Whether the evidence is that of a local minimum."""
         return self.verdict.is_minimum
 
+    @property
     def signature(self) -> tuple[int, int, int]:
-        """Return the lemma's ``(p, q, r)``: first order, second order, no dependence."""
+        """The lemma's ``(p, q, r)``: first order, second order, no dependence."""
         return self.analysis.signature
 
+    @property
     def entrapment(self) -> dict[str, Entrapment]:
-        """Return the kind of entrapment in every direction.
+        """The kind of entrapment in every direction.
 
         Keys are the contacts that hold the point, then the principal directions along the face,
         named by the coordinates that change most.
         """
         return dict(self.analysis.entrapment)
 
+    @property
     def entrapment_counts(self) -> dict[str, int]:
-        """Return how many directions are half-V, half-U, U and free."""
+        """How many directions are half-V, half-U, U and free."""
         kinds = list(self.analysis.entrapment.values())
         return {kind.value: kinds.count(kind) for kind in Entrapment if kind is not Entrapment.NONE}
 
+    @property
     def lemma(self) -> tuple[Condition, ...]:
-        """Return the four hypotheses of the minimisation lemma, each with its deciding number."""
+        """The four hypotheses of the minimisation lemma, each with its deciding number."""
         a = self.analysis
         held = a.multipliers.values[[*a.strong_positions]]
         curved = a.curvature.values[abs(a.curvature.values) > a.small_curvature]
@@ -243,8 +247,9 @@ class Certificate(Printed):
             ),
         )
 
+    @property
     def residuals(self) -> Residuals:
-        """Recompute the residuals from the functions and the stored multipliers."""
+        """The residuals, recomputed from the functions and the stored multipliers."""
         values, gradients, hessians = self.problem.evaluate(self.point, 2)
         names = [*self.problem.polyhedron.names, *self.problem.polyhedron.equation_names]
         multipliers = self.multipliers
@@ -269,7 +274,7 @@ class Certificate(Printed):
     def holds(self, tolerance: float | None = None) -> bool:
         """Whether this is a minimum whose recomputed residuals are all within ``tolerance``."""
         limit = self.tolerance if tolerance is None else tolerance
-        return self.is_minimum and self.residuals().worst <= limit
+        return self.is_minimum and self.residuals.worst <= limit
 
     def explain(self, *, unit: str | None = None) -> str:
         """Say in a few sentences why the point is, or is not, a local minimum.
@@ -332,7 +337,7 @@ def certify(
     >>> M = Manifold.euclidean("x y")
     >>> x, y = M.symbols
     >>> c = certify(Polyhedron(M, {"floor": y}), x**2 + y, [0.0, 0.0])
-    >>> c.verdict.name, c.multipliers, c.signature()
+    >>> c.verdict.name, c.multipliers, c.signature
     ('STRICT_MINIMUM', {'floor': 1.0}, (1, 1, 0))
     """
     check_tolerance("tolerance", tolerance)

@@ -281,7 +281,7 @@ def _followed(c: "Certificate") -> str:
 
 
 def _entrapment(c: "Certificate") -> Iterator[str]:
-    kinds = c.entrapment()
+    kinds = c.entrapment
     if not kinds:
         return
     groups: dict[str, list[str]] = {}

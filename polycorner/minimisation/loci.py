@@ -81,7 +81,7 @@ class Quotient:
     def flat_beyond(self, found: Certificate) -> bool:
         """Whether the energy is flat in more directions than the symmetry explains."""
         known = self.symmetry.directions(self.problem.polyhedron.manifold, found.point)
-        return found.signature()[2] > rank(known, found.rank_tolerance)
+        return found.signature[2] > rank(known, found.rank_tolerance)
 
     def active_count(self, found: Certificate) -> int:
         """Return how many functions vanish at a point, without analysing it."""

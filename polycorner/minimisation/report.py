@@ -36,7 +36,7 @@ def certificate_line(c: "Certificate") -> str:
 def certificate_sheet(c: "Certificate") -> Sheet:
     """Return a certificate as tables of the point, the active functions and the directions."""
     manifold = c.problem.polyhedron.manifold
-    residuals = c.residuals()
+    residuals = c.residuals
     several = "" if c.multipliers_unique else "The multipliers are one choice of several."
     return Sheet(
         "Certificate",
@@ -46,7 +46,7 @@ def certificate_sheet(c: "Certificate") -> Sheet:
                     ("verdict", c.verdict.value),
                     ("energy", number(c.energy, 12)),
                     ("active", ", ".join(c.active) or "none"),
-                    ("signature", "(p, q, r) = ({}, {}, {})".format(*c.signature())),
+                    ("signature", "(p, q, r) = ({}, {}, {})".format(*c.signature)),
                     ("infeasibility", f"{residuals.infeasibility:.1e}"),
                     ("stationarity", f"{residuals.stationarity:.1e}"),
                     ("complementarity", f"{residuals.complementarity:.1e}"),
@@ -57,7 +57,7 @@ def certificate_sheet(c: "Certificate") -> Sheet:
             several,
             Table(
                 ("direction", "entrapment"),
-                tuple((direction, kind.value) for direction, kind in c.entrapment().items()),
+                tuple((direction, kind.value) for direction, kind in c.entrapment.items()),
             ),
             units(manifold.periods),
         ),
@@ -89,7 +89,7 @@ def minima_sheet(found: "Minima") -> Sheet:
         (
             number(c.energy),
             str(count),
-            "({}, {}, {})".format(*c.signature()),
+            "({}, {}, {})".format(*c.signature),
             c.verdict.name,
             names(c.active) or "-",
             *(number(x, 6) for x in _point(c)),

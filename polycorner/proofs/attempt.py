@@ -144,7 +144,7 @@ def _explained(certificate: Certificate, undecided: Undecided) -> Undecided:
     hints = []
     if not certificate.licq:
         hints.append("the gradients of the active functions are nearly dependent")
-    flat = [label for label, kind in certificate.entrapment().items() if kind is Entrapment.FREE]
+    flat = [label for label, kind in certificate.entrapment.items() if kind is Entrapment.FREE]
     if flat:
         hints.append(f"the energy is flat along {', '.join(flat)}")
     return Undecided(undecided.name, "; ".join([undecided.reason, *hints]))

@@ -39,7 +39,7 @@ def test_an_empty_set_is_infeasible(method, kind):
     c = minimise(D, x**2 + y**2, [2.0, 0.5], method=method)
     assert c.verdict is Verdict.INFEASIBLE
     assert not c.holds(1)
-    assert c.residuals().infeasibility > 0.1
+    assert c.residuals.infeasibility > 0.1
     assert "no point of the polyhedron" in str(c)
 
 
@@ -77,8 +77,8 @@ def test_a_minimum_inside_has_no_contacts(method):
     assert c.point == pytest.approx([1, -0.5], abs=1e-9)
     assert c.active == ()
     assert c.multipliers == {}
-    assert c.signature() == (0, 2, 0)
-    assert c.entrapment() == {"x": Entrapment.U, "y": Entrapment.U}
+    assert c.signature == (0, 2, 0)
+    assert c.entrapment == {"x": Entrapment.U, "y": Entrapment.U}
 
 
 def test_a_search_cut_short_says_so():
@@ -93,7 +93,7 @@ def test_a_point_outside_is_said_to_be_outside():
     c = certify(QUADRANT, x + y, [-1e-3, 1])
     assert c.verdict is Verdict.OUTSIDE
     assert not c.holds(1)
-    assert c.residuals().infeasibility == pytest.approx(1e-3)
+    assert c.residuals.infeasibility == pytest.approx(1e-3)
 
 
 @every_method

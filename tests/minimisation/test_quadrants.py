@@ -71,12 +71,12 @@ def counted(corner):
 def test_a_bent_quadrant_has_the_signature_it_was_built_with(corner):
     c = corner.certify()
     p, q, r = counted(corner)
-    assert c.signature() == (p, q, r)
+    assert c.signature == (p, q, r)
     assert c.verdict is (Verdict.MINIMUM_ALONG_LOCUS if r else Verdict.STRICT_MINIMUM)
     assert c.active == tuple(f"f{i + 1}" for i in range(p))
     expected = {name: corner.slopes[i] for i, name in enumerate(c.active)}
     assert c.multipliers == pytest.approx(expected, rel=1e-10)
-    assert c.entrapment_counts() == {"half-V": p, "half-U": 0, "U": q, "free": r}
+    assert c.entrapment_counts == {"half-V": p, "half-U": 0, "U": q, "free": r}
     assert len(c.curvatures) == q + r
     assert c.licq
     assert c.multipliers_unique
@@ -84,8 +84,8 @@ def test_a_bent_quadrant_has_the_signature_it_was_built_with(corner):
     assert c.multiplier_ranges == {name: (lam, lam) for name, lam in c.multipliers.items()}
     assert c.stratum.rank == p
     assert c.stratum.dimension == q + r
-    assert [condition.holds for condition in c.lemma()] == [True] * 4
-    assert c.residuals().worst < 1e-13
+    assert [condition.holds for condition in c.lemma] == [True] * 4
+    assert c.residuals.worst < 1e-13
     assert c.holds()
     assert c.holds(1e-13)
 
@@ -94,7 +94,7 @@ def test_a_bent_quadrant_has_the_signature_it_was_built_with(corner):
 def test_a_bent_locus_is_followed(corner):
     c = corner.certify()
     assert c.verdict is Verdict.MINIMUM_ALONG_LOCUS
-    assert c.signature() == counted(corner)
+    assert c.signature == counted(corner)
 
 
 @given(corners(), st.integers(0, 2**32 - 1))
@@ -116,9 +116,9 @@ def test_a_negative_multiplier_refutes(corner, data):
     p, *_ = counted(corner)
     assert c.verdict is Verdict.NOT_STATIONARY
     assert c.multipliers[f"f{i + 1}"] == pytest.approx(slopes[i], rel=1e-10)
-    assert c.signature()[0] == p - 1
-    assert c.entrapment()[f"f{i + 1}"] is Entrapment.NONE
-    assert not c.lemma()[1].holds
+    assert c.signature[0] == p - 1
+    assert c.entrapment[f"f{i + 1}"] is Entrapment.NONE
+    assert not c.lemma[1].holds
     assert not c.holds(1)
 
 
@@ -130,10 +130,10 @@ def test_a_negative_curvature_refutes(corner, data):
     curvatures[i] *= -1
     c = changed(corner, curvatures=curvatures).certify()
     assert c.verdict is Verdict.SADDLE
-    assert c.signature() == (p, q, r)
+    assert c.signature == (p, q, r)
     assert (c.curvatures < -1e-3).sum() == 1
-    assert list(c.entrapment().values()).count(Entrapment.NONE) == 1
-    assert [condition.holds for condition in c.lemma()][:3] == [True, True, False]
+    assert list(c.entrapment.values()).count(Entrapment.NONE) == 1
+    assert [condition.holds for condition in c.lemma][:3] == [True, True, False]
     assert not c.holds(1)
 
 
@@ -146,13 +146,13 @@ def test_a_weakly_active_face_holds_by_its_curvature(corner, data, sign):
     c = changed(corner, slopes=slopes, curvatures=curvatures, mixed=0.0).certify()
     assert not c.strictly_complementary
     assert c.multipliers[f"f{i + 1}"] == pytest.approx(0, abs=1e-12)
-    assert c.signature() == (p - 1, q + 1, r)
+    assert c.signature == (p - 1, q + 1, r)
     if sign < 0:
         assert c.verdict is Verdict.SADDLE
         return
     assert c.verdict is (Verdict.MINIMUM_ALONG_LOCUS if r else Verdict.WEAK_MINIMUM)
-    assert c.entrapment()[f"f{i + 1}"] is Entrapment.HALF_U
-    assert c.entrapment_counts() == {"half-V": p - 1, "half-U": 1, "U": q, "free": r}
+    assert c.entrapment[f"f{i + 1}"] is Entrapment.HALF_U
+    assert c.entrapment_counts == {"half-V": p - 1, "half-U": 1, "U": q, "free": r}
     assert c.holds()
 
 
@@ -163,9 +163,9 @@ def test_every_method_comes_to_rest_in_the_bent_quadrant(method, corner, seed):
     start = corner.centre + 0.05 * rng.normal(size=corner.n)
     c = corner.minimise(start, method=method)
     assert c.verdict is Verdict.STRICT_MINIMUM
-    assert c.signature() == counted(corner)
+    assert c.signature == counted(corner)
     assert c.point == pytest.approx(corner.point, abs=1e-9)
-    assert c.residuals().worst < 1e-12
+    assert c.residuals.worst < 1e-12
 
 
 @every_method
@@ -175,7 +175,7 @@ def test_every_method_comes_to_rest_on_the_locus(method, corner, seed):
     start = corner.centre + 0.05 * rng.normal(size=corner.n)
     c = corner.minimise(start, method=method)
     assert c.verdict is Verdict.MINIMUM_ALONG_LOCUS
-    assert c.signature() == counted(corner)
+    assert c.signature == counted(corner)
     assert c.energy == pytest.approx(0, abs=1e-12)
 
 
@@ -197,14 +197,14 @@ def test_units_change_no_verdict(corner, data):
     c = corner.certify()
     other = changed(corner, units=units, gains=gains, gain=gain).certify()
     assert other.verdict is c.verdict
-    assert other.signature() == c.signature()
+    assert other.signature == c.signature
     assert other.active == c.active
-    assert other.entrapment_counts() == c.entrapment_counts()
+    assert other.entrapment_counts == c.entrapment_counts
     for i, name in enumerate(c.active):
         expected = c.multipliers[name] * gain / gains[i]
         assert other.multipliers[name] == pytest.approx(expected, rel=1e-8)
     assert other.curvatures == pytest.approx(c.curvatures * gain, rel=1e-7, abs=1e-11 * gain)
-    assert other.residuals().worst < 1e-11
+    assert other.residuals.worst < 1e-11
 
 
 @every_method
@@ -215,5 +215,5 @@ def test_units_change_no_point_of_rest(method, corner, data):
     other = changed(corner, units=units, gains=gains, gain=gain)
     c = other.minimise(corner.centre + 0.02, method=method)
     assert c.verdict is Verdict.STRICT_MINIMUM
-    assert c.signature() == counted(corner)
+    assert c.signature == counted(corner)
     assert c.point / units == pytest.approx(corner.centre, abs=1e-9)

@@ -209,7 +209,7 @@ def test_a_floor_is_one_minimum_for_each_room(name):
     found = minima(Polyhedron(SPACE, tree), Z, starts=150, box=[*SQUARE, (0, 1)], rng=3)
     assert len(found) == rooms
     assert sum(found.counts) == 150
-    assert [c.signature() for c in found] == [(1, 0, 2)] * rooms
+    assert [c.signature for c in found] == [(1, 0, 2)] * rooms
     assert [len(c.active) for c in found] == [1] * rooms  # in the middle of a floor, not at a wall
 
 

@@ -94,8 +94,8 @@ FLOOR = Polyhedron(M3, {"floor": y})
 def test_a_vanishing_second_order_is_not_guessed(power, sign):
     c = certify(FLOOR, y + z**2 + sign * x**power, [0, 0, 0])
     assert c.verdict is Verdict.UNDECIDED
-    assert c.signature() == (1, 1, 1)
-    assert not c.lemma()[3].holds
+    assert c.signature == (1, 1, 1)
+    assert not c.lemma[3].holds
 
 
 @pytest.mark.parametrize(
@@ -142,4 +142,4 @@ def test_a_bent_locus_of_two_dimensions_is_recognised():
     far = Polyhedron(M3, {"far": x + 100})
     c = certify(far, (x + x * z + y**2 / 4) ** 2, [0, 0, 0])
     assert c.verdict is Verdict.MINIMUM_ALONG_LOCUS
-    assert c.signature() == (0, 1, 2)
+    assert c.signature == (0, 1, 2)

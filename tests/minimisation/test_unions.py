@@ -60,7 +60,7 @@ def test_pieces_that_do_not_reach_the_point_do_not_matter():
     D = Polyhedron(M2, AnyOf(AllOf(y, 5 - y), AllOf(x - 3, 9 - x)))
     c = certify(D, x**2 + y, [0, 0])
     assert c.verdict is Verdict.STRICT_MINIMUM
-    assert c.signature() == (1, 1, 0)
+    assert c.signature == (1, 1, 0)
     assert len(c.active) == 1
 
 
@@ -74,7 +74,7 @@ def test_descent_switches_from_one_disk_to_the_next(method):
     downhill = np.array([1, 0.1]) / np.hypot(1, 0.1)
     assert c.point == pytest.approx(-1.25 * downhill, abs=1e-9)
     assert c.verdict is Verdict.STRICT_MINIMUM
-    assert c.signature() == (1, 1, 0)
+    assert c.signature == (1, 1, 0)
 
 
 @every_method

@@ -269,7 +269,7 @@ def test_every_minimum_on_a_grid_is_a_rest_held_as_its_profile_says():
         assert np.linalg.norm(rest.point - centre) < 0.05
         growth = {order_of_growth(BOARD, rest.point, side) for side in (-1, 1)}
         orders = (*sorted(growth - {None}), None) if None in growth else tuple(growth) * 2
-        assert rest.entrapment_counts() == KINDS[orders]
+        assert rest.entrapment_counts == KINDS[orders]
         seen.add(orders)
     assert seen == set(KINDS)
 

@@ -12,9 +12,9 @@ def same_certificate(one, other):
     np.testing.assert_array_equal(one.point, other.point)
     assert one.verdict is other.verdict
     assert one.multipliers == other.multipliers
-    assert one.signature() == other.signature()
-    assert one.entrapment() == other.entrapment()
-    assert one.residuals() == other.residuals()
+    assert one.signature == other.signature
+    assert one.entrapment == other.entrapment
+    assert one.residuals == other.residuals
     for name in ("tolerance", "rank_tolerance", "method", "iterations", "search"):
         assert getattr(one, name) == getattr(other, name)
 

@@ -62,7 +62,7 @@ def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[st
 
 def _entry(entry: "DyadMinimum") -> dict[str, Any]:
     certificate = entry.certificate
-    residuals = certificate.residuals()
+    residuals = certificate.residuals
     return {
         "name": entry.name,
         "heading_deg": list(entry.headings),
@@ -72,10 +72,10 @@ def _entry(entry: "DyadMinimum") -> dict[str, Any]:
         "height": entry.height,
         "active": list(certificate.active),
         "multipliers": entry.multipliers,
-        "signature": list(certificate.signature()),
-        "entrapment": certificate.entrapment_counts(),
+        "signature": list(certificate.signature),
+        "entrapment": certificate.entrapment_counts,
         "entrapment_by_direction": {
-            direction: kind.value for direction, kind in certificate.entrapment().items()
+            direction: kind.value for direction, kind in certificate.entrapment.items()
         },
         "chirality": certificate.stratum.chirality,
         "is_minimum": certificate.is_minimum,
@@ -145,7 +145,7 @@ def _table(entries: "tuple[DyadMinimum, ...]") -> "Table":
 def _rows(entries: "tuple[DyadMinimum, ...]") -> list[tuple[str, list[str]]]:
     certificates = [entry.certificate for entry in entries]
     unit = "mm" if entries[0].pair.is_plane else "dE/dgap"
-    residuals = [certificate.residuals() for certificate in certificates]
+    residuals = [certificate.residuals for certificate in certificates]
     return [
         ("heading (deg)", ["{:.6f}  {:.6f}".format(*e.headings) for e in entries]),
         ("azimuth (deg)", ["{:.6f}  {:.6f}".format(*e.azimuths) for e in entries]),
@@ -153,10 +153,10 @@ def _rows(entries: "tuple[DyadMinimum, ...]") -> list[tuple[str, list[str]]]:
         ("height (mm)", [f"{e.height:.9f}" for e in entries]),
         ("minimum", ["yes" if c.is_minimum else "no" for c in certificates]),
         (f"multipliers ({unit})", [_lines(e.multipliers, "{:.9f}") for e in entries]),
-        ("(p, q, r)", ["({}, {}, {})".format(*c.signature()) for c in certificates]),
+        ("(p, q, r)", ["({}, {}, {})".format(*c.signature) for c in certificates]),
         (
             "entrapment",
-            [_lines({d: k.value for d, k in c.entrapment().items()}, "{}") for c in certificates],
+            [_lines({d: k.value for d, k in c.entrapment.items()}, "{}") for c in certificates],
         ),
         ("infeasibility", [f"{r.infeasibility:.1e}" for r in residuals]),
         ("stationarity", [f"{r.stationarity:.1e}" for r in residuals]),

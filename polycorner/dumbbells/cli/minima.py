@@ -105,7 +105,7 @@ def _report(
                 "energy": certificate.energy,
                 "count": count,
                 "active": list(certificate.active),
-                "signature": list(certificate.signature()),
+                "signature": list(certificate.signature),
                 "verdict": certificate.verdict.value,
                 "point": certificate.point.tolist(),
             }

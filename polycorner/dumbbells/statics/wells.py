@@ -96,7 +96,7 @@ def dyad_holds(pair: DumbbellPair, chirality: Chirality = "R") -> tuple[Hold, ..
         msg = f"chirality: expected 'R' or 'L'; got {chirality!r}"
         raise ValueError(msg)
     corner = dyad_minima(pair)["RL".index(chirality)].certificate
-    if not corner.is_minimum or corner.signature()[0] != len(CORNER):
+    if not corner.is_minimum or corner.signature[0] != len(CORNER):
         msg = f"pair: expected one held by three contacts; its corner is {corner.verdict.value}"
         raise ValueError(msg)
     return _holds(pair, corner)
@@ -113,7 +113,7 @@ def _holds(pair: DumbbellPair, corner: Certificate) -> tuple[Hold, ...]:
     length = np.linalg.norm(opening, axis=0)
     forces = pair.ball_heights_per_energy * np.array(list(corner.multipliers.values()))
     stiff = np.einsum("ij,ik,kj->j", opening, curved, opening) / length**2
-    labels = corner.entrapment()
+    labels = corner.entrapment
     holds = [
         Hold(name, labels[name], 1 / size, force, force / size, k)
         for name, size, force, k in zip(
@@ -127,7 +127,7 @@ def _modes(corner: Certificate, scale: Array, slopes: Array, curved: Array) -> I
     """Yield the normal modes along the face, each with the certificate's name that is nearest."""
     face = np.linalg.svd(slopes)[2][len(slopes) :].T
     stiff, modes = np.linalg.eigh(face.T @ curved @ face)
-    along = [(name, k) for name, k in corner.entrapment().items() if name not in corner.active]
+    along = [(name, k) for name, k in corner.entrapment.items() if name not in corner.active]
     bent = corner.curvatures > corner.analysis.small_curvature
     order = [*np.flatnonzero(bent), *np.flatnonzero(~bent)]  # the order of the certificate's names
     vectors = corner.analysis.curvature.vectors[:, order]

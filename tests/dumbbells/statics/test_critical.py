@@ -168,7 +168,7 @@ def test_at_the_critical_thickness_the_certificate_shows_the_way_down():
     found = critical_corner(PAIR)
     assert found.certificate.verdict is Verdict.SADDLE
     assert found.pair == replace(PAIR, rod_radius=found.value)
-    assert found.certificate.residuals().worst < 1e-12
+    assert found.certificate.residuals.worst < 1e-12
 
 
 # ------------------------------------------------------------------- what becomes of the pair

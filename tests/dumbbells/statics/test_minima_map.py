@@ -128,7 +128,7 @@ def test_end_to_end_is_one_locus_of_any_distance():
     found = pair_minima(PAIR, starts=200)
     ends, points = found[0], found.points[0]
     assert ends.verdict is Verdict.MINIMUM_ALONG_LOCUS
-    assert ends.signature() == (0, 4, 2)
+    assert ends.signature == (0, 4, 2)
     assert ends.active == ()
     apart = abs(points[:, 4] - points[:, 1])
     assert apart.min() >= PAIR.length + 2 * PAIR.ball_radius - 1e-9
@@ -177,7 +177,7 @@ def test_long_thin_dumbbells_also_rest_crossed(length, rod, drum):
     (crossed,) = (c for c in found if kind_of(c) == "crossed")
     assert crossed.energy == pytest.approx(4 + 4 * rod, rel=1e-12)
     assert crossed.active == ("ab",)
-    assert crossed.signature() == (1, 3, 2)
+    assert crossed.signature == (1, 3, 2)
     low, high = sorted(abs(pair.heading(crossed.point)))
     width = 2 * math.sqrt(rod * (drum - 1 - rod))
     assert (low, math.sin(high) * length / 2) == pytest.approx((0, width), abs=1e-6)

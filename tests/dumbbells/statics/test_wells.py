@@ -40,7 +40,7 @@ def jacobian(function, q, step=1e-5):
 
 
 def test_labels_are_those_of_the_certificate():
-    assert {hold.direction: hold.kind for hold in HOLDS} == CERTIFICATE.entrapment()
+    assert {hold.direction: hold.kind for hold in HOLDS} == CERTIFICATE.entrapment
     kinds = [hold.kind for hold in HOLDS]
     assert kinds == [Entrapment.HALF_V] * 3 + [Entrapment.U] * 2 + [Entrapment.FREE]
     assert {h.direction: h.multiplier for h in HALF_V} == pytest.approx(CERTIFICATE.multipliers)

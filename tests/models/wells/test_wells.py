@@ -33,8 +33,8 @@ def test_a_well_is_what_its_certificate_says(kind):
     well = Well.of_depth(kind, 2.5, rim=1.7)
     certificate = certify(well.polyhedron, well.energy, [0.0])
     assert well.kind is kind
-    assert list(certificate.entrapment().values()) == [kind]
-    assert certificate.signature() == ((1, 0, 0) if kind is Entrapment.HALF_V else (0, 1, 0))
+    assert list(certificate.entrapment.values()) == [kind]
+    assert certificate.signature == ((1, 0, 0) if kind is Entrapment.HALF_V else (0, 1, 0))
 
 
 @given(walled(), st.floats(0.0, 3.0))
