@@ -22,8 +22,8 @@ import numpy as np
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.placements import forbidden_solid, relative_placements
-from polycorner.pictures.meshes import components_of_complement, write_mesh
-from polycorner.pictures.solid_view import draw_solid
+from polycorner.pictures.solids.meshes import components_of_complement, write_mesh
+from polycorner.pictures.solids.rendering import draw_solid
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 P = PAIR.ball_radius + PAIR.rod_radius

@@ -1,1 +1,5 @@
-"""Figures of regions, clusters, disks and studies; never imported by the core."""
+"""Figures of regions, solids, clusters, disks and sweeps; never imported by the core."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -88,7 +88,7 @@ def atlas(
     if not math.isfinite(heading):
         fail(f"--heading: expected an angle in degrees; got {heading:g}")
     with patience(WORDS):
-        from polycorner.dumbbells.pictures import models_3d as scenes
+        from polycorner.dumbbells.pictures import scenes
         from polycorner.dumbbells.statics.skeleton import pair_atlas
         from polycorner.dumbbells.viewer import page as scene_page
 
@@ -112,7 +112,7 @@ def trajectory(file: Path, out: Path | None, port: int, host: str, no_browser: b
     except (OSError, ValueError, KeyError) as error:
         fail(f"FILE: expected a trajectory as of polycorner drum --out; got {file} ({error})")
     from polycorner.dumbbells.pictures import film as scene_film
-    from polycorner.dumbbells.pictures import models_3d as scenes
+    from polycorner.dumbbells.pictures import scenes
     from polycorner.dumbbells.viewer import page as scene_page
 
     _deliver(
@@ -130,7 +130,7 @@ def _deliver(
     if out is None:
         _serve(lambda: _viewer().page_application(page(), host), host, port, browser=browser)
         return
-    from polycorner.dumbbells.pictures import models_3d as scenes
+    from polycorner.dumbbells.pictures import scenes
     from polycorner.dumbbells.viewer import page as scene_page
 
     suffix = out.suffix.lower()
@@ -147,9 +147,9 @@ def _deliver(
 
 def _viewer() -> Any:
     """Return the pages that are served, whose library is an extra."""
-    from polycorner.dumbbells.viewer import viewer
+    from polycorner.dumbbells.viewer import applications
 
-    return viewer
+    return applications
 
 
 def _serve(made: "Callable[[], Application]", host: str, port: int, *, browser: bool) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.pictures.grids import FEWEST_CELLS, Function
-from polycorner.pictures.sharp import SharpSurface, sharp_surface
-from polycorner.pictures.sharp_strata import Gaps
+from polycorner.pictures.solids.charts import Gaps
+from polycorner.pictures.solids.grids import FEWEST_CELLS, Function
+from polycorner.pictures.solids.sharp_surfaces import SharpSurface, sharp_surface
 from polycorner.spaces.manifold import Array
 
 
@@ -125,7 +125,7 @@ def forbidden_solid(
 
     Faces are single contacts, mesh edges follow the curves of two contacts, and corners, where
     three and more contacts close, are vertices
-    (:func:`~polycorner.pictures.sharp.sharp_surface`); labels are positions in
+    (:func:`~polycorner.pictures.sharp_surface`); labels are positions in
     ``pair.polyhedron.names``.  Its volume is in mm^2 rad.
 
     In the plane it is all that is forbidden up to congruence; in a drum it is a section at fixed

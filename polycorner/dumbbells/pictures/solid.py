@@ -16,10 +16,10 @@ from polycorner.dumbbells.pictures.placements import (
 )
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.files.atomic import write_atomically
-from polycorner.pictures.meshes import write_mesh
-from polycorner.pictures.sharp import SharpSurface
-from polycorner.pictures.sharp_strata import Chart
-from polycorner.pictures.solid_view import draw_solid
+from polycorner.pictures.solids.charts import Chart
+from polycorner.pictures.solids.meshes import write_mesh
+from polycorner.pictures.solids.rendering import draw_solid
+from polycorner.pictures.solids.sharp_surfaces import SharpSurface
 from polycorner.pictures.style import save
 from polycorner.skeletons.refinement import traced
 from polycorner.spaces.manifold import Array
@@ -159,7 +159,7 @@ class SolidFacts:
     faces, unresolved : int
         Number of triangles, and of those that lie on no single contact.
     surface_error, edge_error : float
-        Largest gap on faces and on edges, see :class:`~polycorner.pictures.sharp.SharpSurface`,
+        Largest gap on faces and on edges, see :class:`~polycorner.pictures.SharpSurface`,
         in mm.
     corner_error : float
         Largest distance of a corner of the atlas from the nearest vertex; a radian counts ``l/2``

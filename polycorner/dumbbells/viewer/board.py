@@ -19,8 +19,8 @@ from polycorner.dumbbells.pictures.bodies import (
 from polycorner.dumbbells.pictures.film import HANDS, TOUCHING, stratum_words
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.placements import relative_coordinates
-from polycorner.dumbbells.viewer.descent import STRIDE, Descent, descent
 from polycorner.dumbbells.viewer.sliders import SHAPE, Slider, coordinates, sliders_for
+from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descent
 from polycorner.minimisation.certificate import Certificate, certify
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.strata import LocalType

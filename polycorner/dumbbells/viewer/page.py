@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from polycorner.dumbbells.pictures.bodies import box_of, sizes_of
 from polycorner.dumbbells.pictures.film import Film
-from polycorner.dumbbells.pictures.models_3d import atlas_scene, glb, library
+from polycorner.dumbbells.pictures.scenes import atlas_scene, glb, library
 from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, WORDS
 from polycorner.dumbbells.pictures.solid import KINDS as KIND_WORDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
@@ -117,7 +117,7 @@ def three_script() -> str:
 def _page(title: str, note: str, data: dict[str, Any], keys: str) -> str:
     scripts = {
         "three": three_script(),
-        "scene": page_file("scene.js"),
+        "scene": page_file("stage.js"),
         "player": page_file("film.js"),
     }
     style = page_file("page.css")

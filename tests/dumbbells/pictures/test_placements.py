@@ -18,7 +18,7 @@ from polycorner.dumbbells.pictures.placements import (
     relative_gaps,
     relative_placements,
 )
-from polycorner.pictures.meshes import components_of_complement, isosurface
+from polycorner.pictures.solids.meshes import components_of_complement, isosurface
 
 TAU = math.tau
 PAIR = DumbbellPair(16, 3, 1.5)

@@ -19,7 +19,7 @@ from polycorner.dumbbells import DumbbellDrum, DumbbellPair, pair_atlas
 from polycorner.dumbbells.dynamics.pairs import handedness
 from polycorner.dumbbells.pictures import film as scene_film
 from polycorner.dumbbells.viewer import page as scene_page
-from polycorner.dumbbells.viewer.descent import descent
+from polycorner.dumbbells.viewer.steepest_descent import descent
 from polycorner.errors import PolycornerError
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)

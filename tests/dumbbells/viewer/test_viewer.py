@@ -17,8 +17,8 @@ from tornado.websocket import websocket_connect
 from polycorner import certify, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.placements import relative_placements
+from polycorner.dumbbells.viewer import applications
 from polycorner.dumbbells.viewer import server as viewer_server
-from polycorner.dumbbells.viewer import viewer
 from polycorner.dumbbells.viewer.board import Board, atlas_place, trail
 from polycorner.dumbbells.viewer.sliders import (
     BUTTONS,
@@ -213,7 +213,7 @@ async def serving(application):
 
 @pytest.fixture(scope="module")
 def application():
-    return viewer.live_application(DRUM, "127.0.0.1")
+    return applications.live_application(DRUM, "127.0.0.1")
 
 
 @contextlib.asynccontextmanager
@@ -315,7 +315,7 @@ def test_garbage_closes_the_connection_with_a_sentence(application, message, cod
 
 
 def test_a_flood_is_stopped(application, monkeypatch):
-    monkeypatch.setattr(viewer, "RATE", 20)
+    monkeypatch.setattr(applications, "RATE", 20)
 
     async def flood():
         async with serving(application) as port, connected(port) as socket_:
@@ -328,7 +328,7 @@ def test_a_flood_is_stopped(application, monkeypatch):
 
 
 def test_only_so_many_pages_at_a_time(application, monkeypatch):
-    monkeypatch.setattr(viewer, "PAGES", 1)
+    monkeypatch.setattr(applications, "PAGES", 1)
 
     async def crowd():
         async with serving(application) as port:
@@ -349,7 +349,7 @@ def test_headers_keep_the_page_to_itself(application):
     async def look():
         async with serving(application) as port:
             client = AsyncHTTPClient()
-            for path in ("", "scene.js", "board.js", "page.css", "three.js"):
+            for path in ("", "stage.js", "board.js", "page.css", "three.js"):
                 answer = await client.fetch(f"http://localhost:{port}/{path}")
                 policy = answer.headers["Content-Security-Policy"]
                 assert policy.startswith("default-src 'none'; script-src 'self'")
@@ -357,7 +357,7 @@ def test_headers_keep_the_page_to_itself(application):
                 assert "unsafe" not in policy
                 assert answer.headers["X-Frame-Options"] == "DENY"
                 assert answer.headers["X-Content-Type-Options"] == "nosniff"
-            for path in ("favicon.ico", "../pyproject.toml", "%2e%2e/x", "scene.js/", "live/x"):
+            for path in ("favicon.ico", "../pyproject.toml", "%2e%2e/x", "stage.js/", "live/x"):
                 missing = await client.fetch(f"http://localhost:{port}/{path}", raise_error=False)
                 assert missing.code == 404
             posted = HTTPRequest(f"http://localhost:{port}/", method="POST", body="x")

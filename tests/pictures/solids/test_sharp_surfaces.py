@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.pictures.meshes import isosurface
-from polycorner.pictures.sharp import sharp_surface
+from polycorner.pictures.solids.meshes import isosurface
+from polycorner.pictures.solids.sharp_surfaces import sharp_surface
 
 EVERYWHERE = [(-1.61, 1.67), (-1.59, 1.63), (-1.66, 1.62)]
 AROUND = (True, True, True)

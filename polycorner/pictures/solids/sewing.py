@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.errors import SolverError
-from polycorner.pictures.grids import AXES, Indices, Mask
+from polycorner.pictures.solids.grids import AXES, Indices, Mask
 from polycorner.spaces.manifold import Array
 
 # Kinds of vertices in a key after those on an edge along axis 0, 1 or 2.

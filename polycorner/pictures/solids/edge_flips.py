@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from polycorner.pictures.grids import Indices, Mask
-from polycorner.pictures.sharp_cuts import edges_of
-from polycorner.pictures.sharp_thinning import LONG, Labelled
+from polycorner.pictures.solids.creases import edges_of
+from polycorner.pictures.solids.edge_collapse import LONG, Labelled
+from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
 
 # Pairs with a face of a shape below this are tried; the worse shape has to grow by the gain.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from polycorner.errors import SolverError
 from polycorner.files.atomic import atomic
-from polycorner.pictures.grids import (
+from polycorner.pictures.solids.grids import (
     AXES,
     Bounds,
     Function,
@@ -24,7 +24,13 @@ from polycorner.pictures.grids import (
     grid,
     layer,
 )
-from polycorner.pictures.sewing import IN_CELL, keys_of, merged, sewn_euler_characteristic, shared
+from polycorner.pictures.solids.sewing import (
+    IN_CELL,
+    keys_of,
+    merged,
+    sewn_euler_characteristic,
+    shared,
+)
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.errors import SolverError
-from polycorner.pictures.grids import Bounds, Indices, Mask
-from polycorner.pictures.meshes import Isosurface, closed_mesh, isosurface
-from polycorner.pictures.sharp_cuts import Cut, cut_along_creases, edges_of
-from polycorner.pictures.sharp_flips import flipped
-from polycorner.pictures.sharp_strata import Chart, Gaps
-from polycorner.pictures.sharp_thinning import Labelled, labelled, thinned
+from polycorner.pictures.solids.charts import Chart, Gaps
+from polycorner.pictures.solids.creases import Cut, cut_along_creases, edges_of
+from polycorner.pictures.solids.edge_collapse import Labelled, labelled, thinned
+from polycorner.pictures.solids.edge_flips import flipped
+from polycorner.pictures.solids.grids import Bounds, Indices, Mask
+from polycorner.pictures.solids.meshes import Isosurface, closed_mesh, isosurface
 from polycorner.spaces.manifold import Array
 
 
@@ -97,7 +97,7 @@ def sharp_surface(
     """Return the boundary of ``{min f_i < 0}`` in a box, with mesh edges along its creases.
 
     1. Marching cubes ([LLVT]) and false position give a closed triangulation of
-       ``min f_i = 0`` (:func:`~polycorner.pictures.meshes.isosurface`).
+       ``min f_i = 0`` (:func:`~polycorner.pictures.isosurface`).
     2. Each vertex is settled by Newton's method on the function that is least there.
     3. Edges from one function to another get a vertex where both vanish, faces between three a
        vertex where three vanish: vertices on features as in [KBSS], by Newton's method on the
@@ -117,13 +117,13 @@ def sharp_surface(
         Of points ``(N, 3)`` and an order: the values ``(N, m)`` alone for order 0, with the
         gradients ``(N, m, 3)`` for order 1.
     bounds, resolution, periodic
-        As for :func:`~polycorner.pictures.meshes.isosurface`.  The least function alone has to
+        As for :func:`~polycorner.pictures.isosurface`.  The least function alone has to
         repeat itself along a periodic axis; the others may change their roles.
 
     Raises
     ------
     TypeError, ValueError
-        As for :func:`~polycorner.pictures.meshes.isosurface`.
+        As for :func:`~polycorner.pictures.isosurface`.
     SolverError
         If the surface found is not closed.
     """

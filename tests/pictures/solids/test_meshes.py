@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from oracles import observed_order
 from scipy.interpolate import RegularGridInterpolator
 
-from polycorner.pictures.meshes import components_of_complement, isosurface, write_mesh
+from polycorner.pictures.solids.meshes import components_of_complement, isosurface, write_mesh
 
 TAU = math.tau
 EVERYWHERE = [(-1.31, 1.37), (-1.29, 1.33), (-1.36, 1.32)]
@@ -287,7 +287,7 @@ def test_wrong_use_is_named(changes, error, message):
 def test_values_are_asked_for_in_slabs(monkeypatch):
     """No call sees more points than a slab holds, and slabs make no difference."""
     whole = isosurface(ball, EVERYWHERE, 20)
-    monkeypatch.setattr("polycorner.pictures.grids.SLAB", 1000)
+    monkeypatch.setattr("polycorner.pictures.solids.grids.SLAB", 1000)
     sizes = []
 
     def counted(p):

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner.pictures.grids import Indices, Mask
-from polycorner.pictures.sharp_cuts import Cut, edges_of
-from polycorner.pictures.sharp_strata import Chart
+from polycorner.pictures.solids.charts import Chart
+from polycorner.pictures.solids.creases import Cut, edges_of
+from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
 
 # Edges shorter than this many cells are drawn together; none becomes longer than the other.

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from polycorner import minimise
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair, pair_atlas
 from polycorner.dumbbells.pictures import bodies as scene_bodies
-from polycorner.dumbbells.pictures import models_3d as scenes
+from polycorner.dumbbells.pictures import scenes
 from polycorner.dumbbells.pictures.placements import forbidden_solid
 
 PLANE, DRUM = DumbbellPair(16, 3, 1.5), DumbbellPair(16, 3, 1.5, 125)

@@ -17,7 +17,7 @@ from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.dumbbells.pictures.models_3d import solid_bytes
+from polycorner.dumbbells.pictures.scenes import solid_bytes
 from polycorner.dumbbells.viewer.board import Board
 from polycorner.dumbbells.viewer.page import page_file, three_script
 from polycorner.dumbbells.viewer.server import allowed, names_of
@@ -201,7 +201,7 @@ class _Live(WebSocketHandler):
 def live_application(pair: DumbbellPair, host: str) -> Application:
     """Return the server of the live page of a pair; the first answers are compiled here."""
     Board.of(pair).fall()
-    texts = {name: page_file(name) for name in ("scene.js", "board.js", "page.css")}
+    texts = {name: page_file(name) for name in ("stage.js", "board.js", "page.css")}
     texts |= {"": page_file("board.html"), "three.js": three_script()}
     return _application(texts, POLICY, host, [("/live", _Live, {"pair": pair})])
 

@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from polycorner.pictures.grids import Mask
+from polycorner.pictures.solids.grids import Mask
 from polycorner.spaces.manifold import Array
 
 # Of points ``(N, 3)`` the values ``(N, m)`` and, for order 1, the gradients ``(N, m, 3)``.

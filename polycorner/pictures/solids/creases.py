@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner.pictures.grids import Indices, Mask
-from polycorner.pictures.sharp_strata import Chart
+from polycorner.pictures.solids.charts import Chart
+from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
 
 ROUNDS = 6

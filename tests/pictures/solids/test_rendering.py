@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from examples import ex05_solid
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.placements import forbidden_solid
-from polycorner.pictures import solid_view
-from polycorner.pictures.meshes import isosurface
-from polycorner.pictures.solid_view import View, draw_solid, place_solid, visible
+from polycorner.pictures.solids import rendering
+from polycorner.pictures.solids.meshes import isosurface
+from polycorner.pictures.solids.rendering import View, draw_solid, place_solid, visible
 from polycorner.pictures.style import save
 
 TAU = math.tau
@@ -107,7 +107,7 @@ def test_a_curve_that_flickers_changes_side_once():
     truth = np.arange(200) < 120
     seen = truth ^ (rng.random(200) < 0.2)
     assert np.diff(seen).sum() > 20
-    settled = solid_view._settled(seen)
+    settled = rendering._settled(seen)
     assert np.diff(settled).sum() <= 3
     assert settled[:110].all()
     assert not settled[130:].any()

@@ -1,0 +1,17 @@
+from .applications import live_application, page_application
+from .page import atlas_page, film_page, write_page
+from .server import PortTakenError, bound, serve
+from .steepest_descent import Descent, descent
+
+__all__ = [
+    "Descent",
+    "PortTakenError",
+    "atlas_page",
+    "bound",
+    "descent",
+    "film_page",
+    "live_application",
+    "page_application",
+    "serve",
+    "write_page",
+]

@@ -1,0 +1,38 @@
+from .clusters import draw_clusters, draw_motion
+from .disks import draw_critical
+from .parameter_boxes import draw_cells
+from .regions import draw_region
+from .solids import (
+    Isosurface,
+    SharpSurface,
+    View,
+    components_of_complement,
+    draw_solid,
+    isosurface,
+    place_solid,
+    sharp_surface,
+    visible,
+    write_mesh,
+)
+from .style import save
+from .sweeps import draw_study
+
+__all__ = [
+    "Isosurface",
+    "SharpSurface",
+    "View",
+    "components_of_complement",
+    "draw_cells",
+    "draw_clusters",
+    "draw_critical",
+    "draw_motion",
+    "draw_region",
+    "draw_solid",
+    "draw_study",
+    "isosurface",
+    "place_solid",
+    "save",
+    "sharp_surface",
+    "visible",
+    "write_mesh",
+]

@@ -1,0 +1,5 @@
+"""Solids bounded by smooth functions: watertight meshes with sharp edges, and drawings of them."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
