@@ -70,7 +70,7 @@ class Search:
         """Search, or go on, saving every so often; also what an interrupted search found."""
         import numpy as np
 
-        from polycorner.files import save_atlas
+        from polycorner.files import save_skeleton
         from polycorner.skeletons.elements import Completeness
         from polycorner.skeletons.search import resume as go_on
         from polycorner.skeletons.search import skeleton
@@ -89,25 +89,25 @@ class Search:
                 left -= budget
             while left > 0 and (resume or found.complete is Completeness.BUDGET):
                 resume = False
-                save_atlas(found, self.state, label=self.label)
+                save_skeleton(found, self.state, label=self.label)
                 found = go_on(found, budget=min(CHUNK, left), progress=progress)
                 left -= CHUNK
         self.finished = found.complete not in (Completeness.BUDGET, Completeness.INTERRUPTED)
         if self.finished:
             self.state.unlink(missing_ok=True)
         else:
-            save_atlas(found, self.state, label=self.label)
+            save_skeleton(found, self.state, label=self.label)
         self.drawn = self.finished
         self.interrupted = found.complete is Completeness.INTERRUPTED
         return found
 
     def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
-        from polycorner.files import load_atlas
+        from polycorner.files import load_skeleton
 
         if not self.state.exists():
             fail("--resume: expected an unfinished search with the same options; got none")
         try:
-            return load_atlas(self.state, polyhedron, symmetry=symmetry, label=self.label)
+            return load_skeleton(self.state, polyhedron, symmetry=symmetry, label=self.label)
         except ValueError as error:
             fail(f"--resume: {error}")
 

@@ -1,15 +1,15 @@
 from .certificates import load_certificate, save_certificate
 from .graphs import save_graph, skeleton_graph
-from .skeletons import load_atlas, save_atlas
+from .skeletons import load_skeleton, save_skeleton
 from .trajectories import load_trajectory, save_trajectory
 
 __all__ = [
-    "load_atlas",
     "load_certificate",
+    "load_skeleton",
     "load_trajectory",
-    "save_atlas",
     "save_certificate",
     "save_graph",
+    "save_skeleton",
     "save_trajectory",
     "skeleton_graph",
 ]

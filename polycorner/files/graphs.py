@@ -1,4 +1,4 @@
-"""The graph of an atlas as GraphML, for other programs."""
+"""The graph of a skeleton as GraphML, for other programs."""
 
 import json
 import os
@@ -21,7 +21,9 @@ SCHEMA = 1
 TAKEN = ("kind", "active", "rank", "dimension", "local_type", "singular", "chirality", "length")
 
 
-def skeleton_graph(atlas: Skeleton, *, units: Mapping[str, str] | None = None) -> "nx.MultiGraph":
+def skeleton_graph(
+    skeleton: Skeleton, *, units: Mapping[str, str] | None = None
+) -> "nx.MultiGraph":
     """Return corners as nodes and edges as edges, with plain values only.
 
     Nodes are called by the position of the corner, ``"0"``, ``"1"``, ...  What is no corner gets a
@@ -30,9 +32,9 @@ def skeleton_graph(atlas: Skeleton, *, units: Mapping[str, str] | None = None) -
 
     Parameters
     ----------
-    atlas : Skeleton
+    skeleton : Skeleton
     units : mapping from str to str, optional
-        Units of coordinates by name, as for :func:`~polycorner.files.save_atlas`.
+        Units of coordinates by name, as for :func:`~polycorner.files.save_skeleton`.
 
     Returns
     -------
@@ -40,42 +42,42 @@ def skeleton_graph(atlas: Skeleton, *, units: Mapping[str, str] | None = None) -
     """
     import networkx as nx
 
-    if not isinstance(atlas, Skeleton):
-        msg = f"atlas: expected a Skeleton; got {type(atlas).__name__}"
+    if not isinstance(skeleton, Skeleton):
+        msg = f"skeleton: expected a Skeleton; got {type(skeleton).__name__}"
         raise TypeError(msg)
-    names = atlas.polyhedron.manifold.names
-    known = units_of(atlas.polyhedron, None, units).coordinates
+    names = skeleton.polyhedron.manifold.names
+    known = units_of(skeleton.polyhedron, None, units).coordinates
     about = {
         "polycorner_graph": SCHEMA,
         "polycorner_version": versions()["polycorner"],
-        "complete": atlas.complete.name,
-        "functions": json.dumps(atlas.polyhedron.names),
+        "complete": skeleton.complete.name,
+        "functions": json.dumps(skeleton.polyhedron.names),
         "length_units": "scale units",
         **{f"{_column(name)}_units": known[name] or "not stated" for name in names},
     }
     graph = nx.MultiGraph(**about)
-    for k, corner in enumerate(atlas.corners):
+    for k, corner in enumerate(skeleton.corners):
         graph.add_node(str(k), **_corner(corner), **_place(names, corner.point))
-    for k, edge in enumerate(atlas.edges):
+    for k, edge in enumerate(skeleton.edges):
         start, stop = _ends(k, edge)
         for node, where, kind in ((start, 0, edge.kinds[0]), (stop, -1, edge.kinds[1])):
             if node not in graph:
-                point = atlas.polyhedron.manifold.wrap(edge.polyline[where])
+                point = skeleton.polyhedron.manifold.wrap(edge.polyline[where])
                 graph.add_node(node, kind=kind.name.lower(), **_place(names, point))
         graph.add_edge(start, stop, key=k, **_edge(k, edge))
     return graph
 
 
 def save_graph(
-    atlas: Skeleton, path: str | os.PathLike[str], *, units: Mapping[str, str] | None = None
+    skeleton: Skeleton, path: str | os.PathLike[str], *, units: Mapping[str, str] | None = None
 ) -> Path:
-    """Write the graph of an atlas as GraphML; the file appears whole or not at all.
+    """Write the graph of a skeleton as GraphML; the file appears whole or not at all.
 
     What is in it says :func:`skeleton_graph`; ``networkx.read_graphml`` reads it again.
 
     Parameters
     ----------
-    atlas : Skeleton
+    skeleton : Skeleton
     path : path
         The file; its folder is made if need be.
     units : mapping from str to str, optional
@@ -94,7 +96,7 @@ def save_graph(
     """
     import networkx as nx
 
-    lines = nx.generate_graphml(skeleton_graph(atlas, units=units))
+    lines = nx.generate_graphml(skeleton_graph(skeleton, units=units))
     text = "\n".join(['<?xml version="1.0" encoding="utf-8"?>', *lines, ""])
     return write_atomically(path, text)
 

@@ -52,9 +52,9 @@ def _faults(explorer: Explorer, content: dict[str, Any]) -> Iterator[str]:
     yield from _number_faults(explorer)
 
 
-def _symmetry_faults(explorer: Explorer, written: dict[str, Any] | None) -> Iterator[str]:
+def _symmetry_faults(explorer: Explorer, written: dict[str, Any]) -> Iterator[str]:
     here = symmetry_entry(explorer)
-    if written is not None and written != here:
+    if written != here:
         yield f"symmetry: written {_words(written)}, found {_words(here)}"
 
 
@@ -68,8 +68,6 @@ def _corner_faults(
     names, spot = explorer.polyhedron.names, place.spot
     if not place.active:
         yield f"corner {k} is on none of the functions"
-    if "values" not in entry:  # version 1
-        return
     values = np.array([read_number(x) for x in entry["values"]])
     slopes = np.linalg.norm(spot.gradients, axis=1)
     size = VALUES * np.maximum(slopes, abs(spot.values))

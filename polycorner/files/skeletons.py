@@ -1,4 +1,4 @@
-"""Atlases as JSON, finished or not: gone on with when they are loaded, after a check."""
+"""Skeletons as JSON, finished or not: gone on with when they are loaded, after a check."""
 
 import os
 from collections.abc import Mapping
@@ -19,45 +19,27 @@ from polycorner.skeletons.explorer import Curve, Explorer
 from polycorner.skeletons.faces import Flag, Passage
 from polycorner.skeletons.walks import End
 
-KIND = Kind("an atlas", "save_atlas", "polycorner atlas", schema=2, unsealed=1)
-FIRST = (
-    "polycorner atlas",
-    "label",
-    "functions",
-    "complete",
-    "tolerance",
-    "extent",
-    "corners",
-    "ends",
-    "curves",
-    "passages",
-    "seeds",
-    "pending",
-    "shot",
-    "notes",
-    "lost",
-    "random",
-)  # the entries of version 1; fmt: skip
+KIND = Kind("a skeleton", "save_skeleton", "polycorner skeleton", schema=1)
 RANDOM = ("MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")
 
 
-def save_atlas(
-    atlas: Skeleton,
+def save_skeleton(
+    skeleton: Skeleton,
     path: str | os.PathLike[str],
     *,
     label: str = "",
     units: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write an atlas, finished or not, as JSON; the file appears whole or not at all.
+    """Write a skeleton, finished or not, as JSON; the file appears whole or not at all.
 
     Parameters
     ----------
-    atlas : Skeleton
+    skeleton : Skeleton
         What :func:`~polycorner.skeletons.search.skeleton` returned.
     path : path
         The file; its folder is made if need be.
     label : str, optional
-        What the search is called; :func:`load_atlas` can insist on it.
+        What the search is called; :func:`load_skeleton` can insist on it.
     units : mapping from str to str, optional
         Units of coordinates by name.  Those of the package's models are known, and a circle of
         period ``2 pi`` is an angle in ``rad``.
@@ -73,15 +55,15 @@ def save_atlas(
     OSError
         If the file cannot be written.
     """
-    if not isinstance(atlas, Skeleton) or not isinstance(atlas.state, Explorer):
-        msg = f"atlas: expected a Skeleton that skeleton returned; got {type(atlas).__name__}"
+    if not isinstance(skeleton, Skeleton) or not isinstance(skeleton.state, Explorer):
+        msg = f"skeleton: expected a Skeleton that skeleton returned; got {type(skeleton).__name__}"
         raise TypeError(msg)
-    explorer: Explorer = atlas.state
-    d, manifold = atlas.polyhedron, atlas.polyhedron.manifold
+    explorer: Explorer = skeleton.state
+    d, manifold = skeleton.polyhedron, skeleton.polyhedron.manifold
     known = units_of(d, None, units).coordinates
     content = {
         "label": label,
-        "complete": atlas.complete.name,
+        "complete": skeleton.complete.name,
         "coordinates": [
             {"name": name, "unit": known[name], "period": number(period), "scale": scale}
             for name, period, scale in zip(
@@ -107,24 +89,23 @@ def save_atlas(
     return save_json(KIND, path, content)
 
 
-def load_atlas(
+def load_skeleton(
     path: str | os.PathLike[str],
     polyhedron: Polyhedron,
     *,
     symmetry: Symmetry | None = None,
     label: str | None = None,
 ) -> Skeleton:
-    """Read an atlas back; :func:`~polycorner.skeletons.search.resume` goes on with it.
+    """Read a skeleton back; :func:`~polycorner.skeletons.search.resume` goes on with it.
 
     Checked anew: that names, periods and scales are those of the polyhedron; that the functions
     have the values written at every corner, to ``1e-9`` of their slopes; that the corners lie on
-    the functions written, and all points of edges on theirs and in the polyhedron.  Files of
-    version 1 have neither digest nor values: of these a changed number may go unnoticed.
+    the functions written, and all points of edges on theirs and in the polyhedron.
 
     Parameters
     ----------
     path : path
-        A file that :func:`save_atlas` wrote.
+        A file that :func:`save_skeleton` wrote.
     polyhedron, symmetry
         Those it was computed for: formulas are not in the file.
     label : str, optional
@@ -133,33 +114,19 @@ def load_atlas(
     Raises
     ------
     ValueError
-        If the file is no atlas or was changed, or if it is one of another polyhedron or symmetry.
+        If the file is no skeleton, was changed, or is of another polyhedron or symmetry.
     """
     content = load_json(KIND, path)
-    if content[KIND.key] == 1:
-        if set(content) != set(FIRST):
-            raise KIND.refusal(path, "is something else")
-        content = _from_first(content, polyhedron)
     if label is not None and content.get("label") != label:
-        msg = f"path: expected an atlas called {label!r}; {path} is called {content.get('label')!r}"
+        msg = (
+            f"path: expected a skeleton called {label!r}; {path} is called {content.get('label')!r}"
+        )
         raise ValueError(msg)
     try:
         _check_names(content, polyhedron, path)
         return _restored(content, polyhedron, symmetry or Symmetry(), path)
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
         raise KIND.refusal(path, f"is damaged ({error!r})") from error
-
-
-def _from_first(content: dict[str, Any], polyhedron: Polyhedron) -> dict[str, Any]:
-    """Return the entries of a file of version 1 as those of version 2."""
-    manifold = polyhedron.manifold
-    columns = zip(manifold.names, manifold.periods, manifold.scales, strict=True)
-    return content | {
-        "coordinates": [{"name": c, "period": number(p), "scale": s} for c, p, s in columns],
-        "equations": list(polyhedron.equation_names),
-        "symmetry": None,
-        "corners": [{"point": point} for point in content["corners"]],
-    }
 
 
 def _check_names(
@@ -175,7 +142,7 @@ def _check_names(
     ):
         if list(found) != list(wanted):
             names = ", ".join(polyhedron.names if what == "functions" else manifold.names)
-            msg = f"path: expected an atlas of {names}; {path} has other {what}"
+            msg = f"path: expected a skeleton of {names}; {path} has other {what}"
             raise ValueError(msg)
 
 
@@ -191,12 +158,12 @@ def _restored(
     try:
         _fill(explorer, content)
         found = fault(explorer, content)
-        atlas = None if found else assembled(explorer, Completeness[content["complete"]])
+        skeleton = None if found else assembled(explorer, Completeness[content["complete"]])
     except ValueError as error:
         raise KIND.refusal(path, f"is damaged ({error})") from error
-    if atlas is None:
+    if skeleton is None:
         raise KIND.refusal(path, f"is not what is computed here: {found}")
-    return atlas
+    return skeleton
 
 
 def _fill(explorer: Explorer, content: dict[str, Any]) -> None:

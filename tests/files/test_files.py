@@ -53,8 +53,8 @@ def certificate(_):
 def atlas(_):
     return Sample(
         skeleton(BOWL, [[0.0, 1.0]]),
-        door.save_atlas,
-        lambda path: door.load_atlas(path, BOWL),
+        door.save_skeleton,
+        lambda path: door.load_skeleton(path, BOWL),
         same_atlas,
         atlas_files,
     )

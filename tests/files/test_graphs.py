@@ -97,7 +97,7 @@ def test_coordinates_may_be_called_as_they_like(tmp_path):
 
 
 def test_something_else_is_refused(tmp_path):
-    with pytest.raises(TypeError, match=r"^atlas: expected a Skeleton; got str"):
+    with pytest.raises(TypeError, match=r"^skeleton: expected a Skeleton; got str"):
         save_graph("atlas", tmp_path / "a.graphml")
     atlas = skeleton(Polyhedron(M, {"half": Y}), [[0.0, 1.0]])
     with pytest.raises(ValueError, match=r"^units: expected names among x, y"):

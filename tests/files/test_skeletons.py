@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,12 +10,11 @@ from kept_files import same_atlas as same
 
 from polycorner import AllOf, Manifold, Polyhedron, Symmetry, skeleton
 from polycorner.dumbbells import DumbbellPair
-from polycorner.files import load_atlas, save_atlas
-from polycorner.models import Pinball, SphereCluster, Tutorial
+from polycorner.files import load_skeleton, save_skeleton
+from polycorner.models import SphereCluster
 from polycorner.skeletons import Completeness
 from polycorner.skeletons.search import resume
 
-DATA = Path(__file__).parents[1] / "data"
 M = Manifold.euclidean("x y")
 X, Y = M.symbols
 PARTS = {"out": 9 - X**2 - Y**2, "in": X**2 + Y**2 - 1, "cut": X + 2 - Y}
@@ -27,17 +25,17 @@ MODEL = SphereCluster(6)
 @pytest.mark.parametrize("budget", [1, 2, 100])
 def test_a_loaded_atlas_goes_on_as_the_saved_one(tmp_path, budget):
     starts = [[0.0, 1.5], [2.5, 0.0]]
-    path = save_atlas(skeleton(RING, starts, budget=budget), tmp_path / "deep" / "ring.json")
-    same(load_atlas(path, RING), skeleton(RING, starts, budget=budget))
-    same(resume(load_atlas(path, RING)), skeleton(RING, starts))
+    path = save_skeleton(skeleton(RING, starts, budget=budget), tmp_path / "deep" / "ring.json")
+    same(load_skeleton(path, RING), skeleton(RING, starts, budget=budget))
+    same(resume(load_skeleton(path, RING)), skeleton(RING, starts))
     assert [entry.name for entry in path.parent.iterdir()] == ["ring.json"]
 
 
 def test_relabellings_survive(tmp_path):
     part = skeleton(MODEL.polyhedron, MODEL.starts(), symmetry=MODEL.symmetry, budget=2)
     assert part.complete is Completeness.BUDGET
-    path = save_atlas(part, tmp_path / "spheres.json")
-    whole = resume(load_atlas(path, MODEL.polyhedron, symmetry=MODEL.symmetry))
+    path = save_skeleton(part, tmp_path / "spheres.json")
+    whole = resume(load_skeleton(path, MODEL.polyhedron, symmetry=MODEL.symmetry))
     same(whole, skeleton(MODEL.polyhedron, MODEL.starts(), symmetry=MODEL.symmetry))
 
 
@@ -45,7 +43,7 @@ def test_relabellings_survive(tmp_path):
 def test_every_random_generator_goes_on(tmp_path, kind):
     rng = np.random.Generator(getattr(np.random, kind)(7))
     atlas = skeleton(RING, [[0.0, 1.5], [2.5, 0.0]], budget=1, rng=rng)
-    read = load_atlas(save_atlas(atlas, tmp_path / "ring.json"), RING)
+    read = load_skeleton(save_skeleton(atlas, tmp_path / "ring.json"), RING)
     wanted = atlas.state.rng.integers(2**63, size=9)
     np.testing.assert_array_equal(read.state.rng.integers(2**63, size=9), wanted)
 
@@ -61,19 +59,19 @@ def test_every_random_generator_goes_on(tmp_path, kind):
 )
 def test_closed_singular_and_open_edges_survive_and_no_edges_at_all(tmp_path, polyhedron, starts):
     atlas = skeleton(polyhedron, starts)
-    same(load_atlas(save_atlas(atlas, tmp_path / "a.json"), polyhedron), atlas)
+    same(load_skeleton(save_skeleton(atlas, tmp_path / "a.json"), polyhedron), atlas)
 
 
 def test_an_endless_extent_survives(tmp_path):
     atlas = skeleton(RING, [[0.0, 1.5]], extent=math.inf)
-    read = load_atlas(save_atlas(atlas, tmp_path / "ring.json"), RING)
+    read = load_skeleton(save_skeleton(atlas, tmp_path / "ring.json"), RING)
     assert read.state.ground.extent == math.inf
 
 
 def test_angles_and_lengths_have_their_units(tmp_path):
     pair = DumbbellPair(16, 3, 1.5)
     atlas = skeleton(pair.polyhedron, [pair.nested("R")], symmetry=pair.symmetry, budget=1)
-    written = json.loads(save_atlas(atlas, tmp_path / "pair.json").read_text())
+    written = json.loads(save_skeleton(atlas, tmp_path / "pair.json").read_text())
     units = {c["name"]: c["unit"] for c in written["coordinates"]}
     assert units == {name: "rad" if "theta" in name else "mm" for name in pair.manifold.names}
     assert written["symmetry"] == {"motions": 3, "elements": 0, "relabels": False}
@@ -85,22 +83,22 @@ def test_angles_and_lengths_have_their_units(tmp_path):
 def test_other_files_are_refused(tmp_path):
     (tmp_path / "text").write_text("not JSON")
     (tmp_path / "other").write_text(json.dumps({"corners": []}))
-    ring = save_atlas(skeleton(RING, [[0.0, 1.5]]), tmp_path / "ring")
+    ring = save_skeleton(skeleton(RING, [[0.0, 1.5]]), tmp_path / "ring")
     disc = Polyhedron(M, AllOf(1 - X**2 - Y**2))
     for path, polyhedron in ((tmp_path / "text", RING), (tmp_path / "other", RING), (ring, disc)):
-        with pytest.raises(ValueError, match=r"^path: expected an atlas"):
-            load_atlas(path, polyhedron)
-    with pytest.raises(ValueError, match=r"^path: expected an atlas called 'this'; .* called ''"):
-        load_atlas(ring, RING, label="this")
-    with pytest.raises(TypeError, match=r"^atlas: expected a Skeleton"):
-        save_atlas("ring", ring)
+        with pytest.raises(ValueError, match=r"^path: expected a skeleton"):
+            load_skeleton(path, polyhedron)
+    with pytest.raises(ValueError, match=r"^path: expected a skeleton called 'this'; .* called ''"):
+        load_skeleton(ring, RING, label="this")
+    with pytest.raises(TypeError, match=r"^skeleton: expected a Skeleton"):
+        save_skeleton("ring", ring)
     with pytest.raises(FileNotFoundError):
-        load_atlas(tmp_path / "none", RING)
+        load_skeleton(tmp_path / "none", RING)
 
 
 @pytest.fixture
 def ring(tmp_path):
-    return save_atlas(skeleton(RING, [[0.0, 1.5]]), tmp_path / "ring.json")
+    return save_skeleton(skeleton(RING, [[0.0, 1.5]]), tmp_path / "ring.json")
 
 
 @pytest.mark.parametrize(
@@ -112,7 +110,7 @@ def ring(tmp_path):
 )
 def test_another_polyhedron_with_the_same_names_is_refused(ring, parts, told):
     with pytest.raises(ValueError, match=rf"is not what is computed here: {told}"):
-        load_atlas(ring, Polyhedron(M, parts))
+        load_skeleton(ring, Polyhedron(M, parts))
 
 
 def test_another_space_or_symmetry_is_refused(ring, tmp_path):
@@ -120,14 +118,14 @@ def test_another_space_or_symmetry_is_refused(ring, tmp_path):
     x, y = wide.symbols
     parts = {"out": 9 - x**2 - y**2, "in": x**2 + y**2 - 1, "cut": x + 2 - y}
     with pytest.raises(ValueError, match=r"has other coordinates, periods and scales"):
-        load_atlas(ring, Polyhedron(wide, parts))
+        load_skeleton(ring, Polyhedron(wide, parts))
     with pytest.raises(ValueError, match=r"has other equations"):
-        load_atlas(ring, Polyhedron(M, PARTS, {"flat": Y}))
+        load_skeleton(ring, Polyhedron(M, PARTS, {"flat": Y}))
     part = skeleton(MODEL.polyhedron, MODEL.starts(), symmetry=MODEL.symmetry, budget=1)
-    path = save_atlas(part, tmp_path / "spheres.json")
+    path = save_skeleton(part, tmp_path / "spheres.json")
     for symmetry in (None, Symmetry(tangents=MODEL.symmetry.tangents)):
         with pytest.raises(ValueError, match=r"symmetry: written motions 6, elements 0"):
-            load_atlas(path, MODEL.polyhedron, symmetry=symmetry)
+            load_skeleton(path, MODEL.polyhedron, symmetry=symmetry)
 
 
 def bent(entries):
@@ -210,66 +208,7 @@ def odd(entries):
 )
 def test_what_does_not_fit_the_polyhedron_is_refused_even_with_a_digest(ring, change):
     resealed(ring, change)
-    with pytest.raises(ValueError, match=r"^path: expected an atlas that save_atlas wrote; .* is "):
-        load_atlas(ring, RING)
-
-
-# ------------------------------------------------------------------------------- the first version
-
-
-@pytest.mark.parametrize(
-    ("name", "model", "symmetry"),
-    [
-        ("tutorial", Tutorial(), None),
-        ("pinball", Pinball(), None),
-        ("spheres", MODEL, MODEL.symmetry),
-    ],
-)
-def test_files_of_the_first_version_are_read(tmp_path, name, model, symmetry):
-    path = DATA / f"atlas_{name}_v1.json"
-    written = json.loads(path.read_text())
-    assert written["polycorner atlas"] == 1
-    read = load_atlas(path, model.polyhedron, symmetry=symmetry)
-    assert read.complete.name == written["complete"]
-    for corner, point in zip(read.corners, written["corners"], strict=True):
-        np.testing.assert_array_equal(corner.point, model.manifold.wrap(point))
-    for edge, entry in zip(read.edges, written["curves"], strict=True):
-        np.testing.assert_array_equal(edge.polyline, entry["points"])
-        assert edge.active == tuple(written["functions"][i] for i in entry["active"])
-        assert [kind.name for kind in edge.kinds] == entry["kinds"]
-        assert edge.length == entry["length"]
-    again = load_atlas(save_atlas(read, tmp_path / "new.json"), model.polyhedron, symmetry=symmetry)
-    same(again, read)
-
-
-def test_the_first_versions_corners_are_the_models():
-    read = load_atlas(DATA / "atlas_tutorial_v1.json", Tutorial().polyhedron)
-    found = sorted(corner.point.tolist() for corner in read.corners)
-    np.testing.assert_allclose(found, sorted(c.tolist() for c in Tutorial().corners().values()))
-    assert len(read.edges) == 7
-    assert len(read.faces) == 1
-
-
-def test_a_search_of_the_first_version_is_gone_on_with():
-    read = load_atlas(DATA / "atlas_spheres_v1.json", MODEL.polyhedron, symmetry=MODEL.symmetry)
-    whole = resume(read)
-    assert len(whole.corners) == 2  # the octahedron and the tetrahedra in a row ([HC])
-
-
-@pytest.mark.parametrize("change", [bent, torn, astray, nowhere, backwards, lost, waiting, crossed])
-def test_damage_is_found_in_files_of_the_first_version(tmp_path, change):
-    entries = json.loads((DATA / "atlas_tutorial_v1.json").read_text())
-    change(entries)
-    path = tmp_path / "old.json"
-    path.write_text(json.dumps(entries))
-    with pytest.raises(ValueError, match=r"^path: expected an atlas that save_atlas wrote"):
-        load_atlas(path, Tutorial().polyhedron)
-
-
-def test_a_new_file_does_not_pass_for_an_old_one(ring):
-    entries = json.loads(ring.read_text())
-    del entries["sha256"]
-    for kept in (entries | {"polycorner atlas": 1}, entries):
-        ring.write_text(json.dumps(kept))
-        with pytest.raises(ValueError, match=r"is something else|digest"):
-            load_atlas(ring, RING)
+    with pytest.raises(
+        ValueError, match=r"^path: expected a skeleton that save_skeleton wrote; .* is "
+    ):
+        load_skeleton(ring, RING)
