@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.files.atomic import write_atomically
+from polycorner.atomic import write_atomically
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from PIL import Image
 
 from paper_checks.figures.style import styled
-from polycorner.files.atomic import atomic
+from polycorner.atomic import atomic
 
 DPI = 200
 SHADES = 128  # of a PNG

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import click
 
+from polycorner.atomic import write_atomically
 from polycorner.cli.manner import (
     Command,
     manner,
@@ -19,7 +20,6 @@ from polycorner.cli.manner import (
     timed,
 )
 from polycorner.errors import nearest
-from polycorner.files.atomic import write_atomically
 
 # What is about one call, not about what is computed, has no place in a file.
 NO_SETTINGS = frozenset({"config", "help", "json", "out", "quiet", "resume", "verbose"})

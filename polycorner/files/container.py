@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from polycorner import __version__
-from polycorner.files.atomic import write_atomically
+from polycorner.atomic import write_atomically
 
 DIGEST = "sha256"
 SEAL = b"\npolycorner sha256 "

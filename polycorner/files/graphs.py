@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from polycorner.files.atomic import write_atomically
+from polycorner.atomic import write_atomically
 from polycorner.files.container import versions
 from polycorner.files.models import units_of
 from polycorner.skeletons.elements import Corner, Edge, Skeleton

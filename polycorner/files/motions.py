@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.files.atomic import write_atomically
+from polycorner.atomic import write_atomically
 from polycorner.files.container import SEALED, Kind, sealed, unsealed, versions
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind

@@ -5,7 +5,7 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from polycorner.files.atomic import atomic
+from polycorner.atomic import atomic
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito).
 BODIES = ("#0072B2", "#D55E00")

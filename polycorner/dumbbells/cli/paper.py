@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from polycorner.atomic import write_atomically
 from polycorner.cli.common import (
     deliver,
     fail,
@@ -18,7 +19,6 @@ from polycorner.cli.common import (
     writing,
 )
 from polycorner.cli.manner import manner, timed
-from polycorner.files.atomic import write_atomically
 
 if TYPE_CHECKING:
     from paper_checks.framework.running import Run

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.files.atomic import PART, atomic
+from polycorner.atomic import PART, atomic
 from polycorner.files.motions import event_table, read_events, read_touches, touch_table
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.recorder import Recorder

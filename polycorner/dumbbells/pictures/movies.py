@@ -14,9 +14,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.typing import NDArray
 from PIL import Image
 
+from polycorner.atomic import atomic
 from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.dumbbells.pictures.drum import DrumView
-from polycorner.files.atomic import atomic
 
 Picture = NDArray[np.uint8]
 FRAMES = 300  # at most

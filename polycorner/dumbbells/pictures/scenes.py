@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from numpy.typing import ArrayLike
 
+from polycorner.atomic import write_atomically
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import (
@@ -29,7 +30,6 @@ from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, LIT
 from polycorner.dumbbells.pictures.solid import KINDS as WORDS
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.files.atomic import write_atomically
 from polycorner.pictures.style import BODIES
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, finite, reals

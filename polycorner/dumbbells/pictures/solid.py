@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from polycorner.atomic import write_atomically
 from polycorner.dumbbells.pictures.placements import (
     forbidden_solid,
     relative_coordinates,
     relative_gaps,
 )
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.files.atomic import write_atomically
 from polycorner.pictures.solids.charts import Chart
 from polycorner.pictures.solids.meshes import write_mesh
 from polycorner.pictures.solids.rendering import draw_solid

@@ -23,6 +23,7 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
+from polycorner.atomic import write_atomically
 from polycorner.dumbbells.pictures.bodies import box_of, sizes_of
 from polycorner.dumbbells.pictures.film import Film
 from polycorner.dumbbells.pictures.scenes import atlas_scene, glb, library
@@ -30,7 +31,6 @@ from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, WORDS
 from polycorner.dumbbells.pictures.solid import KINDS as KIND_WORDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.errors import PolycornerError
-from polycorner.files.atomic import write_atomically
 
 END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # what follows is trimesh's own page
 KEYS = " Space plays, ← and → step, Home and End go to the ends."

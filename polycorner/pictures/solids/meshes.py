@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner.atomic import atomic
 from polycorner.errors import SolverError
-from polycorner.files.atomic import atomic
 from polycorner.pictures.solids.grids import (
     AXES,
     Bounds,

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import gaps
 
+from polycorner import atomic as writing
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics import checkpoints as drum_checkpoints
 from polycorner.dumbbells.dynamics import pairs as drum_pairs
@@ -24,7 +25,6 @@ from polycorner.dumbbells.dynamics.pairs import Sizes
 from polycorner.dumbbells.dynamics.runs import Saving, run
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.files import atomic as writing
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.noise import Noise
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from polycorner.files.atomic import PART, atomic, write_atomically
+from polycorner.atomic import PART, atomic, write_atomically
 
 
 def full(*_, **__):
@@ -102,7 +102,7 @@ def test_a_read_only_folder_is_one_sentence(tmp_path):
 
 KILLED = """
 import os, signal, sys
-from polycorner.files.atomic import atomic
+from polycorner.atomic import atomic
 with atomic(sys.argv[1]) as temporary:
     temporary.write_bytes(b"half of it")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -142,13 +142,13 @@ WRITES = re.compile(
     r"\.write_text\(|\.write_bytes\(|\.to_netcdf\([^)]*path|open\([^)]*[\"'][wax]b?[\"']"
     r"|\.(?:savefig|export|save)\((?:path|file_name|folder|out|target)\b|\.replace\((?:path|target)\)"
 )
-OTHERS = ("files/atomic.py", "formulas/cache.py", "formulas/kernels.py")  # the latter are caches
+OTHERS = ("atomic.py", "formulas/cache.py", "formulas/kernels.py")  # the latter are caches
 
 
 @pytest.mark.parametrize("package", ["polycorner", "paper_checks"])
 def test_every_file_is_written_atomically(package):
     """Nothing in the packages opens a file for writing, or saves under the final name."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[1]
     found = [
         f"{path.relative_to(root)}: {line.strip()}"
         for path in sorted((root / package).rglob("*.py"))
