@@ -57,14 +57,14 @@ def plane_energy() -> families.Family:
 
     It is the limit of ``rho`` times the height above the lowest as the drum grows.
     """
-    return _family(("trough",), PLANE, ("l", "w"), _plane_heights)
+    return _family(("trough",), PLANE, ("l", "w"), _plane_heights, "mm^2")
 
 
 @lru_cache(maxsize=1)
 def mean_heading() -> families.Family:
     """Return ``sin((theta1 + theta2)/2 - h)``; parameter ``h``, in radians."""
     key = repr((cache.source_key(__name__), "heading"))
-    return families.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key)
+    return families.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key, "1")
 
 
 def _mean_heading() -> "Formulas":
@@ -79,9 +79,10 @@ def _family(
     coordinates: tuple[str, ...],
     parameters: tuple[str, ...],
     formulas: "Callable[[], Formulas]",
+    unit: str = "mm",
 ) -> families.Family:
     key = repr((cache.source_key(bodies.__name__, __name__), names, coordinates, parameters))
-    return families.Family(names, variables(coordinates), parameters, formulas, key)
+    return families.Family(names, variables(coordinates), parameters, formulas, key, unit)
 
 
 def _symbols(names: str) -> "list[sympy.Symbol]":

@@ -79,9 +79,11 @@ class DumbbellPair:
         """``M x M``; a unit displacement moves a ball by about its radius."""
         r, turn = self.ball_radius, 2 * self.ball_radius / self.length
         if self.is_plane:
-            return Manifold(formulas.PLANE, (math.inf, math.inf, math.tau), (r, r, turn)) ** 2
+            lines, units = (math.inf, math.inf, math.tau), ("mm", "mm", "rad")
+            return Manifold(formulas.PLANE, lines, (r, r, turn), units) ** 2
         scales = (r / self.centre_radius, r, turn)
-        return Manifold(formulas.DRUM, (math.tau, math.inf, math.tau), scales) ** 2
+        periods, units = (math.tau, math.inf, math.tau), ("rad", "mm", "rad")
+        return Manifold(formulas.DRUM, periods, scales, units) ** 2
 
     @cached_property
     def polyhedron(self) -> Polyhedron:

@@ -64,6 +64,8 @@ class Family(Value):
     key : str
         Identifies the formulas between processes.  With a key, SymPy is not even imported
         once the kernels are on disk; without one, it is computed from the expressions.
+    unit : str
+        Unit of the functions' values, such as ``"mm"``; ``""`` if none is stated.
     """
 
     names: tuple[str, ...]
@@ -71,6 +73,7 @@ class Family(Value):
     parameters: tuple[str, ...]
     formulas: "Callable[[], tuple[Expressions, Expressions]]"
     key: str = ""
+    unit: str = ""
 
     @classmethod
     def of(
@@ -79,6 +82,8 @@ class Family(Value):
         variables: Iterable[str],
         parameters: Iterable[str] = (),
         definitions: "Mapping[str, Any] | None" = None,
+        *,
+        unit: str = "",
     ) -> "Family":
         """Return the family of given expressions, checking every symbol at once."""
         variables, parameters = tuple(variables), tuple(parameters)
@@ -86,7 +91,7 @@ class Family(Value):
         _check_new("definitions", tuple(definitions or ()), variables + parameters)
         given = {name: _sympified(name, e) for name, e in expressions.items()}
         known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
-        family = cls(tuple(given), variables, parameters, Written(known, given))
+        family = cls(tuple(given), variables, parameters, Written(known, given), unit=unit)
         return replace(family, key=family.program().digest())
 
     def program(self) -> Program:

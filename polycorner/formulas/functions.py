@@ -35,6 +35,8 @@ class SmoothFunction(Value):
         The coordinates bound to ``variables``, in order.
     definitions : mapping from str to sympy.Expr, optional
         Intermediate quantities the expression uses by name.
+    unit : str, optional
+        Unit of the values, shown in tables and files; none by default.
 
     Raises
     ------
@@ -60,13 +62,14 @@ class SmoothFunction(Value):
         variables: Sequence[str] | None = None,
         reads: Sequence[str] | None = None,
         definitions: "Mapping[str, sympy.Expr] | None" = None,
+        unit: str = "",
     ) -> None:
         if not isinstance(manifold, Manifold):
             msg = f"manifold: expected a Manifold; got {type(manifold).__name__}"
             raise TypeError(msg)
         values = {str(symbol): value for symbol, value in (parameters or {}).items()}
         formal = tuple(variables or manifold.names)
-        family = Family.of({name: expression}, formal, values, definitions)
+        family = Family.of({name: expression}, formal, values, definitions, unit=unit)
         self._bind(family, name, manifold, tuple(reads or formal), tuple(values.values()))
 
     @classmethod
@@ -128,6 +131,11 @@ class SmoothFunction(Value):
         return (
             f"SmoothFunction({self.name!r}, reads {[self.manifold.names[i] for i in self.reads]})"
         )
+
+    @property
+    def unit(self) -> str:
+        """The unit of the values, ``""`` if none is stated."""
+        return self.family.unit
 
     @property
     def expression(self) -> "sympy.Expr":

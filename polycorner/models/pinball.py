@@ -105,7 +105,7 @@ class Pinball:
     @cached_property
     def manifold(self) -> Manifold:
         """The plane of the board."""
-        return Manifold.euclidean("x y")
+        return Manifold.euclidean("x y", unit="1")
 
     @cached_property
     def walls(self) -> tuple[Wall, ...]:
@@ -182,7 +182,7 @@ def _heights() -> Family:
     """Return the height; parameter ``s``, the sine of the tilt."""
     from polycorner.formulas.cache import source_key
 
-    return Family(("height",), ("x", "y"), ("s",), _height_formula, source_key(__name__))
+    return Family(("height",), ("x", "y"), ("s",), _height_formula, source_key(__name__), "1")
 
 
 def _height_formula() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":

@@ -132,7 +132,8 @@ def wall_family() -> Family:
     from polycorner.formulas.cache import source_key
 
     parameters = ("mx", "my", "nx", "ny", "k")
-    return Family(("wall",), ("x", "y"), parameters, _wall_formula, source_key(__name__))
+    key = source_key(__name__)
+    return Family(("wall",), ("x", "y"), parameters, _wall_formula, key, "1")
 
 
 def meeting_corners(polyhedron: Polyhedron, walls: Sequence[Wall]) -> Array:

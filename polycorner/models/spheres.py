@@ -31,7 +31,7 @@ VARIABLES = ("x1", "y1", "z1", "x2", "y2", "z2")
 @lru_cache(maxsize=1)
 def _gap() -> Family:
     """Return the gap of two spheres of unit diameter, ``|x_2 - x_1|^2 - 1``."""
-    return Family(("gap",), VARIABLES, (), _formulas, cache.source_key(__name__))
+    return Family(("gap",), VARIABLES, (), _formulas, cache.source_key(__name__), "diameter^2")
 
 
 def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
@@ -69,7 +69,7 @@ class SphereCluster:
     @cached_property
     def manifold(self) -> Manifold:
         """Space, once for every sphere."""
-        return Manifold.euclidean("x y z") ** self.count
+        return Manifold.euclidean("x y z", unit="diameter") ** self.count
 
     @cached_property
     def pairs(self) -> tuple[tuple[int, int], ...]:

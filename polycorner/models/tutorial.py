@@ -59,7 +59,7 @@ class Tutorial:
     @cached_property
     def manifold(self) -> Manifold:
         """The plane."""
-        return Manifold.euclidean("x y", scale=self.size)
+        return Manifold.euclidean("x y", scale=self.size, unit="1")
 
     @cached_property
     def walls(self) -> tuple[Wall, ...]:

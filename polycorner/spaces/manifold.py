@@ -4,13 +4,14 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import refuse
 from polycorner.values import Value, read_only
 
 if TYPE_CHECKING:
@@ -35,11 +36,16 @@ class Manifold(Value):
     scales : sequence of float, optional
         Unit displacement of each coordinate (default 1), so that millimetres and angles can
         share a vector.  Every tolerance of the package is measured in these units.
+    units : sequence of str, optional
+        Unit of each coordinate, such as ``"mm"``, and ``""`` where none is stated; default
+        ``"rad"`` for circles of period ``2 pi``.  Tables and files show it; two manifolds that
+        differ in nothing else are equal.
 
     Raises
     ------
     ValueError
-        If names repeat or are no identifiers, or a period or scale is not positive.
+        If names repeat or are no identifiers, if a period or scale is not positive, or if there is
+        not one unit for each coordinate.
 
     Examples
     --------
@@ -53,6 +59,7 @@ class Manifold(Value):
     names: tuple[str, ...]
     periods: tuple[float, ...] = ()
     scales: tuple[float, ...] = ()
+    units: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         names = _names(self.names)
@@ -62,16 +69,20 @@ class Manifold(Value):
         scales = _positive("scales", _given(self.scales, 1.0, n), n, finite=True)
         object.__setattr__(self, "periods", periods)
         object.__setattr__(self, "scales", scales)
+        object.__setattr__(self, "units", _units(self.units, periods))
 
     @classmethod
-    def euclidean(cls, names: str | Sequence[str], *, scale: float = 1.0) -> "Manifold":
+    def euclidean(
+        cls, names: str | Sequence[str], *, scale: float = 1.0, unit: str = ""
+    ) -> "Manifold":
         """``R^n`` with coordinates named in one string (``"x y"``) or a sequence.
 
         >>> Manifold.euclidean("x y").dimension
         2
         """
         parsed = _names(names)
-        return cls(parsed, (math.inf,) * len(parsed), (scale,) * len(parsed))
+        n = len(parsed)
+        return cls(parsed, (math.inf,) * n, (scale,) * n, (unit,) * n)
 
     @property
     def dimension(self) -> int:
@@ -222,6 +233,16 @@ def _names(names: str | Sequence[str]) -> tuple[str, ...]:
     return parsed
 
 
+def _units(units: Any, periods: Sequence[float]) -> tuple[str, ...]:
+    given = tuple("rad" if period == math.tau else "" for period in periods)
+    if isinstance(units, tuple) and not units:
+        return given
+    words = () if isinstance(units, str) else tuple(units)
+    if len(words) != len(given) or not all(isinstance(unit, str) for unit in words):
+        refuse("units", f"{len(given)} strings, one for each coordinate", units)
+    return words
+
+
 def _given(values: Any, default: float, n: int) -> Any:
     return (default,) * n if isinstance(values, tuple) and not values else values
 
@@ -247,4 +268,5 @@ def _product(factors: tuple[Manifold, ...]) -> Manifold:
         tuple(names),
         tuple(period for factor in factors for period in factor.periods),
         tuple(scale for factor in factors for scale in factor.scales),
+        tuple(unit for factor in factors for unit in factor.units),
     )

@@ -1,6 +1,7 @@
 """Products of lines and circles: wrapping, shortest vectors, products, and refusals."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import manifolds, vectors
 
-from polycorner import Manifold
+from polycorner import Manifold, SmoothFunction
 
 CYLINDER = Manifold(("phi", "eta"), periods=(math.tau, math.inf), scales=(0.1, 3.0))
 PLANE = Manifold.euclidean("x y")
@@ -281,3 +282,22 @@ class TestConstruction:
     def test_the_scale_of_euclidean_space_is_positive(self, scale):
         with pytest.raises(ValueError, match=r"^scales?: "):
             Manifold.euclidean("x y", scale=scale)
+
+
+def test_units_are_stated_and_angles_have_theirs():
+    drum = Manifold(("phi", "eta", "turns"), (math.tau, math.inf, 1.0))
+    assert drum.units == ("rad", "", "")
+    stated = Manifold(drum.names, drum.periods, units=("rad", "mm", "turn"))
+    assert stated == drum
+    assert (stated * Manifold.euclidean("x y", unit="m")).units == ("rad", "mm", "turn", "m", "m")
+    assert pickle.loads(pickle.dumps(stated)).units == stated.units
+    for units in (("mm",), "mm", ("rad", "mm", None)):
+        with pytest.raises(ValueError, match=r"^units: expected 3 strings"):
+            Manifold(drum.names, drum.periods, units=units)
+
+
+def test_functions_have_units():
+    M = Manifold.euclidean("x")
+    gap = SmoothFunction("gap", M.symbols[0], M, unit="mm")
+    assert (gap.unit, gap.renamed("other").unit) == ("mm", "mm")
+    assert SmoothFunction("gap", M.symbols[0], M).unit == ""

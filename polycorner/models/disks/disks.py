@@ -96,7 +96,8 @@ class TorusDisks:
         names = [f"{axis}{i}" for i in range(1, self.count + 1) for axis in "xy"]
         periods = (1.0,) * len(names) + (np.inf,)
         scale = 0.5 / np.sqrt(self.count)
-        return Manifold((*names, "r"), periods, (scale,) * len(periods))
+        n = len(periods)
+        return Manifold((*names, "r"), periods, (scale,) * n, ("lattice vector",) * n)
 
     @cached_property
     def polyhedron(self) -> Polyhedron:

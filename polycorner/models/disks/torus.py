@@ -48,7 +48,7 @@ def _family(
     from polycorner.formulas.cache import source_key
 
     key = repr((source_key(__name__), names, variables, parameters))
-    return Family(names, variables, parameters, formulas, key)
+    return Family(names, variables, parameters, formulas, key, "lattice vector")
 
 
 def _gap_formula() -> "Formulas":
