@@ -13,10 +13,10 @@ from polycorner.files.skeleton_checks import corner_entry, fault, symmetry_entry
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
-from polycorner.skeletons.curves import Ground
 from polycorner.skeletons.elements import Completeness, Skeleton
 from polycorner.skeletons.explorer import Curve, Explorer
-from polycorner.skeletons.faces import Flag, Passage
+from polycorner.skeletons.flags import Crossing, Flag
+from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 
 KIND = Kind("a skeleton", "save_skeleton", "polycorner skeleton", schema=1)
@@ -73,17 +73,17 @@ def save_skeleton(
         "functions": list(d.names),
         "equations": list(d.equation_names),
         "symmetry": symmetry_entry(explorer),
-        "tolerance": explorer.ground.tolerance,
-        "extent": number(explorer.ground.extent),
-        "corners": [corner_entry(explorer, place) for place in explorer.places],
-        "ends": [[[ray, edge] for ray, edge in p.edges.items()] for p in explorer.places],
+        "tolerance": explorer.quotient.tolerance,
+        "extent": number(explorer.quotient.extent),
+        "corners": [corner_entry(explorer, record) for record in explorer.records],
+        "ends": [[[ray, edge] for ray, edge in p.edges.items()] for p in explorer.records],
         "curves": [_curve(curve) for curve in explorer.curves],
         "passages": [[_flag(p.start), _flag(p.stop)] for p in explorer.passages],
         "seeds": [[count, seed.tolist()] for count, seed in explorer.seeds],
         "pending": list(explorer.pending),
         "shot": [[edge, sorted(face)] for edge, face in sorted(explorer.shot, key=_order)],
         "notes": explorer.notes,
-        "lost": bool(explorer.register.lost),
+        "lost": bool(explorer.registry.lost),
         "random": _listed(explorer.rng.bit_generator.state),
     }
     return save_json(KIND, path, content)
@@ -153,8 +153,8 @@ def _restored(
     path: str | os.PathLike[str],
 ) -> Skeleton:
     extent = read_number(content["extent"])
-    ground = Ground(polyhedron, symmetry, float(content["tolerance"]), extent)
-    explorer = Explorer(ground, [], _generator(content["random"]))
+    quotient = Quotient(polyhedron, symmetry, float(content["tolerance"]), extent)
+    explorer = Explorer(quotient, [], _generator(content["random"]))
     try:
         _fill(explorer, content)
         found = fault(explorer, content)
@@ -169,19 +169,19 @@ def _restored(
 def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
     n = explorer.manifold.dimension
     for corner in content["corners"]:
-        explorer.register.restore(_points(corner["point"], n, 1))
-    for place, ends in zip(explorer.places, content["ends"], strict=True):
-        place.edges.update(dict(ends))
+        explorer.registry.restore(_points(corner["point"], n, 1))
+    for record, ends in zip(explorer.records, content["ends"], strict=True):
+        record.edges.update(dict(ends))
     explorer.curves += [_read_curve(entry, n) for entry in content["curves"]]
     explorer.passages += [
-        Passage(_read_flag(start), _read_flag(stop)) for start, stop in content["passages"]
+        Crossing(_read_flag(start), _read_flag(stop)) for start, stop in content["passages"]
     ]
     explorer.seeds.extend((count, _points(seed, n, 1)) for count, seed in content["seeds"])
     explorer.pending.extend((corner, ray) for corner, ray in content["pending"])
     explorer.shot.update((edge, frozenset(face)) for edge, face in content["shot"])
     for sentence in content["notes"]:
-        explorer.register.note(sentence)
-    explorer.register.lost = bool(content["lost"])
+        explorer.registry.note(sentence)
+    explorer.registry.lost = bool(content["lost"])
 
 
 def _points(written: Any, n: int, dimensions: int) -> Any:
@@ -229,8 +229,8 @@ def _flag(flag: Flag) -> list[Any]:
 
 
 def _read_flag(written: list[Any]) -> Flag:
-    kind, place, names = written
-    return kind, tuple(place) if isinstance(place, list) else place, frozenset(names)
+    kind, record, names = written
+    return kind, tuple(record) if isinstance(record, list) else record, frozenset(names)
 
 
 def _order(crossing: tuple[int, frozenset[int]]) -> tuple[int, list[int]]:

@@ -7,18 +7,18 @@ from polycorner.polyhedra.strata import stratum_at
 from polycorner.polyhedra.symmetry import renamed
 from polycorner.skeletons.elements import Completeness, Corner, Edge, Face, Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.faces import Flag, Forest
-from polycorner.skeletons.registry import Place
+from polycorner.skeletons.flags import Flag, Forest
+from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.walks import End
 
 
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
     """Return the atlas as it stands."""
     faces, components = _faces(explorer)
-    corners = tuple(_corner(explorer, place) for place in explorer.places)
+    corners = tuple(_corner(explorer, record) for record in explorer.records)
     edges = tuple(
         Edge(
-            active=_ordered(explorer, explorer.register.names(curve.active)),
+            active=_ordered(explorer, explorer.registry.names(curve.active)),
             ends=(
                 curve.start[0] if curve.start is not None else None,
                 curve.stop[0] if curve.stop is not None else None,
@@ -47,10 +47,10 @@ def _whole(explorer: Explorer) -> bool:
     """Whether faces and Euler characteristic can be trusted everywhere."""
     if explorer.symmetry.relabels or any(curve.branches for curve in explorer.curves):
         return False
-    for place in explorer.places:
-        star = place.star
-        flags = [(i, sector.active) for sector in star.sectors for i in sector.rays]
-        if (star.singular and star.full > 2) or max(Counter(flags).values(), default=0) > 1:
+    for record in explorer.records:
+        figure = record.figure
+        flags = [(i, sector.active) for sector in figure.sectors for i in sector.rays]
+        if (figure.singular and figure.full > 2) or max(Counter(flags).values(), default=0) > 1:
             return False
     return True
 
@@ -59,12 +59,14 @@ def _ordered(explorer: Explorer, names: frozenset[str]) -> tuple[str, ...]:
     return tuple(name for name in explorer.polyhedron.names if name in names)
 
 
-def _corner(explorer: Explorer, place: Place) -> Corner:
-    ends = [place.edges.get(representative) for representative in place.orbit]
+def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
+    ends = [record.edges.get(representative) for representative in record.orbit]
     return Corner(
-        point=explorer.manifold.wrap(place.spot.q),
-        stratum=stratum_at(explorer.polyhedron, place.spot.q, tolerance=explorer.ground.tolerance),
-        singular=place.star.singular,
+        point=explorer.manifold.wrap(record.point.q),
+        stratum=stratum_at(
+            explorer.polyhedron, record.point.q, tolerance=explorer.quotient.tolerance
+        ),
+        singular=record.figure.singular,
         edges=tuple(end for end in ends if end is not None),
     )
 
@@ -101,10 +103,10 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
 
 
 def _flags(explorer: Explorer) -> Iterator[Flag]:
-    for k, place in enumerate(explorer.places):
-        for sector in place.star.sectors:
+    for k, record in enumerate(explorer.records):
+        for sector in record.figure.sectors:
             for i in sector.rays:
-                yield ("half", (k, i), explorer.register.names(sector.active))
+                yield ("half", (k, i), explorer.registry.names(sector.active))
     for k, curve in enumerate(explorer.curves):
         if curve.start is None:
             for face in explorer.faces_beside(curve):
@@ -113,25 +115,25 @@ def _flags(explorer: Explorer) -> Iterator[Flag]:
 
 def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
     """Yield flags that belong to one boundary curve of one face."""
-    for k, place in enumerate(explorer.places):
-        for sector in place.star.sectors:
-            face = explorer.register.names(sector.active)
+    for k, record in enumerate(explorer.records):
+        for sector in record.figure.sectors:
+            face = explorer.registry.names(sector.active)
             i, j = sector.rays
             yield ("half", (k, i), face), ("half", (k, j), face)
-            for p in place.stabiliser:
+            for p in record.stabiliser:
                 for ray in sector.rays:
-                    active = renamed(explorer.register.names(place.star.rays[ray].active), p)
-                    for other, twin in enumerate(place.star.rays):
-                        if explorer.register.names(twin.active) == active:
+                    active = renamed(explorer.registry.names(record.figure.rays[ray].active), p)
+                    for other, twin in enumerate(record.figure.rays):
+                        if explorer.registry.names(twin.active) == active:
                             image: Flag = ("half", (k, other), renamed(face, p))
                             if p:
                                 yield ("half", (k, ray), face), image
     for curve in explorer.curves:
         if curve.start is not None:
-            place = explorer.places[curve.start[0]]
-            for sector in place.star.sectors:
+            record = explorer.records[curve.start[0]]
+            for sector in record.figure.sectors:
                 if curve.start[1] in sector.rays:
-                    face = explorer.register.names(sector.active)
+                    face = explorer.registry.names(sector.active)
                     stop: Flag = ("half", curve.stop, renamed(face, curve.relabelled))
                     yield ("half", curve.start, face), stop
 
@@ -150,22 +152,22 @@ def _edge_of(explorer: Explorer, flag: Flag) -> int:
     if flag[0] == "curve":
         return int(flag[1])
     k, i = flag[1]
-    place = explorer.places[k]
-    found: int = place.edges.get(place.orbit[i], -1)
+    record = explorer.records[k]
+    found: int = record.edges.get(record.orbit[i], -1)
     return found
 
 
 def _components(
     explorer: Explorer, flags: dict[Flag, None], surface: Forest, faces: int
 ) -> dict[int, int]:
-    spot = explorer.places[0].spot if explorer.places else None
-    if spot is None and not explorer.curves:
+    point = explorer.records[0].point if explorer.records else None
+    if point is None and not explorer.curves:
         return {}
-    if spot is None:
-        spot = explorer.ground.spot(explorer.curves[0].points[0])
-    fixed = len(spot.matrix([])) - len(explorer.polyhedron.equations)
-    free = explorer.manifold.dimension - len(spot.matrix([]))
-    counts = {fixed: len(explorer.places), fixed + 1: len(explorer.curves)}
+    if point is None:
+        point = explorer.quotient.at(explorer.curves[0].points[0])
+    fixed = len(point.matrix([])) - len(explorer.polyhedron.equations)
+    free = explorer.manifold.dimension - len(point.matrix([]))
+    counts = {fixed: len(explorer.records), fixed + 1: len(explorer.curves)}
     if free >= 2:
         counts[fixed + 2] = faces
     if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:

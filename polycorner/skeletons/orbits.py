@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from polycorner.polyhedra.symmetry import Element, renamed
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.faces import Forest
+from polycorner.skeletons.flags import Forest
 from polycorner.skeletons.registry import SAME
 from polycorner.spaces.manifold import Array
 
@@ -69,16 +69,16 @@ class _Images:
     def __init__(self, atlas: Skeleton, nearby: Nearby | None) -> None:
         self.atlas, self.nearby = atlas, nearby
         self.explorer: Explorer = atlas.state
-        self.names = self.explorer.register.names
+        self.names = self.explorer.registry.names
         self.faces = {_signature(f.active, f.boundary): k for k, f in enumerate(atlas.faces)}
 
     def corner(self, k: int, g: Element) -> int | None:
         """Return the image of a corner."""
-        places = self.explorer.places
-        active = renamed(self.names(places[k].active), g.names)
-        alike = [j for j, other in enumerate(places) if self.names(other.active) == active]
+        records = self.explorer.records
+        active = renamed(self.names(records[k].active), g.names)
+        alike = [j for j, other in enumerate(records) if self.names(other.active) == active]
         return self._nearest(
-            g.apply(places[k].spot.q), [(j, places[j].spot.q) for j in alike], SAME
+            g.apply(records[k].point.q), [(j, records[j].point.q) for j in alike], SAME
         )
 
     def edge(self, k: int, g: Element) -> int | None:
@@ -95,15 +95,15 @@ class _Images:
         corner = self.corner(curve.start[0], g)
         if corner is None:
             return None
-        ray = self.explorer.places[curve.start[0]].star.rays[curve.start[1]]
-        place = self.explorer.places[corner]
+        ray = self.explorer.records[curve.start[0]].figure.rays[curve.start[1]]
+        record = self.explorer.records[corner]
         rays = [
-            (i, other.frame.q)
-            for i, other in enumerate(place.star.rays)
+            (i, other.sample.q)
+            for i, other in enumerate(record.figure.rays)
             if self.names(other.active) == active
         ]
-        found = self._nearest(g.apply(ray.frame.q), rays, 0.2 * ray.distance)
-        return None if found is None else place.edges.get(place.orbit[found])
+        found = self._nearest(g.apply(ray.sample.q), rays, 0.2 * ray.distance)
+        return None if found is None else record.edges.get(record.orbit[found])
 
     def face(self, k: int, g: Element) -> int | None:
         """Return the image of a face."""

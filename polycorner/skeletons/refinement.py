@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from polycorner.skeletons.curves import settle
 from polycorner.skeletons.elements import Edge, Skeleton
 from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.points import projected
 from polycorner.spaces.manifold import Array
 
 
@@ -25,13 +25,13 @@ def traced(atlas: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
     """
     explorer: Explorer = atlas.state
     rows = [atlas.polyhedron.names.index(name) for name in edge.active]
-    kept = explorer.ground.spot(edge.polyline[len(edge.polyline) // 2]).basis(rows)
+    kept = explorer.quotient.at(edge.polyline[len(edge.polyline) // 2]).basis(rows)
     points = [edge.polyline[0]]
     for start, end in zip(edge.polyline, edge.polyline[1:], strict=False):
         chord = float(np.linalg.norm((end - start) / explorer.scales))
         for s in np.arange(1, pieces) / pieces:
-            frame = settle(explorer.ground, start + s * (end - start), kept, chord)
-            if frame is not None:
-                points.append(frame.q)
+            point = projected(explorer.quotient, start + s * (end - start), kept, chord)
+            if point is not None:
+                points.append(point.q)
         points.append(end)
     return np.array(points)

@@ -1,7 +1,7 @@
 """The corners found so far, and which of them a point is.
 
 With relabellings only one corner of each orbit is kept, and of its rays one of each orbit under
-the relabellings that leave the corner in place stands for all of them.
+the relabellings that leave the corner in record stands for all of them.
 """
 
 from collections.abc import Iterable
@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, renamed
-from polycorner.skeletons.curves import Ground, Spot, settle
-from polycorner.skeletons.rays import Ray, Star, star_at
+from polycorner.skeletons.points import EvaluatedPoint, Quotient, projected
+from polycorner.skeletons.vertex_figures import Ray, VertexFigure, vertex_figure
 from polycorner.spaces.manifold import Array
 
 SAME = 1e-5
@@ -22,28 +22,28 @@ Names = frozenset[str]
 
 
 @dataclass
-class Place:
+class CornerRecord:
     """A corner while the atlas grows.
 
     ``orbit[k]`` is the ray that stands for ray ``k``; ``edges`` the edges by such rays.
     """
 
-    spot: Spot
+    point: EvaluatedPoint
     active: frozenset[int]
-    star: Star
+    figure: VertexFigure
     key: Array
     stabiliser: list[Relabelling]
     orbit: list[int]
     edges: dict[int, int] = field(default_factory=dict)
 
 
-class Places:
+class CornerRegistry:
     """Corners, and what there is to say about them and about the walks between them."""
 
-    def __init__(self, ground: Ground) -> None:
-        self.ground, self.symmetry = ground, ground.symmetry
-        self.polyhedron, self.manifold = ground.polyhedron, ground.polyhedron.manifold
-        self.places: list[Place] = []
+    def __init__(self, quotient: Quotient) -> None:
+        self.quotient, self.symmetry = quotient, quotient.symmetry
+        self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
+        self.records: list[CornerRecord] = []
         self.notes: dict[str, None] = {}
         self.lost = False
 
@@ -60,46 +60,46 @@ class Places:
         self.notes.setdefault(sentence)
         self.lost |= lost
 
-    def find(self, spot: Spot) -> tuple[int, list[Relabelling]] | None:
+    def find(self, point: EvaluatedPoint) -> tuple[int, list[Relabelling]] | None:
         """Return the position of the corner at a point, new or known, and how to get there.
 
         The relabellings carry the names at the point to the names at the corner.
         """
-        active = spot.active()
+        active = point.active()
         if active is None:
-            self.note(f"a walk ended outside the polyhedron at {written_point(spot.q)}", lost=True)
+            self.note(f"a walk ended outside the polyhedron at {written_point(point.q)}", lost=True)
             return None
-        spot = self._polished(spot, active)
-        key = self._key(spot.q)
-        for k, place in enumerate(self.places):
-            if abs(place.key - key).max() > NEAR:
+        point = self._polished(point, active)
+        key = self._key(point.q)
+        for k, record in enumerate(self.records):
+            if abs(record.key - key).max() > NEAR:
                 continue
-            carried = self.symmetry.relabellings(self.manifold, spot.q, place.spot.q, SAME)
-            there = self.names(place.active)
+            carried = self.symmetry.relabellings(self.manifold, point.q, record.point.q, SAME)
+            there = self.names(record.active)
             same = [p for p in carried if renamed(self.names(active), p) == there]
             if same:
                 return k, same
             if carried:
                 self.note(
-                    f"corners {self.written(place.active)} and {self.written(active)} "
+                    f"corners {self.written(record.active)} and {self.written(active)} "
                     f"are closer than {SAME:g} scale units: kept apart"
                 )
-        return self._add(spot, active, key)
+        return self._add(point, active, key)
 
-    def _polished(self, spot: Spot, active: frozenset[int]) -> Spot:
-        basis = spot.basis(active)
-        if len(basis) + len(spot.matrix([])) < len(spot.q):
-            return spot
-        exact = settle(self.ground, spot.q, basis, NEAR)
+    def _polished(self, point: EvaluatedPoint, active: frozenset[int]) -> EvaluatedPoint:
+        basis = point.basis(active)
+        if len(basis) + len(point.matrix([])) < len(point.q):
+            return point
+        exact = projected(self.quotient, point.q, basis, NEAR)
         if exact is None:
-            return spot
+            return point
         away = exact.distances
         if abs(away[sorted(active)]).max() > SLACK:
             self.note(
                 f"{self.written(active)} meet within the tolerance but not in one "
                 f"point: corners closer together than it count as one"
             )
-        gaps = {i: away[i] for i in range(self.ground.count) if i not in active}
+        gaps = {i: away[i] for i in range(self.quotient.count) if i not in active}
         near = [i for i, gap in gaps.items() if abs(gap) < SAME and not self.polyhedron.is_union]
         for i in near:
             self.note(
@@ -114,26 +114,28 @@ class Places:
 
     def restore(self, q: Array) -> None:
         """Add a corner at a point that was one before."""
-        spot = self.ground.spot(q)
-        self._add(spot, spot.active() or frozenset(), self._key(q))
+        point = self.quotient.at(q)
+        self._add(point, point.active() or frozenset(), self._key(q))
 
-    def _add(self, spot: Spot, active: frozenset[int], key: Array) -> tuple[int, list[Relabelling]]:
-        star = star_at(spot, active)
-        for sentence in star.notes:
+    def _add(
+        self, point: EvaluatedPoint, active: frozenset[int], key: Array
+    ) -> tuple[int, list[Relabelling]]:
+        figure = vertex_figure(point, active)
+        for sentence in figure.notes:
             self.note(sentence, lost=True)
-        if star.singular and star.full > 2:
+        if figure.singular and figure.full > 2:
             self.note(f"faces at the singular corner {self.written(active)} are not put together")
-        stabiliser = self.symmetry.relabellings(self.manifold, spot.q, spot.q, SAME)
-        place = Place(spot, active, star, key, stabiliser, [])
-        for i, ray in enumerate(star.rays):
-            twin = self.match(place, ray.frame.q, ray, stabiliser, range(i))
-            place.orbit.append(i if twin is None else place.orbit[twin[0]])
-        self.places.append(place)
-        return len(self.places) - 1, list(stabiliser)
+        stabiliser = self.symmetry.relabellings(self.manifold, point.q, point.q, SAME)
+        record = CornerRecord(point, active, figure, key, stabiliser, [])
+        for i, ray in enumerate(figure.rays):
+            twin = self.match(record, ray.sample.q, ray, stabiliser, range(i))
+            record.orbit.append(i if twin is None else record.orbit[twin[0]])
+        self.records.append(record)
+        return len(self.records) - 1, list(stabiliser)
 
     def match(
         self,
-        place: Place,
+        record: CornerRecord,
         sample: Array | None,
         ray: Ray,
         relabellings: Iterable[Relabelling],
@@ -141,16 +143,16 @@ class Places:
     ) -> tuple[int, Relabelling] | None:
         """Return which ray of a corner a ray is, after one of the relabellings."""
         among = list(among)
-        named = {i: self.names(place.star.rays[i].active) for i in among}
+        named = {i: self.names(record.figure.rays[i].active) for i in among}
         active = self.names(ray.active)
         possible = [(i, p) for p in relabellings for i in among if renamed(active, p) == named[i]]
-        if possible and not place.star.singular and not self.polyhedron.is_union:
+        if possible and not record.figure.singular and not self.polyhedron.is_union:
             return possible[0]
         for i, p in possible:
-            other = place.star.rays[i]
+            other = record.figure.rays[i]
             near = 0.2 * other.distance
             if sample is not None and p in self.symmetry.relabellings(
-                self.manifold, sample, other.frame.q, near
+                self.manifold, sample, other.sample.q, near
             ):
                 return i, p
         return None

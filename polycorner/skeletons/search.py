@@ -9,9 +9,9 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
-from polycorner.skeletons.curves import Ground
 from polycorner.skeletons.elements import Completeness, Skeleton
 from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.points import Quotient
 from polycorner.spaces.manifold import reals
 
 EXTENT = 1000.0
@@ -99,8 +99,8 @@ def skeleton(
             f"starts: expected a list of points, shape (k, {points.shape[-1]}); got {points.shape}"
         )
         raise ValueError(msg)
-    ground = Ground(polyhedron, symmetry or Symmetry(), tolerance, extent)
-    return _run(Explorer(ground, points, _generator(rng)), budget, progress)
+    quotient = Quotient(polyhedron, symmetry or Symmetry(), tolerance, extent)
+    return _run(Explorer(quotient, points, _generator(rng)), budget, progress)
 
 
 def resume(atlas: Skeleton, *, budget: int = BUDGET, progress: Progress | None = None) -> Skeleton:

@@ -13,7 +13,7 @@ from enum import Enum
 
 import numpy as np
 
-from polycorner.skeletons.curves import Frame, settle
+from polycorner.skeletons.points import HeldPoint, projected
 from polycorner.spaces.manifold import Array
 
 FIRST_STEP = 0.2
@@ -45,7 +45,7 @@ class Walk:
     ----------
     points : (k, n) array
         Where it went, in coordinates that are not wrapped.
-    frame : Frame
+    last : HeldPoint
         At its end.
     tangent : (n,) array
         Scaled unit direction of arrival.
@@ -58,7 +58,7 @@ class Walk:
     """
 
     points: Array
-    frame: Frame
+    last: HeldPoint
     tangent: Array
     end: End
     length: float
@@ -66,7 +66,7 @@ class Walk:
 
 
 def follow(
-    start: Frame,
+    start: HeldPoint,
     direction: Array,
     *,
     passive: frozenset[int] = frozenset(),
@@ -77,7 +77,7 @@ def follow(
 
     Parameters
     ----------
-    start : Frame
+    start : HeldPoint
         Where the held functions vanish.
     direction : (n,) array
         Where to go; projected to the tangent space.
@@ -86,7 +86,7 @@ def follow(
     home : bool
         Whether to stop when the walk comes back to where it started.
     extent : float, optional
-        Length after which to give up; default that of the ground.
+        Length after which to give up; default that of the quotient.
     """
     return _Follower(start, direction, passive, home=home, extent=extent).run()
 
@@ -96,23 +96,23 @@ class _Follower:
 
     def __init__(
         self,
-        start: Frame,
+        start: HeldPoint,
         direction: Array,
         passive: frozenset[int],
         *,
         home: bool,
         extent: float | None,
     ) -> None:
-        self.ground = ground = start.ground
-        self.scales = ground.polyhedron.manifold.scale_array
-        self.frame, self.t = start, start.tangent(direction)
+        self.quotient = quotient = start.quotient
+        self.scales = quotient.polyhedron.manifold.scale_array
+        self.point, self.t = start, start.tangent(direction)
         self.out = self.t
         self.start, self.home = start, home
-        self.extent = ground.extent if extent is None else extent
+        self.extent = quotient.extent if extent is None else extent
         held = passive.union(start.kept)
-        self.watched = np.array([i for i in range(ground.count) if i not in held], dtype=np.int64)
+        self.watched = np.array([i for i in range(quotient.count) if i not in held], dtype=np.int64)
         self.passive = sorted(passive.difference(start.kept))
-        self.union = ground.polyhedron.is_union
+        self.union = quotient.polyhedron.is_union
         negative = self.union & (start.values[self.watched] < 0)
         self.signs = np.where(negative, -1.0, 1.0)
         self.points, self.length, self.branches = [start.q], 0.0, 0
@@ -125,17 +125,17 @@ class _Follower:
             taken = self._step(h)
             if isinstance(taken, End):
                 return self._walk(taken)
-            frame, t, h = taken
-            met = self._event(frame, t)
+            point, t, h = taken
+            met = self._event(point, t)
             if met is not None:
                 self._move(*met)
                 return self._walk(End.CORNER)
-            back = self._return(frame) if self.home else None
+            back = self._return(point) if self.home else None
             if back is not None:
                 self._move(*back)
                 return self._walk(End.CLOSED)
-            self._move(frame, t)
-            if any(abs(frame.distances[self.passive]) > DRIFT):
+            self._move(point, t)
+            if any(abs(point.distances[self.passive]) > DRIFT):
                 return self._walk(End.SINGULAR)
             if self.length > self.extent:
                 return self._walk(End.INFINITY)
@@ -146,9 +146,9 @@ class _Follower:
 
         On circles a step stays a small part of the way around.
         """
-        away = abs(self.frame.distances[self.watched])
+        away = abs(self.point.distances[self.watched])
         room = float(away.min(initial=self.extent))
-        manifold = self.ground.polyhedron.manifold
+        manifold = self.quotient.polyhedron.manifold
         turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
         circle = 0.05 / turning if turning > 0 else math.inf
         far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), circle)
@@ -156,56 +156,56 @@ class _Follower:
 
     def _walk(self, end: End) -> Walk:
         points = np.array(self.points)
-        return Walk(points, self.frame, self.t, end, self.length, self.branches)
+        return Walk(points, self.point, self.t, end, self.length, self.branches)
 
-    def _move(self, frame: Frame, t: Array) -> None:
-        side = frame.orientation(t)
+    def _move(self, point: HeldPoint, t: Array) -> None:
+        side = point.orientation(t)
         self.branches += side * self.side < 0
-        self.length += float(np.linalg.norm((frame.q - self.frame.q) / self.scales))
-        self.frame, self.t, self.side = frame, t, side
-        self.points.append(frame.q)
+        self.length += float(np.linalg.norm((point.q - self.point.q) / self.scales))
+        self.point, self.t, self.side = point, t, side
+        self.points.append(point.q)
 
-    def _step(self, h: float) -> tuple[Frame, Array, float] | End:
+    def _step(self, h: float) -> tuple[HeldPoint, Array, float] | End:
         """Return the next point, the tangent there and the step that worked."""
         blocked = False
         while h > SHORTEST_STEP:
-            ahead = self.frame.q + h * self.scales * self.t
-            frame = settle(self.ground, ahead, self.frame.kept, 0.3 * h)
-            if frame is None:
-                blocked |= not Frame(self.ground, ahead, self.frame.kept).finite
+            ahead = self.point.q + h * self.scales * self.t
+            point = projected(self.quotient, ahead, self.point.kept, 0.3 * h)
+            if point is None:
+                blocked |= not HeldPoint(self.quotient, ahead, self.point.kept).finite
             else:
-                t = frame.tangent(self.t)
+                t = point.tangent(self.t)
                 turn = math.acos(min(1.0, float(t @ self.t)))
-                off = (frame.q - self.frame.q) / self.scales - h * self.t
+                off = (point.q - self.point.q) / self.scales - h * self.t
                 # Farther off than the turn explains: another curve of the same functions.
                 strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + STRAY)
-                flipped = frame.orientation(t) * self.side < 0 and h > FLIP
+                flipped = point.orientation(t) * self.side < 0 and h > FLIP
                 if turn < TURN and not strayed and not flipped:
-                    return frame, t, h
+                    return point, t, h
             h /= 2
         return End.CHART if blocked else End.SINGULAR
 
     # ------------------------------------------------------------------------------------ events
 
-    def _between(self, other: Frame, s: float) -> Frame:
+    def _between(self, other: HeldPoint, s: float) -> HeldPoint:
         """Return the point of the set a fraction ``s`` of the way to ``other``."""
-        frame = settle(self.ground, self._guess(other, s), self.frame.kept, math.inf)
-        return other if frame is None else frame
+        point = projected(self.quotient, self._guess(other, s), self.point.kept, math.inf)
+        return other if point is None else point
 
-    def _guess(self, other: Frame, s: float) -> Array:
+    def _guess(self, other: HeldPoint, s: float) -> Array:
         """Return a point of the cubic through both ends with their tangents."""
-        chord = other.q - self.frame.q
+        chord = other.q - self.point.q
         h = self._chord(other) * self.scales
         out, back = h * self.t - chord, h * other.tangent(self.t) - chord
-        return np.asarray(self.frame.q + s * (chord + (1 - s) * ((1 - s) * out - s * back)))
+        return np.asarray(self.point.q + s * (chord + (1 - s) * ((1 - s) * out - s * back)))
 
-    def _event(self, frame: Frame, t: Array) -> tuple[Frame, Array] | None:
+    def _event(self, point: HeldPoint, t: Array) -> tuple[HeldPoint, Array] | None:
         """Return the first point of this step where the face changes, and the tangent there."""
-        found: list[tuple[float, int, Frame, bool]] = []
-        for j, sign in self._suspects(frame, t):
-            place = self._closing(frame, j, sign)
-            if place is not None:
-                found.append((place[0], j, place[1], place[2]))
+        found: list[tuple[float, int, HeldPoint, bool]] = []
+        for j, sign in self._suspects(point, t):
+            record = self._closing(point, j, sign)
+            if record is not None:
+                found.append((record[0], j, record[1], record[2]))
         for _, j, where, crosses in sorted(found, key=lambda item: item[:2]):
             if self._matters(where):
                 return where, where.tangent(self.t)
@@ -213,29 +213,29 @@ class _Follower:
                 self.signs[self.watched == j] *= -1
         return None
 
-    def _matters(self, where: Frame) -> bool:
+    def _matters(self, where: HeldPoint) -> bool:
         """Whether the face changes here, and not only functions that are beside the point."""
         if not self.union:
             return True
         active = where.active()
         if active is None:
             return True
-        held = set(self.frame.kept).union(self.passive)
+        held = set(self.point.kept).union(self.passive)
         return not active <= held
 
-    def _suspects(self, frame: Frame, t: Array) -> list[tuple[int, float]]:
+    def _suspects(self, point: HeldPoint, t: Array) -> list[tuple[int, float]]:
         """Return functions that change sign or may dip to zero in this step.
 
         One that falls first and rises then may, if the cubic through values and slopes does, or
         if the slopes at both ends, kept up, would let it.
         """
-        here, there, rows = self.frame, frame, self.watched
+        here, there, rows = self.point, point, self.watched
         f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
         slope0 = self.signs * (here.gradients[rows] @ self.t)
         slope1 = self.signs * (there.gradients[rows] @ t)
         dips = (slope0 < 0) & (slope1 >= 0)
         crosses = f1 < 0
-        chord = self._chord(frame)
+        chord = self._chord(point)
         reach = np.maximum(self._sizes(here), self._sizes(there)) * chord
         near = f0 + f1 < reach
         return [
@@ -244,77 +244,79 @@ class _Follower:
             if crosses[k] or near[k] or _dip(f0[k], f1[k], slope0[k], slope1[k], chord)
         ]
 
-    def _chord(self, frame: Frame) -> float:
-        return float(np.linalg.norm((frame.q - self.frame.q) / self.scales))
+    def _chord(self, point: HeldPoint) -> float:
+        return float(np.linalg.norm((point.q - self.point.q) / self.scales))
 
-    def _sizes(self, frame: Frame) -> Array:
+    def _sizes(self, point: HeldPoint) -> Array:
         """Return the lengths of the watched functions' gradients."""
-        rows = frame.gradients[self.watched]
+        rows = point.gradients[self.watched]
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", rows, rows)))
 
-    def _closing(self, frame: Frame, j: int, sign: float) -> tuple[float, Frame, bool] | None:
+    def _closing(
+        self, point: HeldPoint, j: int, sign: float
+    ) -> tuple[float, HeldPoint, bool] | None:
         """Return where function ``j`` first reaches zero: fraction, point, and whether it crosses.
 
         A function that ends positive is followed to where its slope vanishes; there it touches
         (within the tolerance), has crossed before, or was only near.
         """
-        end, far = frame, 1.0
-        if sign * frame.values[j] >= 0:
+        end, far = point, 1.0
+        if sign * point.values[j] >= 0:
 
-            def slope(s: float) -> tuple[float, Frame]:
-                at = self._between(frame, s)
+            def slope(s: float) -> tuple[float, HeldPoint]:
+                at = self._between(point, s)
                 return sign * float(at.gradients[j] @ at.tangent(self.t)), at
 
             far, end = _root(slope)
             distance = sign * end.distances[j]
-            if distance > self.ground.tolerance:
+            if distance > self.quotient.tolerance:
                 return None
-            if distance >= -self.ground.tolerance:
+            if distance >= -self.quotient.tolerance:
                 return far, end, False
 
-        def value(s: float) -> tuple[float, Frame]:
-            at = self._between(frame, s)
+        def value(s: float) -> tuple[float, HeldPoint]:
+            at = self._between(point, s)
             return sign * float(at.values[j]), at
 
-        if end is frame and self.frame.is_curve:
-            quick = self._crossing(frame, j)
+        if end is point and self.point.is_curve:
+            quick = self._crossing(point, j)
             if quick is not None:
                 return (*quick, True)
         s, where = _root(value, far)
-        return s, where, end is frame
+        return s, where, end is point
 
-    def _crossing(self, frame: Frame, j: int) -> tuple[float, Frame] | None:
+    def _crossing(self, point: HeldPoint, j: int) -> tuple[float, HeldPoint] | None:
         """Return where ``j`` crosses zero, by Newton's method; None if that leaves the step."""
-        f0, f1 = self.frame.values[j], frame.values[j]
-        guess = self._guess(frame, f0 / (f0 - f1))
-        kept = [*self.frame.kept, j]
-        place = settle(self.ground, guess, kept, self._chord(frame))
-        if place is None or place.condition < 1e-3:
+        f0, f1 = self.point.values[j], point.values[j]
+        guess = self._guess(point, f0 / (f0 - f1))
+        kept = [*self.point.kept, j]
+        record = projected(self.quotient, guess, kept, self._chord(point))
+        if record is None or record.condition < 1e-3:
             return None
-        chord = (frame.q - self.frame.q) / self.scales
-        s = float((place.q - self.frame.q) / self.scales @ chord / (chord @ chord))
-        return (s, Frame(self.ground, place.q, self.frame.kept)) if 0 <= s <= 1 else None
+        chord = (point.q - self.point.q) / self.scales
+        s = float((record.q - self.point.q) / self.scales @ chord / (chord @ chord))
+        return (s, HeldPoint(self.quotient, record.q, self.point.kept)) if 0 <= s <= 1 else None
 
-    def _return(self, frame: Frame) -> tuple[Frame, Array] | None:
+    def _return(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
         """Return where this step passes the start of the walk again, and the tangent there."""
-        near = 2 * self._chord(frame)
-        if self.length < near or abs(self._from_home(frame.q)).max() > near:
+        near = 2 * self._chord(point)
+        if self.length < near or abs(self._from_home(point.q)).max() > near:
             return None
         ahead = self._from_home(self.start.q + 1e-6 * self.scales * self.out)
 
-        def passed(s: float) -> tuple[float, Frame]:
-            at = self._between(frame, s)
+        def passed(s: float) -> tuple[float, HeldPoint]:
+            at = self._between(point, s)
             return float(self._from_home(at.q) @ ahead), at
 
         if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
             return None
         _, nearest = _root(passed)
-        same = abs(self._from_home(nearest.q)).max() < 100 * self.ground.tolerance
+        same = abs(self._from_home(nearest.q)).max() < 100 * self.quotient.tolerance
         return (nearest, nearest.tangent(self.t)) if same else None
 
     def _from_home(self, q: Array) -> Array:
         """Return the way from the start's orbit, by the invariants."""
-        manifold, invariants = self.ground.polyhedron.manifold, self.ground.symmetry.invariants
+        manifold, invariants = self.quotient.polyhedron.manifold, self.quotient.symmetry.invariants
         if invariants is None:
             return manifold.difference(q, self.start.q) / self.scales
         return invariants(q) - invariants(self.start.q)
@@ -330,7 +332,9 @@ def _dip(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
     return bool((values < 0.25 * min(f0, f1) + 1e-9).any())
 
 
-def _root(value: Callable[[float], tuple[float, Frame]], far: float = 1.0) -> tuple[float, Frame]:
+def _root(
+    value: Callable[[float], tuple[float, HeldPoint]], far: float = 1.0
+) -> tuple[float, HeldPoint]:
     """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
     a, b = 0.0, far
     (fa, _), (fb, at) = value(a), value(b)

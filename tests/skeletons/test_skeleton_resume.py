@@ -5,7 +5,7 @@ import pytest
 from atlas_shapes import ball, counts, identical, isomorphic, polytope, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
-from polycorner.skeletons import Completeness, curves
+from polycorner.skeletons import Completeness, points
 from polycorner.skeletons.search import resume
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
@@ -29,14 +29,14 @@ class Interrupter:
 
 def interrupted_evaluation(monkeypatch, when, *arguments, **options):
     """Return an atlas that was interrupted in the middle of a given evaluation, and the count."""
-    alarm, evaluated = Interrupter(when), curves.evaluated
+    alarm, evaluated = Interrupter(when), points.evaluated
 
     def wrapped(polyhedron, q):
         alarm()
         return evaluated(polyhedron, q)
 
     with monkeypatch.context() as patch:
-        patch.setattr(curves, "evaluated", wrapped)
+        patch.setattr(points, "evaluated", wrapped)
         try:
             return skeleton(*arguments, **options), when - alarm.left
         except KeyboardInterrupt:

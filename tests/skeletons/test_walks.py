@@ -14,7 +14,7 @@ from strategies import directions
 from polycorner import AllOf, Manifold, Polyhedron, SmoothFunction, Symmetry
 from polycorner.formulas.families import Family
 from polycorner.skeletons import End
-from polycorner.skeletons.curves import Frame, Ground, settle
+from polycorner.skeletons.points import HeldPoint, Quotient, projected
 from polycorner.skeletons.walks import follow
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
@@ -22,8 +22,8 @@ x, y, z = SPACE.symbols
 TAU = math.tau
 
 
-def ground(D, *, symmetry=None, extent=100.0):
-    return Ground(D, symmetry or Symmetry(), 1e-8, extent)
+def quotient(D, *, symmetry=None, extent=100.0):
+    return Quotient(D, symmetry or Symmetry(), 1e-8, extent)
 
 
 ELLIPSE = Family.of(
@@ -42,7 +42,7 @@ def ellipse(a, b):
 def frame(D, q, held, **options):
     """Return a frame at a point, holding functions by name."""
     rows = [D.names.index(name) for name in held]
-    return Frame(ground(D, **options), np.asarray(q, dtype=float), rows)
+    return HeldPoint(quotient(D, **options), np.asarray(q, dtype=float), rows)
 
 
 class TestStraight:
@@ -53,7 +53,7 @@ class TestStraight:
         D = Polyhedron(space(3), half_space(normal, distance * slope, "wall"))
         walk = follow(frame(D, np.zeros(3), []), v)
         assert walk.end is End.CORNER
-        np.testing.assert_allclose(walk.frame.q, distance * v, atol=1e-8)
+        np.testing.assert_allclose(walk.last.q, distance * v, atol=1e-8)
         assert walk.length == pytest.approx(distance, abs=1e-8)
         assert np.linalg.norm(walk.points @ _across(v), ord=np.inf) < 1e-9
         np.testing.assert_allclose(walk.tangent, v, atol=1e-9)
@@ -64,7 +64,7 @@ class TestStraight:
         random.shuffle(walls)
         planes = [half_space([1, 0], w, f"wall{k}") for k, w in enumerate(walls)]
         walk = follow(frame(Polyhedron(space(2), planes), [0, 0], []), np.array([1.0, 0]))
-        assert walk.frame.q[0] == pytest.approx(min(walls), abs=1e-9)
+        assert walk.last.q[0] == pytest.approx(min(walls), abs=1e-9)
 
     @given(st.floats(0.2, 10), st.floats(1e-3, 0.5), st.floats(-0.99, 0.99))
     def test_a_small_obstacle_on_the_way_is_not_jumped_over(self, distance, radius, off):
@@ -74,7 +74,7 @@ class TestStraight:
         walk = follow(frame(D, [0, 0], []), np.array([1.0, 0]))
         assert walk.end is End.CORNER
         exact = distance - radius * math.sqrt(1 - off**2)
-        assert walk.frame.q[0] == pytest.approx(exact, abs=1e-7)
+        assert walk.last.q[0] == pytest.approx(exact, abs=1e-7)
 
     @given(st.floats(0.2, 10), st.floats(0.05, 2))
     @settings(max_examples=4 * settings.default.max_examples)
@@ -82,7 +82,7 @@ class TestStraight:
         D = Polyhedron(space(2), ball((distance, radius), radius, "disc", inside=False))
         walk = follow(frame(D, [0, 0], []), np.array([1.0, 0]))
         assert walk.end is End.CORNER
-        np.testing.assert_allclose(walk.frame.q, [distance, 0], atol=1e-6)
+        np.testing.assert_allclose(walk.last.q, [distance, 0], atol=1e-6)
 
     @given(st.floats(0.2, 5), st.floats(0.5, 2))
     def test_two_functions_that_touch_in_one_point_are_met(self, distance, steep):
@@ -91,7 +91,7 @@ class TestStraight:
         D = Polyhedron(PLANE, {"top": bend - y, "bottom": bend + y})
         walk = follow(frame(D, [0, 0], []), np.array([1.0, 0]))
         assert walk.end is End.CORNER
-        np.testing.assert_allclose(walk.frame.q, [distance, 0], atol=1e-4)
+        np.testing.assert_allclose(walk.last.q, [distance, 0], atol=1e-4)
 
     @given(st.floats(0.2, 10), st.floats(0.05, 2), st.floats(1e-6, 0.1))
     def test_an_obstacle_that_is_passed_by_is_not_met(self, distance, radius, gap):
@@ -105,7 +105,7 @@ class TestStraight:
         gate = SmoothFunction.member(GATE, "gate", PLANE, parameters=(distance,))
         walk = follow(frame(Polyhedron(PLANE, gate), [0, 0], [], extent=60), np.array([1.0, 0]))
         assert walk.end is End.CORNER
-        assert walk.frame.q[0] == pytest.approx(distance - math.sqrt(math.log(2)), abs=1e-7)
+        assert walk.last.q[0] == pytest.approx(distance - math.sqrt(math.log(2)), abs=1e-7)
 
 
 def _across(v):
@@ -135,7 +135,7 @@ class TestAlongCurves:
         assert abs(np.diff(slopes)).max() <= 0.25 + 1e-9
         exact = arc_length(lambda t: (t, 5 * t**2), -0.5, math.sqrt(0.6))
         assert exact * math.sin(0.125) / 0.125 <= walk.length <= exact
-        np.testing.assert_allclose(walk.frame.q, [math.sqrt(0.6), 3], atol=1e-9)
+        np.testing.assert_allclose(walk.last.q, [math.sqrt(0.6), 3], atol=1e-9)
 
     @given(st.floats(0.1, 5), st.floats(0.1, 1), st.floats(0, TAU))
     def test_a_closed_curve_is_walked_once_around(self, a, part, start):
@@ -146,7 +146,7 @@ class TestAlongCurves:
             here, _across(here.gradients[0] / np.linalg.norm(here.gradients[0])), home=True
         )
         assert walk.end is End.CLOSED
-        np.testing.assert_allclose(walk.frame.q, q, atol=1e-6)
+        np.testing.assert_allclose(walk.last.q, q, atol=1e-6)
         assert turned(walk.points, (0, 0)) == pytest.approx(TAU, abs=1e-6)
         exact = arc_length(lambda t: (a * sp.cos(t), a * part * sp.sin(t)), 0, TAU)
         assert exact * math.sin(0.125) / 0.125 <= walk.length <= exact * (1 + 1e-9)
@@ -175,14 +175,14 @@ class TestAlongCurves:
         D = Polyhedron(PLANE, {"root": sp.sqrt(x) - y})
         walk = follow(frame(D, [1, 1], ["root"]), np.array([-1.0, -0.5]))
         assert walk.end is End.CHART
-        assert np.linalg.norm(walk.frame.q) < 1e-2
+        assert np.linalg.norm(walk.last.q) < 1e-2
 
     def test_dependent_gradients_end_a_walk(self):
         """Along the cusp ``x^3 = y^2`` to its tip."""
         D = Polyhedron(PLANE, {"cusp": x**3 - y**2})
         walk = follow(frame(D, [1, 1], ["cusp"]), np.array([-1.0, -1.5]))
         assert walk.end is End.SINGULAR
-        assert np.linalg.norm(walk.frame.q) < 1e-2
+        assert np.linalg.norm(walk.last.q) < 1e-2
 
     def test_the_extent_ends_a_walk(self):
         D = Polyhedron(PLANE, {"floor": y})
@@ -197,23 +197,23 @@ class TestSettling:
         q = np.array([a, b])
         assume(abs(np.linalg.norm(q) - 1) < 0.3)
         D = Polyhedron(space(2), ball((0, 0), 1, "rim"))
-        found = settle(ground(D), q, [0], 1.0)
+        found = projected(quotient(D), q, [0], 1.0)
         np.testing.assert_allclose(found.q, q / np.linalg.norm(q), atol=1e-12)
 
     def test_what_is_out_of_reach_is_not_found(self):
         D = Polyhedron(space(2), ball((0, 0), 1, "rim"))
-        assert settle(ground(D), np.array([3.0, 0]), [0], 0.5) is None
-        assert settle(ground(D), np.array([0.0, 0]), [0], 5.0) is None
+        assert projected(quotient(D), np.array([3.0, 0]), [0], 0.5) is None
+        assert projected(quotient(D), np.array([0.0, 0]), [0], 5.0) is None
 
     def test_no_correction_moves_along_the_orbit(self):
         """Two points of a line at a distance: both are moved by the same amount."""
         D = Polyhedron(PLANE, {"gap": (y - x) ** 2 - 1})
         shift = Symmetry(tangents=lambda _: np.array([[1.0, 1.0]]), invariants=np.diff)
-        found = settle(ground(D, symmetry=shift), np.array([0.2, 1.6]), [0], 1.0)
+        found = projected(quotient(D, symmetry=shift), np.array([0.2, 1.6]), [0], 1.0)
         np.testing.assert_allclose(found.q, [0.4, 1.4], atol=1e-12)
 
     def test_in_scale_units_the_correction_is_the_shortest(self):
         M = Manifold(("x", "y"), scales=(1.0, 10.0))
         D = Polyhedron(M, {"line": 1 - x - y})
-        found = settle(ground(D), np.zeros(2), [0], 5.0)
+        found = projected(quotient(D), np.zeros(2), [0], 5.0)
         np.testing.assert_allclose(found.q, [1 / 101, 100 / 101], atol=1e-12)

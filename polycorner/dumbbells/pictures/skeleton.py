@@ -15,7 +15,7 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.skeleton import PairAtlas, long_rod_length
 from polycorner.dumbbells.statics.skeleton_map import PairMap, Signature
 from polycorner.pictures.style import BODIES, SHADES
-from polycorner.skeletons.curves import Ground, settle
+from polycorner.skeletons.points import Quotient, projected
 from polycorner.spaces.manifold import Array
 
 HANDS = {"R": "#009E73", "L": "#CC79A7", "N": "0.55"}
@@ -45,9 +45,9 @@ def draw_map(found: PairMap) -> Figure:
         here, colour = found.table == k, SHADES[(1 + 2 * k) % len(SHADES)]
         if here.any():
             axes.plot(x[here], y[here], "o", ms=5, ls="", color=colour, alpha=0.5, zorder=1)
-            place = (float(np.median(x[here])), float(np.median(y[here])))
+            record = (float(np.median(x[here])), float(np.median(y[here])))
             box = {"boxstyle": "round", "fc": "white", "ec": colour, "lw": 1.5}
-            axes.text(*place, _described(signature), ha="center", va="center", fontsize=8.5,
+            axes.text(*record, _described(signature), ha="center", va="center", fontsize=8.5,
                       zorder=2, bbox=box)  # fmt: skip
     rods = np.linspace(0.0, 1.0, 200)
     exact = [long_rod_length(1.0, t) for t in rods.tolist()]
@@ -141,18 +141,18 @@ def draw_atlas(atlas: PairAtlas) -> Figure:
     edges it is there.  In the plane dumbbell A is upright.
     """
     nodes, motions = _quotient(atlas)
-    places = _places(nodes)
+    records = _places(nodes)
     figure = Figure(layout="constrained")
     axes = figure.add_subplot()
-    reach = np.abs(places).max(axis=0, initial=0.0) + 0.7 * BOX
+    reach = np.abs(records).max(axis=0, initial=0.0) + 0.7 * BOX
     for motion, bend in _bent(motions):
-        middle = _draw_edge(axes, places[motion.ends[0]], places[motion.ends[1]], bend, motion)
+        middle = _draw_edge(axes, records[motion.ends[0]], records[motion.ends[1]], bend, motion)
         reach = np.maximum(reach, np.abs(middle) + 0.4)
     shown = [_facing(atlas.pair, node.point, whole=True) for node in nodes]
     size = max((np.ptp(centres, axis=0).max() for centres in shown), default=1.0)
     scale = 0.72 * BOX / (size + 2 * atlas.pair.ball_radius)
-    for node, centres, place in zip(nodes, shown, places, strict=True):
-        _draw_node(axes, atlas.pair, node, scale * centres, place, scale)
+    for node, centres, record in zip(nodes, shown, records, strict=True):
+        _draw_node(axes, atlas.pair, node, scale * centres, record, scale)
     for colour, name in zip(BODIES, ("dumbbell A", "dumbbell B"), strict=True):
         axes.plot([], [], "o", color=colour, ms=9, label=name)
     axes.plot([], [], "o", color=LIT, mec="black", ms=6, label="contact")
@@ -246,16 +246,16 @@ def _draw_edge(axes: Axes, start: Array, stop: Array, bend: float, motion: _Moti
 
 
 def _draw_node(
-    axes: Axes, pair: DumbbellPair, node: _Node, centres: Array, place: Array, scale: float
+    axes: Axes, pair: DumbbellPair, node: _Node, centres: Array, record: Array, scale: float
 ) -> None:
-    x, y = place - BOX / 2
+    x, y = record - BOX / 2
     box = FancyBboxPatch((x, y), BOX, BOX, "round,pad=0.05", fc="white", lw=3, zorder=4)
     box.set_edgecolor(HANDS[node.hand])
     axes.add_patch(box)
-    _draw_bodies(axes, pair, centres + place + np.array([0.0, 0.09]), scale, node.active)
+    _draw_bodies(axes, pair, centres + record + np.array([0.0, 0.09]), scale, node.active)
     caption = f"{', '.join(node.active)}  (×{node.count})"
     axes.text(x, y + BOX, _written(node.kind), c=HANDS[node.hand], fontsize=17, va="top", zorder=7)
-    axes.text(place[0], y, caption, fontsize=8.5, ha="center", va="bottom", zorder=7)
+    axes.text(record[0], y, caption, fontsize=8.5, ha="center", va="bottom", zorder=7)
 
 
 # --------------------------------------------------------------------------------------- motions
@@ -298,9 +298,9 @@ def _frames(atlas: PairAtlas, motion: _Motion) -> list[Array]:
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     at = np.linspace(0.0, travelled[-1], FRAMES)
     chords = np.stack([np.interp(at, travelled, x) for x in way.T], axis=-1)
-    ground = Ground(polyhedron, atlas.pair.symmetry, TOUCH, float(travelled[-1]))
+    quotient = Quotient(polyhedron, atlas.pair.symmetry, TOUCH, float(travelled[-1]))
     held = [polyhedron.names.index(name) for name in motion.active]
-    settled = [settle(ground, q, ground.spot(q).basis(held), 1.0) for q in chords[1:-1]]
+    settled = [projected(quotient, q, quotient.at(q).basis(held), 1.0) for q in chords[1:-1]]
     inner = [q if s is None else s.q for q, s in zip(chords[1:-1], settled, strict=True)]
     return [way[0], *inner, way[-1]]
 

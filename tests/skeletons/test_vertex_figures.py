@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from oracles_atlas import Cells
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry
-from polycorner.skeletons.curves import Ground
-from polycorner.skeletons.rays import star_at
+from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.vertex_figures import vertex_figure
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols
@@ -21,10 +21,10 @@ few = settings(max_examples=settings.default.max_examples // 2)
 fewest = settings(max_examples=settings.default.max_examples // 8)
 
 
-def star(D, q, symmetry=None):
+def figure(D, q, symmetry=None):
     """Return what leaves a point, with all functions that matter there."""
-    spot = Ground(D, symmetry or Symmetry(), 1e-8, 100.0).spot(np.asarray(q, dtype=float))
-    return star_at(spot, spot.active())
+    point = Quotient(D, symmetry or Symmetry(), 1e-8, 100.0).point(np.asarray(q, dtype=float))
+    return vertex_figure(point, point.active())
 
 
 def directions(found):
@@ -39,7 +39,7 @@ def check(D, found, q):
     """Assert that every ray begins a curve inside the set on which its functions vanish."""
     for ray in found.rays:
         assert np.linalg.norm(ray.direction) == pytest.approx(1)
-        there = ray.frame.q
+        there = ray.sample.q
         assert D.contains(there, tolerance=1e-8)
         assert abs(D.values(there)[sorted(ray.active)]).max(initial=0) < 1e-12
         away = (there - q) / np.array(D.manifold.scales)
@@ -57,7 +57,7 @@ class TestRegular:
         rng = np.random.default_rng(seed)
         normals = np.linalg.qr(rng.standard_normal((n, n)))[0] + 0.2 * rng.random((n, n))
         D = polytope(-normals, np.zeros(n))
-        found = star(D, np.zeros(n))
+        found = figure(D, np.zeros(n))
         inverse = np.linalg.inv(normals).T
         expected = inverse / np.linalg.norm(inverse, axis=1)[:, None]
         assert len(found.rays) == n
@@ -73,7 +73,7 @@ class TestRegular:
         angles = math.tau * np.arange(sides) / sides
         rows = np.column_stack([np.cos(angles), np.sin(angles), np.ones(sides)])
         D = polytope(rows, np.zeros(sides))
-        found = star(D, np.zeros(3))
+        found = figure(D, np.zeros(3))
         assert {ray.active for ray in found.rays} == {
             frozenset((k, (k + 1) % sides)) for k in range(sides)
         }
@@ -86,7 +86,7 @@ class TestRegular:
     def test_rows_that_only_touch_belong_to_the_rays_they_touch(self):
         rows = [[-1, 0, 0], [0, -1, 0], [0, 0, -1], [-1, -1, 0], [-1, -1, -1]]
         D = polytope(rows, [0] * 5)
-        found = star(D, np.zeros(3))
+        found = figure(D, np.zeros(3))
         active = {tuple(ray.direction.round(9) + 0.0): set(ray.active) for ray in found.rays}
         assert active == {
             (0, 0, 1): {0, 1, 3},
@@ -105,7 +105,7 @@ class TestRegular:
             for v, form in zip((x, y, z), forms, strict=True)
         ]
         D = Polyhedron(SPACE, bent)
-        found = star(D, np.zeros(3))
+        found = figure(D, np.zeros(3))
         assert directions(found) == [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
         assert len(found.sectors) == 3
         check(D, found, np.zeros(3))
@@ -115,13 +115,13 @@ class TestRegular:
     def test_directions_are_in_scale_units(self, scales):
         M = Manifold(space(3).names, scales=tuple(scales))
         D = Polyhedron(M, AllOf(*half_spaces(-np.eye(3), [0, 0, 0], M)))
-        found = star(D, np.zeros(3))
+        found = figure(D, np.zeros(3))
         assert directions(found) == [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
         check(D, found, np.zeros(3))
 
     def test_a_line_has_one_ray_and_the_end_of_a_wedge_two(self):
-        assert directions(star(polytope([[-1]], [0]), [0.0])) == [[1.0]]
-        found = star(Polyhedron(PLANE, {"top": x - y, "bottom": y}), [0.0, 0.0])
+        assert directions(figure(polytope([[-1]], [0]), [0.0])) == [[1.0]]
+        found = figure(Polyhedron(PLANE, {"top": x - y, "bottom": y}), [0.0, 0.0])
         root = round(math.sqrt(0.5), 9)
         assert directions(found) == [[root, root], [1, 0]]
         (sector,) = found.sectors
@@ -129,14 +129,14 @@ class TestRegular:
 
     def test_equations_and_symmetries_are_quotiented_out(self):
         D = Polyhedron(SPACE, {"a": x, "b": y, "c": z}, {"plane": x + y + z - 1})
-        found = star(D, [1.0, 0.0, 0.0])
+        found = figure(D, [1.0, 0.0, 0.0])
         assert (found.rank, found.full) == (2, 2)
         root = math.sqrt(0.5)
         np.testing.assert_allclose(
             directions(found), [[-root, 0, root], [-root, root, 0]], atol=1e-8
         )
         shift = Symmetry(tangents=lambda _: np.array([[1.0, 1.0]]), invariants=np.diff)
-        found = star(Polyhedron(PLANE, {"gap": y - x - 1}), [0.0, 1.0], shift)
+        found = figure(Polyhedron(PLANE, {"gap": y - x - 1}), [0.0, 1.0], shift)
         np.testing.assert_allclose(directions(found), [[-root, root]], atol=1e-9)
 
 
@@ -154,7 +154,7 @@ class TestConcave:
             for sign in (1, -1)
             if (tuple(1 - (k == axis and sign < 0) for k in range(3)), axis) in cells.segments()
         }
-        found = star(D, middle)
+        found = figure(D, middle)
         if cells.bends(cells.around(middle, range(3))):
             assert expected <= {tuple(d) for d in directions(found)}
         check(D, found, np.array(middle))
@@ -170,20 +170,20 @@ class TestConcave:
     )
     def test_corners_of_the_plane(self, tree, expected):
         D = Polyhedron(PLANE, tree)
-        found = star(D, [0.0, 0.0])
+        found = figure(D, [0.0, 0.0])
         assert directions(found) == expected
         assert len(found.sectors) == len(expected) // 2
         check(D, found, np.zeros(2))
 
     def test_three_half_spaces_joined(self):
         D = Polyhedron(SPACE, AnyOf(x, y, z))
-        found = star(D, np.zeros(3))
+        found = figure(D, np.zeros(3))
         assert directions(found) == [[-1, 0, 0], [0, -1, 0], [0, 0, -1]]
         assert len(found.sectors) == 3
 
     def test_boxes_that_cross_in_a_corner(self):
         D = boxes_union([[(0, 2), (0, 1)], [(0, 1), (0, 2)]])
-        found = star(D, [1.0, 1.0])
+        found = figure(D, [1.0, 1.0])
         assert directions(found) == [[0, 1], [1, 0]]
         (sector,) = found.sectors
         assert sector.active == frozenset()
@@ -196,7 +196,7 @@ class TestSingular:
         D = Polyhedron(
             space(2), AllOf(ball((0, 0), 1, "rim"), ball((1 - r) * at, r, "hole", inside=False))
         )
-        found = star(D, at)
+        found = figure(D, at)
         assert found.singular
         assert len(found.rays) == 4
         for ray in found.rays:
@@ -207,7 +207,7 @@ class TestSingular:
 
     def test_a_touching_line_leaves_the_circle_s_two_rays(self):
         D = Polyhedron(PLANE, {"disc": 1 - x**2 - y**2, "line": 1 - x})
-        found = star(D, [1.0, 0.0])
+        found = figure(D, [1.0, 0.0])
         assert directions(found) == [[0, -1], [0, 1]]
         assert all(names(D, ray.active) == {"disc"} for ray in found.rays)
         (sector,) = found.sectors
@@ -216,6 +216,6 @@ class TestSingular:
     def test_a_point_that_second_order_does_not_isolate_is_remarked_on(self):
         """Three planes through one line and a paraboloid: the line stays free."""
         D = Polyhedron(SPACE, {"a": x, "b": y, "c": x + y})
-        found = star(D, np.zeros(3))
+        found = figure(D, np.zeros(3))
         assert found.singular
         assert any("rank too low" in note for note in found.notes)

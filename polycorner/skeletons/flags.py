@@ -9,7 +9,7 @@ Flag = tuple[str, Any, frozenset[str]]
 
 
 @dataclass(frozen=True)
-class Passage:
+class Crossing:
     """A straight way across a face, from one of its edges to another."""
 
     start: Flag

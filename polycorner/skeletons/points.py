@@ -29,7 +29,7 @@ DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True)
-class Ground:
+class Quotient:
     """A polyhedron with its symmetry: what walking needs.
 
     Attributes
@@ -54,17 +54,17 @@ class Ground:
         """The number of inequalities; equations have the positions after them."""
         return len(self.polyhedron.functions)
 
-    def spot(self, q: Array) -> "Spot":
+    def at(self, q: Array) -> "EvaluatedPoint":
         """Return everything that is known at a point."""
-        return Spot(self, q, *evaluated(self.polyhedron, q))
+        return EvaluatedPoint(self, q, *evaluated(self.polyhedron, q))
 
 
-class Spot:
+class EvaluatedPoint:
     """A point with values and scaled gradients of all functions, and the orbit through it."""
 
-    def __init__(self, ground: Ground, q: Array, values: Array, gradients: Array) -> None:
-        self.ground, self.q, self.values, self.gradients = ground, q, values, gradients
-        self.orbit = ground.symmetry.directions(ground.polyhedron.manifold, q)
+    def __init__(self, quotient: Quotient, q: Array, values: Array, gradients: Array) -> None:
+        self.quotient, self.q, self.values, self.gradients = quotient, q, values, gradients
+        self.orbit = quotient.symmetry.directions(quotient.polyhedron.manifold, q)
 
     @cached_property
     def distances(self) -> Array:
@@ -73,13 +73,13 @@ class Spot:
 
     def active(self) -> frozenset[int] | None:
         """Return the functions that vanish and matter here; None outside the polyhedron."""
-        ground = self.ground
-        found = local_pieces(ground.polyhedron, self.values, self.gradients, ground.tolerance)
+        quotient = self.quotient
+        found = local_pieces(quotient.polyhedron, self.values, self.gradients, quotient.tolerance)
         return frozenset().union(*found) if found else None
 
     def matrix(self, rows: Sequence[int]) -> Array:
         """Return unit gradients of given functions, of all equations, and the orbit."""
-        m = self.ground.count
+        m = self.quotient.count
         chosen = self.gradients[[*rows, *range(m, len(self.values))]]
         return unit_rows(np.vstack([chosen, self.orbit]))
 
@@ -96,12 +96,12 @@ class Spot:
         Their gradients vanish, or change by more than their own lengths within a few tolerances,
         so that rounding decides the direction.
         """
-        ground, others = self.ground, sorted(rows)
-        steps = VICINITY * ground.tolerance * unit_rows(self.gradients[others])
-        steps[~steps.any(axis=1)] = VICINITY * ground.tolerance
-        nearby = self.q + steps * ground.polyhedron.manifold.scale_array
+        quotient, others = self.quotient, sorted(rows)
+        steps = VICINITY * quotient.tolerance * unit_rows(self.gradients[others])
+        steps[~steps.any(axis=1)] = VICINITY * quotient.tolerance
+        nearby = self.q + steps * quotient.polyhedron.manifold.scale_array
         moved = [
-            evaluated(ground.polyhedron, q)[1][row] for row, q in zip(others, nearby, strict=True)
+            evaluated(quotient.polyhedron, q)[1][row] for row, q in zip(others, nearby, strict=True)
         ]
         return [
             row
@@ -110,8 +110,8 @@ class Spot:
         ]
 
 
-class Frame(Spot):
-    """A spot with an orthonormal frame of the held functions' gradients.
+class HeldPoint(EvaluatedPoint):
+    """A point with an orthonormal frame of the held functions' gradients.
 
     Attributes
     ----------
@@ -124,9 +124,9 @@ class Frame(Spot):
         are dependent.
     """
 
-    def __init__(self, ground: Ground, q: Array, kept: Sequence[int]) -> None:
-        values, gradients = evaluated(ground.polyhedron, q)
-        super().__init__(ground, q, values, gradients)
+    def __init__(self, quotient: Quotient, q: Array, kept: Sequence[int]) -> None:
+        values, gradients = evaluated(quotient.polyhedron, q)
+        super().__init__(quotient, q, values, gradients)
         self.kept = list(kept)
         self._target = np.zeros(0)
         self._factorise()
@@ -136,7 +136,7 @@ class Frame(Spot):
             self._factorise()
 
     def _factorise(self) -> None:
-        held = [*self.kept, *range(self.ground.count, len(self.values))]
+        held = [*self.kept, *range(self.quotient.count, len(self.values))]
         rows = self.gradients[held]
         rows = np.concatenate([rows, self.orbit]) if len(self.orbit) else rows
         sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
@@ -170,17 +170,17 @@ class Frame(Spot):
         return float(np.sign(np.linalg.det(frame) * np.diagonal(self._factor).prod()))
 
 
-def settle(ground: Ground, q: Array, kept: Sequence[int], reach: float) -> Frame | None:
+def projected(quotient: Quotient, q: Array, kept: Sequence[int], reach: float) -> HeldPoint | None:
     """Return the frame of the nearest point where the held functions vanish.
 
     None if Newton's method does not get there within ``reach`` scale units of ``q``, or meets
     values that are not finite.  A step shorter than the square root of the rounding error is
     the last: convergence is quadratic.
     """
-    scales = ground.polyhedron.manifold.scale_array
+    scales = quotient.polyhedron.manifold.scale_array
     moved, last = 0.0, math.inf
     for _ in range(NEWTON):
-        frame = Frame(ground, q, kept)
+        frame = HeldPoint(quotient, q, kept)
         if not frame.finite or frame.condition < SINGULAR:
             return None
         step = frame.correction()
@@ -192,6 +192,6 @@ def settle(ground: Ground, q: Array, kept: Sequence[int], reach: float) -> Frame
             return frame
         q, last = q + scales * step, size
         if size < LAST * min(1.0, frame.condition):
-            frame = Frame(ground, q, kept)
+            frame = HeldPoint(quotient, q, kept)
             return frame if frame.finite else None
     return frame if size <= 1e-9 else None

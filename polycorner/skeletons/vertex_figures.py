@@ -18,7 +18,7 @@ import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.skeletons.curves import Frame, Spot, settle
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, projected
 from polycorner.spaces.manifold import Array
 
 SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -37,13 +37,13 @@ class Ray:
         Scaled unit tangent, orthogonal to the orbit of the symmetry.
     active : frozenset of int
         Functions that vanish along the edge.
-    frame : Frame
+    sample : HeldPoint
         A point of the edge ``distance`` scale units away, holding a basis of ``active``.
     """
 
     direction: Array
     active: frozenset[int]
-    frame: Frame
+    sample: HeldPoint
     distance: float
 
 
@@ -56,7 +56,7 @@ class Sector:
 
 
 @dataclass(frozen=True)
-class Star:
+class VertexFigure:
     """What leaves a corner.
 
     Attributes
@@ -79,63 +79,63 @@ class Star:
         return self.rank < self.full
 
 
-def star_at(spot: Spot, active: frozenset[int]) -> Star:
+def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
     """Return the rays and sectors at a corner with the given active functions."""
-    frame = null_space(spot.matrix([]), RANK_TOLERANCE)
+    frame = null_space(point.matrix([]), RANK_TOLERANCE)
     rows = sorted(active)
-    slopes = unit_rows(spot.gradients[rows]) @ frame
+    slopes = unit_rows(point.gradients[rows]) @ frame
     full = frame.shape[1]
     r = rank(slopes, RANK_TOLERANCE)
     notes: list[str] = []
-    found = _singular(spot, rows, slopes, notes) if r < full else _regular(spot, rows, slopes)
+    found = _singular(point, rows, slopes, notes) if r < full else _regular(point, rows, slopes)
     rays: list[Ray] = []
     for y, tight in found:
         known = len(rays)
         for base in _bases(rows, slopes, tight):
             covered = [x for x in rays if x.direction @ (frame @ y) > 1 - FLAT]
             if not any(x.active >= base for x in covered):
-                ray = _tested(spot, active, frame @ y, base)
+                ray = _tested(point, active, frame @ y, base)
                 if ray is not None and all(x.active != ray.active for x in covered):
                     rays.append(ray)
         if len(rows) == full == r and len(rays) == known:
             notes.append(
-                f"an edge out of the corner {_names(spot, rows)} is shorter than "
+                f"an edge out of the corner {_names(point, rows)} is shorter than "
                 f"{SAMPLES[-1]:g} scale units: not followed"
             )
     if r == full:
-        sectors = _sectors(spot, rows, slopes, [x.direction @ frame for x in rays])
+        sectors = _sectors(point, rows, slopes, [x.direction @ frame for x in rays])
     else:
-        sectors = _cusps(spot, frame, rays) if full == 2 else ()
-    return Star(r, full, tuple(rays), sectors, tuple(notes))
+        sectors = _cusps(point, frame, rays) if full == 2 else ()
+    return VertexFigure(r, full, tuple(rays), sectors, tuple(notes))
 
 
 Candidate = tuple[Array, frozenset[int]]
 
 
-def faces_beside(spot: Spot, active: frozenset[int]) -> list[Ray]:
+def faces_beside(point: EvaluatedPoint, active: frozenset[int]) -> list[Ray]:
     """Return the two-dimensional faces that meet an edge, as rays across it.
 
     Modulo the direction of the edge they are what edges are at a corner.
     """
     rows = sorted(active)
-    along = null_space(spot.matrix(rows), RANK_TOLERANCE)
-    across = null_space(np.vstack([spot.matrix([]), along.T]), RANK_TOLERANCE)
-    slopes = unit_rows(spot.gradients[rows]) @ across
+    along = null_space(point.matrix(rows), RANK_TOLERANCE)
+    across = null_space(np.vstack([point.matrix([]), along.T]), RANK_TOLERANCE)
+    slopes = unit_rows(point.gradients[rows]) @ across
     if across.shape[1] == 0 or along.shape[1] != 1:
         return []
     found: list[Ray] = []
-    for y, tight in _regular(spot, rows, slopes):
+    for y, tight in _regular(point, rows, slopes):
         for base in _bases(rows, slopes, tight):
-            ray = _tested(spot, active, across @ y, base)
+            ray = _tested(point, active, across @ y, base)
             if ray is not None and all(ray.active != other.active for other in found):
                 found.append(ray)
     return found
 
 
-def _regular(spot: Spot, rows: list[int], slopes: Array) -> Iterator[Candidate]:
+def _regular(point: EvaluatedPoint, rows: list[int], slopes: Array) -> Iterator[Candidate]:
     """Yield directions in the quotient and the functions that vanish along them."""
-    ground = spot.ground
-    if not ground.polyhedron.is_union:
+    quotient = point.quotient
+    if not quotient.polyhedron.is_union:
         for d, tight in extreme_rays(slopes, FLAT):
             yield d, frozenset(rows[k] for k in tight)
         return
@@ -146,16 +146,16 @@ def _regular(spot: Spot, rows: list[int], slopes: Array) -> Iterator[Candidate]:
             continue
         line = np.ones((1, 1)) if lines is None else lines.null_space
         for d in (line[:, 0], -line[:, 0]):
-            along = _active_along(spot, rows, slopes @ d)
+            along = _active_along(point, rows, slopes @ d)
             if along is not None and _rank_of(rows, slopes, along) == n - 1:
                 yield d, along
 
 
-def _active_along(spot: Spot, rows: list[int], rates: Array) -> frozenset[int] | None:
+def _active_along(point: EvaluatedPoint, rows: list[int], rates: Array) -> frozenset[int] | None:
     """Return what stays active along a direction; None where it leaves the polyhedron."""
-    away = spot.distances[: spot.ground.count].copy()
+    away = point.distances[: point.quotient.count].copy()
     away[rows] = np.where(abs(rates) > FLAT, rates, 0.0)
-    pieces = spot.ground.polyhedron.signs_to_pieces(np.sign(away).astype(int).tolist())
+    pieces = point.quotient.polyhedron.signs_to_pieces(np.sign(away).astype(int).tolist())
     return frozenset().union(*pieces) if pieces else None
 
 
@@ -163,15 +163,17 @@ def _rank_of(rows: list[int], slopes: Array, some: frozenset[int]) -> int:
     return rank(slopes[[rows.index(i) for i in sorted(some)]], RANK_TOLERANCE)
 
 
-def _singular(spot: Spot, rows: list[int], slopes: Array, notes: list[str]) -> Iterator[Candidate]:
+def _singular(
+    point: EvaluatedPoint, rows: list[int], slopes: Array, notes: list[str]
+) -> Iterator[Candidate]:
     """Break one contact and yield the null directions of the others, by second order if need be.
 
     Where the others still have a null plane and one relation ``sum w_i a_i = 0``, their common
     zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
     """
-    if not _isolated(spot, rows, slopes):
+    if not _isolated(point, rows, slopes):
         notes.append(
-            f"{_names(spot, rows)}: rank too low, and second order does not show an isolated point"
+            f"{_names(point, rows)}: rank too low, and second order does not show an isolated point"
         )
     for k in range(len(rows)):
         rest = [i for i in range(len(rows)) if i != k]
@@ -182,32 +184,32 @@ def _singular(spot: Spot, rows: list[int], slopes: Array, notes: list[str]) -> I
             yield plane[:, 0], tight
             yield -plane[:, 0], tight
         elif plane.shape[1] == 2 and held.relations.shape[1] == 1:
-            for d in _null_lines(spot, [rows[i] for i in rest], held.relations[:, 0], plane):
+            for d in _null_lines(point, [rows[i] for i in rest], held.relations[:, 0], plane):
                 yield d, tight
                 yield -d, tight
         else:
             notes.append(
-                f"breaking {spot.ground.polyhedron.names[rows[k]]} leaves "
+                f"breaking {point.quotient.polyhedron.names[rows[k]]} leaves "
                 f"{plane.shape[1]} free directions to first order: not followed"
             )
 
 
-def _names(spot: Spot, rows: list[int]) -> str:
-    return ", ".join(spot.ground.polyhedron.names[i] for i in rows)
+def _names(point: EvaluatedPoint, rows: list[int]) -> str:
+    return ", ".join(point.quotient.polyhedron.names[i] for i in rows)
 
 
-def _curvature(spot: Spot, rows: list[int], weights: Array, plane: Array) -> Array:
+def _curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
     """Return the weighted sum of the Hessians of unit-slope functions on a subspace."""
-    polyhedron = spot.ground.polyhedron
+    polyhedron = point.quotient.polyhedron
     scales = polyhedron.manifold.scale_array
-    frame = null_space(spot.matrix([]), RANK_TOLERANCE) @ plane
-    hessians = polyhedron.hessians(spot.q)[rows] * np.outer(scales, scales)
-    sizes = np.linalg.norm(spot.gradients[rows], axis=1)
+    frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
+    hessians = polyhedron.hessians(point.q)[rows] * np.outer(scales, scales)
+    sizes = np.linalg.norm(point.gradients[rows], axis=1)
     sizes[sizes == 0] = 1.0  # a gradient that vanishes is a relation by itself
     return np.asarray(frame.T @ np.einsum("i,ijk->jk", weights / sizes, hessians) @ frame)
 
 
-def _isolated(spot: Spot, rows: list[int], slopes: Array) -> bool:
+def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
     """Whether second-order terms isolate the common zeros of the active functions.
 
     The test of prestress stability ([CW] sec. 3): along every null direction ``d`` of the
@@ -217,15 +219,17 @@ def _isolated(spot: Spot, rows: list[int], slopes: Array) -> bool:
     """
     held = Rows(slopes, RANK_TOLERANCE)
     for weights in held.relations.T:
-        values = np.linalg.eigvalsh(_curvature(spot, rows, weights, held.null_space))
+        values = np.linalg.eigvalsh(_curvature(point, rows, weights, held.null_space))
         if values[0] > RANK_TOLERANCE or values[-1] < -RANK_TOLERANCE:
             return True
     return False
 
 
-def _null_lines(spot: Spot, rows: list[int], weights: Array, plane: Array) -> list[Array]:
+def _null_lines(
+    point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array
+) -> list[Array]:
     """Return the directions in a plane along which a weighted sum of Hessians vanishes."""
-    values, axes = np.linalg.eigh(_curvature(spot, rows, weights, plane))
+    values, axes = np.linalg.eigh(_curvature(point, rows, weights, plane))
     if values[0] * values[1] >= 0:
         return []
     low, high = math.sqrt(-values[0]), math.sqrt(values[1])
@@ -245,28 +249,30 @@ def _bases(rows: list[int], slopes: Array, tight: frozenset[int]) -> Iterator[fr
 
 
 def _tested(
-    spot: Spot, active: frozenset[int], direction: Array, base: frozenset[int]
+    point: EvaluatedPoint, active: frozenset[int], direction: Array, base: frozenset[int]
 ) -> Ray | None:
     """Return the ray if a point a little along the curve lies in the polyhedron."""
-    ground = spot.ground
-    scales = ground.polyhedron.manifold.scale_array
+    quotient = point.quotient
+    scales = quotient.polyhedron.manifold.scale_array
     kept = sorted(base)
-    far = 10 * ground.tolerance
+    far = 10 * quotient.tolerance
     for h in [h for h in SAMPLES if h >= far] or [10 * far]:
-        frame = settle(ground, spot.q + h * scales * direction, kept, 0.5 * h)
-        if frame is None:
+        sample = projected(quotient, point.q + h * scales * direction, kept, 0.5 * h)
+        if sample is None:
             continue
-        there = frame.active()
+        there = sample.active()
         if there is not None and there < active and there >= base:
-            return Ray(direction, there, frame, h)
-        if there is not None and there < active and ground.polyhedron.is_union:
-            kept_there = frame.basis(there)
+            return Ray(direction, there, sample, h)
+        if there is not None and there < active and quotient.polyhedron.is_union:
+            kept_there = sample.basis(there)
             if len(kept_there) == len(kept):
-                return Ray(direction, there, Frame(ground, frame.q, kept_there), h)
+                return Ray(direction, there, HeldPoint(quotient, sample.q, kept_there), h)
     return None
 
 
-def _sectors(spot: Spot, rows: list[int], slopes: Array, rays: list[Array]) -> tuple[Sector, ...]:
+def _sectors(
+    point: EvaluatedPoint, rows: list[int], slopes: Array, rays: list[Array]
+) -> tuple[Sector, ...]:
     """Return the sectors between rays that lie in a common two-dimensional flat."""
     n = slopes.shape[1]
     flats: dict[frozenset[int], set[int]] = {}
@@ -280,7 +286,7 @@ def _sectors(spot: Spot, rows: list[int], slopes: Array, rays: list[Array]) -> t
     sectors = []
     for members in flats.values():
         for i, j, middle in _arcs(rays, sorted(members)):
-            active = _active_along(spot, rows, slopes @ middle)
+            active = _active_along(point, rows, slopes @ middle)
             if active is not None and (
                 not active if n == 2 else _rank_of(rows, slopes, active) == n - 2
             ):
@@ -288,11 +294,11 @@ def _sectors(spot: Spot, rows: list[int], slopes: Array, rays: list[Array]) -> t
     return tuple(sectors)
 
 
-def _cusps(spot: Spot, frame: Array, rays: list[Ray]) -> tuple[Sector, ...]:
+def _cusps(point: EvaluatedPoint, frame: Array, rays: list[Ray]) -> tuple[Sector, ...]:
     """Return the sectors at a singular corner of the plane, by points between the samples."""
-    ground = spot.ground
-    scales = ground.polyhedron.manifold.scale_array
-    away = [(ray.frame.q - spot.q) / scales @ frame for ray in rays]
+    quotient = point.quotient
+    scales = quotient.polyhedron.manifold.scale_array
+    away = [(ray.sample.q - point.q) / scales @ frame for ray in rays]
     turn = [math.atan2(y[1], y[0]) % math.tau for y in away]
     ordered = sorted(range(len(rays)), key=turn.__getitem__)
     sectors = []
@@ -300,7 +306,7 @@ def _cusps(spot: Spot, frame: Array, rays: list[Ray]) -> tuple[Sector, ...]:
         gap = (turn[j] - turn[i]) % math.tau
         angle = turn[i] + gap / 2
         y = np.linalg.norm(away[i]) * np.array([math.cos(angle), math.sin(angle)])
-        inner = ground.spot(spot.q + scales * (frame @ y)).active()
+        inner = quotient.at(point.q + scales * (frame @ y)).active()
         if inner is not None and not inner:
             sectors.append(Sector((i, j), inner))
     return tuple(sectors)
