@@ -130,13 +130,15 @@ def choice(argument: str, value: object, known: Iterable[str]) -> str:
     --------
     >>> choice("method", "slqsp", ["descent", "scp", "slsqp"])
     Traceback (most recent call last):
-    ValueError: method: expected descent, scp or slsqp; got slqsp (did you mean slsqp?)
+    ValueError: method: expected 'descent', 'scp' or 'slsqp'; got 'slqsp' (did you mean slsqp?)
     """
     words = list(known)
+    expected = listed(map(repr, words))
     if not isinstance(value, str):
-        refuse(argument, listed(words), value, TypeError)
+        refuse(argument, expected, value, TypeError)
     if value not in words:
-        msg = f"{argument}: expected {listed(words)}; got {nearest(value, words)}"
+        near = nearest(value, words).removeprefix(value)
+        msg = f"{argument}: expected {expected}; got {value!r}{near}"
         raise ValueError(msg)
     return value
 

@@ -5,25 +5,27 @@ non-overlapping placements out of ``M x M``; the energy is the height of the bal
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.dumbbells import formulas
 from polycorner.dumbbells import symmetries as motions
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
 
 Chirality = Literal["L", "R"]
 
 
 @dataclass(frozen=True)
-class DumbbellPair:
+class DumbbellPair(Value):
     """Two equal dumbbells A and B on the inside of a horizontal drum.
 
     ::
@@ -59,10 +61,21 @@ class DumbbellPair:
     rod_weight: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            number = _number(field.name, getattr(self, field.name))
-            object.__setattr__(self, field.name, number)
-        _check(self)
+        number = {
+            name: checks.real(name, getattr(self, name), above=0, unit="mm")
+            for name in ("ball_radius", "rod_radius", "length")
+        }
+        r = number["ball_radius"]
+        number["rod_radius"] = checks.real(
+            "rod_radius", self.rod_radius, above=0, below=r, unit="mm"
+        )
+        radius = checks.real("drum_radius", self.drum_radius, above=r, infinite=True, unit="mm")
+        widest = 2 * (radius - r)  # the longest chord of the cylinder of ball centres
+        number["length"] = checks.real("length", self.length, least=2 * r, most=widest, unit="mm")
+        number["drum_radius"] = radius
+        number["rod_weight"] = checks.real("rod_weight", self.rod_weight, least=0)
+        for name, value in number.items():
+            object.__setattr__(self, name, value)
 
     @property
     def is_plane(self) -> bool:
@@ -126,7 +139,7 @@ class DumbbellPair:
             formulas.mean_heading(),
             "heading",
             self.manifold,
-            parameters=(_number("heading", heading),),
+            parameters=(checks.real("heading", heading),),
         )
         return Polyhedron(
             self.manifold,
@@ -235,13 +248,14 @@ class DumbbellPair:
             Distance, in mm, left at each of the three contacts; default a tenth of the ball radius.
             Exact in the plane; in the drum, right to the order of ``1/R^2``.
         """
-        sign = {"R": 1, "L": -1}.get(chirality)
-        if sign is None:
-            msg = f"chirality: expected 'R' or 'L'; got {chirality!r}"
-            raise ValueError(msg)
-        gap = self.ball_radius / 10 if clearance is None else _number("clearance", clearance)
+        sign = 1 if checks.choice("chirality", chirality, ("R", "L")) == "R" else -1
+        gap = (
+            self.ball_radius / 10
+            if clearance is None
+            else checks.real("clearance", clearance, unit="mm")
+        )
         angle, _, p = self.plane_corner()
-        theta = sign * angle if heading is None else _number("heading", heading)
+        theta = sign * angle if heading is None else checks.real("heading", heading)
         across = p + gap
         along = self.length - math.sqrt(max((2 * self.ball_radius + gap) ** 2 - across**2, 0.0))
         axis = np.array([math.sin(theta), math.cos(theta)])
@@ -290,14 +304,14 @@ class DumbbellPair:
 
     def side_by_side(self, *, clearance: float = 0.0) -> Array:
         """Return two dumbbells on parallel meridians, ball beside ball, ``clearance`` mm apart."""
-        apart = 2 * self.ball_radius + _number("clearance", clearance)
+        apart = 2 * self.ball_radius + checks.real("clearance", clearance, unit="mm")
         if not self.is_plane:
             apart = 2 * self.centre_radius * math.asin(apart / (2 * self.centre_radius))
         return self._pair(np.array([apart, 0.0]), 0.0)
 
     def end_to_end(self, *, gap: float | None = None) -> Array:
         """Return two dumbbells on the lowest meridian, ``gap`` mm (default ``r``) between them."""
-        gap = self.ball_radius if gap is None else _number("gap", gap)
+        gap = self.ball_radius if gap is None else checks.real("gap", gap, unit="mm")
         return self._pair(np.array([0.0, self.length + 2 * self.ball_radius + gap]), 0.0)
 
     def _pair(self, offset: Array, theta: float) -> Array:
@@ -315,9 +329,7 @@ class DumbbellPair:
 
     def half_turn(self, q: ArrayLike, which: Literal["A", "B"]) -> Array:
         """Return the pair with the two balls of one dumbbell exchanged: ``theta + pi``."""
-        if which not in ("A", "B"):
-            msg = f"which: expected 'A' or 'B'; got {which!r}"
-            raise ValueError(msg)
+        checks.choice("which", which, ("A", "B"))
         turned = self.manifold.points(q).copy()
         turned[..., 2 if which == "A" else 5] += math.pi
         return self.manifold.wrap(turned)
@@ -332,43 +344,3 @@ class DumbbellPair:
     def heading(self, q: ArrayLike) -> Array:
         """Return the headings of A and B in ``(-pi/2, pi/2]``, ``(..., 2)``, in radians."""
         return self.canonical(q)[..., [2, 5]]
-
-
-def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        msg = f"{name}: expected a real number; got {value!r}"
-        raise TypeError(msg)
-    number = float(value)
-    if math.isnan(number) or (math.isinf(number) and name != "drum_radius"):
-        msg = f"{name}: expected a finite number; got {number}"
-        raise ValueError(msg)
-    return number
-
-
-def _check(pair: DumbbellPair) -> None:
-    r, t, length = pair.ball_radius, pair.rod_radius, pair.length
-    rules = (
-        ("length", length, length > 0, "a positive length in mm"),
-        ("ball_radius", r, r > 0, "a positive length in mm"),
-        ("rod_radius", t, t > 0, "a positive length in mm"),
-        ("drum_radius", pair.drum_radius, pair.drum_radius > 0, "a positive length in mm or inf"),
-        ("rod_weight", pair.rod_weight, pair.rod_weight >= 0, "a number not below 0"),
-        ("rod_radius", t, t < r, f"less than the ball radius {r:g} mm"),
-        (
-            "drum_radius",
-            pair.drum_radius,
-            pair.drum_radius > r,
-            f"more than the ball radius {r:g} mm",
-        ),
-        ("length", length, length >= 2 * r, f"at least two ball radii, {2 * r:g} mm"),
-        (
-            "length",
-            length,
-            length <= 2 * (pair.drum_radius - r),
-            f"at most 2 (R - r) = {2 * (pair.drum_radius - r):g} mm, to fit in the drum",
-        ),
-    )
-    for name, value, holds, expected in rules:
-        if not holds:
-            msg = f"{name}: expected {expected}; got {value:g}"
-            raise ValueError(msg)

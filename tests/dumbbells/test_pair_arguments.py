@@ -12,58 +12,28 @@ GOOD = {"length": 16, "ball_radius": 3, "rod_radius": 1.5, "drum_radius": 125, "
 DRUM = DumbbellPair(**GOOD)
 
 
-@pytest.mark.parametrize("name", GOOD)
-@pytest.mark.parametrize("bad", ["16", None, True, np.True_, 1j, [16.0], np.array(16.0), math])
-def test_parameters_are_real_numbers(name, bad):
-    with pytest.raises(TypeError, match=f"^{name}: expected a real number; got "):
-        DumbbellPair(**GOOD | {name: bad})
+NO_NUMBERS = ["16", None, True, np.True_, 1j, [16.0], np.array(16.0), math]
+SIZES = [name for name in GOOD if name != "rod_weight"]
+REFUSED = [  # what is changed, the exception, the argument that is blamed
+    *(({name: bad}, TypeError, name) for name in GOOD for bad in NO_NUMBERS),
+    *(({name: bad}, ValueError, name) for name in GOOD for bad in (math.nan, -math.inf, -1.0)),
+    *(({name: 0.0}, ValueError, name) for name in SIZES),
+    *(({name: math.inf}, ValueError, name) for name in GOOD if name != "drum_radius"),
+    ({"rod_radius": 3.0}, ValueError, "rod_radius"),
+    ({"rod_radius": 4.0}, ValueError, "rod_radius"),
+    ({"length": 5.9}, ValueError, "length"),
+    ({"drum_radius": 10.9}, ValueError, "length"),  # the dumbbell does not fit into the drum
+    ({"length": 244.5}, ValueError, "length"),
+    ({"drum_radius": 1.0}, ValueError, "drum_radius"),  # smaller than a ball
+    ({"drum_radius": 3.0}, ValueError, "drum_radius"),
+]
 
 
-@pytest.mark.parametrize("name", GOOD)
-@pytest.mark.parametrize("bad", [math.nan, -math.inf, -1.0])
-def test_parameters_are_finite_and_not_negative(name, bad):
-    with pytest.raises(ValueError, match=f"^{name}: expected .*; got "):
-        DumbbellPair(**GOOD | {name: bad})
-
-
-@pytest.mark.parametrize("name", [name for name in GOOD if name != "rod_weight"])
-def test_sizes_are_not_zero(name):
-    with pytest.raises(ValueError, match=f"^{name}: expected a positive"):
-        DumbbellPair(**GOOD | {name: 0.0})
-
-
-@pytest.mark.parametrize("name", [name for name in GOOD if name != "drum_radius"])
-def test_only_the_drum_may_be_infinite(name):
-    with pytest.raises(ValueError, match=f"^{name}: expected a finite number"):
-        DumbbellPair(**GOOD | {name: math.inf})
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"rod_radius": 3.0}, "rod_radius: expected less than the ball radius 3 mm; got 3"),
-        ({"rod_radius": 4.0}, "rod_radius: expected less than the ball radius 3 mm; got 4"),
-        ({"length": 5.9}, "length: expected at least two ball radii, 6 mm; got 5.9"),
-        ({"drum_radius": 10.9}, "length: expected at most .* = 15.8 mm.*; got 16"),
-        ({"length": 244.5}, "length: expected at most .* = 244 mm.*; got 244.5"),
-    ],
-)
-def test_sizes_fit_together(changes, says):
-    with pytest.raises(ValueError, match=f"^{says}"):
+@pytest.mark.parametrize(("changes", "kind", "blamed"), REFUSED)
+def test_a_bad_size_is_refused_in_one_line(changes, kind, blamed):
+    with pytest.raises(kind, match=rf"^{blamed}: expected .*; got ") as caught:
         DumbbellPair(**GOOD | changes)
-
-
-@pytest.mark.parametrize("radius", [1.0, 3.0])
-def test_a_drum_that_is_smaller_than_a_ball_is_what_is_blamed(radius):
-    with pytest.raises(ValueError, match=r"^drum_radius: "):
-        DumbbellPair(**GOOD | {"drum_radius": radius})
-
-
-def test_the_sentence_is_one_line():
-    for changes in ({"length": math.nan}, {"rod_radius": 4.0}, {"drum_radius": "wide"}):
-        with pytest.raises((ValueError, TypeError)) as caught:
-            DumbbellPair(**GOOD | changes)
-        assert "\n" not in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("changes", [{"length": 6.0}, {"drum_radius": 11.0}, {"rod_radius": 2.999}])

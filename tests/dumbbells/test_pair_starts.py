@@ -81,7 +81,7 @@ class TestNested:
     @BOTH
     @pytest.mark.parametrize("hand", ["", "r", "right", None, 1, True])
     def test_hands_are_left_and_right(self, pair, hand):
-        with pytest.raises(ValueError, match=r"^chirality: expected 'R' or 'L'"):
+        with pytest.raises((TypeError, ValueError), match=r"^chirality: expected 'R' or 'L'"):
             pair.nested(hand)
 
     @pytest.mark.parametrize("name", ["heading", "clearance"])
@@ -211,5 +211,5 @@ class TestHeading:
 
     @pytest.mark.parametrize("which", ["", "a", "C", None, 1])
     def test_one_turns_a_or_b(self, which):
-        with pytest.raises(ValueError, match=r"^which: expected 'A' or 'B'"):
+        with pytest.raises((TypeError, ValueError), match=r"^which: expected 'A' or 'B'"):
             DRUM.half_turn(DRUM.nested("R"), which)
