@@ -65,7 +65,7 @@ def test_closed_singular_and_open_edges_survive_and_no_edges_at_all(tmp_path, po
 def test_an_endless_extent_survives(tmp_path):
     atlas = skeleton(RING, [[0.0, 1.5]], extent=math.inf)
     read = load_skeleton(save_skeleton(atlas, tmp_path / "ring.json"), RING)
-    assert read.state.ground.extent == math.inf
+    assert read.state.quotient.extent == math.inf
 
 
 def test_angles_and_lengths_have_their_units(tmp_path):

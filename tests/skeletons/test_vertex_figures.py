@@ -23,7 +23,7 @@ fewest = settings(max_examples=settings.default.max_examples // 8)
 
 def figure(D, q, symmetry=None):
     """Return what leaves a point, with all functions that matter there."""
-    point = Quotient(D, symmetry or Symmetry(), 1e-8, 100.0).point(np.asarray(q, dtype=float))
+    point = Quotient(D, symmetry or Symmetry(), 1e-8, 100.0).at(np.asarray(q, dtype=float))
     return vertex_figure(point, point.active())
 
 
