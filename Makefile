@@ -3,7 +3,7 @@
 PYTEST := .venv/bin/python -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad paper test thorough lint format types imports docs links bench constraints clean
+.PHONY: help env env-pip dyad paper test cores thorough lint format types imports docs links bench constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -40,11 +40,15 @@ paper: .venv/.runtime ## every claim of the paper checked, slow ones too; the re
 # ----------------------------------------------------------------------------------------- check
 
 # The workers already use every core; threads inside the linear algebra would only compete.
-test thorough: export OPENBLAS_NUM_THREADS = 1
-test thorough: export OMP_NUM_THREADS = 1
+test cores thorough: export OPENBLAS_NUM_THREADS = 1
+test cores thorough: export OMP_NUM_THREADS = 1
 
 test: .venv/.dev ## tests and doctests, without those marked slow
 	@$(PYTEST) -n auto -m "not slow"
+
+cores: .venv/.dev ## geometry again, with the linear algebra of an older processor (x86 only)
+	@OPENBLAS_CORETYPE=Haswell $(PYTEST) -n auto -q -m "not slow" \
+	    tests/polyhedra tests/skeletons tests/minimisation
 
 thorough: .venv/.dev ## all tests, with many more generated inputs
 	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto
@@ -64,7 +68,7 @@ imports: .venv/.dev ## which folder and which file may import which
 	@.venv/bin/lint-imports
 
 docs: .venv/.dev ## the documentation, in docs/_build/html
-	@.venv/bin/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@.venv/bin/sphinx-build -W --keep-going -j 2 -b html docs docs/_build/html
 
 links: .venv/.dev ## external links of the documentation (needs the network)
 	@.venv/bin/sphinx-build -q -b linkcheck -D plot_gallery=0 docs docs/_build/links

@@ -1,4 +1,4 @@
-"""Formulas as MathML, which a browser typesets by itself: no script and no font is fetched."""
+"""Formulas as MathML, typeset by the browser without scripts or fonts from elsewhere."""
 
 import re
 from html import escape
@@ -8,17 +8,33 @@ from paper_checks.framework.typesetting import mathml
 
 BOXED = re.compile(r"\\boxed\{(.*)\}", re.DOTALL)
 APART = re.compile(r"\\qquad")
+PUNCTUATION = re.compile(r"[,.;:!?)\]]+")
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Make ``mathml`` one of the renderers that ``html_math_renderer`` may name."""
     app.add_html_math_renderer("mathml", (inline, None), (displayed, None))
+    app.connect("doctree-resolved", keep_punctuation)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
+def keep_punctuation(_app: Any, document: Any, _name: str) -> None:
+    """Attach the punctuation after an inline formula to it, so that no line begins with a comma."""
+    from docutils import nodes
+
+    for node in document.findall(nodes.math):
+        after = node.next_node(siblings=True, descend=False)
+        found = PUNCTUATION.match(after.astext()) if isinstance(after, nodes.Text) else None
+        if found:
+            node["after"] = found[0]
+            after.parent.replace(after, nodes.Text(after.astext()[found.end() :]))
+
+
 def inline(translator: Any, node: Any) -> None:
-    """Write a formula within a line."""
-    _write(translator, f'<span class="formula">{typeset(node.astext())}</span>')
+    """Write a formula within a line, on one line with the punctuation that follows it."""
+    formula = f'<span class="formula">{typeset(node.astext())}</span>'
+    after = node.get("after", "")
+    _write(translator, f'<span class="nb">{formula}{escape(after)}</span>' if after else formula)
 
 
 def displayed(translator: Any, node: Any) -> None:
