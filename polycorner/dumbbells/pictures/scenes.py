@@ -70,7 +70,7 @@ def pair_scene(pair: DumbbellPair, q: ArrayLike, *, tolerance: float = TOUCHING)
 
     Examples
     --------
-    >>> from polycorner.models import DumbbellPair
+    >>> from polycorner.dumbbells import DumbbellPair
     >>> pair = DumbbellPair(16, 3, 1.5, 125)
     >>> scene = pair_scene(pair, pair.nested("R"))
     >>> [name for name in scene.graph.nodes_geometry if name[0] in "AB"]

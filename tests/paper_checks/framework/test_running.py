@@ -109,7 +109,7 @@ def test_terminal(done, capsys):
 def test_interrupted_processes_end_and_what_was_found_is_kept(tmp_path):
     script = tmp_path / "interrupted.py"
     script.write_text(INTERRUPTED, encoding="utf-8")
-    root = TESTS.parent
+    root = TESTS.parents[1]
     with subprocess.Popen(
         [sys.executable, str(script)],
         stdout=subprocess.PIPE,
