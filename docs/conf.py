@@ -12,8 +12,8 @@ from numpydoc.xref import DEFAULT_LINKS
 warnings.filterwarnings("ignore", message="A worker stopped while some jobs were given")
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # for the folder `extensions`
-ROOMS = import_module("extensions.homes").ROOMS
+sys.path.insert(0, str(HERE.parent))  # for `docs.extensions`
+ROOMS = import_module("docs.extensions.homes").ROOMS
 
 project = "polycorner"
 author = "The polycorner developers"
@@ -28,10 +28,11 @@ extensions = [
     "myst_parser",
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
-    "extensions.homes",
-    "extensions.links",
-    "extensions.mathml",
-    "extensions.tidy",
+    "docs.extensions.api",
+    "docs.extensions.homes",
+    "docs.extensions.links",
+    "docs.extensions.mathml",
+    "docs.extensions.tidy",
 ]
 exclude_patterns = [
     "_build",
@@ -103,8 +104,8 @@ sphinx_gallery_conf = {
     "ignore_pattern": r"__init__\.py",
     "within_subsection_order": "FileNameSortKey",
     "nested_sections": False,
-    "image_scrapers": ("extensions.gallery.pictures",),
-    "reset_argv": "extensions.gallery.arguments",
+    "image_scrapers": ("docs.extensions.gallery.pictures",),
+    "reset_argv": "docs.extensions.gallery.arguments",
     "reset_modules": (),
     "capture_repr": (),
     "notebook_extensions": set(),

@@ -160,7 +160,7 @@ def mapping(argument: str, value: object) -> Mapping[Any, Any]:
     return value
 
 
-def generator(argument: str, value: object) -> np.random.Generator:
+def generator(argument: str, value: object) -> "np.random.Generator":
     """Return a random generator: a given one, or a new one for None or a seed.
 
     Examples

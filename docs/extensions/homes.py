@@ -21,7 +21,10 @@ ROOMS = (
     "polycorner.models",
     "polycorner.files",
     "polycorner.sweeps",
+    "polycorner.pictures",
     "polycorner.dumbbells",
+    "polycorner.dumbbells.pictures",
+    "polycorner.dumbbells.viewer",
 )
 
 DOCSTRING = re.compile(r"docstring of ([\w.]+)")
