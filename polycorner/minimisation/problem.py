@@ -119,7 +119,7 @@ class Problem:
         return use
 
     def descend(self, piece: Piece, q: Array, limit: int) -> tuple[int, int, Array, Array]:
-        """Run the compiled descent inside one piece; see :func:`entry_points.descend`."""
+        """Run the compiled descent inside one piece; see the compiled ``descend``."""
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
@@ -151,7 +151,7 @@ class Problem:
     def probe(
         self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
     ) -> float:
-        """Return how much the energy changes along directions; see :func:`entry_points.probe`."""
+        """Return how much the energy changes along directions; see the compiled ``probe``."""
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
