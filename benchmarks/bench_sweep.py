@@ -21,7 +21,7 @@ import numpy as np
 from side_by_side import interleave, print_table, seconds, write
 
 from polycorner.dumbbells.studies import heading
-from polycorner.sweeps.execution import sweep
+from polycorner.sweeps import sweep
 
 WORKERS, ROUNDS, SLEEP = 2, 3, 0.02
 COUNTS = {0.0: 2000, SLEEP: 500}  # points that do nothing, and points that sleep

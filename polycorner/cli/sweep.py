@@ -1,14 +1,18 @@
-"""``polycorner sweep``: a function at every point of a grid, for days if need be."""
+"""``polycorner sweep``: a parameter study over a grid."""
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
+from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from polycorner.checks import missing_extra
 from polycorner.cli.common import (
     deliver,
     fail,
@@ -18,66 +22,99 @@ from polycorner.cli.common import (
     write_answer,
     writing,
 )
-from polycorner.cli.manner import console, remark
+from polycorner.cli.manner import console
+from polycorner.errors import nearest
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from polycorner.sweeps.study_files import StudyFile
+    from polycorner.progress import Progress
+    from polycorner.sweeps.study_files import NamedStudy, StudyFile
 
-    Report = Callable[[int, int, int], object]
-
-EPILOG = """\b
-Examples:
-  polycorner sweep examples/studies/heading.toml --out out/heading
-  polycorner sweep examples/studies/climbing.toml --out out/climbing --workers 8
-  polycorner sweep mine.toml --out out/mine --scheduler tcp://scheduler:8786 --resume
-With --out, results are kept in DIR/sweep.zarr as they come: after Ctrl-C (exit code 130), a
-full disk or a killed process, the same command with --resume goes on with what is missing.
-A study that is finished is shown again and not computed.
-A study "module:function" runs code of yours; the module is looked for beside the file too.
-"""
+NAMED = "polycorner.dumbbells.studies"  # package with the table STUDIES and its study files
 STORE = "sweep.zarr"
 SHOWN = 5  # messages of failed points
 
 
-@click.command(epilog=EPILOG)
-@click.argument("study", type=click.Path(path_type=Path), metavar="STUDY.toml")
+def named_files() -> dict[str, Path]:
+    """Return the study files of the package by name."""
+    folder = Path(str(files(NAMED)))
+    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+
+
+def _epilog() -> str:
+    """Return the end of the help text, which lists the studies of the package."""
+    titles = [
+        f"  {name:<9} {file.read_text(encoding='utf-8').partition(':')[0].lstrip('# ')}"
+        for name, file in named_files().items()
+    ]
+    return EPILOG.format(studies="\n".join(titles), folder=Path(str(files(NAMED))))
+
+
+EPILOG = """\b
+Examples:
+  polycorner sweep heading --out out/heading
+  polycorner sweep climbing --out out/climbing --workers 8
+  polycorner sweep mine.toml --out out/mine --scheduler tcp://scheduler:8786 --resume
+
+\b
+STUDY is a TOML file or the name of a study that is installed:
+{studies}
+Their files, to copy and change, are in
+  {folder}
+
+With --out, results are written to DIR/sweep.zarr as they come: after Ctrl-C (exit code 130), a
+full disk or a killed process, the same command with --resume computes the missing points.
+A finished study is shown again and not computed.
+A study "module:function" runs your code; the module is also looked for beside the file.
+"""
+
+
+class SweepCommand(click.Command):
+    """A command whose help lists the installed studies."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the end of the help text."""
+        self.epilog = _epilog()
+        super().format_epilog(ctx, formatter)
+
+
+@click.command(cls=SweepCommand)
+@click.argument("study")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the Dask cluster at this address.")
 @click.option("--workers", type=int, help="Processes on this machine. [its processors]")
-@click.option("--resume", is_flag=True, help="Go on with a study that was stopped or killed.")
-@click.option("--retry", is_flag=True, help="Like --resume, and compute failed points once more.")
-@click.option("--seed", type=int, help="Seed of the random streams. [the file's, or 0]")
+@click.option("--resume", is_flag=True, help="Resume a study that was interrupted or killed.")
+@click.option("--retry", is_flag=True, help="Like --resume, and compute failed points again.")
+@click.option("--seed", type=int, help="Seed of the random streams. [that of the file, or 0]")
 @output_options
 def sweep(
-    study: Path, scheduler: str | None, workers: int | None, resume: bool, retry: bool,
+    study: str, scheduler: str | None, workers: int | None, resume: bool, retry: bool,
     seed: int | None, as_json: bool, out: Path | None,
 ) -> None:  # fmt: skip
-    """Compute a study at every point of its grid, and keep what is finished."""
+    """Compute a study at every point of its grid."""
     _check(scheduler, workers, seed, resume=resume or retry, out=out)
     prepare(out)
-    from polycorner.sweeps.results import SweepError
+    from polycorner.sweeps.study import SweepError
 
+    store = None if out is None else out / STORE
     try:
-        plan = _plan(study)
-        store = None if out is None else out / STORE
+        file = _file(study)
+        plan = _plan(file)
         if store is not None:
             _check_store(store, resume=resume or retry)
-        found = _computed(plan, study, store, scheduler, workers, seed, retry=retry)
+        found = _computed(plan, file.stem, store, scheduler, workers, seed, retry=retry)
+        answer = _answer(plan, found, store)
     except (ValueError, TypeError, ImportError, SweepError) as error:
         fail(str(error))
     except KeyboardInterrupt:
-        _say_interrupted(out)
-        raise click.exceptions.Exit(130) from None
-    answer = _answer(plan, found, store)
+        _end_interrupted(store)
 
     def write() -> list[Path]:
         return [] if out is None else _write(plan, found, answer, out)
 
     deliver(answer, lambda: _print(answer), write, as_json=as_json)
     if answer["interrupted"]:
-        _say_interrupted(out)
-        raise click.exceptions.Exit(130)
+        _end_interrupted(store)
 
 
 def _check(
@@ -86,54 +123,62 @@ def _check(
     if scheduler is not None and workers is not None:
         fail("--workers: expected no --scheduler beside it, whose workers are its own; got both")
     if workers is not None and workers < 1:
-        fail(f"--workers: expected a positive whole number; got {workers}")
+        fail(f"--workers: expected a whole number >= 1; got {workers}")
     if seed is not None and seed < 0:
-        fail(f"--seed: expected a whole number not below 0; got {seed}")
+        fail(f"--seed: expected a whole number >= 0; got {seed}")
     if resume and out is None:
-        fail("--resume: expected --out, the folder of the study to go on with; got none")
+        fail("--resume: expected --out, the folder of the study to resume; got none")
 
 
-def _plan(study: Path) -> "StudyFile":
+def _named() -> "Mapping[str, NamedStudy]":
+    """Return the installed studies by name."""
+    found: Mapping[str, NamedStudy] = import_module(NAMED).STUDIES
+    return found
+
+
+def _file(study: str) -> Path:
+    """Return the study file: a path, or the file of an installed study."""
+    path, known = Path(study), named_files()
+    if path.is_file() or path.suffix or path.name != study:
+        return path
+    if study not in known:
+        got = nearest(study, known)
+        fail(f"STUDY: expected a TOML file or one of {', '.join(known)}; got {got}")
+    return known[study]
+
+
+def _plan(file: Path) -> "StudyFile":
     from polycorner.sweeps.study_files import read_study
 
-    sys.path.insert(0, str(study.resolve().parent))  # a function of the user's own lies there
-    return read_study(study)
+    if file not in named_files().values():
+        sys.path.insert(0, str(file.resolve().parent))  # for the user's own functions
+    return read_study(file, _named())
 
 
 def _check_store(store: Path, *, resume: bool) -> None:
-    """Refuse to go on with an unfinished study unasked, or to resume what was never begun."""
-    from polycorner.sweeps.identity import stored_study
+    """Refuse to resume an unfinished study unasked, or one that does not exist."""
+    from polycorner.sweeps.store import stored_state
 
-    begun = stored_study(store) is not None
-    if resume and not begun:
+    state = stored_state(store)
+    if resume and not state:
         fail(f"--resume: expected a study in {store}; got none")
-    if begun and not resume:
-        from polycorner.sweeps.execution import open_results
-
-        pending = int((open_results(store)["status"].values == 0).sum())
-        if pending:
-            fail(f"--out: {store} has an unfinished study; --resume goes on with it")
+    if state not in ("", "finished") and not resume:
+        fail(f"--out: {store} has an unfinished study; --resume computes the missing points")
 
 
 # ----------------------------------------------------------------------------------------- the work
 
 
 def _computed(
-    plan: "StudyFile",
-    file: Path,
-    store: Path | None,
-    scheduler: str | None,
-    workers: int | None,
-    seed: int | None,
-    *,
-    retry: bool,
-) -> "xr.Dataset":
+    plan: "StudyFile", title: str, store: Path | None, scheduler: str | None,
+    workers: int | None, seed: int | None, *, retry: bool,
+) -> "xr.Dataset":  # fmt: skip
     from polycorner.sweeps.execution import sweep as compute
 
     if seed is not None and not plan.random:
         fail(f"--seed: expected none, for {plan.study} draws no random numbers; got {seed}")
     chosen = (seed if seed is not None else plan.seed or 0) if plan.random else None
-    with _executor(scheduler, workers) as executor, _told(file.stem) as progress:
+    with _executor(scheduler, workers) as executor, _shown(title) as progress:
         return compute(
             plan.function,
             plan.grid,
@@ -155,7 +200,7 @@ def _executor(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
-        fail("--scheduler: expected Dask to be installed: pip install 'polycorner[dask]'")
+        fail(str(missing_extra("distributed", "dask")))
     connect: Any = Client
     try:
         client = connect(scheduler, timeout=10, set_as_default=False)
@@ -166,25 +211,26 @@ def _executor(scheduler: str | None, workers: int | None) -> Iterator[Any]:
 
 
 @contextmanager
-def _told(name: str) -> "Iterator[Report | None]":
-    """Show how many points are done, how many failed, and the time left."""
+def _shown(name: str) -> "Iterator[Progress]":
+    """Show how many points are finished, how many failed, and the time left."""
     with progress_bar(name, left=True) as change:
-        if change is None:
-            yield None
-            return
 
-        def progress(done: int, failed: int, total: int) -> None:
-            words = f"{name}, {failed} failed" if failed else name
-            change(completed=done + failed, total=total, description=words)
+        def progress(done: float, total: float | None, note: str, /) -> None:
+            if change is not None:
+                change(completed=done, total=total, note=note)
 
         yield progress
 
 
-def _say_interrupted(out: Path | None) -> None:
-    if out is None:
-        remark("interrupted; with --out the study could have been gone on with")
+def _end_interrupted(store: Path | None) -> NoReturn:
+    """Say, also with ``--quiet``, how to continue, and end with exit code 130."""
+    if store is None:
+        words = "interrupted; with --out the study could be resumed"
     else:
-        remark(f"interrupted, kept in {out / STORE}; the same command with --resume goes on")
+        words = f"interrupted, kept in {store}; the same command with --resume computes the rest"
+    sys.stdout.flush()
+    click.echo(f"polycorner: {words}", err=True)
+    raise click.exceptions.Exit(130)
 
 
 # --------------------------------------------------------------------------------------- the answer
@@ -231,33 +277,29 @@ def _failures(found: "xr.Dataset") -> list[dict[str, Any]]:
     """Return the messages of failed points, commonest first, each with one of its points."""
     import numpy as np
 
-    places = np.argwhere(found["status"].values == 2)
-    counts: dict[str, int] = {}
-    first: dict[str, Any] = {}
-    messages = found["message"].values
-    for place in places:
-        words = str(messages[tuple(place)])
-        counts[words] = counts.get(words, 0) + 1
-        first.setdefault(words, place)
-    dims = found["status"].dims
+    failed = found["status"].values == 2
+    messages = found["message"].values[failed].tolist()
+    first = dict(zip(reversed(messages), np.argwhere(failed)[::-1], strict=True))
+    axes = [(str(name), found[name].values) for name in found["status"].dims]
     return [
         {
-            "message": words,
-            "count": counts[words],
+            "message": message,
+            "count": count,
             "point": {
-                str(d): found[d].values[k].item() for d, k in zip(dims, first[words], strict=True)
+                name: values[k].item()
+                for (name, values), k in zip(axes, first[message], strict=True)
             },
         }
-        for words in sorted(counts, key=lambda words: -counts[words])
+        for message, count in Counter(messages).most_common()
     ]
 
 
 def _write(plan: "StudyFile", found: "xr.Dataset", answer: dict[str, Any], out: Path) -> list[Path]:
     from polycorner.pictures import style as plots
-    from polycorner.pictures import sweeps
 
     written = [out / STORE, write_answer(answer, out, "sweep.json")]
-    figure = sweeps.draw_study(plan.study, found) if answer["done"] else None
+    named = _named()
+    figure = named[plan.study].figure(found) if answer["done"] and plan.study in named else None
     if figure is not None:
         with writing(out):
             written.append(plots.save(figure, out / f"{plan.study}.png"))

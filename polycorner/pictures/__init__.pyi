@@ -15,7 +15,6 @@ from .solids import (
     write_mesh,
 )
 from .style import save
-from .sweeps import draw_study
 
 __all__ = [
     "Isosurface",
@@ -28,7 +27,6 @@ __all__ = [
     "draw_motion",
     "draw_region",
     "draw_solid",
-    "draw_study",
     "isosurface",
     "place_solid",
     "save",

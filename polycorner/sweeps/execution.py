@@ -1,32 +1,28 @@
-"""Parameter studies: a function at every point of a grid, on any number of workers, for days."""
+"""Parameter studies: a function at every point of a grid, on any number of workers."""
 
 import inspect
-import json
 import os
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.errors import nearest
+from polycorner.checks import names, whole
 from polycorner.interrupts import first_interrupt
-from polycorner.sweeps.grid import Axis, Grid, written
-from polycorner.sweeps.identity import stored_study
+from polycorner.progress import Progress, silent
+from polycorner.sweeps.grid import Grid
 from polycorner.sweeps.points import Job, Outcome
-from polycorner.sweeps.results import MemoryTable, Study, SweepError
-from polycorner.sweeps.scheduling import Dispatch
-from polycorner.sweeps.store import Store, open_results
-from polycorner.sweeps.workers import hired
+from polycorner.sweeps.scheduling import Scheduler
+from polycorner.sweeps.store import Store
+from polycorner.sweeps.study import Study, SweepError, canonical
+from polycorner.sweeps.tables import Table
+from polycorner.sweeps.workers import workers_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Report: TypeAlias = Callable[[int, int, int], object]
-
-__all__ = ["Axis", "Grid", "SweepError", "open_results", "sweep"]
 
 
 def sweep(
@@ -34,63 +30,66 @@ def sweep(
     grid: "Mapping[str, Any] | Grid",
     *,
     executor: Any = None,
-    rng: int | None = None,
+    rng: int | np.random.Generator | None = None,
     fixed: Mapping[str, Any] | None = None,
     store: "str | os.PathLike[str] | None" = None,
     retry: bool = False,
-    progress: Report | None = None,
+    progress: Progress = silent,
 ) -> "xr.Dataset":
-    """Return ``function`` at every point of a grid as one dataset.
+    """Return the values of ``function`` at every point of a grid as one dataset.
 
     A point where the function raises is a row like any other: its status is 2 (failed), its
-    message the type and the sentence of the exception, its results are nan.  Nothing depends on
-    how many workers there are, on the order they finish in, or on how often a study was stopped.
+    message is the type and message of the exception, its results are nan.  The results do not
+    depend on the number of workers, on the order in which points finish, or on how often the study
+    was interrupted and resumed.
 
     Parameters
     ----------
     function : callable
         ``function(**point, **fixed)`` returns a mapping from names to numbers, arrays of numbers
-        or texts, each of them alone or as ``(value, unit)``; the same names and shapes everywhere.
-        If it has a parameter ``rng`` it gets a generator of its own at each point, spawned from the
-        seed by the point's number.  Workers elsewhere have to be able to load it.
+        or texts, each alone or as ``(value, unit)``; the same names and shapes everywhere.  If it
+        has a parameter ``rng``, it gets a generator of its own at each point.
     grid : mapping from str to Axis
         The values of each parameter: an :class:`Axis`, values alone, or ``(values, unit)``.  All
-        combinations are computed, the last axis running fastest.
+        combinations are computed; the last axis varies fastest.
     executor : optional
-        None (default) computes here; a number starts so many processes, replaced when they die;
-        otherwise any ``concurrent.futures.Executor`` or a ``distributed.Client``, which stay open.
-    rng : int, optional
-        Seed of the random streams; by default that of the store, or a new one, which the result
-        tells.
+        None (default) computes in this process; a number starts that many processes, which are
+        replaced when they die; otherwise a ``concurrent.futures.Executor`` or a
+        ``distributed.Client``, which stays open.  Functions and arguments are sent by cloudpickle.
+    rng : int or Generator, optional
+        Seed of the random streams (default 0), or a generator that one is drawn from.  The point
+        with number k gets the k-th child of the seed (:class:`numpy.random.SeedSequence`).
     fixed : mapping, optional
-        Further arguments, the same at every point: numbers, texts, lists and mappings of such.
+        Further arguments, the same at every point: anything that can be pickled.
     store : path, optional
-        A folder to keep the results in, as zarr arrays.  Killed at any moment, the same call goes
-        on with what is missing.
+        A folder for the results, as zarr arrays.  After any interruption, the same call computes
+        the missing points.
     retry : bool, optional
-        Compute points that failed once more.
+        Compute failed points again.
     progress : callable, optional
-        Called with the numbers of points done, failed, and in all.
+        Called with the number of finished points (with a store: of those written), the number of
+        all points, and a note on failures; see :class:`~polycorner.progress.Progress`.
 
     Returns
     -------
     xarray.Dataset
-        Results, ``status`` (0 pending, 1 done, 2 failed), ``message`` and ``seconds`` over the
+        Results, ``message``, ``seconds`` and ``status`` (0 pending, 1 done, 2 failed) over the
         axes; as attributes the provenance, and ``complete``: "finished" or "interrupted".
 
     Raises
     ------
     TypeError, ValueError
-        Naming the argument; also if the store is of another study or in use.
+        Naming the argument; also if the store is of another study, damaged or in use.
     ImportError
         If a store is asked for and zarr is missing.
     SweepError
-        If the workers are gone or the store cannot be written; what was finished is kept.
+        If the workers do not answer or the store cannot be written; finished points are kept.
 
     Notes
     -----
-    The first Ctrl-C waits for the points under way (a cluster's are let go) and returns what there
-    is, the rest being pending; a second one ends the study at once, and what is in the store stays.
+    The first Ctrl-C waits for the points that are being computed (those on a cluster are cancelled)
+    and returns the results so far, with the other points pending.  The second one raises
+    KeyboardInterrupt at once; what is in the store stays.
 
     Examples
     --------
@@ -102,72 +101,67 @@ def sweep(
     """
     axes, constants = Grid.of(grid), dict(fixed or {})
     random = check_arguments(function, axes, constants)
-    path = None if store is None else Path(store)
-    seed = _seed(rng, path, wanted=random)
-    study = Study(axes, _name(function), json.loads(written(constants, "fixed")), seed)
-    table = MemoryTable(study) if path is None else Store(path, study)
+    study = Study(axes, _name(function), canonical(constants), _seed(rng, wanted=random))
+    table = Table(study) if store is None else Store(Path(store), study)
     try:
-        finished = _compute(table, Job(function, constants, seed), executor, retry, progress)
+        finished = _compute(table, Job(function, constants, study.seed), executor, retry, progress)
         table.close(complete="finished" if finished else "interrupted")
     except SweepError as error:
-        _settle(table)
+        _close(table)
         msg = f"{error}; {_kept(table)}"
         raise SweepError(msg, results=table.dataset()) from error
     except BaseException:
-        _settle(table)
+        _close(table)
         raise
     return table.dataset()
 
 
-def _compute(
-    table: "MemoryTable | Store", job: Job, executor: Any, retry: bool, progress: Report | None
-) -> bool:
-    """Compute what is missing, or a part of it until Ctrl-C; return whether it is all there."""
-    now, stop = table.progress, threading.Event()
+def _compute(table: Table, job: Job, executor: Any, retry: bool, progress: Progress) -> bool:
+    """Compute the missing points, until Ctrl-C; return whether all are finished."""
+    grid, stop = table.study.grid, threading.Event()
+    reported = -1
 
     def record(outcomes: list[Outcome]) -> None:
+        nonlocal reported
         table.add(outcomes)
-        if progress is not None:
-            progress(now.done, now.failed, now.total)
+        failed = table.failed
+        if table.done + failed != reported or outcomes:
+            reported = table.done + failed
+            progress(reported, grid.size, f"{failed} failed" if failed else "")
 
     record([])
-    if now.done + (0 if retry else now.failed) == now.total:
+    if table.done + (0 if retry else table.failed) == grid.size:
         return True
-    crew, at_once = hired(executor), True
-    todo = now.pending(retry=retry)
-    dispatch = Dispatch(crew, job, table.study.grid, todo, record, stop.is_set)
-
-    def stopped() -> None:
-        stop.set()
-        dispatch.wake()
-
+    workers, at_once = workers_of(executor), True
+    scheduler = Scheduler(workers, job, grid, table.missing(retry=retry), record, stop.is_set)
     try:
-        with first_interrupt(stopped):
-            dispatch.run()
+        with first_interrupt(stop.set):
+            scheduler.run()
         at_once = False
     finally:
-        dispatch.cancel()
-        crew.leave(at_once=at_once)
-    return now.done + now.failed == now.total and not (retry and stop.is_set())
+        scheduler.cancel()
+        workers.close(at_once=at_once)
+    table.flush()
+    record([])
+    return table.done + table.failed == grid.size and not (retry and stop.is_set())
 
 
-def _settle(table: "MemoryTable | Store") -> None:
-    """Bring what is finished into order, as far as that goes."""
+def _close(table: Table) -> None:
+    """Keep what is finished as far as that is possible."""
     try:
         table.close(complete="interrupted")
     except SweepError:
-        table.abandon()
+        return  # a full disk has been reported already
 
 
-def _kept(table: "MemoryTable | Store") -> str:
-    now = table.progress
-    finished = f"{now.done + now.failed} of {now.total} points are finished"
+def _kept(table: Table) -> str:
+    finished = f"{table.done + table.failed} of {table.study.grid.size} points are finished"
     if isinstance(table, Store):
-        return f"{finished} and kept in {table.path}; the same call goes on with the others"
-    return f"{finished}, the `results` of this exception; a store would let the study go on"
+        return f"{finished} and kept in {table.path}; the same call computes the others"
+    return f"{finished}, the `results` of this exception; with a store the study could be resumed"
 
 
-# ------------------------------------------------------------------------------------ what is asked
+# -------------------------------------------------------------------------------------- arguments
 
 
 def check_arguments(
@@ -175,30 +169,31 @@ def check_arguments(
     grid: Grid,
     fixed: Mapping[str, Any],
     *,
-    names: tuple[str, str] = ("grid", "fixed"),
+    called: tuple[str, str] = ("grid", "fixed"),
 ) -> bool:
     """Refuse arguments that the function does not take; return whether it takes a generator.
 
-    ``names`` is what ``grid`` and ``fixed`` are called in the sentence of the error.
+    ``called`` are the names of ``grid`` and ``fixed`` in the errors.
     """
     if not callable(function):
         msg = f"function: expected something to call; got {function!r}"
         raise TypeError(msg)
     both = sorted(set(grid.names) & set(fixed))
     if both:
-        msg = f"{names[1]}: expected parameters that are no axis; got {', '.join(both)}"
+        msg = f"{called[1]}: expected parameters that are no axis; got {', '.join(both)}"
         raise ValueError(msg)
     try:
         parameters = inspect.signature(function).parameters
     except (TypeError, ValueError):
-        return False  # some compiled functions do not tell
+        return False  # some compiled functions have no signature
     if not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
-        _check_names(names[0], grid.names, parameters)
-        _check_names(names[1], tuple(fixed), parameters)
+        known = [name for name in parameters if name != "rng"]
+        names(called[0], grid.names, known)
+        names(called[1], fixed, known)
     given = {*grid.names, *fixed, "rng"}
     missing = [name for name, p in parameters.items() if _is_needed(p) and name not in given]
     if missing:
-        msg = f"{names[0]}: expected all that the function needs; {', '.join(missing)} is missing"
+        msg = f"{called[0]}: expected all that the function needs; {', '.join(missing)} is missing"
         raise ValueError(msg)
     return "rng" in parameters
 
@@ -208,29 +203,15 @@ def _is_needed(parameter: inspect.Parameter) -> bool:
     return parameter.default is parameter.empty and parameter.kind not in optional
 
 
-def _check_names(argument: str, names: tuple[str, ...], parameters: Mapping[str, Any]) -> None:
-    known = [name for name in parameters if name != "rng"]
-    for name in names:
-        if name not in known:
-            msg = f"{argument}: expected names among {', '.join(known)}; got {nearest(name, known)}"
-            raise ValueError(msg)
-
-
-def _seed(rng: Any, path: Path | None, *, wanted: bool) -> int | None:
-    if not wanted and rng is not None:
-        msg = f"rng: expected none for a function without a parameter rng; got {rng!r}"
-        raise ValueError(msg)
+def _seed(rng: Any, *, wanted: bool) -> int | None:
     if not wanted:
+        if rng is not None:
+            msg = f"rng: expected none for a function without a parameter rng; got {rng!r}"
+            raise ValueError(msg)
         return None
-    if rng is None:
-        stored = None if path is None else stored_study(path)
-        if stored is not None and stored["seed"] is not None:
-            return int(stored["seed"])
-        return int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
-    if isinstance(rng, bool) or not isinstance(rng, int | np.integer) or not 0 <= rng < 2**63:
-        msg = f"rng: expected a seed, a whole number from 0 to 2^63 - 1; got {rng!r}"
-        raise ValueError(msg)
-    return int(rng)
+    if rng is None or isinstance(rng, np.random.Generator):
+        return 0 if rng is None else int(rng.integers(2**63))
+    return whole("rng", rng, least=0, most=2**63 - 1)
 
 
 def _name(function: Any) -> str:

@@ -1,6 +1,5 @@
-"""Grids of parameters: the product of named axes, its points numbered row by row."""
+"""Grids of parameters: products of named axes, their points numbered in row-major order."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,8 +9,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-Value: TypeAlias = bool | int | float | str
-RESERVED = ("status", "message", "seconds", "journal", "rng")
+from polycorner.checks import instance, refuse
+
+Scalar: TypeAlias = bool | int | float | str
+RESERVED = ("status", "message", "seconds", "rng")
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Axis:
     Parameters
     ----------
     values : (n,) numbers or texts
-        All different, none of them nan; ``inf`` is a value.
+        All different, none of them nan; ``inf`` is allowed.
     unit : str, optional
         Their unit; empty if they have none.
 
@@ -36,39 +37,33 @@ class Axis:
     Axis(values=(8, 16, 24), unit='mm')
     """
 
-    values: tuple[Value, ...]
+    values: tuple[Scalar, ...]
     unit: str = ""
 
-    def __init__(self, values: Iterable[Value] | ArrayLike, unit: str = "") -> None:
-        object.__setattr__(self, "values", _listed(values))
-        if not isinstance(unit, str):
-            msg = f"unit: expected a text such as 'mm'; got {unit!r}"
-            raise TypeError(msg)
-        object.__setattr__(self, "unit", unit)
+    def __init__(self, values: Iterable[Scalar] | ArrayLike, unit: str = "") -> None:
+        object.__setattr__(self, "values", _scalars(values))
+        object.__setattr__(self, "unit", instance("unit", unit, str))
 
 
-def _listed(values: Any) -> tuple[Value, ...]:
-    listed = list(values) if isinstance(values, Iterable) and not isinstance(values, str) else None
-    array = None if listed is None else np.array(listed)
-    if array is None or array.ndim != 1 or array.dtype.kind not in "biufU" or not len(array):
-        msg = f"values: expected a list of numbers or of texts; got {values!r}"
-        raise TypeError(msg)
-    if array.dtype.kind == "U" and not all(isinstance(value, str) for value in listed or ()):
-        msg = f"values: expected numbers only, or texts only; got {values!r}"
-        raise TypeError(msg)
+def _scalars(values: Any) -> tuple[Scalar, ...]:
+    if not isinstance(values, Iterable) or isinstance(values, str):
+        refuse("values", "a list of numbers or of texts", values, TypeError)
+    scalars = list(values)
+    array = np.array(scalars)
+    if array.ndim != 1 or array.dtype.kind not in "biufU" or not len(array):
+        refuse("values", "a list of numbers or of texts", values, TypeError)
+    if array.dtype.kind == "U" and not all(isinstance(value, str) for value in scalars):
+        refuse("values", "numbers only, or texts only", values, TypeError)
     if array.dtype.kind == "f" and np.isnan(array).any():
-        msg = f"values: expected numbers; got nan among {values!r}"
-        raise ValueError(msg)
+        refuse("values", "numbers without nan", values)
     if len(np.unique(array)) < len(array):
-        twice = next(value for value in listed or () if (array == value).sum() > 1)
-        msg = f"values: expected values that differ; got {twice!r} twice"
-        raise ValueError(msg)
+        refuse("values", "values that differ from one another", values)
     return tuple(array.tolist())
 
 
 @dataclass(frozen=True)
 class Grid:
-    """The full product of axes; point ``k`` is the ``k``-th with the last axis running fastest.
+    """The full product of axes; the last axis varies fastest in the numbering of the points.
 
     Parameters
     ----------
@@ -83,35 +78,34 @@ class Grid:
         if isinstance(grid, Grid):
             return grid
         if not isinstance(grid, Mapping) or not grid:
-            msg = f"grid: expected a mapping from names to values; got {grid!r}"
-            raise TypeError(msg)
+            refuse("grid", "a mapping from names to values", grid, TypeError)
         return Grid({_name(name): _axis(name, given) for name, given in grid.items()})
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The parameters."""
+        """Names of the parameters."""
         return tuple(self.axes)
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """How many values each has."""
+        """Number of values of each parameter."""
         return tuple(len(axis.values) for axis in self.axes.values())
 
     @cached_property
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return math.prod(self.shape)
 
-    def point(self, number: int) -> dict[str, Value]:
+    def point(self, number: int) -> dict[str, Scalar]:
         """Return the parameters of a point."""
-        places = np.unravel_index(number, self.shape)
+        index = np.unravel_index(number, self.shape)
         return {
-            name: axis.values[int(place)]
-            for (name, axis), place in zip(self.axes.items(), places, strict=True)
+            name: axis.values[int(k)]
+            for (name, axis), k in zip(self.axes.items(), index, strict=True)
         }
 
     def description(self) -> list[dict[str, Any]]:
-        """Return names, units and values, as JSON has them."""
+        """Return names, units and values in the types of JSON."""
         return [
             {"name": name, "unit": axis.unit, "values": list(axis.values)}
             for name, axis in self.axes.items()
@@ -120,8 +114,7 @@ class Grid:
 
 def _name(name: Any) -> str:
     if not isinstance(name, str) or not name.isidentifier() or name in RESERVED:
-        msg = f"grid: expected names of parameters, none of {', '.join(RESERVED)}; got {name!r}"
-        raise ValueError(msg)
+        refuse("grid", f"names of parameters other than {', '.join(RESERVED)}", name)
     return name
 
 
@@ -134,18 +127,3 @@ def _axis(name: str, given: Any) -> Axis:
     except (TypeError, ValueError) as error:
         msg = f"grid: {name}: {error}"
         raise type(error)(msg) from None
-
-
-def written(value: Any, argument: str) -> str:
-    """Return a value as JSON, the same for the same value."""
-    try:
-        return json.dumps(value, sort_keys=True, default=_plain)
-    except (TypeError, ValueError):
-        msg = f"{argument}: expected numbers, texts, lists and mappings of such; got {value!r}"
-        raise TypeError(msg) from None
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    raise TypeError

@@ -1,16 +1,19 @@
-"""One point after another, wherever the worker is: values, or the sentence that says why not."""
+"""Evaluation of single points in a worker: the values, or the reason for a failure."""
 
+import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
 from polycorner.sweeps.grid import RESERVED
 
-EXACT = 2**53  # up to which every whole number is a float
+EXACT = 2**53  # whole numbers up to here are exact as floats
 LONGEST = 1000  # characters of a message
 
 Entry: TypeAlias = float | str | Array
@@ -18,7 +21,7 @@ Entry: TypeAlias = float | str | Array
 
 @dataclass(frozen=True)
 class Column:
-    """What one result looks like: its name, its unit, whether it is a text, and its shape."""
+    """The description of one result: name, unit, whether it is a text, and its shape."""
 
     name: str
     unit: str = ""
@@ -28,20 +31,20 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of a point.
+    """The outcome of one point.
 
     Attributes
     ----------
     number : int
-        Of the point.
+        Number of the point.
     seconds : float
-        How long it took.
+        Time that it took.
     columns : tuple of Column
-        What was returned; empty if the point failed.
+        What the function returned; empty if the point failed.
     values : tuple
         The values of the columns.
     message : str
-        Type and sentence of the exception; empty if there was none.
+        Type and message of the exception; empty if there was none.
     """
 
     number: int
@@ -53,20 +56,38 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Job:
-    """What is computed at every point.
+    """The computation at every point; it travels to other processes with all that it refers to.
+
+    Functions are pickled by cloudpickle, so lambdas, closures and functions of a notebook can be
+    sent.  A worker unpickles a job once, not once a batch.
 
     Attributes
     ----------
     function : callable
     fixed : mapping from str
-        Arguments that are the same everywhere.
+        Arguments with the same value at every point.
     seed : int or None
-        Of the random streams; None if the function takes none.
+        Seed of the random streams; None if the function takes no generator.
     """
 
     function: Callable[..., Mapping[str, Any]]
     fixed: Mapping[str, Any]
     seed: int | None
+
+    @cached_property
+    def _content(self) -> bytes:
+        import cloudpickle
+
+        content: bytes = cloudpickle.dumps((self.function, self.fixed, self.seed))
+        return content
+
+    def __reduce__(self) -> tuple[Callable[[bytes], "Job"], tuple[bytes]]:
+        return _unpickled, (self._content,)
+
+
+@lru_cache(maxsize=4)
+def _unpickled(content: bytes) -> Job:
+    return Job(*pickle.loads(content))
 
 
 def stream(seed: int, number: int) -> np.random.Generator:
@@ -77,15 +98,15 @@ def stream(seed: int, number: int) -> np.random.Generator:
 def evaluate(
     job: Job, numbers: Sequence[int], points: Sequence[Mapping[str, Any]], budget: float
 ) -> list[Outcome]:
-    """Return the outcomes of the first points, as many as can be begun in ``budget`` seconds.
+    """Return the outcomes of the first points, as many as can be started within ``budget`` seconds.
 
-    One at least; of several, those that are finished when Ctrl-C reaches the worker.
+    At least one point is evaluated.  After Ctrl-C in the worker the finished ones are returned.
     """
     found: list[Outcome] = []
-    begun = time.perf_counter()
+    start = time.perf_counter()
     try:
         for number, point in zip(numbers, points, strict=True):
-            if found and time.perf_counter() - begun > budget:
+            if found and time.perf_counter() - start > budget:
                 break
             found.append(_outcome(job, number, point))
     except KeyboardInterrupt:
@@ -95,17 +116,17 @@ def evaluate(
 
 
 def _outcome(job: Job, number: int, point: Mapping[str, Any]) -> Outcome:
-    begun = time.perf_counter()
+    start = time.perf_counter()
     random = {} if job.seed is None else {"rng": stream(job.seed, number)}
     try:
         returned = job.function(**point, **job.fixed, **random)
         columns, values = _columns(returned, (*point, *RESERVED))
     except (Exception, SystemExit) as error:
-        return Outcome(number, time.perf_counter() - begun, message=sentence(error))
-    return Outcome(number, time.perf_counter() - begun, columns, values)
+        return Outcome(number, time.perf_counter() - start, message=one_line(error))
+    return Outcome(number, time.perf_counter() - start, columns, values)
 
 
-def sentence(error: BaseException) -> str:
+def one_line(error: BaseException) -> str:
     """Return type and message of an exception in one line."""
     words = " ".join(str(error).split())
     return f"{type(error).__name__}: {words}"[:LONGEST] if words else type(error).__name__
@@ -113,13 +134,11 @@ def sentence(error: BaseException) -> str:
 
 def _columns(returned: Any, taken: Sequence[str]) -> tuple[tuple[Column, ...], tuple[Entry, ...]]:
     if not isinstance(returned, Mapping) or not returned:
-        msg = f"function: expected a mapping from names to values; it returned {returned!r}"
-        raise TypeError(msg)
+        refuse("function", "a mapping from names to values as its result", returned, TypeError)
     columns, values = [], []
     for name, given in returned.items():
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
-            msg = f"function: expected names of results, none of {', '.join(taken)}; got {name!r}"
-            raise ValueError(msg)
+            refuse("function", f"names of results other than {', '.join(taken)}", name)
         unit, value = _entry(name, given)
         text = isinstance(value, str)
         columns.append(Column(name, unit, text, () if text else np.shape(value)))
@@ -128,7 +147,7 @@ def _columns(returned: Any, taken: Sequence[str]) -> tuple[tuple[Column, ...], t
 
 
 def _entry(name: str, given: Any) -> tuple[str, Entry]:
-    """Return unit and value of a result: a number, numbers, a text, or one of them and its unit."""
+    """Return unit and value of a result: a number, numbers or a text, alone or with a unit."""
     unit, value = "", given
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str):
         value, unit = given
@@ -136,14 +155,9 @@ def _entry(name: str, given: Any) -> tuple[str, Entry]:
         return unit, str(value)
     array = np.asarray(value)
     if array.dtype.kind not in "biuf":
-        msg = f"{name}: expected a number, an array of numbers or a text; got {value!r}"
-        raise TypeError(msg)
-    if array.dtype.kind in "iu" and array.size and max(abs(int(x)) for x in _ends(array)) > EXACT:
-        msg = f"{name}: expected whole numbers up to 2^53; got {value!r}"
-        raise ValueError(msg)
+        refuse(name, "a number, an array of numbers or a text", value, TypeError)
+    whole = array.dtype.kind in "iu" and array.size
+    if whole and max(abs(int(array.min())), abs(int(array.max()))) > EXACT:
+        refuse(name, "whole numbers up to 2^53", value)
     numbers = array.astype(np.float64)
     return unit, numbers if numbers.ndim else float(numbers)
-
-
-def _ends(array: Any) -> tuple[Any, Any]:
-    return array.min(), array.max()

@@ -1,150 +1,128 @@
-"""Handing out points in small batches, few at a time, and taking in what becomes of them."""
+"""Scheduling of points: small batches, few of them in flight, outcomes as they arrive."""
 
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from pickle import PicklingError
-from queue import SimpleQueue
 from typing import Any
 
 from polycorner.sweeps.grid import Grid
-from polycorner.sweeps.points import Job, Outcome, evaluate, sentence
-from polycorner.sweeps.results import SweepError
-from polycorner.sweeps.workers import LARGEST, Crew, is_killer, is_lost
+from polycorner.sweeps.points import Job, Outcome, evaluate, one_line
+from polycorner.sweeps.study import SweepError
+from polycorner.sweeps.workers import LARGEST, Workers, is_broken, killed_workers
 
 TARGET = 0.1  # s that a batch should take
-BUDGET = 1.0  # s after which a worker hands in what it has of a batch
-PATIENCE = 10.0  # s for the rest of a broken pool to be told
+BUDGET = 1.0  # s after which a worker returns the rest of a batch
+TICK = 0.5  # s between two looks whether to stop
+PATIENCE = 10.0  # s for the other futures of a broken pool to end
 
 Batch = list[int]
 
 
-class Pace:
-    """How many points make a batch, from how long they took so far."""
-
-    def __init__(self) -> None:
-        self.size, self.mean = 1, math.nan
-
-    def take(self, outcomes: list[Outcome]) -> None:
-        """Learn from outcomes; batches grow twofold at most."""
-        if not outcomes:
-            return
-        mean = sum(outcome.seconds for outcome in outcomes) / len(outcomes)
-        self.mean = mean if math.isnan(self.mean) else 0.8 * self.mean + 0.2 * mean
-        fitting = LARGEST if self.mean * LARGEST < TARGET else max(1, int(TARGET / self.mean))
-        self.size = min(fitting, 2 * self.size, LARGEST)
-
-
-class Dispatch:
+class Scheduler:
     """One pass over the points of a study.
 
     Parameters
     ----------
-    crew : Crew
+    workers : Workers
     job : Job
     grid : Grid
     todo : iterator of int
         The points to compute.
     record : callable
-        Takes the outcomes of points.
+        Takes lists of outcomes; called at least every :data:`TICK` seconds while points are in
+        flight elsewhere.
     stopped : callable
-        Whether to hand out nothing more.
+        Whether to submit nothing more.
     """
 
     def __init__(
-        self, crew: Crew, job: Job, grid: Grid, todo: Iterator[int],
+        self, workers: Workers, job: Job, grid: Grid, todo: Iterator[int],
         record: Callable[[list[Outcome]], None], stopped: Callable[[], bool],
     ) -> None:  # fmt: skip
-        self.crew, self.job, self.grid = crew, job, grid
+        self.workers, self.job, self.grid = workers, job, grid
         self.todo, self.record, self.stopped = todo, record, stopped
-        self.landed: SimpleQueue[Future[Any] | None] = SimpleQueue()
-        self.flying: dict[Future[Any], Batch] = {}
-        self.again: deque[int] = deque()  # handed back by workers that had no time
+        self.in_flight: dict[Future[Any], Batch] = {}
+        self.returned: deque[int] = deque()  # by workers whose budget of time was spent
         self.suspects: deque[int] = deque()  # in flight when a worker died
-        self.pace = Pace()
-
-    def wake(self) -> None:
-        """Make :meth:`run` look whether it is to stop; also from a signal's handler."""
-        self.landed.put(None)
+        self.batch_size, self.mean = 1, math.nan  # points; s a point, smoothed
 
     def run(self) -> None:
-        """Hand out points until none is left or until stopped, and wait for those in flight."""
+        """Submit points until none is left or until stopped, and wait for those in flight."""
         while True:
-            while not self.stopped() and self._launch():
+            while not self.stopped() and self._submit():
                 pass
-            if not self.flying:
-                return
-            future = self.landed.get()
-            if future is None:
+            if self.stopped():
                 self.cancel()
-            elif future in self.flying:
-                self._land(future, self.flying.pop(future))
+            if not self.in_flight:
+                return
+            finished, _ = wait(self.in_flight, timeout=TICK, return_when=FIRST_COMPLETED)
+            for future in finished:
+                if future in self.in_flight:  # not taken along with a broken pool
+                    self._receive(future, self.in_flight.pop(future))
+            if not finished:
+                self.record([])
 
     def cancel(self) -> None:
-        """Take back what no worker has begun."""
-        for future in list(self.flying):
+        """Cancel batches that no worker has started."""
+        for future in list(self.in_flight):
             if future.cancel():
-                self.flying.pop(future, None)
+                self.in_flight.pop(future, None)
 
-    def _launch(self) -> bool:
-        """Hand out a batch, if there is one and room for it; suspects one by one and alone."""
-        room = self.crew.ahead * self.crew.width if not self.suspects else 1
-        if len(self.flying) >= room:
+    def _submit(self) -> bool:
+        """Submit a batch if there is one and room for it; suspects one by one and alone."""
+        room = 1 if self.suspects else self.workers.in_flight
+        if len(self.in_flight) >= room:
             return False
         batch = [self.suspects.popleft()] if self.suspects else self._batch()
         if not batch:
             return False
         points = [self.grid.point(number) for number in batch]
         try:
-            future = self.crew.submit(evaluate, self.job, batch, points, BUDGET)
+            future = self.workers.executor.submit(evaluate, self.job, batch, points, BUDGET)
         except (TypeError, AttributeError, PicklingError) as error:
-            raise self._unloadable(error) from error
+            raise self._not_sent(error) from error
         except Exception as error:
             raise _gone(error) from error
-        self.flying[future] = batch
-        future.add_done_callback(self.landed.put)
+        self.in_flight[future] = batch
         return True
 
     def _batch(self) -> Batch:
         batch: Batch = []
-        while len(batch) < min(self.pace.size, self.crew.largest):
-            number = self.again.popleft() if self.again else next(self.todo, None)
+        while len(batch) < min(self.batch_size, self.workers.largest):
+            number = self.returned.popleft() if self.returned else next(self.todo, None)
             if number is None:
                 break
             batch.append(number)
         return batch
 
-    def _land(self, future: "Future[Any]", batch: Batch) -> None:
+    def _receive(self, future: "Future[Any]", batch: Batch) -> None:
         error = _error(future)
         if error is None:
             self._take(future.result(), batch)
         elif self.stopped():
-            return  # workers were interrupted too; their points stay pending
+            return  # the workers were interrupted as well; these points stay pending
         elif isinstance(error, KeyboardInterrupt):
-            self.again.extend(batch)
-        elif is_killer(error):
-            self._accuse(batch, error)
-        elif is_lost(error):
+            self.returned.extend(batch)
+        elif killed_workers(error):
+            self._suspect(batch, error)
+        elif is_broken(error):
             self._replace(batch, error)
         else:
-            raise self._unloadable(error) from error
-
-    def _unloadable(self, error: BaseException) -> TypeError:
-        name = getattr(self.job.function, "__qualname__", repr(self.job.function))
-        return TypeError(
-            "function: expected one that workers can load and whose arguments can be sent, "
-            f"defined in a module; got {name} ({sentence(error)})"
-        )
+            raise self._not_sent(error) from error
 
     def _take(self, outcomes: list[Outcome], batch: Batch) -> None:
-        self.pace.take(outcomes)
         found = {outcome.number for outcome in outcomes}
-        self.again.extend(number for number in batch if number not in found)
+        self.returned.extend(number for number in batch if number not in found)
+        mean = sum(outcome.seconds for outcome in outcomes) / len(outcomes)
+        self.mean = mean if math.isnan(self.mean) else 0.8 * self.mean + 0.2 * mean
+        size = LARGEST if self.mean * LARGEST < TARGET else max(1, int(TARGET / self.mean))
+        self.batch_size = min(size, 2 * self.batch_size)
         self.record(outcomes)
 
-    def _accuse(self, batch: Batch, error: BaseException) -> None:
-        """Try the points of a batch that killed its worker alone; alone, the point has failed."""
+    def _suspect(self, batch: Batch, error: BaseException) -> None:
+        """Try the points of a batch that killed its worker one by one; a single one has failed."""
         if len(batch) > 1:
             self.suspects.extend(batch)
         else:
@@ -152,22 +130,28 @@ class Dispatch:
             self.record([Outcome(batch[0], math.nan, message=" ".join(message.split()))])
 
     def _replace(self, batch: Batch, error: BaseException) -> None:
-        """Go on with a new executor; what was in flight is tried one by one."""
-        if not self.crew.renews:
-            raise _gone(error) from error
-        alone = not self.flying and len(batch) == 1
-        wait(self.flying, timeout=PATIENCE)
-        others, self.flying = self.flying, {}
+        """Continue with a new executor; what was in flight is tried point by point."""
+        alone = not self.in_flight
+        wait(self.in_flight, timeout=PATIENCE)
+        others, self.in_flight = self.in_flight, {}
         for future, points in others.items():
             if future.done() and _error(future) is None:
                 self._take(future.result(), points)
             else:
                 self.suspects.extend(points)
-        self.crew.renew()
+        if not self.workers.replace():
+            raise _gone(error) from error
         if alone:
-            self._accuse(batch, error)
+            self._suspect(batch, error)
         else:
             self.suspects.extend(batch)
+
+    def _not_sent(self, error: BaseException) -> TypeError:
+        name = getattr(self.job.function, "__qualname__", repr(self.job.function))
+        return TypeError(
+            "function: expected one that can be sent to workers, along with its arguments; "
+            f"got {name} ({one_line(error)})"
+        )
 
 
 def _error(future: "Future[Any]") -> BaseException | None:
@@ -178,4 +162,4 @@ def _error(future: "Future[Any]") -> BaseException | None:
 
 
 def _gone(error: BaseException) -> SweepError:
-    return SweepError(f"executor: expected workers that answer; they are gone ({sentence(error)})")
+    return SweepError(f"executor: expected workers that answer; got {one_line(error)}")

@@ -1,67 +1,51 @@
-"""Results of a study in a zarr store that can be killed at any moment and gone on with.
+"""Results of a study in a zarr store that can be killed at any moment and resumed.
 
 ::
 
-    store/zarr.json             the study, its provenance, the columns
-    store/<axis>/               values of a parameter
-    store/<column>/             results, chunk by chunk; so are status, message and seconds
-    store/journal/points.jsonl  what was finished since chunks were written last
-    store/journal/lock          held by the process at work
+    store/zarr.json    the study, its provenance, its columns, checksums
+    store/<axis>/      values of a parameter
+    store/<column>/    results, chunk by chunk; likewise message, seconds and status
+    store.lock         held by the process that writes
 
-A finished point goes into the journal first.  Now and then the journal's points are written into
-the chunks, each of which appears whole or not at all, the status last; only then is the journal
-emptied.  Killed in between, the same points are written once more.
+Rows are written after every point, or as often as writing takes a twentieth of the time.  Each
+file appears whole or not at all, and the status last: what has a status is there.
 """
 
 import json
 import math
+import os
 import time
-import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.sweeps.chunks import Chunks
-from polycorner.sweeps.grid import written
-from polycorner.sweeps.identity import (
-    check_study,
-    is_store,
-    need_zarr,
-    stored_columns,
-    stored_study,
-)
-from polycorner.sweeps.journal import Journal, Lock
+from polycorner.checks import missing_extra
+from polycorner.sweeps.checksums import ROOT, check_store, checked_root, write_root
+from polycorner.sweeps.grid import Axis, Grid
 from polycorner.sweeps.points import Column, Outcome
-from polycorner.sweeps.results import (
-    MESSAGE,
-    SECONDS,
-    STATUS,
-    Progress,
-    Study,
-    SweepError,
-    blank,
-    coordinate,
-    dimensions,
-    fitting,
-    units,
-    versions,
+from polycorner.sweeps.study import Study, SweepError, difference, versions
+from polycorner.sweeps.tables import (
+    Table,
+    Variable,
+    coordinate_arrays,
+    coordinates,
+    variables,
 )
 
 if TYPE_CHECKING:
     import xarray as xr
 
 POINTS = 4096  # in a chunk, at most
-BYTES = 4 << 20  # in a chunk, at most, as far as one point has less
-FULL = 16 << 20  # bytes of the journal at which it is written into the chunks
-OFTEN = 30.0  # s after which it is, unless that takes more than its share
-SHARE = 0.02  # of the time, for writing chunks
+BYTES = 4 << 20  # in a chunk, at most, unless one point has more
+SHARE = 0.05  # of the time, for writing
 
 
-class Store:
+class Store(Table):
     """A table of results on disk.
 
     Parameters
@@ -75,123 +59,136 @@ class Store:
     ImportError
         If zarr is missing.
     ValueError
-        If the folder holds something else, another study, or is in use.
+        If the folder holds something else, another study or a damaged store, or is in use.
     SweepError
         If it cannot be written.
     """
 
     def __init__(self, path: Path, study: Study) -> None:
         need_zarr()
-        self.path, self.study = path, study
+        from filelock import FileLock, Timeout
+
+        super().__init__(study)
+        self.path, self.waiting = path, list[Outcome]()
+        self.cost, self.written = 0.0, -math.inf
+        self.present: list[str] = []  # names of the arrays on disk
         check_study(path, study)
         with self._writing():
-            self._take()
-
-    def _take(self) -> None:
-        """Open the store for this process alone."""
-        folder = self.path / "journal"
-        folder.mkdir(parents=True, exist_ok=True)
+            path.mkdir(parents=True, exist_ok=True)
+            self.lock = FileLock(f"{path}.lock", thread_local=False)
+            try:
+                self.lock.acquire(blocking=False)
+            except Timeout:
+                msg = f"store: expected one that nothing else is writing; {path} is in use"
+                raise ValueError(msg) from None
         try:
-            self.lock = Lock(folder / "lock")
-        except BlockingIOError as error:
-            path = self.path
-            msg = f"store: expected one that nothing else is writing; {path} is in use by {error}"
-            raise ValueError(msg) from None
-        try:
-            check_study(self.path, self.study)
-            self.journal = Journal(folder / "points.jsonl")
-            self._open()
+            with self._writing():
+                self._open()
         except BaseException:
-            self.abandon()
+            self.lock.release()
             raise
 
     def _open(self) -> None:
+        check_study(self.path, self.study)
+        if (self.path / ROOT).exists():
+            self.about = check_store(self.path)
+            self.present = checked_root(self.path)[1]
+            self.columns = _columns(self.about)
+        else:
+            self.about = self.study.attributes()
+            write_root(self.path, self.about, [])
+        for new in coordinates(self.study.grid):
+            if new.name not in self.present:
+                self._create(new, new.shape)
+                self.arrays[new.name][...] = new.fill
+        self.create()
+        self.status = np.asarray(self.arrays["status"][...]).reshape(-1)
+
+    def create(self) -> None:
+        """Make the arrays that do not exist yet; they count once the root lists them."""
         import zarr
 
-        if is_store(self.path):
-            self.group: Any = zarr.open_group(self.path, mode="r+", zarr_format=3)
-        else:
-            about = self.study.attributes()
-            self.group = zarr.create_group(self.path, zarr_format=3, attributes=about)
-        self.group.require_group("journal")
-        self._note_version()
-        for name, axis in self.study.grid.axes.items():
-            values = coordinate(axis)
-            kind = "string" if values.dtype.kind == "U" else values.dtype
-            array = self._array(name, values.shape, values.shape, kind, units(axis.unit), (name,))
-            array[...] = values
-        self.columns = stored_columns(self.group.attrs)
-        grid, chunks = self.study.grid, Chunks(self.study.grid.shape, POINTS)
-        for name, kind, about in (
-            ("message", "string", MESSAGE),
-            ("seconds", "float64", SECONDS),
-            ("status", "int8", STATUS),
-        ):
-            self._array(name, grid.shape, chunks.sizes, kind, about, grid.names)
-        self.progress = Progress(np.asarray(self.group["status"][...]).reshape(-1))
-        self.waiting: dict[int, Outcome] = {}
-        self.written, self.cost = time.monotonic(), 0.0
-        for outcome in self.journal.read(self.columns):
-            self.waiting[outcome.number] = outcome
-            self.progress.mark(outcome)
-        self._write()
+        for new in variables(self.study.grid, self.columns):
+            if new.name not in self.present:
+                self._create(new, _chunk_shape(self.study.grid.shape, new))
+            elif new.name not in self.arrays:
+                self.arrays[new.name] = zarr.open_array(self.path / new.name, mode="r+")
+        made = [*self.present, *(name for name in self.arrays if name not in self.present)]
+        if made != self.present:
+            columns = json.dumps([asdict(column) for column in self.columns])
+            self.about = self.about | {"columns": columns}
+            write_root(self.path, self.about, made)
+            self.present = made
 
-    def _note_version(self) -> None:
-        known = json.loads(str(self.group.attrs["versions"]))
-        if versions() not in known:
-            self.group.attrs["versions"] = written([*known, versions()], "versions")
+    def _create(self, new: Variable, chunk: tuple[int, ...]) -> None:
+        import zarr
+        from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    def _array(
-        self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], kind: Any,
-        about: dict[str, Any], names: tuple[str, ...],
-    ) -> Any:  # fmt: skip
-        """Return an array of the group, made if it is not there."""
-        if (self.path / name / "zarr.json").exists():
-            return self.group[name]
-        fill: Any = "" if kind == "string" else math.nan if kind == "float64" else 0
-        return self.group.create_array(
-            name, shape=shape, chunks=chunks, dtype=kind, fill_value=fill, attributes=about,
-            dimension_names=names, overwrite=True,
-        )  # fmt: skip
+        array: Any = zarr.create_array(
+            self.path / new.name,
+            shape=new.shape,
+            chunks=chunk,
+            dtype="string" if new.dtype.kind == "T" else new.dtype,
+            compressors=[ZstdCodec(), Crc32cCodec()],
+            fill_value=None if isinstance(new.fill, np.ndarray) else new.fill,
+            attributes=new.attributes,
+            dimension_names=new.dimensions,
+            overwrite=True,
+        )
+        self.arrays[new.name] = array
 
-    def _chunks(self, column: Column) -> Chunks:
-        size = 8 * max(1, math.prod(column.shape))
-        return Chunks(self.study.grid.shape, max(1, min(POINTS, BYTES // size)))
-
-    def _begin(self, columns: tuple[Column, ...]) -> None:
-        """Make the arrays of the results; they count from when their names are in the group."""
-        grid = self.study.grid
-        for column in columns:
-            self.group.create_array(
-                column.name,
-                shape=(*grid.shape, *column.shape),
-                chunks=(*self._chunks(column).sizes, *column.shape),
-                dtype="string" if column.text else "float64",
-                fill_value="" if column.text else math.nan,
-                attributes=units(column.unit),
-                dimension_names=dimensions(grid, column),
-                overwrite=True,
-            )
-        self.group.attrs["columns"] = json.dumps([asdict(column) for column in columns])
-        self.columns = columns
-        self._consolidate()
-
-    def add(self, outcomes: Iterable[Outcome]) -> None:
-        """Take the outcomes of points; they are in the journal when this returns."""
-        fit = []
-        for outcome in outcomes:
-            if not self.columns and outcome.columns:
-                with self._writing():
-                    self._begin(outcome.columns)
-            fit.append(fitting(outcome, self.columns))
+    def add(self, outcomes: Sequence[Outcome]) -> None:
+        """Take the outcomes of points, and write what waits when it is time."""
         with self._writing():
-            self.journal.add(fit)
-            for outcome in fit:
-                self.waiting[outcome.number] = outcome
-                self.progress.mark(outcome)
-            since = time.monotonic() - self.written
-            if self.journal.size > FULL or since > max(OFTEN, self.cost / SHARE):
-                self._write()
+            self.waiting += [self.fitting(outcome) for outcome in outcomes]
+            if time.monotonic() - self.written > self.cost / SHARE:
+                self.flush()
+
+    def flush(self) -> None:
+        """Write all rows that wait."""
+        if self.waiting:
+            start = time.monotonic()
+            with self._writing():
+                self.write(self.waiting)
+            self.waiting.clear()
+            self.written = time.monotonic()
+            self.cost = self.written - start
+
+    def write(self, outcomes: Sequence[Outcome]) -> None:
+        """Write rows into the chunks."""
+        self._note_start()
+        numbers, rows = self.rows(outcomes)
+        index = np.stack(np.unravel_index(numbers, self.study.grid.shape), axis=1)
+        for name, values in rows.items():
+            self._write_points(name, index, values)
+        self.status[numbers] = rows["status"]
+
+    def _note_start(self) -> None:
+        """Note, before rows are written, that the study is unfinished and which versions work."""
+        known = json.loads(self.about["versions"])
+        if versions() not in known:
+            known.append(versions())
+        about = self.about | {"complete": "unfinished", "versions": json.dumps(known)}
+        if about != self.about:
+            write_root(self.path, about, self.present)
+            self.about = about
+
+    def _write_points(self, name: str, index: Any, values: Any) -> None:
+        """Write the values at some points, chunk by chunk, and wait for the disk."""
+        array: Any = self.arrays[name]
+        sizes = np.array(array.chunks[: index.shape[1]])
+        chunk = index // sizes
+        for place in np.unique(chunk, axis=0):
+            here, corner = (chunk == place).all(axis=1), place * sizes
+            region = tuple(slice(a, a + n) for a, n in zip(corner, sizes, strict=True))
+            slab = np.array(array[region])
+            slab[tuple((index[here] - corner).T)] = values[here]
+            array[region] = slab
+            rest = "0" * (values.ndim - 1)
+            file = self.path.joinpath(name, "c", *map(str, place), *rest)
+            if file.exists():  # zarr does not write chunks without a value
+                with file.open("rb+") as opened:
+                    os.fsync(opened.fileno())
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -202,89 +199,114 @@ class Store:
             msg = f"store: expected a disk that can be written; {self.path}: {why}"
             raise SweepError(msg) from error
 
-    def _write(self) -> None:
-        """Write what waits into the chunks, and empty the journal."""
-        if self.waiting:
-            begun = time.monotonic()
-            outcomes = [self.waiting[number] for number in sorted(self.waiting)]
-            numbers = np.array([outcome.number for outcome in outcomes])
-            for k, column in enumerate(self.columns):
-                values = blank(column, (len(outcomes),))
-                for row, outcome in enumerate(outcomes):
-                    if outcome.values:
-                        values[row] = outcome.values[k]
-                self._chunks(column).write(
-                    self.group[column.name], self.path / column.name, numbers, values
-                )
-            rows = {
-                "message": np.array([o.message for o in outcomes], dtype=np.dtypes.StringDType()),
-                "seconds": np.array([o.seconds for o in outcomes]),
-                "status": self.progress.status[numbers],  # the last: it says that the others are in
-            }
-            for name, values in rows.items():
-                chunks = Chunks(self.study.grid.shape, POINTS)
-                chunks.write(self.group[name], self.path / name, numbers, values)
-            self.waiting.clear()
-            self.cost = time.monotonic() - begun
-        self.journal.clear()
-        self.written = time.monotonic()
-
-    def _consolidate(self) -> None:
-        import zarr
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # at the journal, and that zarr's format may grow
-            zarr.consolidate_metadata(self.path)
-
     def close(self, *, complete: str) -> None:
-        """Write everything into the chunks and let go of the store."""
-        with self._writing():
-            self._write()
-            self.group.attrs["complete"] = complete
-            self._consolidate()
-        self.abandon()
-
-    def abandon(self) -> None:
-        """Let go of the store as it is; what is in the journal counts."""
-        if hasattr(self, "journal"):
-            self.journal.close()
-        self.lock.release()
+        """Write everything that waits and release the store."""
+        try:
+            with self._writing():
+                self.flush()
+                if self.about["complete"] != complete:
+                    self.about = self.about | {"complete": complete}
+                    write_root(self.path, self.about, self.present)
+        finally:
+            self.lock.release()
 
     def dataset(self) -> "xr.Dataset":
         """Return the results; values are read from the disk when they are asked for."""
         return open_results(self.path)
 
 
+def need_zarr() -> None:
+    """Raise ImportError with the command that installs zarr."""
+    if find_spec("zarr") is None:
+        package, extra = "zarr", "sweep"
+        raise missing_extra(package, extra)
+
+
+def check_study(path: Path, study: Study) -> None:
+    """Refuse a folder with anything but this study, in a sentence that names the difference."""
+    if path.exists() and not path.is_dir():
+        msg = f"store: expected a folder; {path} is a file"
+        raise ValueError(msg)
+    found = stored_study(path)
+    if found is None:
+        if path.is_dir() and any(path.iterdir()):
+            msg = f"store: expected a new or empty folder, or a store of a sweep; {path} is neither"
+            raise ValueError(msg)
+        return
+    differs = difference(json.loads(study.attributes()["study"]), found)
+    if differs:
+        msg = f"store: expected {differs}; {path} is of another study"
+        raise ValueError(msg)
+
+
+def stored_study(path: Path) -> dict[str, Any] | None:
+    """Return the identity of the study in a store, or None where there is none."""
+    if not (path / ROOT).exists():
+        return None
+    found: dict[str, Any] = json.loads(checked_root(path)[0]["study"])
+    return found
+
+
+def stored_state(path: Path) -> str:
+    """Return "unfinished", "interrupted" or "finished", or an empty text without a store."""
+    return str(checked_root(path)[0]["complete"]) if (path / ROOT).exists() else ""
+
+
 def open_results(path: str | Path) -> "xr.Dataset":
-    """Return the results in a store, finished or not; values are read when they are asked for.
+    """Return the results in a store, finished or not, after checking every file of it.
 
     Parameters
     ----------
     path : path
-        What :func:`~polycorner.sweeps.execution.sweep` was given as ``store``.
+        What :func:`~polycorner.sweeps.sweep` was given as ``store``.
+
+    Returns
+    -------
+    xarray.Dataset
+        Its values are read when they are asked for.
 
     Raises
     ------
     ImportError
         If zarr is missing.
     ValueError
-        If there is no such store.
+        If there is no such store, or a file of it was changed or damaged; it is named.
     """
     need_zarr()
     import xarray as xr
 
     folder = Path(path)
-    study = stored_study(folder)
-    if study is None:
-        msg = f"store: expected a store of a sweep; {folder} has none"
-        raise ValueError(msg)
-    found: xr.Dataset = xr.open_zarr(folder, consolidated=False, chunks=None, decode_times=False)
-    names = [column.name for column in stored_columns(found.attrs)]
-    coordinates = {
-        axis["name"]: (axis["name"], np.array(axis["values"]), units(axis["unit"]))
-        for axis in study["axes"]
+    about = check_store(folder)
+    found: xr.Dataset = xr.open_zarr(folder, consolidated=True, chunks=None, decode_times=False)
+    names = [column.name for column in _columns(about)]
+    ordered = found[[*names, "message", "seconds", "status"]]
+    ordered.attrs = {
+        name: value
+        for name, value in about.items()
+        if name not in ("columns", "checksums", "sha256")
     }
-    about = {name: value for name, value in found.attrs.items() if name != "columns"}
-    ordered = found[[*names, "status", "message", "seconds"]]
-    ordered.attrs = about
-    return ordered.assign_coords(coordinates)
+    return ordered.assign_coords(coordinate_arrays(_grid(json.loads(about["study"]))))
+
+
+def _grid(study: dict[str, Any]) -> Grid:
+    return Grid({axis["name"]: Axis(axis["values"], axis["unit"]) for axis in study["axes"]})
+
+
+def _columns(about: dict[str, Any]) -> tuple[Column, ...]:
+    """Return the columns of the results from the attributes of a store."""
+    entries = json.loads(about.get("columns", "[]"))
+    return tuple(Column(**entry | {"shape": tuple(entry["shape"])}) for entry in entries)
+
+
+def _chunk_shape(grid: tuple[int, ...], new: Variable) -> tuple[int, ...]:
+    """Return the shape of chunks: a rectangle of consecutive points, with all values of each.
+
+    Of a grid of 5 x 4 x 10 points, a chunk of at most 100 has 2 x 4 x 10.
+    """
+    values = new.shape[len(grid) :]
+    room = max(1, min(POINTS, BYTES // (8 * max(1, math.prod(values)))))
+    sizes: list[int] = []
+    for length in reversed(grid):
+        sizes.append(min(length, max(1, room)))
+        room = room // length if room >= length else 0
+    return (*reversed(sizes), *(max(1, length) for length in values))

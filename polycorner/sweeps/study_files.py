@@ -10,32 +10,54 @@ from typing import Any
 
 import numpy as np
 
+from polycorner.checks import choice, instance, real, whole
 from polycorner.errors import nearest
 from polycorner.sweeps.execution import check_arguments
 from polycorner.sweeps.grid import Axis, Grid
 
 KEYS = ("study", "seed", "axes", "fixed")
 AXIS = ("values", "start", "stop", "count", "spacing", "unit")
-SHIPPED = "polycorner.dumbbells.studies"  # has the table STUDIES
 SPACINGS: Mapping[str, Callable[..., Any]] = {"linear": np.linspace, "logarithmic": np.geomspace}
 
 
 @dataclass(frozen=True)
+class NamedStudy:
+    """A study that files refer to by a name.
+
+    Attributes
+    ----------
+    function : callable
+        For :func:`~polycorner.sweeps.sweep`.
+    units : mapping from str to str
+        Units of its parameters.
+    file : Path
+        A study file with usual values.
+    figure : callable
+        Returns a figure of the results, or None where none is apt.
+    """
+
+    function: Callable[..., Mapping[str, Any]]
+    units: Mapping[str, str]
+    file: Path
+    figure: Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
 class StudyFile:
-    """What is in the file of a study.
+    """The contents of a study file.
 
     Attributes
     ----------
     study : str
-        Name of a study that ships, or ``module:function``.
+        The name of a study, or ``module:function``.
     function : callable
     grid : Grid
     fixed : dict
-        Arguments that are the same at every point.
+        Arguments with the same value at every point.
     seed : int or None
         None for the default.
     random : bool
-        Whether the function draws random numbers.
+        Whether the function takes a random generator.
     """
 
     study: str
@@ -46,12 +68,14 @@ class StudyFile:
     random: bool
 
 
-def read_study(path: str | os.PathLike[str]) -> StudyFile:
-    """Read a study from a TOML file; a function of the user's own is imported, so its module runs.
+def read_study(
+    path: str | os.PathLike[str], named: Mapping[str, NamedStudy] | None = None
+) -> StudyFile:
+    """Read a study from a TOML file; the module of a user's own function is imported and runs.
 
     ::
 
-        study = "heading"                 # or "my_module:my_function"
+        study = "my_module:my_function"   # or one of the names, such as "heading"
         seed = 1                          # optional
 
         [axes]
@@ -61,6 +85,12 @@ def read_study(path: str | os.PathLike[str]) -> StudyFile:
         [fixed]
         drum_radius = 125
 
+    Parameters
+    ----------
+    path : path
+    named : mapping from str to NamedStudy, optional
+        Studies that the file may refer to by name.
+
     Raises
     ------
     ValueError
@@ -69,7 +99,7 @@ def read_study(path: str | os.PathLike[str]) -> StudyFile:
     file = Path(path)
     content = _content(file)
     try:
-        return _study(content)
+        return _study(content, named or {})
     except (TypeError, ValueError) as error:
         msg = f"{file}: {error}"
         raise ValueError(msg) from error
@@ -87,59 +117,46 @@ def _content(file: Path) -> dict[str, Any]:
         raise ValueError(msg) from error
 
 
-def _study(content: dict[str, Any]) -> StudyFile:
-    _known("", content, KEYS)
+def _study(content: dict[str, Any], named: Mapping[str, NamedStudy]) -> StudyFile:
+    _check_keys("", content, KEYS)
     name = content.get("study")
     if not isinstance(name, str):
-        msg = f"study: expected {', '.join(_shipped())} or module:function; got {name!r}"
-        raise ValueError(msg)
-    function, units = _function(name)
-    axes = _table(content, "axes")
+        msg = f"study: expected {_expected(named)}; got {name!r}"
+        raise TypeError(msg)
+    function, units = _function(name, named)
+    axes = instance("axes", content.get("axes", {}), dict)
     if not axes:
         msg = "axes: expected a table with the values of each parameter; got none"
         raise ValueError(msg)
     grid = Grid.of({key: _axis(key, entry, units.get(key, "")) for key, entry in axes.items()})
-    fixed = _table(content, "fixed")
-    random = check_arguments(function, grid, fixed, names=("axes", "fixed"))
+    fixed = instance("fixed", content.get("fixed", {}), dict)
+    random = check_arguments(function, grid, fixed, called=("axes", "fixed"))
     seed = content.get("seed")
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
-        msg = f"seed: expected a whole number not below 0; got {seed!r}"
-        raise ValueError(msg)
-    return StudyFile(name, function, grid, fixed, seed, random)
+    chosen = None if seed is None else whole("seed", seed, least=0)
+    return StudyFile(name, function, grid, fixed, chosen, random)
 
 
-def _known(field: str, keys: Iterable[str], known: Iterable[str]) -> None:
-    listed = list(known)
+def _check_keys(field: str, keys: Iterable[str], known: tuple[str, ...]) -> None:
     for key in keys:
-        if key not in listed:
+        if key not in known:
             where = f"{field}: " if field else ""
-            msg = f"{where}expected {', '.join(listed)}; got {nearest(key, listed)}"
+            msg = f"{where}expected {', '.join(known)}; got {nearest(key, known)}"
             raise ValueError(msg)
 
 
-def _table(content: dict[str, Any], key: str) -> dict[str, Any]:
-    table = content.get(key, {})
-    if not isinstance(table, dict):
-        msg = f"{key}: expected a table; got {table!r}"
-        raise TypeError(msg)
-    return table
+def _expected(named: Mapping[str, NamedStudy]) -> str:
+    return f"{', '.join(named)} or module:function" if named else "module:function"
 
 
-def _shipped() -> Mapping[str, Any]:
-    """Return the studies that ship, by name."""
-    found: Mapping[str, Any] = import_module(SHIPPED).STUDIES
-    return found
-
-
-def _function(name: str) -> tuple[Callable[..., Mapping[str, Any]], Mapping[str, str]]:
+def _function(
+    name: str, named: Mapping[str, NamedStudy]
+) -> tuple[Callable[..., Mapping[str, Any]], Mapping[str, str]]:
     """Return the function of a study and the units of its parameters."""
+    if name in named:
+        return named[name].function, named[name].units
     if ":" not in name:
-        studies = _shipped()
-        if name not in studies:
-            expected = ", ".join(studies)
-            msg = f"study: expected {expected} or module:function; got {nearest(name, studies)}"
-            raise ValueError(msg)
-        return studies[name].function, studies[name].units
+        msg = f"study: expected {_expected(named)}; got {nearest(name, named)}"
+        raise ValueError(msg)
     module, _, attribute = name.partition(":")
     try:
         function: Any = import_module(module)
@@ -154,7 +171,7 @@ def _function(name: str) -> tuple[Callable[..., Mapping[str, Any]], Mapping[str,
 def _axis(name: str, entry: Any, unit: str) -> Axis:
     field = f"axes.{name}"
     if isinstance(entry, dict):
-        _known(field, entry, AXIS)
+        _check_keys(field, entry, AXIS)
     table = entry if isinstance(entry, dict) else {"values": entry}
     try:
         return Axis(_values(table), table.get("unit", unit))
@@ -173,15 +190,6 @@ def _values(table: dict[str, Any]) -> Any:
     if not ranged <= set(table):
         msg = f"expected values, or start, stop and count; got {', '.join(table) or 'nothing'}"
         raise ValueError(msg)
-    for end in ("start", "stop"):
-        if isinstance(table[end], bool) or not isinstance(table[end], int | float):
-            msg = f"{end}: expected a number; got {table[end]!r}"
-            raise TypeError(msg)
-    count, spacing = table["count"], table.get("spacing", "linear")
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        msg = f"count: expected a positive whole number; got {count!r}"
-        raise ValueError(msg)
-    if spacing not in SPACINGS:
-        msg = f"spacing: expected {' or '.join(SPACINGS)}; got {spacing!r}"
-        raise ValueError(msg)
-    return SPACINGS[spacing](table["start"], table["stop"], count)
+    start, stop = real("start", table["start"]), real("stop", table["stop"])
+    spacing = SPACINGS[choice("spacing", table.get("spacing", "linear"), SPACINGS)]
+    return spacing(start, stop, whole("count", table["count"], least=1))

@@ -1,4 +1,4 @@
-"""Who computes the points: this process, an executor, a pool of processes, a Dask cluster."""
+"""Workers that compute points: this process, an executor, processes, a Dask cluster."""
 
 import multiprocessing
 import os
@@ -9,11 +9,12 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from typing import Any
 
-from polycorner.sweeps.results import SweepError
+from polycorner.checks import refuse, whole
+from polycorner.sweeps.study import SweepError
 
 AHEAD = 3  # batches in flight for each worker
 LARGEST = 200  # points in a batch
-WATCHED = 5.0  # s between two looks at how many workers a cluster has
+REFRESH = 5.0  # s between two looks at the number of workers of a cluster
 
 
 class Inline(Executor):
@@ -29,90 +30,78 @@ class Inline(Executor):
         return future
 
 
-class Crew:
-    """An executor, how many work there, and what to do when one of them dies.
+class Workers:
+    """An executor, and the number of points that it computes at a time.
 
     Parameters
     ----------
     executor : Executor
-    width : callable
-        Returns how many points are computed at a time.
+    count : callable
+        Returns the number of workers.
+    largest, ahead : int, optional
+        Points in a batch, and batches in flight for each worker, at most.
     """
 
-    renews = False  # whether a broken executor is replaced
-    largest = LARGEST  # points in a batch
-    ahead = AHEAD  # batches in flight for each worker
-
-    def __init__(self, executor: Executor, width: Callable[[], int]) -> None:
-        self.executor = executor
-        self._width, self._looked, self._workers = width, -WATCHED, 1
+    def __init__(
+        self,
+        executor: Executor,
+        count: Callable[[], int],
+        *,
+        largest: int = LARGEST,
+        ahead: int = AHEAD,
+    ) -> None:
+        self.executor, self.largest, self.ahead = executor, largest, ahead
+        self._count, self._looked, self._workers = count, -REFRESH, 1
 
     @property
-    def width(self) -> int:
-        """How many points are computed at a time."""
+    def in_flight(self) -> int:
+        """Number of batches that may be in flight."""
         now = time.monotonic()
-        if now - self._looked >= WATCHED:
-            self._workers, self._looked = max(1, self._width()), now
-        return self._workers
+        if now - self._looked >= REFRESH:
+            self._workers, self._looked = max(1, self._count()), now
+        return self.ahead * self._workers
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """Hand in a call."""
-        return self.executor.submit(function, *arguments)
+    def replace(self) -> bool:
+        """Replace a broken executor; return whether there is a new one."""
+        return False
 
-    def renew(self) -> None:
-        """Replace a broken executor."""
-        msg = "executor: expected one that can be replaced"
-        raise SweepError(msg)
-
-    def leave(self, *, at_once: bool) -> None:
-        """End what this crew started itself."""
+    def close(self, *, at_once: bool) -> None:
+        """Stop what was started here."""
 
 
-class Alone(Crew):
-    """One worker, the process at work itself, which computes point by point."""
-
-    largest = 1
-    ahead = 1
-
-    def __init__(self) -> None:
-        super().__init__(Inline(), lambda: 1)
-
-
-class Pool(Crew):
-    """Processes of our own, started anew when one of them dies.
+class Processes(Workers):
+    """Processes that are started here, and replaced when one of them dies.
 
     Parameters
     ----------
     count : int
-        How many.
     """
 
-    renews = True
-
     def __init__(self, count: int) -> None:
-        self.count = count
-        super().__init__(self._start(), lambda: count)
+        super().__init__(self._started(count), lambda: count)
 
-    def _start(self) -> ProcessPoolExecutor:
+    @staticmethod
+    def _started(count: int) -> ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")  # nothing is inherited but the code
-        executor = ProcessPoolExecutor(self.count, mp_context=context, initializer=_serve)
+        executor = ProcessPoolExecutor(count, mp_context=context, initializer=_serve)
         try:
             executor.submit(os.getpid).result()
         except BrokenExecutor as error:
             msg = (
-                f"executor: expected {self.count} processes to start; got {error} (a script has to "
+                f"executor: expected {count} processes to start; got {error} (a script has to "
                 'call sweep under `if __name__ == "__main__":`)'
             )
             raise SweepError(msg) from error
         return executor
 
-    def renew(self) -> None:
+    def replace(self) -> bool:
         """Start the processes anew."""
-        self.leave(at_once=True)
-        self.executor = self._start()
+        self.close(at_once=True)
+        self.executor = self._started(self._count())
+        return True
 
-    def leave(self, *, at_once: bool) -> None:
-        """End the processes: those at work after what they do, or at once."""
+    def close(self, *, at_once: bool) -> None:
+        """Stop the processes after what they are computing, or at once."""
         workers = dict(getattr(self.executor, "_processes", None) or {})
         self.executor.shutdown(wait=not at_once, cancel_futures=True)
         if at_once:
@@ -122,7 +111,7 @@ class Pool(Crew):
 
 
 def _serve() -> None:
-    """Leave Ctrl-C to the process that started this one, and end when that does."""
+    """Ignore Ctrl-C, which the parent process handles, and end when the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -134,38 +123,27 @@ def _follow(parent: Any) -> None:
     os._exit(1)
 
 
-def hired(executor: Any) -> Crew:
-    """Return who is meant by the argument ``executor`` of a sweep.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If nobody is.
-    """
+def workers_of(executor: Any) -> Workers:
+    """Return the workers that the argument ``executor`` of a sweep stands for."""
     if executor is None:
-        return Alone()
-    if isinstance(executor, int) and not isinstance(executor, bool):
-        if executor < 1:
-            msg = f"executor: expected a positive number of processes; got {executor}"
-            raise ValueError(msg)
-        return Pool(executor)
+        return Workers(Inline(), lambda: 1, largest=1, ahead=1)
+    if isinstance(executor, int):
+        return Processes(whole("executor", executor, least=1))
     if isinstance(executor, Executor):
         count = getattr(executor, "_max_workers", None) or os.cpu_count() or 1
-        return Crew(executor, lambda: int(count))
-    if callable(getattr(executor, "get_executor", None)):
-        return Crew(executor.get_executor(pure=False), lambda: sum(executor.nthreads().values()))
-    msg = (
-        "executor: expected an Executor of concurrent.futures, a Client of Dask, a number of "
-        f"processes or None; got {executor!r}"
-    )
-    raise TypeError(msg)
+        return Workers(executor, lambda: int(count))
+    if not callable(getattr(executor, "get_executor", None)):
+        kinds = "an Executor of concurrent.futures, a Client of Dask, a number of processes or None"
+        refuse("executor", kinds, executor, TypeError)
+    threads: Any = executor.nthreads
+    return Workers(executor.get_executor(pure=False), lambda: sum(threads().values()))
 
 
-def is_lost(error: BaseException) -> bool:
-    """Whether an error of a future says that the executor itself is gone."""
+def is_broken(error: BaseException) -> bool:
+    """Whether the error of a future means that the executor itself is gone."""
     return isinstance(error, BrokenExecutor | CancelledError)
 
 
-def is_killer(error: BaseException) -> bool:
-    """Whether an error of a future says that computing it killed workers of a cluster."""
+def killed_workers(error: BaseException) -> bool:
+    """Whether the error of a future means that computing it killed workers of a cluster."""
     return type(error).__name__ == "KilledWorker"  # of distributed, which is not imported here

@@ -1,7 +1,8 @@
-"""``polycorner sweep``: results, files, going on, and one line for a mistake."""
+"""``polycorner sweep``: results, files, interruptions, and one line for a mistake."""
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,8 +14,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from polycorner.dumbbells.studies import heading
-from polycorner.sweeps.execution import open_results, sweep
+from polycorner.dumbbells.studies import STUDIES, heading
+from polycorner.sweeps import Axis, Grid, StudyFile, open_results, sweep
 
 TESTS = Path(__file__).parents[1]
 HEADING = """
@@ -33,14 +34,16 @@ b = [1, 2, 3, 4, 5]
 FUNCTION = """
 import time
 def slow(a, b, rng):
+    open("calls", "a").write("x")
     time.sleep(0.02)
     return {"x": rng.normal()}
 """
 
 
 @pytest.fixture(autouse=True)
-def own_path(monkeypatch):
-    """Let each test have modules of its own beside its files."""
+def own_path(monkeypatch, tmp_path):
+    """Let each test have a folder of its own, with modules beside its files."""
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path[:])
     monkeypatch.delitem(sys.modules, "own_functions", raising=False)
 
@@ -96,15 +99,18 @@ def test_quiet_prints_the_answer_alone(capsys, tmp_path, file):
     assert "wrote" not in printed
 
 
-@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGKILL])
-def test_stopped_it_goes_on_with_resume_and_only_then(capsys, tmp_path, blow):
+@pytest.mark.parametrize(
+    ("blow", "quiet"), [(signal.SIGINT, ()), (signal.SIGINT, ("--quiet",)), (signal.SIGKILL, ())]
+)
+def test_interrupted_it_resumes_with_resume_and_only_then(capsys, tmp_path, blow, quiet):
     (tmp_path / "own.toml").write_text(OWN)
     (tmp_path / "own_functions.py").write_text(FUNCTION)
     out = tmp_path / "out"
     command = ("sweep", str(tmp_path / "own.toml"), "--out", str(out), "--workers", "1")
-    journal = out / "sweep.zarr" / "journal" / "points.jsonl"
+    calls = tmp_path / "calls"
     with subprocess.Popen(
-        [sys.executable, "-m", "polycorner", *command],
+        [sys.executable, "-m", "polycorner", *command, *quiet],
+        cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": str(TESTS.parent)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -112,14 +118,15 @@ def test_stopped_it_goes_on_with_resume_and_only_then(capsys, tmp_path, blow):
     ) as running:
         until = time.monotonic() + 60
         while running.poll() is None and time.monotonic() < until:
-            if journal.exists() and journal.read_bytes().count(b"\n") > 10:
+            if calls.exists() and calls.stat().st_size > 40:
                 break
             time.sleep(0.02)
         running.send_signal(blow)
         printed, err = running.communicate(timeout=60)
     if blow == signal.SIGINT:
         assert running.returncode == 130
-        assert "the same command with --resume goes on" in err
+        assert "kept in" in err
+        assert "the same command with --resume computes the rest" in err
         assert "pending" in printed
     code, _, err = run(capsys, *command[1:])
     assert code == 2
@@ -148,7 +155,7 @@ def test_a_seed_overrides_the_files(capsys, tmp_path):
 
 
 MISTAKES = {
-    ("--workers", "0"): "--workers: expected a positive whole number",
+    ("--workers", "0"): "--workers: expected",
     ("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"): "--workers: expected no --scheduler",
     ("--seed", "-1"): "--seed: expected",
     ("--seed", "1"): "--seed: expected none, for heading draws no random numbers",
@@ -156,6 +163,49 @@ MISTAKES = {
     ("--resume", "--out", "{tmp}/none"): "--resume: expected a study in",
     ("--sceduler", "x"): "--sceduler",
 }
+
+
+def test_studies_of_the_package_go_by_name_and_help_lists_them(capsys, tmp_path, monkeypatch):
+    code, printed, err = run(capsys, "--help")
+    assert (code, err) == (0, "")
+    for name, study in STUDIES.items():
+        assert f"\n    {name} " in printed
+        assert study.file.is_file()
+    assert str(STUDIES["heading"].file.parent) in printed.replace("\n", "")
+    (tmp_path / "heading").mkdir()  # as --out heading leaves it
+    grid = Grid({"length": Axis([16.0]), "rod_radius": Axis([1.5])})
+    short = StudyFile("heading", heading, grid, {}, None, random=False)
+    monkeypatch.setattr("polycorner.sweeps.study_files.read_study", lambda *_: short)
+    code, printed, err = run(capsys, "heading", "--workers", 1)
+    assert (code, err) == (0, "")
+    assert "1 of 1 points done" in printed
+
+
+def test_examples_in_the_help_are_studies_that_exist(capsys):
+    _, printed, _ = run(capsys, "--help")
+    named = re.findall(r"polycorner sweep (\w+) ", printed)
+    assert set(named) <= set(STUDIES)
+    assert named
+
+
+@pytest.mark.parametrize("study", ["haeding", "none.toml", "no/heading"])
+def test_a_study_that_does_not_exist_is_named(capsys, study):
+    code, out, err = run(capsys, study)
+    assert (code, out) == (2, "")
+    assert study in err
+    assert err.count("\n") == 1
+
+
+def test_a_damaged_store_is_refused_and_the_file_is_named(capsys, tmp_path, file):
+    out = tmp_path / "out"
+    assert run(capsys, file, "--out", out, "--workers", 1)[0] == 0
+    for damaged in (out / "sweep.zarr" / "status" / "c" / "0" / "0", out / "sweep.zarr/zarr.json"):
+        content = damaged.read_bytes()
+        damaged.write_bytes(content[:5] + bytes([content[5] ^ 4]) + content[6:])
+        code, printed, err = run(capsys, file, "--out", out)
+        assert (code, printed) == (2, "")
+        assert str(damaged) in err
+        damaged.write_bytes(content)
 
 
 @pytest.mark.parametrize(("arguments", "words"), MISTAKES.items())

@@ -14,7 +14,7 @@ from polycorner.dumbbells.dynamics.dyads import follow_dyads
 from polycorner.dumbbells.statics.minima import dyad_minima
 from polycorner.dumbbells.studies import bunch, climbing, heading
 from polycorner.motion.noise import Noise
-from polycorner.sweeps.execution import sweep
+from polycorner.sweeps import sweep
 
 
 @pytest.mark.parametrize("chirality", ["R", "L"])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sweep_functions
 
-from polycorner.sweeps.execution import SweepError, open_results, sweep
+from polycorner.sweeps import SweepError, open_results, sweep
 
 distributed = pytest.importorskip("distributed")
 TESTS = Path(__file__).parents[1]
@@ -21,7 +21,7 @@ FIXED = {"pause": 0.01}
 
 @contextmanager
 def running(*arguments):
-    path = os.pathsep.join([str(TESTS), str(TESTS.parent)])
+    path = os.pathsep.join([str(TESTS / "support"), str(TESTS.parent)])
     quiet = subprocess.DEVNULL
     with subprocess.Popen(
         [sys.executable, "-m", *arguments],
@@ -60,7 +60,7 @@ def cluster(tmp_path, caplog):
 def killing(process, after):
     """Return a progress that kills a process once so many points are done."""
 
-    def progress(done, _failed, _total):
+    def progress(done, _total, _note):
         if done > after and process.poll() is None:
             process.kill()
             process.wait()
@@ -80,7 +80,7 @@ def test_a_worker_killed_on_the_way_then_the_scheduler(cluster, tmp_path):
         assert found[name].values.tobytes() == serial[name].values.tobytes()
 
     store = tmp_path / "s.zarr"
-    with pytest.raises(SweepError, match=r"they are gone.*kept in .*s\.zarr; the same"):
+    with pytest.raises(SweepError, match=r"workers that answer.*kept in .*s\.zarr; the same"):
         sweep(**given, executor=client, store=store, progress=killing(scheduler, 40))
     kept = open_results(store)
     done = kept["status"].values == 1

@@ -1,10 +1,8 @@
-"""Studies against the loop they stand for; random streams, failures, workers, wrong use."""
+"""Studies against the loop over their points; random streams, failures, provenance."""
 
 import itertools
 import json
-import sys
-import threading
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -13,9 +11,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.sweeps import scheduling as sweep_dispatch
-from polycorner.sweeps.execution import Axis, SweepError, sweep
-from polycorner.sweeps.workers import AHEAD, Crew, Inline
+from polycorner.sweeps import sweep
 
 GRID = {"a": ([0, 1, 2], "mm"), "b": [1, 2, 3, 4]}
 
@@ -113,12 +109,14 @@ def test_every_point_has_the_stream_its_number_spawns(seed):
     assert found.attrs["seed"] == seed
 
 
-def test_a_seed_that_was_not_given_is_told_and_gives_the_same_again():
-    first = sweep(sweep_functions.drawn, {"a": [1], "b": [2, 3]})
+def test_the_default_seed_is_zero_and_a_generator_gives_one():
+    grid = {"a": [1], "b": [2, 3]}
+    first = sweep(sweep_functions.drawn, grid)
+    assert first.attrs["seed"] == 0
     assert "rng" not in first.attrs["fixed"]
-    again = sweep(sweep_functions.drawn, {"a": [1], "b": [2, 3]}, rng=first.attrs["seed"])
-    xr.testing.assert_identical(plain(first), plain(again))
-    assert sweep(sweep_functions.drawn, {"a": [1], "b": [2]}).attrs["seed"] != first.attrs["seed"]
+    xr.testing.assert_identical(plain(first), plain(sweep(sweep_functions.drawn, grid, rng=0)))
+    drawn = sweep(sweep_functions.drawn, grid, rng=np.random.default_rng(7)).attrs["seed"]
+    assert drawn == np.random.default_rng(7).integers(2**63)
 
 
 @pytest.mark.parametrize("workers", [1, 3, 40])
@@ -141,7 +139,7 @@ def test_the_dataset_tells_where_it_is_from(tmp_path):
         "name": "a", "unit": "mm", "values": [1.5]
     }  # fmt: skip
     assert found.attrs["complete"] == "finished"
-    assert found.attrs["polycorner_sweep"] == 1
+    assert found.attrs["polycorner_sweep"] == 2
     assert found.attrs["command"]
     found.to_netcdf(tmp_path / "found.nc", engine="h5netcdf")
     with xr.open_dataset(tmp_path / "found.nc", engine="h5netcdf") as back:
@@ -150,166 +148,8 @@ def test_the_dataset_tells_where_it_is_from(tmp_path):
 
 
 def test_progress_counts_up_to_all_points():
-    counts = []
-    sweep(sweep_functions.mixed, GRID, progress=lambda *now: counts.append(now))
-    assert counts[0] == (0, 0, 12)
-    assert counts[-1] == (11, 1, 12)
-    finished = [done + failed for done, failed, _ in counts]
-    assert finished == sorted(finished)
-
-
-# ------------------------------------------------------------------------------------- workers
-
-
-class Watched(Executor):
-    """An executor that computes in threads and notes how many calls were open at a time."""
-
-    _max_workers = 2
-
-    def __init__(self):
-        self.pool, self.open, self.most, self.guard = ThreadPoolExecutor(2), 0, 0, threading.Lock()
-
-    def submit(self, fn, /, *args):
-        with self.guard:
-            self.open += 1
-            self.most = max(self.most, self.open)
-        future = self.pool.submit(fn, *args)
-        future.add_done_callback(self._landed)
-        return future
-
-    def _landed(self, _future):
-        with self.guard:
-            self.open -= 1
-
-
-def test_few_batches_are_in_flight_however_large_the_grid():
-    executor = Watched()
-    found = sweep(lambda a, b: {"x": a * b}, {"a": range(100), "b": range(200)}, executor=executor)
-    executor.pool.shutdown()
-    assert executor.most <= AHEAD * 2 + 1
-    assert (found["x"].values == np.outer(range(100), range(200))).all()
-
-
-def test_points_a_worker_has_no_time_for_are_handed_out_again(monkeypatch):
-    monkeypatch.setattr(sweep_dispatch, "BUDGET", 0.0)
-    grid = {"a": range(20), "b": range(30)}
-    with ThreadPoolExecutor(2) as pool:
-        found = sweep(sweep_functions.drawn, grid, executor=pool, rng=5)
-    xr.testing.assert_identical(plain(found), plain(sweep(sweep_functions.drawn, grid, rng=5)))
-
-
-class Faulty(Inline):
-    """An executor whose batches with a certain point, or from a certain call on, break."""
-
-    def __init__(self, error, *, point=None, after=10**9):
-        self.error, self.point, self.after, self.calls = error, point, after, 0
-
-    def submit(self, fn, /, job, numbers, *args):
-        self.calls += 1
-        if self.point in numbers or self.calls > self.after:
-            future = Future()
-            future.set_exception(self.error)
-            return future
-        return super().submit(fn, job, numbers, *args)
-
-
-def test_workers_that_are_gone_leave_what_was_finished():
-    executor = Faulty(BrokenExecutor("all died"), after=3)
-    with pytest.raises(SweepError, match=r"they are gone.*all died.*points are") as stopped:
-        sweep(sweep_functions.mixed, GRID, executor=executor)
-    found = stopped.value.results
-    done = found["status"].values.ravel() > 0
-    assert 0 < done.sum() < done.size
-    assert found.attrs["complete"] == "interrupted"
-    whole = sweep(sweep_functions.mixed, GRID)["total"].values.ravel()
-    np.testing.assert_array_equal(found["total"].values.ravel()[done], whole[done])
-
-
-def test_an_executor_that_is_shut_down_is_said_to_be():
-    pool = ThreadPoolExecutor(1)
-    pool.shutdown()
-    with pytest.raises(SweepError, match="cannot schedule new futures after shutdown"):
-        sweep(sweep_functions.mixed, GRID, executor=pool)
-
-
-KilledWorker = type("KilledWorker", (Exception,), {})  # what a cluster raises
-
-
-@pytest.mark.parametrize("renews", [False, True])
-def test_a_point_that_kills_its_workers_is_a_row_and_the_others_are_there(monkeypatch, renews):
-    error = BrokenExecutor("died") if renews else KilledWorker("several died")
-    executor = Faulty(error, point=17)
-    crew = Crew(executor, lambda: 2)
-    crew.renews, crew.renew = renews, lambda: None
-    monkeypatch.setattr(sys.modules[sweep.__module__], "hired", lambda _: crew)
-    found = sweep(lambda a: {"x": a}, {"a": range(40)}, executor=executor)
-    assert found["status"].values.tolist() == [1 + (k == 17) for k in range(40)]
-    assert found["message"].values[17].startswith("WorkerDied: ")
-    assert np.nansum(found["x"]) == sum(range(40)) - 17
-
-
-@pytest.mark.slow
-def test_processes_that_die_are_replaced():
-    found = sweep(sweep_functions.deadly, {"a": range(3), "b": range(4)}, executor=2)
-    failed = np.argwhere(found["status"].values == 2).tolist()
-    assert failed == [[1, 2]]
-    assert found["message"].values[1, 2].startswith("WorkerDied: ")
-    expected = np.add.outer(np.arange(3.0), np.arange(4))
-    expected[1, 2] = np.nan
-    np.testing.assert_array_equal(found["x"].values, expected)
-
-
-def test_a_function_that_workers_cannot_load_is_named():
-    with pytest.raises(TypeError, match=r"function: expected one that workers can load.*<lambda>"):
-        sweep(lambda a: {"x": a}, {"a": [1]}, executor=1)
-
-
-class Picky(Inline):
-    """An executor that says at once what it cannot send."""
-
-    def submit(self, fn, /, *args):
-        del fn, args
-        msg = "cannot pickle 'socket' object"
-        raise TypeError(msg)
-
-
-def test_an_executor_may_say_so_when_it_is_given_the_call():
-    with pytest.raises(TypeError, match=r"function: expected one that workers.*'socket'"):
-        sweep(sweep_functions.mixed, GRID, executor=Picky())
-
-
-# ----------------------------------------------------------------------------------- wrong use
-
-WRONG = {
-    "grid: expected a mapping": {"grid": [1, 2]},
-    "grid: a: values: expected a list": {"grid": {"a": 3, "b": [1]}},
-    "grid: a: values: expected values that differ; got 2 twice": {"grid": {"a": [1, 2, 2]}},
-    "grid: a: values: expected numbers; got nan": {"grid": {"a": [1.0, float("nan")], "b": [1]}},
-    "grid: a: values: expected numbers only": {"grid": {"a": [1, "x"], "b": [1]}},
-    "grid: expected names of parameters": {"grid": {"status": [1]}},
-    r"got paus \(did you mean pause\?\)": {"fixed": {"paus": 1}},
-    "grid: expected all that the function needs; b is missing": {"grid": {"a": [1]}},
-    "fixed: expected parameters that are no axis; got b": {"fixed": {"b": 1}},
-    "fixed: expected numbers, texts": {"fixed": {"log": object()}},
-    "rng: expected a seed": {"rng": -1},
-    "executor: expected a positive number": {"executor": 0},
-    "executor: expected an Executor": {"executor": "here"},
-    "store: expected a folder": {"store": __file__},
-}
-
-
-@pytest.mark.parametrize(("words", "wrong"), WRONG.items())
-def test_wrong_arguments_are_named(words, wrong):
-    given = {"grid": {"a": [1], "b": [2]}} | wrong
-    with pytest.raises((TypeError, ValueError), match=words):
-        sweep(sweep_functions.drawn, **given)
-
-
-def test_a_unit_is_a_text():
-    with pytest.raises(TypeError, match="unit: expected a text"):
-        Axis([1], 3)
-
-
-def test_a_seed_for_a_function_without_chance_is_refused():
-    with pytest.raises(ValueError, match="rng: expected none"):
-        sweep(sweep_functions.mixed, GRID, rng=1)
+    reports = []
+    sweep(sweep_functions.mixed, GRID, progress=lambda *report: reports.append(report))
+    assert reports[0] == (0, 12, "")
+    assert reports[-1] == (12, 12, "1 failed")
+    assert [done for done, _, _ in reports] == sorted(done for done, _, _ in reports)

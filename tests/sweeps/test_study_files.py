@@ -1,15 +1,10 @@
-"""Studies in TOML files: what they say, and what is wrong with them."""
-
-from pathlib import Path
+"""Studies in TOML files: their contents, and mistakes in them."""
 
 import numpy as np
 import pytest
 
-from polycorner.dumbbells.studies import bunch, climbing, heading
-from polycorner.sweeps.execution import sweep
-from polycorner.sweeps.study_files import read_study
-
-EXAMPLES = Path(__file__).parents[2] / "examples" / "studies"
+from polycorner.dumbbells.studies import STUDIES, bunch, climbing, heading
+from polycorner.sweeps import read_study, sweep
 
 
 def written(tmp_path, text):
@@ -18,8 +13,8 @@ def written(tmp_path, text):
     return file
 
 
-def test_examples_are_studies():
-    studies = {file.stem: read_study(file) for file in EXAMPLES.glob("*.toml")}
+def test_files_of_the_package_are_studies():
+    studies = {name: read_study(study.file, STUDIES) for name, study in STUDIES.items()}
     assert {name: plan.function for name, plan in studies.items()} == {
         "heading": heading, "climbing": climbing, "bunch": bunch
     }  # fmt: skip
@@ -46,11 +41,11 @@ def test_axes_are_lists_or_ranges(tmp_path):
 MISTAKES = {
     'studdy = "heading"': r"expected study, seed, axes, fixed; got studdy \(did you mean study\?\)",
     'study = "haeding"': r"study: expected heading, climbing, bunch or .*; got haeding \(did",
-    "study = 3": "study: expected",
+    "study = 3": "study: expected heading, climbing, bunch or module:function; got 3",
     'study = "no_such_module:f"': "study: expected module:function that can be imported",
     'study = "math:no_such"': "study: expected module:function that can be imported",
     'study = "heading"': "axes: expected a table",
-    'study = "heading"\naxes = 3': "axes: expected a table; got 3",
+    'study = "heading"\naxes = 3': "axes: expected a dict; got int",
     'study = "heading"\n[axes]\nlenght = [1]\nrod_radius = [1]': r"axes: .* got lenght \(did you",
     'study = "heading"\n[axes]\nlength = [1]': "axes: .* rod_radius is missing",
     'study = "heading"\n[axes]\nlength = {start = 1, stop = 2, cuont = 3}': (
@@ -73,7 +68,7 @@ MISTAKES = {
 @pytest.mark.parametrize(("text", "words"), MISTAKES.items(), ids=range(len(MISTAKES)))
 def test_mistakes_name_file_and_field(tmp_path, text, words):
     with pytest.raises(ValueError, match=f"study.toml.*{words}"):
-        read_study(written(tmp_path, text))
+        read_study(written(tmp_path, text), STUDIES)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):

@@ -10,6 +10,7 @@ from .placements import forbidden_solid, relative_coordinates, relative_placemen
 from .scenes import atlas_scene, drum_scene, glb, pair_scene, write_scene
 from .skeleton import draw_atlas, draw_map, draw_motions
 from .solid import SolidFacts, relative_corners, relative_curves, solid_facts, write_solid
+from .studies import draw_study
 from .wells import draw_wells
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "draw_motions",
     "draw_pair",
     "draw_steady_headings",
+    "draw_study",
     "draw_wells",
     "drum_scene",
     "forbidden_solid",

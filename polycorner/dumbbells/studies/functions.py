@@ -1,8 +1,6 @@
-"""Parameter studies that ship: headings of dyads, how driven pairs climb, who leaves a bunch."""
+"""Functions for parameter studies: headings of dyads, climbing pairs, bunches in a drum."""
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,22 +9,6 @@ from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
 
 FIRST, LAST = 2.0, 14.0  # degrees between which pairs start, as far as they are several
-
-
-@dataclass(frozen=True)
-class Shipped:
-    """A study with a name.
-
-    Attributes
-    ----------
-    function : callable
-        For :func:`~polycorner.sweeps.execution.sweep`.
-    units : mapping from str to str
-        Of its parameters.
-    """
-
-    function: Callable[..., Mapping[str, Any]]
-    units: Mapping[str, str]
 
 
 def heading(
@@ -234,12 +216,3 @@ def bunch(
 def in_proportion(static: float, usual: tuple[float, float]) -> tuple[float, float]:
     """Return a static coefficient and the dynamic one, by the usual two."""
     return static, static * usual[1] / usual[0]
-
-
-LENGTHS = dict.fromkeys(("length", "ball_radius", "rod_radius", "drum_radius"), "mm")
-DRUM = LENGTHS | {"tilt": "deg", "spin": "rad/s", "duration": "s", "noise": "1"}
-STUDIES: Mapping[str, Shipped] = {
-    "heading": Shipped(heading, LENGTHS),
-    "climbing": Shipped(climbing, DRUM),
-    "bunch": Shipped(bunch, DRUM | {"top": "mm", "dt": "s"}),
-}

@@ -1,13 +1,13 @@
-"""Figures of parameter studies: what is drawn is what was computed."""
+"""Figures of parameter studies: curves, bars and means against the data."""
 
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from polycorner.dumbbells.pictures.studies import draw_study
 from polycorner.dumbbells.studies import heading
-from polycorner.pictures.sweeps import draw_study
-from polycorner.sweeps.execution import sweep
+from polycorner.sweeps import sweep
 
 RODS = [1.5, 2.9]
 

@@ -1,0 +1,5 @@
+"""Parameter studies of dumbbells: headings of dyads, climbing pairs, bunches."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

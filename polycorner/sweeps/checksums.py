@@ -1,0 +1,126 @@
+"""Checksums of a store: every file tells whether it is as it was written.
+
+A chunk ends in its CRC-32C, written by zarr's codec.  The root ``zarr.json`` holds the SHA-256
+digests of the metadata of all arrays, the numbers of their chunks where the study is finished,
+and the digest of itself, computed with zeros in its own place.
+"""
+
+import json
+import re
+from collections.abc import Iterable
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from polycorner.atomic import write_atomically
+
+ROOT = "zarr.json"
+ZEROS = "0" * 64
+DIGEST = re.compile(rb'"sha256": "([0-9a-f]{64})"')
+CONSOLIDATED = {"kind": "inline", "must_understand": False}
+
+
+def write_root(path: Path, attributes: dict[str, Any], arrays: Iterable[str]) -> None:
+    """Write the metadata of a store: its attributes, and what its arrays are.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the store.
+    attributes : dict
+    arrays : iterable of str
+        Names of its arrays, each of which has its metadata.  If the attribute ``complete`` is
+        "finished", their chunks are counted.
+    """
+    contents = {name: (path / name / ROOT).read_bytes() for name in arrays}
+    checks: dict[str, Any] = {
+        "metadata": {name: sha256(content).hexdigest() for name, content in contents.items()}
+    }
+    if attributes["complete"] == "finished":
+        checks["chunks"] = {name: len(chunks(path / name)) for name in contents}
+    metadata = {name: json.loads(content) for name, content in contents.items()}
+    document = {
+        "zarr_format": 3,
+        "node_type": "group",
+        "attributes": attributes | {"checksums": json.dumps(checks), "sha256": ZEROS},
+        "consolidated_metadata": CONSOLIDATED | {"metadata": metadata},
+    }
+    content = json.dumps(document, indent=2, allow_nan=False).encode()
+    write_atomically(
+        path / ROOT, content.replace(ZEROS.encode(), sha256(content).hexdigest().encode(), 1)
+    )
+
+
+def checked_root(path: Path) -> tuple[dict[str, Any], list[str]]:
+    """Return the attributes of a store and the names of its arrays.
+
+    Raises
+    ------
+    ValueError
+        If there is no store of a sweep, or its metadata was changed.
+    """
+    file = path / ROOT
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        msg = f"store: expected a store of a sweep; {file} cannot be read ({error.strerror})"
+        raise ValueError(msg) from error
+    if b'"polycorner_sweep": 1,' in content:
+        msg = f"store: expected one of format 2; {path} has format 1, of polycorner 0.1"
+        raise ValueError(msg)
+    found = DIGEST.search(content)
+    if found is None and b"polycorner" not in content:
+        msg = f"store: expected a store of a sweep; {file} is damaged or of something else"
+        raise ValueError(msg)
+    blank = b"" if found is None else content.replace(found[1], ZEROS.encode(), 1)
+    if found is None or sha256(blank).hexdigest().encode() != found[1]:
+        raise _changed(file)
+    document = json.loads(content)
+    return document["attributes"], list(document["consolidated_metadata"]["metadata"])
+
+
+def check_store(path: Path) -> dict[str, Any]:
+    """Read every file of a store and return its attributes.
+
+    Raises
+    ------
+    ValueError
+        Naming a file that was changed, or an array that lacks chunks.
+    """
+    import google_crc32c
+
+    attributes, arrays = checked_root(path)
+    checks = json.loads(attributes["checksums"])
+    for name in arrays:
+        file = path / name / ROOT
+        if sha256(_read(file)).hexdigest() != checks["metadata"][name]:
+            raise _changed(file)
+        files = chunks(path / name)
+        for file in files:
+            content = _read(file)
+            if google_crc32c.value(content[:-4]).to_bytes(4, "little") != content[-4:]:
+                raise _changed(file)
+        expected = checks.get("chunks", {}).get(name, len(files))
+        if len(files) != expected:
+            msg = f"store: expected {expected} chunks in {path / name}; found {len(files)}"
+            raise ValueError(msg)
+    return attributes
+
+
+def chunks(array: Path) -> list[Path]:
+    """Return the files of the chunks of an array."""
+    return sorted(file for file in (array / "c").rglob("*") if file.is_file() and not file.suffix)
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError:
+        return b""
+
+
+def _changed(file: Path) -> ValueError:
+    return ValueError(
+        f"store: expected a file as it was written; {file} was changed or damaged (checksum): "
+        "restore it, or delete the store and compute the study anew"
+    )
