@@ -52,13 +52,13 @@ def main() -> Result:
 
 def draw(result: Result, whole: PairMap, folder: Path) -> list[Path]:
     """Draw the map, the atlas and its motions into a folder."""
-    from polycorner.dumbbells.pictures.skeleton import draw_atlas, draw_map, draw_motions
+    from polycorner.dumbbells.pictures import draw_atlas, draw_motions, draw_pair_map
     from polycorner.pictures.style import save
 
     return [
         save(draw_atlas(result.atlas), folder / "ex08_atlas.png"),
         save(draw_motions(result.atlas), folder / "ex08_motions.png"),
-        save(draw_map(whole), folder / "ex08_map.png"),
+        save(draw_pair_map(whole), folder / "ex08_map.png"),
     ]
 
 

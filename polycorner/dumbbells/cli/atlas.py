@@ -57,14 +57,13 @@ def dyad(
         corner["rank"] -= 0 if pair.is_plane else 1
 
     def draw(folder: Path) -> list[Path]:
-        from polycorner.dumbbells.pictures import skeleton as pair_atlas
-        from polycorner.dumbbells.pictures import solid as pair_solid
-        from polycorner.pictures import style as plots
+        from polycorner.dumbbells.pictures import draw_atlas, draw_motions, write_solid
+        from polycorner.pictures import save
 
         return [
-            plots.save(pair_atlas.draw_atlas(whole), folder / "atlas.png"),
-            plots.save(pair_atlas.draw_motions(whole), folder / "motions.png"),
-            *pair_solid.write_solid(whole, folder),
+            save(draw_atlas(whole), folder / "atlas.png"),
+            save(draw_motions(whole), folder / "motions.png"),
+            *write_solid(whole, folder),
         ]
 
     search.finish(answer, as_json=as_json, draw=draw)

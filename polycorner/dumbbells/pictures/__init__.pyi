@@ -1,3 +1,4 @@
+from .atlas_graph import draw_atlas
 from .bifurcation import draw_bifurcation, draw_critical
 from .drum import DrumView, draw_drum, draw_history
 from .dyads import draw_heading, draw_pair
@@ -5,10 +6,11 @@ from .experiments import draw_climbing, draw_exits, draw_steady_headings
 from .film import Film, pair_film, run_film
 from .keel import draw_keel
 from .minima_map import draw_kinds, draw_minima_map
+from .motion_strips import draw_motions
 from .movies import write_movie
+from .pair_map import draw_pair_map
 from .placements import forbidden_solid, relative_coordinates, relative_placements
 from .scenes import atlas_scene, drum_scene, glb, pair_scene, write_scene
-from .skeleton import draw_atlas, draw_map, draw_motions
 from .solid import SolidFacts, relative_corners, relative_curves, solid_facts, write_solid
 from .studies import draw_study
 from .wells import draw_wells
@@ -28,10 +30,10 @@ __all__ = [
     "draw_history",
     "draw_keel",
     "draw_kinds",
-    "draw_map",
     "draw_minima_map",
     "draw_motions",
     "draw_pair",
+    "draw_pair_map",
     "draw_steady_headings",
     "draw_study",
     "draw_wells",

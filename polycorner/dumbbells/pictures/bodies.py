@@ -1,4 +1,4 @@
-"""Where balls, contacts and the wall are in space: what every view in three dimensions draws."""
+"""Places of balls, rods, contacts and the wall, shared by all drawings of dumbbells."""
 
 import math
 from dataclasses import dataclass
@@ -162,6 +162,19 @@ def _foot(segment: Array, point: Array) -> Array:
     size = float(axis @ axis)
     share = float((point - start) @ axis) / size if size > 0 else 0.0
     return np.asarray(start + min(max(share, 0.0), 1.0) * axis)
+
+
+def rod_outlines(ends: Array, radius: float) -> Array:
+    """Return the rectangles of rods in the plane, ``(..., 4, 2)``, from their ends ``(..., 2, 2)``.
+
+    A rod that is seen end on has length zero; its rectangle is then as wide as the rod.
+    """
+    axis = ends[..., 1, :] - ends[..., 0, :]
+    length = np.linalg.norm(axis, axis=-1, keepdims=True)
+    unit = np.where(length > 0, axis / np.where(length > 0, length, 1.0), np.array([1.0, 0.0]))
+    side = radius * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+    one, other = ends[..., 0, :], ends[..., 1, :]
+    return np.stack([one + side, other + side, other - side, one - side], axis=-2)
 
 
 def tube_surface(points: ArrayLike, radius: float) -> tuple[Array, NDArray[np.int64]]:

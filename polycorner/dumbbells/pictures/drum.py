@@ -11,13 +11,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.pairs import Sizes, dyads, mean_heading
 from polycorner.dumbbells.dynamics.runs import DrumRun
-from polycorner.dumbbells.pictures.skeleton import HANDS, WORDS
+from polycorner.dumbbells.pictures.bodies import rod_outlines
+from polycorner.dumbbells.pictures.symbols import HANDS, WORDS, sizes_in_words
 from polycorner.pictures.style import BODIES
 from polycorner.spaces.manifold import Array
 
 SINGLE = "#8C9BA8"
+ARROW = "0.35"
+LOWEST: dict[str, Any] = {"color": "0.6", "linewidth": 0.8, "linestyle": "--"}
 AVERAGE = "black"
 FEW = 6  # bodies that get colours of their own
 LINES = (*BODIES, "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -73,10 +77,9 @@ def _frame(axes: Axes) -> None:
 def title(run: DrumRun) -> str:
     """Return what a figure says about the parameters."""
     drum = run.drum
-    sizes = f"l = {drum.length:g}, r = {drum.ball_radius:g}, t = {drum.rod_radius:g} mm"
     place = f"R = {drum.drum_radius:g} mm, α = {math.degrees(drum.tilt):g}°"
     noise = f", noise {run.noise.chatter:g}" if run.noise.chatter else ""
-    return f"{sizes};  {place}, ω = {drum.spin:g} rad/s{noise}"
+    return f"{sizes_in_words(drum.pair)};  {place}, ω = {drum.spin:g} rad/s{noise}"
 
 
 def _curves(run: DrumRun) -> tuple[Array, Array, Array]:
@@ -173,13 +176,9 @@ class DrumView:
         self.balls = PolyCollection([], linewidths=0.5, zorder=3)
         self.axes.add_collection(self.rods)
         self.axes.add_collection(self.balls)
-        handles = [
-            Line2D([], [], color=HANDS[hand], lw=0, marker="o", label=f"{WORDS[hand]} dyad")
-            for hand in ("R", "L")
-        ]
-        if run.drum.count > 1:
+        if handles := _key(run.drum):
             place: dict[str, Any] = {"loc": "outside lower center", "ncols": 2, "frameon": False}
-            self.figure.legend(handles=handles, fontsize=8, handletextpad=0.1, **place)
+            self.figure.legend(handles=handles, fontsize=8, **place)
         self.words = self.figure.suptitle(" ", fontsize=11)
         self.moving = (self.rods, self.balls, self.words)
 
@@ -202,7 +201,7 @@ class DrumView:
     def _draw_drum(self, low: float, high: float) -> None:
         drum, axes = self.run.drum, self.axes
         axes.set_facecolor("#FBFAF7")
-        axes.axvline(0, color="0.6", linewidth=0.8, linestyle="--", zorder=1)
+        axes.axvline(0, zorder=1, **LOWEST)
         if drum.floor:
             axes.axhspan(low, 0, color="0.55", zorder=1)
         if math.isfinite(drum.top) and high > drum.top:
@@ -210,7 +209,7 @@ class DrumView:
         if drum.spin:
             ends = ((0.03, 0.94), (0.2, 0.94))
             start, stop = ends if drum.spin > 0 else ends[::-1]
-            arrow = {"arrowstyle": "-|>", "color": "0.35", "lw": 1.4}
+            arrow = {"arrowstyle": "-|>", "color": ARROW, "lw": 1.4}
             axes.annotate(
                 "", stop, xytext=start, xycoords="axes fraction", arrowprops=arrow, zorder=4
             )
@@ -225,7 +224,7 @@ class DrumView:
             colours[i] = colours[j] = HANDS[hand]
         balls = self.sizes.balls(path.q[index, here])
         faces = [colours[body] for body in here.tolist()]
-        self.rods.set_verts(_rods(balls, self.run.drum.rod_radius))
+        self.rods.set_verts(list(rod_outlines(balls, self.run.drum.rod_radius)))
         self.rods.set(facecolor=[(*_rgb(c), 0.75) for c in faces], edgecolor="white")
         self.balls.set_verts(_disks(balls.reshape(-1, 2), self.run.drum.ball_radius))
         self.balls.set(facecolor=[c for c in faces for _ in range(2)], edgecolor="white")
@@ -235,18 +234,26 @@ class DrumView:
         return self.figure
 
 
+def _key(drum: DumbbellDrum) -> list[Line2D]:
+    """Return what the colours of the dumbbells, the arrow and the lines of a drum mean."""
+    entries = []
+    if drum.count > 1:
+        kinds = [(HANDS[hand], f"{WORDS[hand]} dyad") for hand in ("R", "L")]
+        entries += [
+            Line2D([], [], color=colour, lw=0, marker="o", label=label)
+            for colour, label in [*kinds, (SINGLE, "dumbbell in no dyad")]
+        ]
+    if drum.spin:
+        marker = ">" if drum.spin > 0 else "<"
+        entries.append(Line2D([], [], color=ARROW, marker=marker, ms=5, label="motion of the wall"))
+    entries.append(Line2D([], [], label="lowest line of the drum", **LOWEST))
+    return entries
+
+
 def _rgb(colour: str) -> tuple[float, float, float]:
     from matplotlib.colors import to_rgb
 
     return to_rgb(colour)
-
-
-def _rods(balls: Array, radius: float) -> list[Array]:
-    axis = balls[:, 1] - balls[:, 0]
-    axis = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
-    side = radius * np.stack([-axis[:, 1], axis[:, 0]], axis=-1)
-    ends = (balls[:, 0] + side, balls[:, 1] + side, balls[:, 1] - side, balls[:, 0] - side)
-    return list(np.stack(ends, axis=1))
 
 
 def _disks(centres: Array, radius: float) -> list[Array]:

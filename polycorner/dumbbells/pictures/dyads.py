@@ -12,8 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.pictures.bodies import contact_point, rod_outlines
+from polycorner.dumbbells.pictures.symbols import multiplier_unit, sizes_in_words
 from polycorner.dumbbells.statics.minima import DyadMinimum, heading_curve
-from polycorner.pictures.style import BODIES, SHADES
+from polycorner.pictures.style import BODIES, SHADES, bridged
 from polycorner.spaces.manifold import Array
 
 
@@ -28,8 +30,7 @@ def draw_pair(entry: DyadMinimum) -> Figure:
         _draw_drum(solid, entry)
         _draw_developed(figure.add_subplot(1, 2, 2), entry)
     headings = " and ".join(f"{h:.3f}°" for h in entry.headings)
-    sizes = f"l = {pair.length:g}, r = {pair.ball_radius:g}, t = {pair.rod_radius:g} mm"
-    figure.suptitle(f"{_label(entry.name)}:  {sizes},  headings {headings}")
+    figure.suptitle(f"{_label(entry.name)}:  {sizes_in_words(pair)},  headings {headings}")
     return figure
 
 
@@ -45,10 +46,13 @@ def draw_heading(pair: DumbbellPair, lengths: Sequence[float], rods: Sequence[fl
     for colour, rod in zip(cycle(SHADES), rods, strict=False):
         for chirality in ("R", "L"):
             model = replace(pair, rod_radius=float(rod))
-            headings, rests = heading_curve(model, lengths, chirality)
+            headings, certified = heading_curve(model, lengths, chirality)
             label = f"computed, t = {rod:g} mm" if chirality == "R" else None
-            axes.plot(lengths_array, np.where(rests, headings, np.nan), color=colour, label=label)
-            axes.plot(lengths_array, np.where(rests, np.nan, headings), ":", color=colour)
+            axes.plot(
+                lengths_array, np.where(certified, headings, np.nan), color=colour, label=label
+            )
+            others = np.where(bridged(certified == 0), headings, np.nan)
+            axes.plot(lengths_array, others, ":", color=colour)
     paper = np.degrees(np.arctan2(pair.ball_radius, lengths_array))
     axes.plot(lengths_array, paper, "k--", label="paper, ±arctan(r/l)")
     axes.plot(lengths_array, -paper, "k--")
@@ -133,20 +137,21 @@ def _draw_developed(axes: Axes, entry: DyadMinimum) -> None:
     low, high = centres.min(axis=0) - margin, centres.max(axis=0) + margin
     half = max(-low[0], high[0], 4.2 * margin)
     for body, colour in zip((centres[:2], centres[2:]), BODIES, strict=True):
-        axes.add_patch(_rod_outline(body, pair.rod_radius, colour))
+        outline = rod_outlines(body, pair.rod_radius)
+        axes.add_patch(Polygon(outline, color=colour, alpha=0.55, lw=0))
         for centre in body:
             axes.add_patch(Circle(tuple(centre), pair.ball_radius, color=colour, lw=0))
-    contacts = sorted(_contacts(entry, centres), key=lambda contact: -contact[1][1])
-    for rank, (name, place, weight) in enumerate(contacts):
-        axes.plot(*place, "o", color="white", markeredgecolor="black", markersize=5, zorder=5)
+    places = {name: contact_point(pair, centres, name) for name in entry.multipliers}
+    contacts = sorted(places, key=lambda name: -places[name][1])
+    for rank, name in enumerate(contacts):
+        axes.plot(*places[name], "o", color="white", markeredgecolor="black", ms=5, zorder=5)
+        row = pair.ball_radius * ((len(contacts) - 1) / 2 - rank)
         axes.annotate(
-            f"{name}:  {weight:.4g}",
-            (place[0], place[1]),
-            xytext=(
-                0.5 * half,
-                place[1] + 1.2 * pair.ball_radius * ((len(contacts) - 1) / 2 - rank),
-            ),
+            f"{name}:  {entry.multipliers[name]:.4g}",
+            (places[name][0], places[name][1]),
+            xytext=(0.95 * half, places[name][1] + 1.2 * row),
             fontsize=9,
+            ha="right",
             va="center",
             arrowprops={"arrowstyle": "-", "color": "black", "lw": 0.8},
             zorder=6,
@@ -158,34 +163,5 @@ def _draw_developed(axes: Axes, entry: DyadMinimum) -> None:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     axes.set(xlabel="lateral position (mm)", ylabel="axial position (mm)")
-    unit = " (mm)" if pair.is_plane else ""
-    axes.set_title(f"developed; contacts with multipliers{unit}" if contacts else "developed")
-
-
-def _rod_outline(body: Array, radius: float, colour: str) -> Polygon:
-    axis = (body[1] - body[0]) / np.linalg.norm(body[1] - body[0])
-    side = radius * np.array([-axis[1], axis[0]])
-    corners = np.array([body[0] + side, body[1] + side, body[1] - side, body[0] - side])
-    return Polygon(corners, color=colour, alpha=0.55, lw=0)
-
-
-def _contacts(entry: DyadMinimum, centres: Array) -> list[tuple[str, Array, float]]:
-    """Return each active contact with the place where it is drawn and its multiplier."""
-    ball = dict(zip(("A1", "A2", "B1", "B2"), centres, strict=True))
-    rod = {"a": centres[:2], "b": centres[2:]}
-    r, t = entry.pair.ball_radius, entry.pair.rod_radius
-    placed = []
-    for name, weight in entry.multipliers.items():
-        if name == "ab":
-            placed.append((name, centres.mean(axis=0), weight))
-            continue
-        if name[0] == "a" or name[-1] == "b":
-            one = ball[name[:2] if name[-1] == "b" else name[1:]]
-            segment = rod["b" if name[-1] == "b" else "a"]
-            axis = segment[1] - segment[0]
-            other = segment[0] + axis * ((one - segment[0]) @ axis) / (axis @ axis)
-            share = r / (r + t)
-        else:
-            one, other, share = ball[name[:2]], ball[name[2:]], 0.5
-        placed.append((name, one + share * (other - one), weight))
-    return placed
+    unit = multiplier_unit(pair)
+    axes.set_title(f"developed; contacts with multipliers ({unit})" if contacts else "developed")

@@ -15,6 +15,7 @@ from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
 from polycorner.dumbbells.pictures.movies import chosen_frames
+from polycorner.dumbbells.pictures.symbols import energy_unit
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
 from polycorner.spaces.manifold import Array, finite, reals
@@ -95,7 +96,7 @@ def stratum_words(stratum: Stratum) -> str:
 
 def energy_name(pair: DumbbellPair) -> str:
     """Return the name of the energy of a pair with its unit."""
-    return "Energy (mm²)" if pair.is_plane else "Energy (mm)"
+    return f"Energy ({energy_unit(pair)})"
 
 
 # ----------------------------------------------------------------------------------------- a pair

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon
 
 from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_room
 from polycorner.dumbbells.statics.skeleton import long_rod_length
 from polycorner.minimisation.certificate import Certificate
@@ -173,7 +174,7 @@ def _draw_bodies(axes: Axes, pair: DumbbellPair, flat: Array, height: Array) -> 
     for body in (slice(0, 2), slice(2, 4)):
         ends, level = flat[body], float(height[body].mean())
         colour = BODIES[0 if body.start == 0 else 1]
-        rod = Polygon(_outline(ends, pair.rod_radius), color=colour)
+        rod = Polygon(rod_outlines(ends, pair.rod_radius), color=colour)
         rod.set(linewidth=0.8, zorder=0.9 + _rank(level, height))
         axes.add_patch(rod)
     axes.set_aspect("equal")
@@ -184,11 +185,3 @@ def _rank(level: float, height: Array) -> float:
     """Return a place between 0 and 1 in the order of drawing."""
     low, high = float(height.min()), float(height.max())
     return (level - low) / (high - low) if high - low > 1e-6 * abs(high) else 0.5
-
-
-def _outline(ends: Array, radius: float) -> Array:
-    axis = ends[1] - ends[0]
-    size = float(np.linalg.norm(axis))
-    unit = axis / size if size > 0 else np.array([1.0, 0.0])
-    side = radius * np.array([-unit[1], unit[0]])
-    return np.array([ends[0] + side, ends[1] + side, ends[1] - side, ends[0] - side])

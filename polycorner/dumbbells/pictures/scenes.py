@@ -26,9 +26,8 @@ from polycorner.dumbbells.pictures.bodies import (
     wall_around,
 )
 from polycorner.dumbbells.pictures.placements import forbidden_solid
-from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, LIT
-from polycorner.dumbbells.pictures.solid import KINDS as WORDS
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
+from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, KIND_WORDS, KINDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.pictures.style import BODIES
 from polycorner.polyhedra.strata import stratum_at
@@ -137,7 +136,7 @@ def atlas_scene(atlas: PairAtlas, *, resolution: int = 64) -> "trimesh.Scene":
     scene: trimesh.Scene = library().Scene()
     scene.add_geometry(solid_mesh(solid.mesh, stretch), node_name="solid", geom_name="solid")
     thick = 0.03 * (pair.length + 2 * pair.ball_radius)
-    colours = {words: KINDS[kind] for kind, words in WORDS.items()}
+    colours = {words: KINDS[kind] for kind, words in KIND_WORDS.items()}
     for k, (name, curve) in enumerate(relative_curves(atlas, period)):
         drawn = tube(curve * stretch, thick / 2, colours.get(name, OTHERS))
         scene.add_geometry(drawn, node_name=f"edge {k + 1}: {name}", geom_name=f"edge {k + 1}")
@@ -270,7 +269,7 @@ def _along(ends: Array) -> Array:
 
 def _add_mark(scene: "trimesh.Scene", node: str, point: Array, ball_radius: float) -> None:
     mark = library().creation.icosphere(subdivisions=2, radius=0.18 * ball_radius)
-    _add(scene, node, "contact", _painted(mark, LIT), _moved(point))
+    _add(scene, node, "contact", _painted(mark, CONTACT), _moved(point))
 
 
 def _add_corner(scene: "trimesh.Scene", k: int, point: Array, hand: str, radius: float) -> None:

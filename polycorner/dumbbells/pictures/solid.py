@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +14,8 @@ from polycorner.dumbbells.pictures.placements import (
     relative_coordinates,
     relative_gaps,
 )
+from polycorner.dumbbells.pictures.relabelling import contact_counts
+from polycorner.dumbbells.pictures.symbols import KIND_WORDS, corner_symbol
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.pictures.solids.charts import Chart
 from polycorner.pictures.solids.meshes import write_mesh
@@ -24,20 +25,13 @@ from polycorner.pictures.style import save
 from polycorner.skeletons.refinement import traced
 from polycorner.spaces.manifold import Array
 
-KINDS = {
-    (2, 0, 0): "ball on ball twice",
-    (1, 1, 0): "ball on ball, ball on rod",
-    (0, 2, 0): "two balls on rods",
-}
 SAME = 1e-6  # mm or radians
-LETTERS = {"Delta": "\\Delta", "E": "\\mathcal{E}"}
 
 
 def contacts_in_words(active: Iterable[str]) -> str:
     """Return the kind of an edge by its contacts, such as ``two balls on rods``."""
-    lengths = Counter(len(name) for name in active)
-    kind = (lengths[4], lengths[3], lengths[2])
-    return KINDS.get(kind, "{} ball-ball, {} ball-rod, {} rod-rod".format(*kind))
+    kind = contact_counts(active)
+    return KIND_WORDS.get(kind, "{} ball-ball, {} ball-rod, {} rod-rod".format(*kind))
 
 
 def relative_curves(
@@ -129,19 +123,11 @@ def relative_corners(
     for corner in atlas.skeleton.corners:
         point = relative_coordinates(atlas.pair, corner.point, mean_heading=atlas.heading)
         point[2] -= period * np.round(point[2] / period)
-        kind, hand = atlas.kind(corner).split("_")
         for image in _images(atlas, point):
             if all(abs(image - other).max() > 1e-6 for other in points):
                 points.append(image)
-                letters.append(_written(kind, hand if hands else ""))
+                letters.append(corner_symbol(atlas.kind(corner), hand=hands))
     return np.array(points), letters
-
-
-def _written(kind: str, hand: str) -> str:
-    """Return a letter as it is typeset; kinds without one stay as they are."""
-    if kind not in LETTERS:
-        return kind
-    return f"${LETTERS[kind]}_{hand}$" if hand else f"${LETTERS[kind]}$"
 
 
 @dataclass(frozen=True)

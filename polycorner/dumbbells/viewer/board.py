@@ -19,6 +19,7 @@ from polycorner.dumbbells.pictures.bodies import (
 from polycorner.dumbbells.pictures.film import HANDS, TOUCHING, stratum_words
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.placements import relative_coordinates
+from polycorner.dumbbells.pictures.symbols import energy_unit, multiplier_unit
 from polycorner.dumbbells.viewer.sliders import SHAPE, Slider, coordinates, sliders_for
 from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descent
 from polycorner.minimisation.certificate import Certificate, certify
@@ -157,14 +158,13 @@ class Board:
         outside = c.stratum.local_type is LocalType.OUTSIDE
         headings = [math.degrees(angle) for angle in pair.heading(self.q).tolist()]
         mean = math.degrees(float(pair.canonical([0, 0, self.mean_heading] * 2)[2]))
-        unit = "mm²" if pair.is_plane else "mm"
         return {
             "contacts": ", ".join(c.stratum.active) or "none",
             "stratum": "outside the polyhedron" if outside else stratum_words(c.stratum),
             "chirality": HANDS[c.stratum.chirality],
             "headings": "{:.6f}° and {:.6f}°".format(*headings),
-            "energy": f"{c.energy:.6f} {unit}",
-            "multipliers": _multipliers(c),
+            "energy": f"{c.energy:.6f} {energy_unit(pair)}",
+            "multipliers": _multipliers(c, multiplier_unit(pair)),
             "rest": c.verdict.value,
             "section": "" if pair.is_plane else f"A section at mean heading {mean:.1f}°.",
         }
@@ -223,12 +223,12 @@ def trail(pair: DumbbellPair, points: Array) -> list[Array]:
 # ---------------------------------------------------------------------------------------- in words
 
 
-def _multipliers(c: Certificate) -> str:
+def _multipliers(c: Certificate, unit: str) -> str:
     if c.stratum.local_type is LocalType.OUTSIDE:
         return "none: the dumbbells overlap"
     if not c.stratum.active:
         return "none: no contact is closed"
-    listed = ", ".join(f"{name} {value:.6f}" for name, value in c.multipliers.items())
+    listed = ", ".join(f"{name} {value:.6f} {unit}" for name, value in c.multipliers.items())
     if c.verdict is Verdict.NOT_STATIONARY:
         return f"{listed} (least squares: the contacts do not balance the weight)"
     return listed

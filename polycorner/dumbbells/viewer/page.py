@@ -27,8 +27,7 @@ from polycorner.atomic import write_atomically
 from polycorner.dumbbells.pictures.bodies import box_of, sizes_of
 from polycorner.dumbbells.pictures.film import Film
 from polycorner.dumbbells.pictures.scenes import atlas_scene, glb, library
-from polycorner.dumbbells.pictures.skeleton import HANDS, KINDS, WORDS
-from polycorner.dumbbells.pictures.solid import KINDS as KIND_WORDS
+from polycorner.dumbbells.pictures.symbols import HANDS, KIND_WORDS, KINDS, WORDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.errors import PolycornerError
 

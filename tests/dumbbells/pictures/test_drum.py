@@ -15,7 +15,7 @@ from polycorner.dumbbells.dynamics.pairs import dyads
 from polycorner.dumbbells.dynamics.runs import run
 from polycorner.dumbbells.pictures import movies
 from polycorner.dumbbells.pictures.drum import AVERAGE, SINGLE, DrumView, draw_drum, draw_history
-from polycorner.dumbbells.pictures.skeleton import HANDS
+from polycorner.dumbbells.pictures.symbols import HANDS
 from polycorner.motion.noise import Noise
 from polycorner.pictures.style import BODIES, save
 

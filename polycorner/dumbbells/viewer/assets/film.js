@@ -1,6 +1,6 @@
 "use strict";
 
-// Plays the film that the page carries: numbers packed by scene_page.py, unpacked here.
+// Plays the film that the page carries: numbers packed by page.py, unpacked here.
 
 const $ = (id) => document.getElementById(id);
 const WHOLE = 20; // seconds in which a film plays at speed 1
@@ -170,7 +170,7 @@ class Player {
 
 // An atlas has no time: the picture, and what its colours mean.
 async function showModel(data) {
-  const stage = new Stage($("stage"));
+  const stage = (window.stage = new Stage($("stage")));
   $("timeline").hidden = $("following").hidden = true;
   const box = await stage.model(await unpacked(data.model));
   if (box) stage.axes(["x", "y", "δ"], box.low, 10);

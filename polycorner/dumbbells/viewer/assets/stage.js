@@ -12,8 +12,8 @@ class Stage {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 1, 4000);
     this.radius = 30;
-    this.moving = new THREE.Group(); // what turns with the drum
-    this.scene.add(this.moving, this.camera);
+    this.phase = 0; // angle (rad) by which the lines along the drum have turned
+    this.scene.add(this.camera);
     this.scene.add(new THREE.AmbientLight(0xffffff, 0.5));
     const lamp = new THREE.DirectionalLight(0xffffff, 0.6);
     lamp.position.set(-0.5, 0.8, 1);
@@ -71,21 +71,22 @@ class Stage {
 
   // ------------------------------------------------------------------------------------- the view
 
-  // Look at a ball of some radius (mm) about a point; remembered for the button that resets it.
-  frame(centre, radius) {
-    this.centre = centre;
-    this.radius = radius;
+  // Look at a ball of some radius (mm) about a point, from a direction and with a direction that
+  // points up the page; remembered for the button that resets the view.
+  frame(centre, radius, from = [0, -0.55, 1], up = [0, 1, 0]) {
+    Object.assign(this, { centre, radius, from, up });
     this.view();
   }
 
-  view(direction = [0, -0.55, 1]) {
+  view() {
     if (!this.renderer) return;
     const target = new THREE.Vector3(...(this.centre ?? [0, 0, 0]));
     const narrow = Math.min(1, this.camera.aspect);
     const far = this.radius / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
     this.controls.target.copy(target);
-    this.camera.up.set(0, 1, 0);
-    this.camera.position.copy(target).addScaledVector(new THREE.Vector3(...direction).normalize(), far);
+    this.camera.up.set(...(this.up ?? [0, 1, 0]));
+    const from = new THREE.Vector3(...(this.from ?? [0, 0, 1])).normalize();
+    this.camera.position.copy(target).addScaledVector(from, far);
     Object.assign(this.camera, { near: far / 100, far: 20 * far });
     this.camera.updateProjectionMatrix();
     this.camera.lookAt(target);
@@ -136,7 +137,7 @@ class Stage {
   }
 
   // Put something in the place of what was called the same before.
-  put(name, object, parent = this.scene) {
+  put(name, object) {
     const old = this.scene.getObjectByName(name);
     if (old) {
       old.removeFromParent();
@@ -148,7 +149,7 @@ class Stage {
     }
     if (object) {
       object.name = name;
-      parent.add(object);
+      this.scene.add(object);
     }
     this.ask();
     return object;
@@ -246,31 +247,32 @@ class Stage {
     const paint = { color: this.colour("wall"), roughness: 1, side: THREE.DoubleSide };
     this.put("wall", new THREE.Mesh(geometry, new THREE.MeshStandardMaterial(paint)));
     // Lines every 10 mm: along the drum they turn with it, around it they stay.
-    const step = wall.radius === null ? spacing : spacing / wall.radius;
-    this.pitch = step;
-    const multiples = ([low, high], unit) => {
-      const first = Math.ceil(low / unit);
-      return Array.from({ length: Math.max(0, Math.floor(high / unit) - first + 1) }, (_, k) => (first + k) * unit);
+    this.pitch = wall.radius === null ? spacing : spacing / wall.radius;
+    // Multiples of a unit, shifted by a phase, in a closed interval.
+    const multiples = ([low, high], unit, phase = 0) => {
+      const first = Math.ceil((low - phase) / unit), last = Math.floor((high - phase) / unit);
+      return Array.from({ length: Math.max(0, last - first + 1) }, (_, k) => (first + k) * unit + phase);
     };
     const lift = 0.02;
-    const along = multiples(wall.across, step).flatMap((u) => [...at(u, wall.along[0], lift), ...at(u, wall.along[1], lift)]);
-    const around = multiples(wall.along, spacing).flatMap((y) =>
-      places.slice(1).flatMap((u, k) => [...at(places[k], y, lift), ...at(u, y, lift)]));
-    this.lines("meridians", along, this.moving);
-    this.lines("parallels", around, this.scene);
+    this.meridians = () => this.lines("meridians", multiples(wall.across, this.pitch, this.phase)
+      .flatMap((u) => [...at(u, wall.along[0], lift), ...at(u, wall.along[1], lift)]));
+    this.meridians();
+    this.lines("parallels", multiples(wall.along, spacing).flatMap((y) =>
+      places.slice(1).flatMap((u, k) => [...at(places[k], y, lift), ...at(u, y, lift)])));
     this.axes(["x", wall.radius === null ? "y" : "η", "z"], at(wall.across[0], wall.along[0], lift), 10);
   }
 
   // Turn the drum by an angle (rad); only the lines show it, so whole spacings do not count.
   turn(angle) {
-    if (this.pitch) this.moving.rotation.y = -(angle % this.pitch);
-    this.ask();
+    if (!this.meridians || angle % this.pitch === this.phase) return;
+    this.phase = angle % this.pitch;
+    this.meridians();
   }
 
-  lines(name, numbers, parent) {
+  lines(name, numbers) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(numbers, 3));
-    this.put(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: this.colour("grid") })), parent);
+    this.put(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: this.colour("grid") })));
   }
 
   // Three arrows of a length (mm) from a point, with their names at the ends.
@@ -317,11 +319,13 @@ class Stage {
     });
   }
 
-  // Look at a box from in front and above.
-  frameBox({ low, high }, direction = [0.7, -1, 0.6]) {
+  // Look at the box of an atlas with the relative heading upwards, from where the figures of the
+  // solid are seen: elevation 22 degrees, azimuth -35 degrees.
+  frameBox({ low, high }) {
     const middle = low.map((value, k) => (value + high[k]) / 2);
-    this.frame(middle, 0.5 * Math.hypot(...low.map((value, k) => high[k] - value)));
-    this.view(direction);
+    const [elevation, azimuth] = [22, -35].map((degrees) => (degrees * Math.PI) / 180);
+    const from = [Math.cos(azimuth), Math.sin(azimuth), Math.tan(elevation)];
+    this.frame(middle, 0.5 * Math.hypot(...low.map((value, k) => high[k] - value)), from, [0, 0, 1]);
   }
 
   // A way through the atlas, and where it has come to; pieces: arrays of [x, y, z].

@@ -1,0 +1,116 @@
+"""Answers of the live page are those of the library."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner import certify, minimise, stratum_at
+from polycorner.dumbbells import DumbbellPair
+from polycorner.dumbbells.pictures.placements import relative_placements
+from polycorner.dumbbells.viewer.board import Board, atlas_place, trail
+from polycorner.dumbbells.viewer.sliders import (
+    coordinates,
+    sliders_for,
+)
+
+DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
+SLIDERS = sliders_for(DRUM, 125.0)
+BOARDS = {pair: Board.of(pair) for pair in (DRUM, PLANE)}
+
+
+@given(st.sampled_from([DRUM, PLANE]), st.lists(st.floats(-1, 1), min_size=6, max_size=6))
+def test_a_reading_is_what_the_library_says(pair, shares):
+    board = BOARDS[pair]
+    start = board.moved(
+        {n: s * SLIDERS[n].high / 4 for n, s in zip(coordinates(), shares, strict=True)}
+    )
+    q, reading = np.array(start.q), start.reading()
+    stratum = stratum_at(pair.polyhedron, q, tolerance=1e-6)
+    gaps = dict(zip(pair.polyhedron.names, pair.polyhedron.values(q).tolist(), strict=True))
+    assert reading["gaps"] == gaps
+    np.testing.assert_array_equal(reading["centres"], pair.ball_centres(q).ravel())
+    words = reading["words"]
+    assert words["energy"].split()[0] == f"{pair.energy.value(q):.6f}"
+    assert words["chirality"][0] == (pair.chirality(q) or "none").lower()[0]
+    inside = bool(pair.polyhedron.contains(q))
+    assert inside is (words["stratum"] != "outside the polyhedron")
+    assert inside is (words["multipliers"] != "none: the dumbbells overlap")
+    assert [name for name, _ in reading["contacts"]] == list(stratum.active)
+    json.dumps(reading, allow_nan=False)
+
+
+@pytest.mark.parametrize("pair", [DRUM, PLANE])
+@pytest.mark.parametrize(("button", "hand"), [("right", "R"), ("left", "L")])
+def test_a_fall_ends_where_the_minimiser_does(pair, button, hand):
+    last, fall = BOARDS[pair].pressed(button).fall()
+    corner = minimise(pair.polyhedron, pair.energy, pair.nested(hand))
+    np.testing.assert_allclose(pair.heading(last.q), pair.heading(corner.point), atol=1e-9)
+    assert fall["verdict"] == corner.verdict.value
+    found = certify(pair.polyhedron, pair.energy, last.q)
+    words = fall["last"]["words"]
+    for name, value in found.multipliers.items():
+        unit = "mm" if pair.is_plane else "mm/mm"
+        assert f"{name} {value:.6f} {unit}," in words["multipliers"] + ","
+    assert words["rest"] == corner.verdict.value
+    assert words["stratum"].startswith("dimension 3, rank 3")
+    heights = [float(frame["words"]["energy"].split()[0]) for frame in fall["frames"]]
+    assert heights == sorted(heights, reverse=True)
+    assert last.moved({"axial_A": last.values["axial_A"]}).reading()["words"] == words
+
+
+def test_a_fall_from_an_overlap_begins_at_a_place_without():
+    board = BOARDS[DRUM].moved(dict.fromkeys(coordinates(), 0.0))
+    assert board.reading()["words"]["contacts"] == "none"
+    last, fall = board.fall()
+    if fall["frames"][0]["words"]["stratum"] == "outside the polyhedron":
+        assert "no point of the polyhedron was reached" in fall["verdict"]
+        assert last.q == board.q
+    else:
+        assert DRUM.polyhedron.implicit(last.q) > -1e-8
+
+
+def test_on_a_face_where_the_weight_is_not_balanced_the_multipliers_are_called_a_fit():
+    apart = PLANE.side_by_side()  # ball on ball twice, at the same height
+    board = BOARDS[PLANE]
+    q = dict(zip(coordinates(), (apart * board.units).tolist(), strict=True))
+    words = board.moved({k: v + (20.0 if "lateral" in k else 0) for k, v in q.items()}).words
+    assert words["contacts"] == "A1B1, A2B2"
+    assert words["multipliers"].endswith("(least squares: the contacts do not balance the weight)")
+    assert words["rest"].startswith("not a minimum")
+
+
+def test_the_shape_changes_and_places_along_the_wall_stay():
+    board = BOARDS[DRUM]
+    other = board.moved({"drum_radius": 60.0, "length": 20.0})
+    assert (other.pair.drum_radius, other.pair.length) == (60.0, 20.0)
+    flat = other.pressed("plane")
+    assert flat.pair.is_plane
+    back = flat.moved({"ball_radius": 2.5, "drum_radius": 70.0}).pressed("drum")
+    assert (back.pair.drum_radius, back.pair.ball_radius) == (70.0, 2.5)
+    for one in (other, flat, back):
+        for name in coordinates():
+            assert one.values[name] == pytest.approx(board.values[name])
+    with pytest.raises(ValueError, match="rod_radius: expected less than the ball radius"):
+        board.moved({"rod_radius": 4.0})
+
+
+@given(st.sampled_from([DRUM, PLANE]), st.integers(0, 2**32 - 1))
+def test_a_place_in_the_atlas_is_where_the_same_bodies_are(pair, seed):
+    """Back from the atlas there are the same gaps, up to the names of balls."""
+    q = pair.placements(np.random.default_rng(seed), 1)[0]
+    place = atlas_place(pair, q) / [1, 1, pair.length / 2]
+    heading = None if pair.is_plane else (q[2] + q[5]) / 2
+    same = relative_placements(pair, place, mean_heading=heading)
+    assert pair.polyhedron.implicit(same) == pytest.approx(pair.polyhedron.implicit(q), abs=1e-9)
+
+
+def test_a_trail_is_cut_where_it_leaves_the_atlas():
+    q = np.zeros((9, 6))
+    q[:, 4], q[:, 5] = 30.0, np.linspace(1.0, 2.0, 9)  # past a quarter turn
+    pieces = trail(PLANE, q)
+    assert [len(piece) for piece in pieces] == [5, 4]
+    assert sum(pieces[0][:, 2] > 0) == 5
+    assert sum(pieces[1][:, 2] < 0) == 4
