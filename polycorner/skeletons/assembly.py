@@ -1,19 +1,23 @@
-"""From what an explorer found to the frozen atlas."""
+"""A frozen skeleton from what a search found."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.polyhedra.symmetry import renamed
 from polycorner.skeletons.elements import Completeness, Corner, Edge, Face, Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import Flag, Forest
+from polycorner.skeletons.flags import Flag
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.walks import End
 
+if TYPE_CHECKING:
+    from networkx.utils import UnionFind
+
 
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
-    """Return the atlas as it stands."""
+    """Return the skeleton as far as it was found."""
     faces, components = _faces(explorer)
     corners = tuple(_corner(explorer, record) for record in explorer.records)
     edges = tuple(
@@ -39,7 +43,7 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
         notes=tuple(explorer.notes),
         components=components,
         whole=_whole(explorer),
-        state=explorer,
+        state=explorer.state,
     )
 
 
@@ -72,23 +76,24 @@ def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
 
 
 def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
-    """Put faces together: flags around corners and along edges, then passages across."""
+    """Assemble faces: flags that meet at corners and along edges, then crossings."""
+    from networkx.utils import UnionFind
+
     flags = dict.fromkeys(_flags(explorer))
-    boundary, surface = Forest(), Forest()
+    boundary, surface = UnionFind(flags), UnionFind(flags)
     broken: list[Flag] = []
     for one, other in _joins(explorer):
         if one in flags and other in flags:
-            boundary.join(one, other)
-            surface.join(one, other)
+            boundary.union(one, other)
+            surface.union(one, other)
         elif one in flags:
             broken.append(one)
-    for passage in explorer.passages:
-        surface.join(passage.start, passage.stop)
-    loose = {boundary.find(flag) for flag in [*broken, *_ends(explorer, flags)]}
+    for crossing in explorer.crossings:
+        surface.union(crossing.start, crossing.stop)
+    loose = {boundary[flag] for flag in [*broken, *_ends(explorer, flags)]}
     faces = []
-    groups = surface.groups(flags)
-    for group in groups:
-        curves = boundary.groups(group)
+    for group in _groups(surface, flags):
+        curves = _groups(boundary, group)
         faces.append(
             Face(
                 active=_ordered(explorer, group[0][2]),
@@ -96,38 +101,36 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
                     tuple(sorted({_edge_of(explorer, flag) for flag in curve} - {-1}))
                     for curve in curves
                 ),
-                closed=not any(boundary.find(curve[0]) in loose for curve in curves),
+                closed=not any(boundary[curve[0]] in loose for curve in curves),
             )
         )
     return tuple(faces), _components(explorer, flags, surface, len(faces))
 
 
+def _groups(sets: "UnionFind", flags: Iterable[Flag]) -> list[list[Flag]]:
+    """Return flags by set, in the order they come."""
+    found: dict[Flag, list[Flag]] = {}
+    for flag in flags:
+        found.setdefault(sets[flag], []).append(flag)
+    return list(found.values())
+
+
 def _flags(explorer: Explorer) -> Iterator[Flag]:
     for k, record in enumerate(explorer.records):
         for sector in record.figure.sectors:
+            names = explorer.registry.names(sector.active)
             for i in sector.rays:
-                yield ("half", (k, i), explorer.registry.names(sector.active))
+                yield ("half", (k, i), names)
     for k, curve in enumerate(explorer.curves):
         if curve.start is None:
-            for face in explorer.faces_beside(curve):
+            for face in explorer.faces_beside(k):
                 yield explorer.flag(k, face)
 
 
 def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
     """Yield flags that belong to one boundary curve of one face."""
     for k, record in enumerate(explorer.records):
-        for sector in record.figure.sectors:
-            face = explorer.registry.names(sector.active)
-            i, j = sector.rays
-            yield ("half", (k, i), face), ("half", (k, j), face)
-            for p in record.stabiliser:
-                for ray in sector.rays:
-                    active = renamed(explorer.registry.names(record.figure.rays[ray].active), p)
-                    for other, twin in enumerate(record.figure.rays):
-                        if explorer.registry.names(twin.active) == active:
-                            image: Flag = ("half", (k, other), renamed(face, p))
-                            if p:
-                                yield ("half", (k, ray), face), image
+        yield from _joins_at(explorer, k, record)
     for curve in explorer.curves:
         if curve.start is not None:
             record = explorer.records[curve.start[0]]
@@ -138,8 +141,28 @@ def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
                     yield ("half", curve.start, face), stop
 
 
-def _ends(explorer: Explorer, flags: dict[Flag, None]) -> Iterator[Flag]:
-    """Yield flags where a boundary curve does not go on: at infinity, or not walked."""
+def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tuple[Flag, Flag]]:
+    """Yield flags at one corner that one sector has, or that a relabelling exchanges."""
+    active = [explorer.registry.names(ray.active) for ray in record.figure.rays]
+    alike: dict[frozenset[str], list[int]] = {}
+    for i, names in enumerate(active):
+        alike.setdefault(names, []).append(i)
+    # A relabelling that changes no name joins nothing.
+    changes = [p for p in record.stabiliser if any(a != b for a, b in p.items())]
+    images = [[alike.get(renamed(names, p), []) for names in active] for p in changes]
+    for sector in record.figure.sectors:
+        face = explorer.registry.names(sector.active)
+        first, last = sector.rays
+        yield ("half", (k, first), face), ("half", (k, last), face)
+        for p, image in zip(changes, images, strict=True):
+            moved = renamed(face, p)
+            for ray in sector.rays:
+                for other in image[ray]:
+                    yield ("half", (k, ray), face), ("half", (k, other), moved)
+
+
+def _ends(explorer: Explorer, flags: Iterable[Flag]) -> Iterator[Flag]:
+    """Yield flags where a boundary curve has an end: at infinity, or not traced."""
     for flag in flags:
         if flag[0] == "curve":
             if explorer.curves[flag[1]].kinds[0] is not End.CLOSED:
@@ -158,8 +181,10 @@ def _edge_of(explorer: Explorer, flag: Flag) -> int:
 
 
 def _components(
-    explorer: Explorer, flags: dict[Flag, None], surface: Forest, faces: int
+    explorer: Explorer, flags: Iterable[Flag], surface: "UnionFind", faces: int
 ) -> dict[int, int]:
+    from networkx.utils import UnionFind
+
     point = explorer.records[0].point if explorer.records else None
     if point is None and not explorer.curves:
         return {}
@@ -171,8 +196,8 @@ def _components(
     if free >= 2:
         counts[fixed + 2] = faces
     if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
-        inside = Forest()
+        inside = UnionFind()
         for flag in flags:
-            inside.join(("edge", _edge_of(explorer, flag)), surface.find(flag))
-        counts[fixed + 3] = len(inside.groups([surface.find(flag) for flag in flags]))
+            inside.union(("edge", _edge_of(explorer, flag)), surface[flag])
+        counts[fixed + 3] = len({inside[surface[flag]] for flag in flags})
     return counts

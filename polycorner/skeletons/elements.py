@@ -1,4 +1,4 @@
-"""The atlas of a polyhedron: its corners, edges and faces, and how they hang together."""
+"""Skeletons of polyhedra: corners, edges, faces and their incidences."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,29 +11,30 @@ from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import networkx as nx
 
 
 class Completeness(Enum):
-    """How complete an atlas is; the value says it in a sentence."""
+    """Completeness of a skeleton; the value is a sentence."""
 
-    EXHAUSTED = "everything that was met has been walked; what nothing led to stays unseen"
-    GAPS = "some edges could not be followed: the notes say which"
-    BUDGET = "the budget was used up: edges are left to walk"
-    INTERRUPTED = "interrupted: edges are left to walk"
-    SEEDS = "no start leads to an edge or a corner: nothing to walk"
+    EXHAUSTED = "every edge that was found has been traced; parts that no start leads to are not found"
+    GAPS = "some edges could not be traced: the notes say which"
+    BUDGET = "budget or time was used up: edges or faces are left"
+    INTERRUPTED = "interrupted: edges or faces are left"
+    SEEDS = "no start leads to an edge or a corner"
 
 
-@dataclass(frozen=True)
-class Corner:
+@dataclass(frozen=True, eq=False)
+class Corner(Value):
     """A corner: a point that its active functions isolate, modulo the symmetry.
 
     Attributes
     ----------
     point : (n,) array
-        The point, of its orbit the one that was met first.
+        The point: of its orbit the first that was found.
     stratum : Stratum
         Active functions, rank, dimension and local type there.
     singular : bool
@@ -68,8 +69,8 @@ class Corner:
         return self.stratum.chirality
 
 
-@dataclass(frozen=True)
-class Edge:
+@dataclass(frozen=True, eq=False)
+class Edge(Value):
     """An edge: a curve on which the active functions vanish, modulo the symmetry.
 
     Attributes
@@ -131,8 +132,8 @@ class Face:
         return 2 - len(self.boundary)
 
 
-@dataclass(frozen=True)
-class Skeleton(Printed):
+@dataclass(frozen=True, eq=False)
+class Skeleton(Printed, Value):
     """Corners, edges and faces of a polyhedron modulo its symmetry; see :func:`skeleton`.
 
     Attributes
@@ -144,15 +145,17 @@ class Skeleton(Printed):
     complete : Completeness
         How complete it is.
     notes : tuple of str
-        Everything a user should know: starts outside, points too near to each other, ends of
-        charts, faces that could not be followed.
+        What a user should know: starts outside, points too near to each other, ends of
+        charts, edges and faces that could not be traced.
     components : mapping from int to int
-        How many connected components the faces of each dimension have: corners, edges, faces,
-        and the interior where it comes next.
+        Numbers of connected components by dimension: corners, edges, faces, and the interior
+        where it comes next.
     whole : bool
-        Whether the faces were put together everywhere and edges meet in corners only: not at
-        singular corners beyond the plane, where edges cross, where a face lies on both sides of
-        an edge, or modulo relabellings.
+        Whether faces were assembled everywhere and edges meet in corners only: not at singular
+        corners beyond the plane, where edges cross, where a face lies on both sides of an edge,
+        or modulo relabellings.
+    state : object
+        The state of the search, for :func:`resume`.
     """
 
     polyhedron: Polyhedron
@@ -184,19 +187,29 @@ class Skeleton(Printed):
 
         It is that of the union of all of them: the polyhedron itself if it has dimension two,
         its boundary if it has dimension three, provided that faces have no handles.  A closed
-        edge counts zero.  It is that of what was found: islands that no walk met are not in it.
-        None where a face is not closed, an edge runs to infinity, or not ``whole``.
+        edge counts zero.  It is that of what was found, without islands that no start leads to.
+        None where it is not determined; :attr:`euler_note` gives the reason.
         """
-        closed = all(face.closed for face in self.faces) and self.faces
-        if (
-            not self.whole
-            or not closed
-            or any(edge.kinds[1] not in (End.CORNER, End.CLOSED) for edge in self.edges)
-        ):
+        if self.euler_note:
             return None
         open_edges = sum(not edge.is_closed for edge in self.edges)
         surfaces = sum(face.euler_characteristic for face in self.faces)
         return len(self.corners) - open_edges + surfaces
+
+    @property
+    def euler_note(self) -> str:
+        """Why the Euler characteristic is not determined; empty where it is."""
+        if self.complete in (Completeness.BUDGET, Completeness.INTERRUPTED):
+            return "the search is not finished"
+        if not self.faces:
+            return "no faces were found"
+        if any(edge.kinds[1] not in (End.CORNER, End.CLOSED) for edge in self.edges):
+            return "an edge has an open end"
+        if not all(face.closed for face in self.faces):
+            return "the boundary of a face is not closed"
+        if not self.whole:
+            return "faces were not assembled everywhere"
+        return ""
 
     @cached_property
     def graph(self) -> "nx.MultiGraph":
@@ -212,6 +225,15 @@ class Skeleton(Printed):
         return graph
 
 
+def corner_name(position: int) -> str:
+    """Return the name of a corner by its position in ``Skeleton.corners``.
+
+    >>> corner_name(3)
+    'C3'
+    """
+    return f"C{position}"
+
+
 MOST_COORDINATES = 6  # of a corner, in a row of its table
 
 
@@ -221,9 +243,14 @@ def _counts(found: Skeleton) -> Iterator[tuple[str, str]]:
     yield "faces", str(len(found.faces))
     counts = (f"{n} of dimension {d}" for d, n in sorted(found.components.items()))
     yield "components", ", ".join(counts) or "none"
-    if found.euler_characteristic is not None:
-        yield "Euler characteristic", str(found.euler_characteristic)
+    yield "Euler characteristic", _euler(found)
     yield "complete", found.complete.value
+
+
+def _euler(found: Skeleton) -> str:
+    if found.euler_note:
+        return f"not determined: {found.euler_note}"
+    return str(found.euler_characteristic)
 
 
 def _corner_table(found: Skeleton) -> Table:
@@ -231,7 +258,7 @@ def _corner_table(found: Skeleton) -> Table:
     shown = manifold.dimension if manifold.dimension <= MOST_COORDINATES else 0
     rows = (
         (
-            str(k),
+            corner_name(k),
             names(corner.active),
             str(corner.rank),
             corner.local_type.name + (", singular" if corner.singular else ""),
@@ -249,7 +276,7 @@ def _edge_table(found: Skeleton) -> Table:
         (
             str(k),
             names(edge.active),
-            *(kind.name.lower() if at is None else str(at) for at, kind in _ends(edge)),
+            *(kind.name.lower() if at is None else corner_name(at) for at, kind in _ends(edge)),
             number(edge.length, 6),
         )
         for k, edge in enumerate(found.edges)

@@ -1,11 +1,10 @@
-"""Corners, edges and faces of an atlas, counted up to a finite group."""
+"""Orbits of a finite group on the corners, edges and faces of a skeleton."""
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
 from polycorner.polyhedra.symmetry import Element, renamed
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import Forest
 from polycorner.skeletons.registry import SAME
 from polycorner.spaces.manifold import Array
 
@@ -14,14 +13,14 @@ Nearby = Callable[[Array], Array]
 
 
 def orbits(
-    atlas: Skeleton, elements: Sequence[Element], *, nearby: Nearby | None = None
+    found: Skeleton, elements: Sequence[Element], *, nearby: Nearby | None = None
 ) -> Mapping[str, Orbits]:
-    """Return the orbits of a finite group on the corners, edges and faces of an atlas.
+    """Return the orbits of a finite group on the corners, edges and faces of a skeleton.
 
     Parameters
     ----------
-    atlas : Skeleton
-        An atlas without relabellings.
+    found : Skeleton
+        A skeleton without relabellings.
     elements : sequence of Element
         Generators suffice.
     nearby : callable, optional
@@ -37,14 +36,14 @@ def orbits(
     Raises
     ------
     ValueError
-        If the image of a corner, edge or face is not in the atlas: the group is no symmetry, or
-        the atlas is not complete.
+        If the image of a corner, edge or face is not in the skeleton: the group is no symmetry, or
+        the skeleton is not complete.
     """
-    images = _Images(atlas, nearby)
+    images = _Images(found, nearby)
     counts = {
-        "corners": (len(atlas.corners), images.corner),
-        "edges": (len(atlas.edges), images.edge),
-        "faces": (len(atlas.faces), images.face),
+        "corners": (len(found.corners), images.corner),
+        "edges": (len(found.edges), images.edge),
+        "faces": (len(found.faces), images.face),
     }
     return {kind: _grouped(n, elements, image) for kind, (n, image) in counts.items()}
 
@@ -52,25 +51,30 @@ def orbits(
 def _grouped(
     count: int, elements: Sequence[Element], image: Callable[[int, Element], int | None]
 ) -> Orbits:
-    forest = Forest()
+    from networkx.utils import UnionFind
+
+    sets = UnionFind(range(count))
     for k in range(count):
         for g in elements:
             other = image(k, g)
             if other is None:
-                msg = "elements: expected symmetries of the atlas; an image is not in it"
+                msg = "elements: expected symmetries of the skeleton; an image is not in it"
                 raise ValueError(msg)
-            forest.join(k, other)
-    return tuple(tuple(group) for group in forest.groups(range(count)))
+            sets.union(k, other)
+    groups: dict[int, list[int]] = {}
+    for k in range(count):
+        groups.setdefault(sets[k], []).append(k)
+    return tuple(map(tuple, groups.values()))
 
 
 class _Images:
-    """Where elements carry the parts of an atlas."""
+    """Images of the parts of a skeleton under elements of the group."""
 
-    def __init__(self, atlas: Skeleton, nearby: Nearby | None) -> None:
-        self.atlas, self.nearby = atlas, nearby
-        self.explorer: Explorer = atlas.state
+    def __init__(self, found: Skeleton, nearby: Nearby | None) -> None:
+        self.found, self.nearby = found, nearby
+        self.explorer = Explorer.resumed(found.state)
         self.names = self.explorer.registry.names
-        self.faces = {_signature(f.active, f.boundary): k for k, f in enumerate(atlas.faces)}
+        self.faces = {_signature(f.active, f.boundary): k for k, f in enumerate(found.faces)}
 
     def corner(self, k: int, g: Element) -> int | None:
         """Return the image of a corner."""
@@ -107,7 +111,7 @@ class _Images:
 
     def face(self, k: int, g: Element) -> int | None:
         """Return the image of a face."""
-        face = self.atlas.faces[k]
+        face = self.found.faces[k]
         boundary = [[self.edge(e, g) for e in curve] for curve in face.boundary]
         return self.faces.get(_signature(renamed(frozenset(face.active), g.names), boundary))
 

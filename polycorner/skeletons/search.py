@@ -1,24 +1,23 @@
-"""Finding the atlas of a polyhedron: the entrance, and the order of the work."""
+"""Search for the skeleton of a polyhedron, from the start or resumed."""
 
-from collections.abc import Callable
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
-from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.explorer import Explorer, SearchState
 from polycorner.skeletons.points import Quotient
 from polycorner.spaces.manifold import reals
 
 EXTENT = 1000.0
 BUDGET = 100_000
-
-# What is told while walking: corners, edges, and ends of edges still to walk.
-Progress = Callable[[int, int, int], None]
 
 
 def skeleton(
@@ -27,34 +26,39 @@ def skeleton(
     *,
     symmetry: Symmetry | None = None,
     budget: int = BUDGET,
+    time_limit: float = math.inf,
     progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
     tolerance: float = TOLERANCE,
     extent: float = EXTENT,
 ) -> Skeleton:
-    """Find corners, edges and faces of a polyhedron by walking.
+    """Find the corners, edges and faces of a polyhedron.
 
-    From every start it falls along random straight directions, onto a face, along the face onto
-    an edge, along the edge into a corner.  It walks every edge out of every corner to the next
-    corner, until nothing new appears; then it shoots across every two-dimensional face from the
-    middle of every edge, which joins the boundary curves of a face and finds what hangs
-    together through faces alone.
+    From each start the search descends in random straight directions to a face, within the face
+    to an edge, and along the edge to a corner.  It traces every edge out of every corner to the
+    next corner until nothing new is found.  Then it crosses every two-dimensional face from the
+    middle of every edge, which joins the boundary curves of a face and finds parts that are
+    connected through faces alone.
 
     Parameters
     ----------
     polyhedron : Polyhedron
         The set.
     starts : sequence of (n,) arrays
-        Points of the set to fall from.
+        Points of the set.
     symmetry : Symmetry, optional
-        What is quotiented out.  With relabellings corners, edges and faces are counted up to
+        Symmetry to divide by.  With relabellings corners, edges and faces are counted up to
         them.
     budget : int, optional
-        How many edges may be walked.
+        Most edges to trace, most starts to descend from and most faces to cross.
+    time_limit : float, optional
+        Seconds after which the search stops: between two edges, descents or crossings, of which
+        it does at least one.
     progress : callable, optional
-        Called as ``progress(corners, edges, pending)`` after every edge.
+        Called as ``progress(edges, edges + pending, note)`` after every edge, descent and crossing;
+        ``pending`` counts the ends of edges to trace; see :class:`~polycorner.progress.Progress`.
     rng : Generator or int, optional
-        Random directions of the falls; default a generator with seed 0.
+        Random directions of the descents; default a generator with seed 0.
     tolerance : float, optional
         Distance, in scale units, up to which a function counts as zero.
     extent : float, optional
@@ -63,8 +67,8 @@ def skeleton(
     Returns
     -------
     Skeleton
-        Also after an interruption (Ctrl-C): then with what was found so far; :func:`resume`
-        goes on from there.
+        After an interruption (Ctrl-C), or when budget or time is used up, what was found so far;
+        :func:`resume` continues the search.
 
     Raises
     ------
@@ -77,77 +81,59 @@ def skeleton(
     >>> from polycorner.spaces.manifold import Manifold
     >>> M = Manifold.euclidean("x y")
     >>> x, y = M.symbols
-    >>> a = skeleton(Polyhedron(M, {"bowl": y - x**2, "lid": 2 - y}), [[0.0, 1.0]])
-    >>> len(a.corners), len(a.edges), len(a.faces), a.euler_characteristic
+    >>> found = skeleton(Polyhedron(M, {"bowl": y - x**2, "lid": 2 - y}), [[0.0, 1.0]])
+    >>> len(found.corners), len(found.edges), len(found.faces), found.euler_characteristic
     (2, 2, 1, 1)
     """
-    if not isinstance(polyhedron, Polyhedron):
-        msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
-        raise TypeError(msg)
-    if symmetry is not None and not isinstance(symmetry, Symmetry):
-        msg = f"symmetry: expected a Symmetry; got {type(symmetry).__name__}"
-        raise TypeError(msg)
+    checks.instance("polyhedron", polyhedron, Polyhedron)
+    if symmetry is not None:
+        checks.instance("symmetry", symmetry, Symmetry)
     check_tolerance("tolerance", tolerance)
-    _check_budget(budget)
-    if isinstance(extent, bool) or not isinstance(extent, int | float) or not extent > 0:
-        msg = f"extent: expected a positive length in scale units; got {extent!r}"
-        raise ValueError(msg)
-    _check_progress(progress)
+    checks.real("extent", extent, above=0, infinite=True, unit="scale units")
     points = polyhedron.manifold.points(np.atleast_2d(reals(starts, "starts")), "starts")
     if points.ndim != 2:
-        msg = (
-            f"starts: expected a list of points, shape (k, {points.shape[-1]}); got {points.shape}"
-        )
-        raise ValueError(msg)
-    quotient = Quotient(polyhedron, symmetry or Symmetry(), tolerance, extent)
-    return _run(Explorer(quotient, points, _generator(rng)), budget, progress)
+        expected = f"a list of points, shape (k, {points.shape[-1]})"
+        checks.refuse("starts", expected, points.shape)
+    quotient = Quotient(polyhedron, symmetry or Symmetry(), tolerance, float(extent))
+    explorer = Explorer(quotient, points, checks.generator("rng", rng))
+    return _run(explorer, budget, time_limit, progress)
 
 
-def resume(atlas: Skeleton, *, budget: int = BUDGET, progress: Progress | None = None) -> Skeleton:
-    """Go on with an atlas that was interrupted or ran out of budget.
+def resume(
+    found: Skeleton,
+    *,
+    budget: int = BUDGET,
+    time_limit: float = math.inf,
+    progress: Progress | None = None,
+) -> Skeleton:
+    """Resume a search that was interrupted or ran out of budget or time.
 
     Parameters
     ----------
-    atlas : Skeleton
-        What was found so far; its corners, edges and faces stay as they are.
-    budget, progress
+    found : Skeleton
+        What was found so far, also from a pickle; it stays as it is.
+    budget, time_limit, progress
         As for :func:`skeleton`.
+
+    Returns
+    -------
+    Skeleton
+        The same corners, edges and faces, and more.
     """
-    if not isinstance(atlas, Skeleton) or not isinstance(atlas.state, Explorer):
-        msg = f"atlas: expected a Skeleton that skeleton() returned; got {type(atlas).__name__}"
-        raise TypeError(msg)
-    _check_budget(budget)
-    _check_progress(progress)
-    return _run(atlas.state, budget, progress)
+    state = checks.instance("found", found, Skeleton, "skeleton()").state
+    checks.instance("found", state, SearchState, "skeleton()")
+    return _run(Explorer.resumed(state), budget, time_limit, progress)
 
 
-def _run(explorer: Explorer, budget: int, progress: Progress | None) -> Skeleton:
-    complete = explorer.run(budget, progress)
+def _run(
+    explorer: Explorer, budget: int, time_limit: float, progress: Progress | None
+) -> Skeleton:
+    checks.whole("budget", budget, least=1)
+    checks.real("time_limit", time_limit, above=0, infinite=True, unit="s")
+    if progress is not None and not callable(progress):
+        checks.refuse("progress", "a callable or None", progress, TypeError)
+    complete = explorer.run(int(budget), time_limit, progress or silent)
     try:
         return assembled(explorer, complete)
     except KeyboardInterrupt:
         return assembled(explorer, Completeness.INTERRUPTED)
-
-
-def _generator(rng: np.random.Generator | int | None) -> np.random.Generator:
-    expected = "rng: expected a Generator or a whole number not below 0"
-    whole = isinstance(rng, int) and not isinstance(rng, bool)
-    if rng is not None and not whole and not isinstance(rng, np.random.Generator):
-        msg = f"{expected}; got {rng!r}"
-        raise TypeError(msg)
-    if isinstance(rng, int) and rng < 0:
-        msg = f"{expected}; got {rng}"
-        raise ValueError(msg)
-    return np.random.default_rng(0 if rng is None else rng)
-
-
-def _check_progress(progress: Progress | None) -> None:
-    if progress is not None and not callable(progress):
-        msg = f"progress: expected a callable or None; got {progress!r}"
-        raise TypeError(msg)
-
-
-def _check_budget(budget: int) -> None:
-    if isinstance(budget, bool) or not isinstance(budget, int) or budget < 1:
-        msg = f"budget: expected a positive whole number of edges; got {budget!r}"
-        raise ValueError(msg)

@@ -1,0 +1,258 @@
+"""Edges while a skeleton grows: traced from corners, or found through one of their points.
+
+The end of an edge at a corner is named by two positions, those of the corner and of the ray.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from polycorner.polyhedra.cones import null_space
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.polyhedra.symmetry import Relabelling, renamed
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
+from polycorner.skeletons.registry import SAME, CornerRecord, CornerRegistry, written_point
+from polycorner.skeletons.vertex_figures import Ray
+from polycorner.skeletons.walks import End, Walk, follow
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+ARC_SEARCH = 40
+
+EdgeEnd = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve(Value):
+    """An edge while the skeleton grows, of at least two points.
+
+    ``relabelled`` carries the names along the walk to the names at the corner ``stop``.
+    """
+
+    points: Array
+    active: frozenset[int]
+    kinds: tuple[End, End]
+    start: EdgeEnd | None
+    stop: EdgeEnd | None
+    relabelled: Relabelling
+    length: float
+    branches: int
+
+    def __post_init__(self) -> None:
+        if len(self.points) < 2:
+            msg = f"points: expected at least two points of an edge; got {len(self.points)}"
+            raise ValueError(msg)
+        super().__post_init__()
+
+    @property
+    def middle(self) -> Array:
+        """The vertex half-way along."""
+        return np.asarray(self.points[len(self.points) // 2])
+
+
+class EdgeTracer:
+    """Corners and edges that were found, and ends of edges still to trace."""
+
+    def __init__(self, quotient: Quotient) -> None:
+        self.quotient = quotient
+        self.polyhedron, self.symmetry = quotient.polyhedron, quotient.symmetry
+        self.manifold = self.polyhedron.manifold
+        self.scales = self.manifold.scale_array
+        self.registry = CornerRegistry(quotient)
+        self.curves: list[Curve] = []
+        self.pending: deque[EdgeEnd] = deque()
+
+    def corner(self, point: EvaluatedPoint) -> tuple[int, list[Relabelling]] | None:
+        """Return the corner at a point; the edges of a new one are pending.
+
+        See :meth:`CornerRegistry.find`.
+        """
+        known = len(self.records)
+        found = self.registry.find(point)
+        if found is not None and found[0] == known:
+            orbit = self.records[known].orbit
+            self.pending.extend((known, i) for i, twin in enumerate(orbit) if twin == i)
+        return found
+
+    @property
+    def records(self) -> list[CornerRecord]:
+        """The corners."""
+        return self.registry.records
+
+    @property
+    def notes(self) -> list[str]:
+        """Everything a user should know."""
+        return list(self.registry.notes)
+
+    def _trace(self, end: EdgeEnd) -> None:
+        k, i = end
+        record = self.records[k]
+        if i in record.edges:
+            return
+        ray = record.figure.rays[i]
+        walk = follow(ray.sample, ray.direction, passive=ray.active)
+        points = np.vstack([record.point.q, walk.points])
+        stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
+        curve = Curve(
+            points, ray.active, (End.CORNER, walk.end), end, stop, carried,
+            walk.length + ray.distance, walk.branches,
+        )  # fmt: skip
+        self.curves.append(curve)
+        number = len(self.curves) - 1
+        record.edges[i] = number
+        if stop is not None:
+            there = self.records[stop[0]]
+            there.edges[there.orbit[stop[1]]] = number
+        self._remark(curve)
+
+    def _remark(self, curve: Curve) -> None:
+        label = self.registry.written(curve.active)
+        for kind in curve.kinds:
+            if kind not in (End.CORNER, End.CLOSED):
+                lost = kind is End.SINGULAR
+                self.registry.note(f"the edge {label} {kind.value}", lost=lost)
+        if curve.branches:
+            self.registry.note(
+                f"the edge {label} meets other curves on the same functions: not followed",
+                lost=True,
+            )
+
+    def _arrive(self, walk: Walk, ray: Ray) -> tuple[EdgeEnd | None, Relabelling]:
+        """Return the end of the edge at the corner a walk came to."""
+        found = self.corner(walk.last)
+        if found is None:
+            return None, {}
+        k, carried = found
+        record = self.records[k]
+        rays = record.figure.rays
+        distance = rays[0].distance if rays else 1e-3
+        back = projected(
+            self.quotient,
+            walk.last.q - distance * self.scales * walk.tangent,
+            walk.last.kept,
+            distance,
+        )
+        sample = None if back is None else back.q
+        match = self.registry.match(record, sample, ray, carried, range(len(rays)))
+        if match is None:
+            self.registry.note(
+                f"the edge {self.registry.written(ray.active)} arrives at a corner "
+                f"that no edge of this kind leaves",
+                lost=True,
+            )
+            return None, {}
+        return (k, match[0]), match[1]
+
+    def _edge_at(
+        self, point: EvaluatedPoint, active: frozenset[int]
+    ) -> tuple[str, EdgeEnd | int] | None:
+        """Return the edge through a point: its end at a corner, or its position.
+
+        None where there is none, or where it cannot be followed; the notes say so.
+        """
+        here = HeldPoint(self.quotient, point.q, point.basis(active))
+        t = self._along(here)
+        walks = []
+        for way in (t, -t):
+            walk = follow(here, way, passive=active, home=True)
+            if walk.end is End.CORNER:
+                stop, _ = self._arrive(walk, Ray(way, active, here, 0.0))
+                return None if stop is None else ("half", stop)
+            walks.append(walk)
+            if walk.end is End.CLOSED:
+                break
+        if all(len(walk.points) == 1 for walk in walks):
+            self.registry.note(
+                f"the edge {self.registry.written(active)} {walks[0].end.value}", lost=True
+            )
+            return None
+        return "curve", self._free_edge(walks, here, active)
+
+    def _free_edge(self, walks: list[Walk], here: HeldPoint, active: frozenset[int]) -> int:
+        """Return the position of an edge without corners, new or known."""
+        for k, curve in enumerate(self.curves):
+            if curve.start is None and self._is_image(here.q, active, curve):
+                return k
+        forth = walks[0]
+        points = forth.points
+        kinds = (forth.end, forth.end)
+        if len(walks) == 2:
+            points = np.vstack([walks[1].points[::-1], points[1:]])
+            kinds = (walks[1].end, forth.end)
+        curve = Curve(
+            points, active, kinds, None, None, {},
+            sum(w.length for w in walks), sum(w.branches for w in walks),
+        )  # fmt: skip
+        self.curves.append(curve)
+        self._remark(curve)
+        return len(self.curves) - 1
+
+    def _is_image(self, q: Array, active: frozenset[int], curve: Curve) -> bool:
+        """Whether a symmetry carries a point with given active functions to a curve."""
+        names, there = self.registry.names(active), self.registry.names(curve.active)
+        return any(
+            renamed(names, g.names) == there and self.lies_on(g.apply(q), curve)
+            for g in self.symmetry.group
+        )
+
+    def lies_on(self, q: Array, curve: Curve) -> bool:
+        """Whether a point lies on a curve: on one of the chords' arcs beside its nearest vertex."""
+        apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
+        nearest = int(np.argmin(apart))
+        chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
+        # A closed curve has its first point twice.
+        nearest = nearest or len(chords)
+        beside = {nearest - 1, nearest % len(chords)}
+        if apart[nearest] > max(chords[k] for k in beside):
+            return False
+        return any(self._on_arc(q, curve, k) for k in beside)
+
+    def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
+        """Whether a point lies on the arc over chord ``k``, by ternary search."""
+        start, end = curve.points[k], curve.points[k + 1]
+        kept = self.quotient.at(start).basis(curve.active)
+
+        def apart(s: float) -> float:
+            at = projected(self.quotient, start + s * (end - start), kept, np.inf)
+            p = start if at is None else at.q
+            return self.symmetry.separation(self.manifold, q, p)
+
+        low, high = 0.0, 1.0
+        for _ in range(ARC_SEARCH):
+            left, right = (2 * low + high) / 3, (low + 2 * high) / 3
+            low, high = (low, right) if apart(left) < apart(right) else (left, high)
+        return apart((low + high) / 2) < SAME
+
+    def _undirected(self, point: EvaluatedPoint, active: frozenset[int]) -> list[int]:
+        """Return the active functions and equations whose gradients have no direction."""
+        return point.vanishing([*active, *range(self.quotient.count, len(point.values))])
+
+    def _note_undirected(self, point: EvaluatedPoint, rows: list[int]) -> None:
+        every = (*self.polyhedron.names, *self.polyhedron.equation_names)
+        self.registry.note(
+            f"the gradient of {', '.join(every[i] for i in rows)} vanishes at "
+            f"{written_point(point.q)}: not followed from there",
+            lost=True,
+        )
+
+    def _free(self, point: EvaluatedPoint, active: frozenset[int]) -> int:
+        fixed = null_space(point.matrix([]), RANK_TOLERANCE)
+        return int(fixed.shape[1]) - len(point.basis(active))
+
+    def _on_curve(self, point: EvaluatedPoint, active: frozenset[int]) -> bool:
+        """Whether functions that depend on each other vanish together on a curve."""
+        kept = point.basis(active)
+        if len(kept) == len(active):
+            return True
+        t = self._along(HeldPoint(self.quotient, point.q, kept))
+        ahead = projected(self.quotient, point.q + 1e-3 * self.scales * t, kept, 1e-3)
+        return ahead is not None and ahead.active() == active
+
+    @staticmethod
+    def _along(point: HeldPoint) -> Array:
+        """Return the direction of the curve on which the held functions vanish."""
+        matrix = point.matrix(point.kept)
+        if not len(matrix):
+            return np.ones(1)
+        return np.asarray(np.linalg.svd(matrix)[2][-1])
