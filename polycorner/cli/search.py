@@ -24,12 +24,12 @@ from polycorner.cli.report import keys, print_answer
 if TYPE_CHECKING:
     from polycorner.polyhedra.polyhedron import Polyhedron
     from polycorner.polyhedra.symmetry import Symmetry
+    from polycorner.progress import Progress
     from polycorner.skeletons.elements import Skeleton
 
-    Progress = Callable[[int, int, int], None]
 
-# Edges walked between two savings of a long search.
-CHUNK = 500
+# Seconds between two savings of a long search.
+SAVED_EVERY = 10.0
 
 
 class Search:
@@ -67,31 +67,36 @@ class Search:
         *,
         resume: bool,
     ) -> "Skeleton":
-        """Search, or go on, saving every so often; also what an interrupted search found."""
+        """Search, or resume, saving by the clock; also what an interrupted search found."""
         import numpy as np
 
         from polycorner.files import save_skeleton
+        from polycorner.skeletons import Budget, skeleton
+        from polycorner.skeletons import resume as resumed
         from polycorner.skeletons.elements import Completeness
-        from polycorner.skeletons.search import resume as go_on
-        from polycorner.skeletons.search import skeleton
 
-        left = self.budget
+        known = 0
         with self.patience() as progress:
             if resume:
                 found = self._load(polyhedron, symmetry)
+                known = len(found.edges)
             else:
                 rng = np.random.default_rng(self.seed)
-                first = starts(rng)
-                budget = min(CHUNK, left)
                 found = skeleton(
-                    polyhedron, first, symmetry=symmetry, budget=budget, progress=progress, rng=rng
+                    polyhedron,
+                    starts(rng),
+                    symmetry=symmetry,
+                    budget=Budget(self.budget, SAVED_EVERY),
+                    progress=progress,
+                    rng=rng,
                 )
-                left -= budget
-            while left > 0 and (resume or found.complete is Completeness.BUDGET):
+            while resume or found.complete is Completeness.BUDGET:
                 resume = False
                 save_skeleton(found, self.state, label=self.label)
-                found = go_on(found, budget=min(CHUNK, left), progress=progress)
-                left -= CHUNK
+                left = self.budget - (len(found.edges) - known)
+                if left < 1:
+                    break
+                found = resumed(found, budget=Budget(left, SAVED_EVERY), progress=progress)
         self.finished = found.complete not in (Completeness.BUDGET, Completeness.INTERRUPTED)
         if self.finished:
             self.state.unlink(missing_ok=True)
@@ -120,13 +125,14 @@ class Search:
                 yield None
                 return
 
-            def progress(corners: int, edges: int, pending: int) -> None:
-                pace = edges / (perf_counter() - begun)
+            def progress(done: float, total: float | None, note: str, /) -> None:
+                pace = done / (perf_counter() - begun)
+                left = f", {(total - done) / pace:.0f} s left" if total and done else ""
                 change(
-                    completed=edges,
-                    total=edges + pending,
-                    description=f"{self.model}: {corners} corners, edges",
-                    note=f"{pace:.0f}/s, {pending / pace:.0f} s left" if edges else "",
+                    completed=done,
+                    total=total,
+                    description=f"{self.model}: {note}",
+                    note=f"{pace:.0f}/s{left}",
                 )
 
             yield progress

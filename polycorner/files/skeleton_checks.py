@@ -7,8 +7,9 @@ import numpy as np
 
 from polycorner.files.container import number, read_number
 from polycorner.polyhedra.strata import distances
-from polycorner.skeletons.explorer import Curve, Explorer
+from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import DRIFT
 from polycorner.spaces.manifold import Array
 
@@ -126,6 +127,6 @@ def _number_faults(explorer: Explorer) -> Iterator[str]:
     for corner, ray in explorer.pending:
         if not (0 <= corner < corners and 0 <= ray < len(explorer.records[corner].figure.rays)):
             yield f"edge {ray} of corner {corner} is to be walked, and is not there"
-    for edge, _ in explorer.shot:
+    for edge, _ in explorer.tried:
         if not 0 <= edge < edges:
             yield f"a face beside edge {edge} was crossed, which is not there"

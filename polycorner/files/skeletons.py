@@ -14,9 +14,10 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
-from polycorner.skeletons.explorer import Curve, Explorer
+from polycorner.skeletons.explorer import Explorer, SearchState
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import End
 
 KIND = Kind("a skeleton", "save_skeleton", "polycorner skeleton", schema=1)
@@ -55,10 +56,10 @@ def save_skeleton(
     OSError
         If the file cannot be written.
     """
-    if not isinstance(skeleton, Skeleton) or not isinstance(skeleton.state, Explorer):
+    if not isinstance(skeleton, Skeleton) or not isinstance(skeleton.state, SearchState):
         msg = f"skeleton: expected a Skeleton that skeleton returned; got {type(skeleton).__name__}"
         raise TypeError(msg)
-    explorer: Explorer = skeleton.state
+    explorer = Explorer.resumed(skeleton.state)
     d, manifold = skeleton.polyhedron, skeleton.polyhedron.manifold
     known = units_of(d, None, units).coordinates
     content = {
@@ -78,10 +79,10 @@ def save_skeleton(
         "corners": [corner_entry(explorer, record) for record in explorer.records],
         "ends": [[[ray, edge] for ray, edge in p.edges.items()] for p in explorer.records],
         "curves": [_curve(curve) for curve in explorer.curves],
-        "passages": [[_flag(p.start), _flag(p.stop)] for p in explorer.passages],
-        "seeds": [[count, seed.tolist()] for count, seed in explorer.seeds],
+        "crossings": [[_flag(p.start), _flag(p.stop)] for p in explorer.crossings],
+        "starts": [[count, start.tolist()] for count, start in explorer.starts],
         "pending": list(explorer.pending),
-        "shot": [[edge, sorted(face)] for edge, face in sorted(explorer.shot, key=_order)],
+        "tried": [[edge, sorted(face)] for edge, face in sorted(explorer.tried, key=_order)],
         "notes": explorer.notes,
         "lost": bool(explorer.registry.lost),
         "random": _listed(explorer.rng.bit_generator.state),
@@ -173,12 +174,12 @@ def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
     for record, ends in zip(explorer.records, content["ends"], strict=True):
         record.edges.update(dict(ends))
     explorer.curves += [_read_curve(entry, n) for entry in content["curves"]]
-    explorer.passages += [
-        Crossing(_read_flag(start), _read_flag(stop)) for start, stop in content["passages"]
+    explorer.crossings += [
+        Crossing(_read_flag(start), _read_flag(stop)) for start, stop in content["crossings"]
     ]
-    explorer.seeds.extend((count, _points(seed, n, 1)) for count, seed in content["seeds"])
+    explorer.starts.extend((count, _points(start, n, 1)) for count, start in content["starts"])
     explorer.pending.extend((corner, ray) for corner, ray in content["pending"])
-    explorer.shot.update((edge, frozenset(face)) for edge, face in content["shot"])
+    explorer.tried.update((edge, frozenset(face)) for edge, face in content["tried"])
     for sentence in content["notes"]:
         explorer.registry.note(sentence)
     explorer.registry.lost = bool(content["lost"])

@@ -94,7 +94,7 @@ class SphereCluster:
         return Symmetry(
             tangents=self._motions,
             invariants=self.distances,
-            key=lambda q: np.sort(self.distances(q)),
+            key=self._sorted_distances,
             relabel=self._relabellings,
         )
 
@@ -127,6 +127,9 @@ class SphereCluster:
     def starts(self) -> Array:
         """Return points to fall from, ``(1, 3 n)``."""
         return self.stacked()[None]
+
+    def _sorted_distances(self, q: Array) -> Array:
+        return np.sort(self.distances(q))
 
     def _motions(self, q: Array) -> Array:
         """Return the velocities of three translations and three rotations about the centroid."""

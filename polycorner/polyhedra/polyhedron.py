@@ -9,16 +9,18 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.spaces.manifold import Array, Manifold, scalar
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
 
 Part = Union["AllOf", "AnyOf", SmoothFunction, "sympy.Expr"]
-# What a model says about a point.
+# A model's remark on a point.
 Annotation = Callable[[Array], str | None]
 # A piece of the set: the positions of the functions that must all be at least zero.
 Piece = frozenset[int]
@@ -26,8 +28,8 @@ Piece = frozenset[int]
 MAX_SELECTIONS = 256
 
 
-class _Group:
-    """Parts joined by one word; a frozen value."""
+class _Group(Value):
+    """Parts joined by one word; an immutable value."""
 
     def __init__(self, *parts: Part) -> None:
         self.parts = parts
@@ -45,20 +47,20 @@ class AnyOf(_Group):
     """The union of its parts: at least one inequality holds (locally concave corners)."""
 
 
-class Polyhedron:
+class Polyhedron(Value):
     """A curvilinear polyhedron ``D = {q : f_i(q) >= 0 joined by and/or, h_j(q) = 0}``.
 
     Parameters
     ----------
     manifold : Manifold
-        Where ``D`` lives.
+        The space of its points.
     parts : AllOf, AnyOf, SmoothFunction, SymPy expression, sequence or mapping
         The inequalities ``f >= 0``.  A sequence means all of them; a mapping gives names.
         Expressions without a name are called ``f1``, ``f2``, ..., or after the group's name.
     equations : the same kinds, optional
         Functions ``h = 0`` (sections), called ``h1``, ``h2``, ... without a name.
     annotations : mapping from str to callable, optional
-        What a model has to say about a point, such as its chirality; kept in strata.
+        A model's remarks on a point, such as its chirality; kept in strata.
 
     Raises
     ------
@@ -83,9 +85,7 @@ class Polyhedron:
         *,
         annotations: Mapping[str, Annotation] | None = None,
     ) -> None:
-        if not isinstance(manifold, Manifold):
-            msg = f"manifold: expected a Manifold; got {type(manifold).__name__}"
-            raise TypeError(msg)
+        checks.instance("manifold", manifold, Manifold)
         self.manifold = manifold
         self.annotations = dict(annotations or {})
         tree, functions = _collect(manifold, "parts", parts, "f")

@@ -1,4 +1,4 @@
-"""Which face of a polyhedron a point lies on."""
+"""Strata: the face of a polyhedron that a point lies on, and its local type."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,17 +7,19 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.polyhedra.cones import inward_direction, rank
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.printing import Printed, Sheet, facts, names
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 TOLERANCE = 1e-8
 RANK_TOLERANCE = 1e-6
 
 
 class LocalType(Enum):
-    """What a polyhedron looks like near a point; the value says it in a sentence."""
+    """Local type of a polyhedron at a point; the value is a sentence."""
 
     OUTSIDE = "the point does not lie in the polyhedron"
     INTERIOR = "no active function: the polyhedron is a neighbourhood of the point"
@@ -28,7 +30,7 @@ class LocalType(Enum):
 
 
 @dataclass(frozen=True)
-class Stratum(Printed):
+class Stratum(Printed, Value):
     """The face of a polyhedron that a point lies on.
 
     Attributes
@@ -153,10 +155,7 @@ def local_pieces(
 
 def check_tolerance(argument: str, value: float) -> None:
     """Refuse a tolerance that is not strictly between 0 and 1."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 0 < value < 1:
-        msg = f"{argument}: expected a number between 0 and 1; got {value!r}"
-        raise ValueError(msg)
+    checks.real(argument, value, above=0, below=1)
 
 
 def _local_type(pieces: list[Piece], gradients: Array, m: int, rank_tolerance: float) -> LocalType:

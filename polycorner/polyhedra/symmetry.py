@@ -1,4 +1,4 @@
-"""Symmetries of a polyhedron: motions that are quotiented out, and relabellings.
+"""Symmetries of a polyhedron: continuous motions and relabellings.
 
 A continuous symmetry is given by its tangent vectors and by invariants that tell its orbits
 apart; a discrete one by the relabellings that carry one point to another.
@@ -10,14 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
 
 # From the names of functions at one point to the names of the same bodies' functions at another.
 Relabelling = Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class Element:
-    """An element of a finite symmetry group: a map of points, and what it does to names.
+class Element(Value):
+    """An element of a finite symmetry group: a map of points, and how it renames functions.
 
     Attributes
     ----------
@@ -33,8 +34,10 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Symmetry:
-    """What may be done to a point without changing what it stands for.
+class Symmetry(Value):
+    """A group of symmetries of a polyhedron, continuous, finite or both.
+
+    It can be pickled where its functions can: module-level functions and methods of values.
 
     Attributes
     ----------
@@ -70,7 +73,7 @@ class Symmetry:
     @property
     def group(self) -> list[Element]:
         """The finite group with the identity first."""
-        return [Element(lambda q: q, {}), *self.elements]
+        return [Element(_same, {}), *self.elements]
 
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
@@ -99,6 +102,10 @@ class Symmetry:
             for element in self.group
             if self.separation(manifold, element.apply(p), q) <= tolerance
         ]
+
+
+def _same(q: Array) -> Array:
+    return q
 
 
 def renamed(names: frozenset[str], relabelling: Relabelling) -> frozenset[str]:

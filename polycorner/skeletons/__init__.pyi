@@ -1,9 +1,11 @@
 from .elements import Completeness, Corner, Edge, Face, Skeleton
+from .explorer import Budget
 from .refinement import traced
 from .search import resume, skeleton
 from .walks import End
 
 __all__ = [
+    "Budget",
     "Completeness",
     "Corner",
     "Edge",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Completeness(Enum):
     """Completeness of a skeleton; the value is a sentence."""
 
-    EXHAUSTED = "every edge that was found has been traced; parts that no start leads to are not found"
+    EXHAUSTED = "every edge that was found is traced; what no start leads to stays unseen"
     GAPS = "some edges could not be traced: the notes say which"
     BUDGET = "budget or time was used up: edges or faces are left"
     INTERRUPTED = "interrupted: edges or faces are left"

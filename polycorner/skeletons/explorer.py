@@ -1,6 +1,7 @@
 """Search for the skeleton of a polyhedron: descents, edges, crossings of faces, in this order."""
 
 import copy
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -10,6 +11,7 @@ from time import monotonic
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.progress import Progress
 from polycorner.skeletons.elements import Completeness
 from polycorner.skeletons.flags import Crossing, Flag
@@ -28,6 +30,32 @@ SHORT = 20
 
 # An edge by position, and the functions of a face beside it.
 Beside = tuple[int, frozenset[int]]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much a search may do before it stops and can be resumed.
+
+    Attributes
+    ----------
+    edges : int
+        Most edges to trace; as many starts may be descended from, and as many faces crossed.
+    seconds : float
+        Time after which it stops: between two edges, descents or crossings, of which it does at
+        least one.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument.
+    """
+
+    edges: int = 100_000
+    seconds: float = math.inf
+
+    def __post_init__(self) -> None:
+        checks.whole("budget", self.edges, least=1)
+        checks.real("seconds", self.seconds, above=0, infinite=True, unit="s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +144,14 @@ class Explorer(EdgeTracer):
 
     # --------------------------------------------------------------------------- order of the work
 
-    def run(self, budget: int, seconds: float, progress: Progress) -> Completeness:
+    def run(self, budget: Budget, progress: Progress) -> Completeness:
         """Work until nothing is left, budget or time is used up, or Ctrl-C.
 
-        The budget bounds the edges, the descents and the crossings of this run, each by itself.
-        At least one piece of work is done, however short the time.
+        At least one edge, descent or crossing is done, however short the time.
         """
-        deadline, first = monotonic() + seconds, True
+        deadline, first = monotonic() + budget.seconds, True
         try:
-            for allowed, work in self._work(budget):
+            for allowed, work in self._work(budget.edges):
                 if not allowed or (monotonic() > deadline and not first):
                     return Completeness.BUDGET
                 work()

@@ -13,13 +13,13 @@ Nearby = Callable[[Array], Array]
 
 
 def orbits(
-    found: Skeleton, elements: Sequence[Element], *, nearby: Nearby | None = None
+    skeleton: Skeleton, elements: Sequence[Element], *, nearby: Nearby | None = None
 ) -> Mapping[str, Orbits]:
     """Return the orbits of a finite group on the corners, edges and faces of a skeleton.
 
     Parameters
     ----------
-    found : Skeleton
+    skeleton : Skeleton
         A skeleton without relabellings.
     elements : sequence of Element
         Generators suffice.
@@ -39,11 +39,11 @@ def orbits(
         If the image of a corner, edge or face is not in the skeleton: the group is no symmetry, or
         the skeleton is not complete.
     """
-    images = _Images(found, nearby)
+    images = _Images(skeleton, nearby)
     counts = {
-        "corners": (len(found.corners), images.corner),
-        "edges": (len(found.edges), images.edge),
-        "faces": (len(found.faces), images.face),
+        "corners": (len(skeleton.corners), images.corner),
+        "edges": (len(skeleton.edges), images.edge),
+        "faces": (len(skeleton.faces), images.face),
     }
     return {kind: _grouped(n, elements, image) for kind, (n, image) in counts.items()}
 
@@ -70,11 +70,11 @@ def _grouped(
 class _Images:
     """Images of the parts of a skeleton under elements of the group."""
 
-    def __init__(self, found: Skeleton, nearby: Nearby | None) -> None:
-        self.found, self.nearby = found, nearby
-        self.explorer = Explorer.resumed(found.state)
+    def __init__(self, skeleton: Skeleton, nearby: Nearby | None) -> None:
+        self.skeleton, self.nearby = skeleton, nearby
+        self.explorer = Explorer.resumed(skeleton.state)
         self.names = self.explorer.registry.names
-        self.faces = {_signature(f.active, f.boundary): k for k, f in enumerate(found.faces)}
+        self.faces = {_signature(f.active, f.boundary): k for k, f in enumerate(skeleton.faces)}
 
     def corner(self, k: int, g: Element) -> int | None:
         """Return the image of a corner."""
@@ -111,7 +111,7 @@ class _Images:
 
     def face(self, k: int, g: Element) -> int | None:
         """Return the image of a face."""
-        face = self.found.faces[k]
+        face = self.skeleton.faces[k]
         boundary = [[self.edge(e, g) for e in curve] for curve in face.boundary]
         return self.faces.get(_signature(renamed(frozenset(face.active), g.names), boundary))
 

@@ -9,7 +9,7 @@ from polycorner.skeletons.points import projected
 from polycorner.spaces.manifold import Array
 
 
-def traced(found: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
+def traced(skeleton: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
     """Return points of an edge ``(k, n)``: its polyline with every chord cut into pieces.
 
     Newton's method projects the new points to the edge, so that they lie on it as exactly as
@@ -17,7 +17,7 @@ def traced(found: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
 
     Parameters
     ----------
-    found : Skeleton
+    skeleton : Skeleton
         What :func:`~polycorner.skeletons.search.skeleton` returned.
     edge : Edge
         One of its edges.
@@ -29,11 +29,12 @@ def traced(found: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
     TypeError, ValueError
         Naming the argument, what was expected and what came.
     """
-    state = checks.instance("found", checks.instance("found", found, Skeleton).state, SearchState)
+    state = checks.instance("skeleton", skeleton, Skeleton).state
+    checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
     checks.instance("edge", edge, Edge)
     checks.whole("pieces", pieces, least=1)
-    quotient, scales = state.quotient, found.polyhedron.manifold.scale_array
-    rows = [found.polyhedron.names.index(name) for name in edge.active]
+    quotient, scales = state.quotient, skeleton.polyhedron.manifold.scale_array
+    rows = [skeleton.polyhedron.names.index(name) for name in edge.active]
     kept = quotient.at(edge.polyline[len(edge.polyline) // 2]).basis(rows)
     points = [edge.polyline[0]]
     for start, end in zip(edge.polyline, edge.polyline[1:], strict=False):

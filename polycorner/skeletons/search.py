@@ -1,7 +1,5 @@
 """Search for the skeleton of a polyhedron, from the start or resumed."""
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,7 +10,7 @@ from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
-from polycorner.skeletons.explorer import Explorer, SearchState
+from polycorner.skeletons.explorer import Budget, Explorer, SearchState
 from polycorner.skeletons.points import Quotient
 from polycorner.spaces.manifold import reals
 
@@ -25,8 +23,7 @@ def skeleton(
     starts: ArrayLike,
     *,
     symmetry: Symmetry | None = None,
-    budget: int = BUDGET,
-    time_limit: float = math.inf,
+    budget: int | Budget = BUDGET,
     progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
     tolerance: float = TOLERANCE,
@@ -49,11 +46,9 @@ def skeleton(
     symmetry : Symmetry, optional
         Symmetry to divide by.  With relabellings corners, edges and faces are counted up to
         them.
-    budget : int, optional
-        Most edges to trace, most starts to descend from and most faces to cross.
-    time_limit : float, optional
-        Seconds after which the search stops: between two edges, descents or crossings, of which
-        it does at least one.
+    budget : int or Budget, optional
+        Most edges to trace; as many starts may be descended from, and as many faces crossed.
+        A :class:`Budget` bounds the time as well.
     progress : callable, optional
         Called as ``progress(edges, edges + pending, note)`` after every edge, descent and crossing;
         ``pending`` counts the ends of edges to trace; see :class:`~polycorner.progress.Progress`.
@@ -96,23 +91,22 @@ def skeleton(
         checks.refuse("starts", expected, points.shape)
     quotient = Quotient(polyhedron, symmetry or Symmetry(), tolerance, float(extent))
     explorer = Explorer(quotient, points, checks.generator("rng", rng))
-    return _run(explorer, budget, time_limit, progress)
+    return _run(explorer, budget, progress)
 
 
 def resume(
-    found: Skeleton,
+    skeleton: Skeleton,
     *,
-    budget: int = BUDGET,
-    time_limit: float = math.inf,
+    budget: int | Budget = BUDGET,
     progress: Progress | None = None,
 ) -> Skeleton:
     """Resume a search that was interrupted or ran out of budget or time.
 
     Parameters
     ----------
-    found : Skeleton
+    skeleton : Skeleton
         What was found so far, also from a pickle; it stays as it is.
-    budget, time_limit, progress
+    budget, progress
         As for :func:`skeleton`.
 
     Returns
@@ -120,19 +114,16 @@ def resume(
     Skeleton
         The same corners, edges and faces, and more.
     """
-    state = checks.instance("found", found, Skeleton, "skeleton()").state
-    checks.instance("found", state, SearchState, "skeleton()")
-    return _run(Explorer.resumed(state), budget, time_limit, progress)
+    state = checks.instance("skeleton", skeleton, Skeleton, "polycorner.skeleton").state
+    checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
+    return _run(Explorer.resumed(state), budget, progress)
 
 
-def _run(
-    explorer: Explorer, budget: int, time_limit: float, progress: Progress | None
-) -> Skeleton:
-    checks.whole("budget", budget, least=1)
-    checks.real("time_limit", time_limit, above=0, infinite=True, unit="s")
+def _run(explorer: Explorer, budget: int | Budget, progress: Progress | None) -> Skeleton:
+    limits = budget if isinstance(budget, Budget) else Budget(budget)
     if progress is not None and not callable(progress):
         checks.refuse("progress", "a callable or None", progress, TypeError)
-    complete = explorer.run(int(budget), time_limit, progress or silent)
+    complete = explorer.run(limits, progress or silent)
     try:
         return assembled(explorer, complete)
     except KeyboardInterrupt:

@@ -176,7 +176,7 @@ def test_the_tolerance_is_an_argument(saved):
     with pytest.raises(ValueError, match="value of 'energy'"):
         load_certificate(saved, BOWL, nearly)
     assert load_certificate(saved, BOWL, nearly, tolerance=1e-6).is_minimum
-    with pytest.raises(ValueError, match=r"^tolerance: expected a number between 0 and 1"):
+    with pytest.raises(ValueError, match=r"^tolerance: expected a number > 0 and < 1"):
         load_certificate(saved, BOWL, nearly, tolerance=0)
 
 

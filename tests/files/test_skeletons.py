@@ -180,7 +180,7 @@ def waiting(entries):
 
 
 def crossed(entries):
-    entries["shot"] = [[-1, [0]]]
+    entries["tried"] = [[-1, [0]]]
 
 
 def flat(entries):

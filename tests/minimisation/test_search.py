@@ -353,7 +353,7 @@ def test_points_are_drawn_where_the_inequalities_hold():
         (TypeError, {"rng": -1}, "rng: expected a Generator or a whole number not below 0; got"),
         (TypeError, {"symmetry": 3}, "symmetry: expected a Symmetry; got int"),
         (TypeError, {"progress": 3}, "progress: expected a function of three numbers; got 3"),
-        (ValueError, {"tolerance": 2}, "tolerance: expected a number between 0 and 1; got 2"),
+        (ValueError, {"tolerance": 2}, "tolerance: expected a number > 0 and < 1; got 2"),
     ],
 )
 def test_arguments_are_refused_in_a_sentence(error, changes, says):

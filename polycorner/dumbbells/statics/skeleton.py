@@ -11,9 +11,10 @@ import numpy as np
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import ball_relabellings, relabellings
 from polycorner.polyhedra.symmetry import Element
+from polycorner.progress import Progress
 from polycorner.skeletons.elements import Corner, Skeleton
 from polycorner.skeletons.orbits import Orbits, orbits
-from polycorner.skeletons.search import BUDGET, Progress, skeleton
+from polycorner.skeletons.search import BUDGET, skeleton
 from polycorner.spaces.manifold import Array
 
 PLACEMENTS = 6

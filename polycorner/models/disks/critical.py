@@ -1,6 +1,6 @@
 """Critical configurations of disks on a torus: searched, judged, named, and told apart."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -9,12 +9,12 @@ import numpy as np
 from polycorner.models.disks.corners import judged, solved
 from polycorner.models.disks.search import Candidate, candidates, smooth
 from polycorner.models.disks.torus import IMAGES, OWN, components, translates, uncut
+from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from polycorner.models.disks.disks import TorusDisks
 
-Progress = Callable[[int, int, int], None]
 Configurations = list["CriticalConfiguration"]
 
 SAME = 1e-6
@@ -148,7 +148,8 @@ def _searched(
         for c in candidates(model.pairs, begin, rng, _moved):
             _add(model, found, _settled(model, c))
         if progress is not None:
-            progress(model.count, attempt, len(found))
+            note = f"{model.count} disks, round {attempt}: {len(found)} critical configurations"
+            progress(attempt, None, note)
         if len(found) == before:
             break
     return found

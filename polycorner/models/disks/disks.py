@@ -17,12 +17,12 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.disks.critical import (
     SAME,
     CriticalConfiguration,
-    Progress,
     coincide,
     critical_configurations,
 )
 from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrapped
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array, Manifold, scalar
 
 Lattice = Literal["square", "hexagonal"]
@@ -237,7 +237,7 @@ class TorusDisks:
         starts : int, optional
             Random starts of each round; default 80 for each disk.
         progress : callable, optional
-            Called as ``progress(disks, round, found)`` after every round, for 2 disks and more.
+            Called as ``progress(round, None, note)`` after every round, for 2 disks and more.
 
         Returns
         -------

@@ -265,5 +265,5 @@ def test_one_disk_touches_its_own_image():
 def test_progress_is_told():
     told = []
     TorusDisks(2).critical(np.random.default_rng(0), starts=20, progress=lambda *a: told.append(a))
-    assert told[0] == (2, 1, 2)
-    assert told[-1][2] == 2
+    assert told[0] == (1, None, "2 disks, round 1: 2 critical configurations")
+    assert told[-1][2].endswith(": 2 critical configurations")
