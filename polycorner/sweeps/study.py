@@ -9,6 +9,8 @@ import shlex
 import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
+from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -104,16 +106,40 @@ def canonical(fixed: dict[str, Any]) -> str:
 
 
 def _described(value: Any) -> Any:
-    """Return plain numbers for NumPy's, and type and SHA-256 of the pickle for other values."""
+    """Return plain numbers for NumPy's, and type and digest of the content for other values."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
+    if isinstance(value, set | frozenset):  # whose order differs from process to process
+        return sorted(json.dumps(part, sort_keys=True, default=_described) for part in value)
     content = io.BytesIO()
-    pickler = pickle.Pickler(content, protocol=5)
+    pickler = _ContentPickler(content, protocol=5)
     pickler.fast = True  # equal values give equal bytes, whether or not they share parts
     pickler.dump(value)
     kind = type(value)
     digest = hashlib.sha256(content.getvalue()).hexdigest()
     return {"type": f"{kind.__module__}:{kind.__qualname__}", "sha256": digest}
+
+
+class _ContentPickler(pickle.Pickler):
+    """A pickler whose output depends on content alone, not on what was computed from it before."""
+
+    def reducer_override(self, value: Any) -> Any:
+        """Return what a value is made of: arrays as bytes, objects without cached properties."""
+        if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+            return np.ndarray, (value.shape, value.dtype.str, value.tobytes())
+        if isinstance(value, type | FunctionType | BuiltinFunctionType):
+            return NotImplemented
+        reduced = value.__reduce_ex__(5)
+        if isinstance(reduced, tuple) and len(reduced) > 2 and isinstance(reduced[2], dict):
+            cached = {
+                name
+                for base in type(value).__mro__
+                for name, member in vars(base).items()
+                if isinstance(member, cached_property)
+            }
+            state = {name: part for name, part in reduced[2].items() if name not in cached}
+            return (*reduced[:2], state, *reduced[3:])
+        return reduced
 
 
 def difference(wanted: dict[str, Any], found: dict[str, Any]) -> str:

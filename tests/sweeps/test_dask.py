@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import regions
 import sweep_functions
 
+from polycorner import minimise
 from polycorner.sweeps import SweepError, open_results, sweep
 
 distributed = pytest.importorskip("distributed")
@@ -88,3 +90,29 @@ def test_a_worker_killed_on_the_way_then_the_scheduler(cluster, tmp_path):
     np.testing.assert_array_equal(kept["x"].values[done], serial["x"].values[done])
     whole = sweep(**given, store=store)
     assert whole["y"].values.tobytes() == serial["y"].values.tobytes()
+
+
+def test_a_region_of_ones_own_on_a_local_cluster(caplog):
+    """Neither the region nor the function that refers to it is known to the workers."""
+    caplog.set_level(logging.CRITICAL, logger="distributed")
+    region, plane = regions.bowl(), regions.PLANE
+
+    def lowest(slope, region):
+        x, y = plane.symbols
+        return {"point": minimise(region, y + slope * x, [0.2, 2.0]).point}
+
+    def closed(slope):
+        return lowest(slope, region)
+
+    grid = {"slope": [0.5, 1.0, 2.0]}
+    here = sweep(lowest, grid, fixed={"region": region})
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address=None
+        ) as local,
+        distributed.Client(local, set_as_default=False) as client,
+    ):
+        there = sweep(lowest, grid, fixed={"region": region}, executor=client)
+        closed_over = sweep(closed, grid, executor=client)
+    for found in (there, closed_over):
+        np.testing.assert_array_equal(found["point"].values, here["point"].values)
