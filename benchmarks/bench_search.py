@@ -21,7 +21,7 @@ from polycorner.dumbbells.statics.minima_map import (
     pair_minima,
     scattered,
 )
-from polycorner.minimisation.search import Minima, minima
+from polycorner.minimisation import Minima, minima
 from polycorner.models import Pinball
 
 STARTS, PART, ROUNDS = 1000, 100, 5

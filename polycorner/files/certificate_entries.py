@@ -9,7 +9,7 @@ import numpy as np
 
 from polycorner.files.container import number, read_number
 from polycorner.files.models import Units
-from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation import Certificate
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
 

@@ -17,9 +17,8 @@ from polycorner.files.certificate_entries import (
 )
 from polycorner.files.container import Kind, load_json, read_number, save_json
 from polycorner.files.models import described, rebuilt, units_of
-from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation import Certificate, Verdict
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.strata import check_tolerance
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Minima of an energy on a polyhedron: where they are, why they are minima, how they move."""
+"""Minima of energies on polyhedra, their certificates and their dependence on parameters."""
 
 import lazy_loader
 

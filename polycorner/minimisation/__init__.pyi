@@ -1,20 +1,30 @@
+from .abundance import Richness, richness
 from .certificate import Certificate, certify
+from .crossings import Crossing, crossing
+from .lemma import Condition, Residuals
 from .methods import minimise, stationary_on
+from .multistart import minima
+from .outcomes import Minima
 from .problem import Problem
-from .search import Minima, minima
 from .sensitivities import Sensitivity, sensitivity
 from .verdicts import Entrapment, Verdict
 
 __all__ = [
     "Certificate",
+    "Condition",
+    "Crossing",
     "Entrapment",
     "Minima",
     "Problem",
+    "Residuals",
+    "Richness",
     "Sensitivity",
     "Verdict",
     "certify",
+    "crossing",
     "minima",
     "minimise",
+    "richness",
     "sensitivity",
     "stationary_on",
 ]

@@ -1,4 +1,4 @@
-"""The analysis behind a certificate: every piece of the polyhedron at a point, put together."""
+"""Analysis of the optimality conditions at a point, over all pieces of the polyhedron there."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,11 +19,12 @@ from polycorner.polyhedra.cones import Rows, inward_direction, null_space, rank
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
-PROBES = np.array(
-    [0.003, 0.03, -0.003, -0.03]
-)  # how far flat directions are followed, in scale units
-# Where several pieces meet, the first of these that one of them shows decides.
+# Distances to which flat directions are followed, in scale units.
+PROBES = np.array([0.003, 0.03, -0.003, -0.03])
+OPEN = 10  # a product of multiplier and gap beyond so many tolerances is not rounding
+# Where several pieces meet, the first of these verdicts that any of them has decides.
 DECISIVE = (
     Verdict.NOT_STATIONARY,
     Verdict.SADDLE,
@@ -33,12 +34,12 @@ DECISIVE = (
     Verdict.WEAK_MINIMUM,
     Verdict.STRICT_MINIMUM,
 )
-PROBE_NOISE = 1e-12  # change of the energy, relative to its own size, that counts as none
+PROBE_NOISE = 1e-12  # relative change of the energy that counts as rounding
 
 
-@dataclass(frozen=True)
-class Local:
-    """Derivatives at the point and what counts as small there."""
+@dataclass(frozen=True, eq=False)
+class Local(Value):
+    """Derivatives at a point, in scaled coordinates, and the tolerances in force there."""
 
     problem: Problem
     point: Array
@@ -50,12 +51,12 @@ class Local:
 
     @cached_property
     def reference(self) -> float:
-        """The energy's own size: its largest first or second derivative in scaled coordinates."""
+        """The size of the energy: its largest first or second derivative in scaled coordinates."""
         return float(max(abs(self.gradients[-1]).max(), abs(self.hessians[-1]).max())) or 1.0
 
     @property
     def small(self) -> float:
-        """A first derivative that counts as zero."""
+        """The size up to which a first derivative counts as zero."""
         return self.tolerance * self.reference
 
     @property
@@ -64,12 +65,38 @@ class Local:
         return range(self.problem.inequalities, len(self.values) - 1)
 
 
-@dataclass(frozen=True)
-class Analysis:
-    """First and second order at a point, in scaled coordinates with unit gradients.
+@dataclass(frozen=True, eq=False)
+class Analysis(Value):
+    """First and second order at a point, in scaled coordinates.
 
-    ``active`` lists rows of the system; ``strong_positions`` are positions in ``active`` of an
-    independent set of functions with positive multipliers, ``weak`` rows with zero multipliers.
+    Attributes
+    ----------
+    verdict : Verdict
+        What the conditions imply.
+    active : tuple of int
+        Rows of the active inequalities of the piece that decides.
+    gradients : (k + e, n) array
+        Gradients of the active inequalities, then of the equations.
+    multipliers : Multipliers
+        Of unit gradients.
+    independent : bool
+        Whether the gradients are linearly independent (LICQ).
+    strong_positions : tuple of int
+        Positions in ``active`` of an independent set of functions with positive multipliers.
+    weak : tuple of int
+        Rows with zero multipliers.
+    curvature : Curvature
+        The second-order condition.
+    reference : float
+        The size of the energy; see :attr:`Local.reference`.
+    small_curvature : float
+        Curvature that counts as zero.
+    flat_verified : bool
+        Whether the energy is constant along every direction in which the second order vanishes.
+    flat_change : float
+        Its largest relative change there; infinite where a direction could not be followed.
+    local : Local
+        The derivatives all this was computed from.
     """
 
     verdict: Verdict
@@ -98,12 +125,54 @@ class Analysis:
         """The kind of entrapment in every direction."""
         return dict(_entrapment(self))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the active inequalities."""
+        return tuple(self.local.problem.polyhedron.names[i] for i in self.active)
+
+    @property
+    def held_names(self) -> tuple[str, ...]:
+        """Names of the active inequalities, then of the equations."""
+        return self.names + self.local.problem.polyhedron.equation_names
+
+    def by_name(self, values: Array) -> dict[str, float]:
+        """Return multipliers of unit gradients as multipliers ``dE/df`` of the functions."""
+        sizes = np.linalg.norm(self.gradients, axis=1)
+        safe = np.where(sizes > 0, sizes, 1.0)
+        return dict(zip(self.held_names, (values / safe).tolist(), strict=True))
+
+    @property
+    def named_multipliers(self) -> dict[str, float]:
+        """``dE/df`` for each active function and equation."""
+        return self.by_name(self.multipliers.values)
+
+    @property
+    def named_ranges(self) -> dict[str, tuple[float, float]]:
+        """The least and the largest value of each multiplier."""
+        lower, upper = map(self.by_name, (self.multipliers.lower, self.multipliers.upper))
+        return {name: (lower[name], upper[name]) for name in lower}
+
+    @property
+    def open_positions(self) -> list[int]:
+        """Positions of active functions whose gap is too large for their multiplier."""
+        if not self.multipliers.exist:
+            return []
+        k = len(self.active)
+        away = distances(self.local.values[list(self.active)], self.gradients[:k])
+        product = abs(self.multipliers.values[:k] * away)
+        return np.flatnonzero(product > OPEN * self.local.small).tolist()
+
+    @property
+    def stationary(self) -> bool:
+        """Whether the first-order conditions hold, complementarity included."""
+        return self.multipliers.exist and not self.open_positions
+
 
 def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float) -> Analysis:
-    """Analyse every piece of the polyhedron near ``q``; the least favourable verdict counts.
+    """Analyse every piece of the polyhedron at ``q``; return the least favourable analysis.
 
     Where several pieces meet, a point is a minimum of the union exactly when it is a minimum of
-    each, so the analysis returned is that of the piece that decides.
+    each of them.
     """
     values, gradients, hessians = problem.evaluate(q, 2)
     local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
@@ -175,9 +244,9 @@ def _verdict(
     curvature: Curvature,
     small_curvature: float,
 ) -> Verdict:
-    """Return the verdict before flat directions are followed and weak functions looked at."""
-    if not multipliers.complementary(away, 10 * local.small):
-        return Verdict.NOT_STATIONARY  # so large a multiplier needs a contact that is truly closed
+    """Return the verdict before flat directions and weakly active functions are considered."""
+    if not multipliers.complementary(away, OPEN * local.small):
+        return Verdict.NOT_STATIONARY  # the gap is not rounding: closing it would change the energy
     if not multipliers.exist:
         k = len(away)
         regular = rows.independent
@@ -186,7 +255,7 @@ def _verdict(
             regular = rate > local.rank_tolerance
         return Verdict.NOT_STATIONARY if regular else Verdict.NO_MULTIPLIER
     if curvature.decided and curvature.least < -small_curvature:
-        # Another choice of multipliers might still show a minimum where they are not unique.
+        # Other multipliers may prove a minimum where they are not unique.
         return Verdict.SADDLE if multipliers.unique else Verdict.UNDECIDED
     if not curvature.decided or curvature.flat.shape[1]:
         return Verdict.UNDECIDED
@@ -194,14 +263,14 @@ def _verdict(
 
 
 def _flat_change(local: Local, face: Piece, flat: Array, piece: Piece) -> float:
-    """Follow flat directions and generic mixtures of them both ways; return the relative change."""
+    """Return the relative change of the energy along flat directions and generic mixtures."""
     if not flat.shape[1]:
         return np.inf
     left, singular, _ = np.linalg.svd(flat, full_matrices=False)
     held = left[:, singular > 1e-6 * singular[0]].T
     directions = flat.T
     if flat.shape[1] > 1:
-        # Weights without rational relations: no polynomial of low degree vanishes on them all.
+        # Weights without rational relations: no polynomial of low degree vanishes on all mixtures.
         powers = np.sqrt([[2.0], [3.0], [5.0]]) ** np.arange(flat.shape[1])
         mixed = powers @ flat.T
         directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
@@ -212,7 +281,7 @@ def _flat_change(local: Local, face: Piece, flat: Array, piece: Piece) -> float:
 def _independent_positions(
     rows: Rows, positive: NDArray[np.int64], k: int, local: Local
 ) -> tuple[int, ...]:
-    """Return positions of strongly active functions that are independent, greedily in order."""
+    """Return positions of strongly active functions with independent gradients, greedily."""
     candidates = positive.tolist()
     if rows.independent:
         return tuple(candidates)
@@ -235,7 +304,7 @@ def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
         if multipliers.values[position] < -local.small:
             yield names[row], Entrapment.NONE
     if multipliers.residual > local.small:
-        return  # the energy slopes along the face: its curvature there holds nothing
+        return  # not stationary on the face: its curvature there is no entrapment
     curved = curvature.vectors[:, curvature.values > small]
     held: list[int] = []
     for row in a.weak:
@@ -258,7 +327,7 @@ def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
 
 
 def _direction_name(vector: Array, names: tuple[str, ...]) -> str:
-    """Name a direction by the coordinates that change at least half as much as the most."""
+    """Name a direction after the coordinates that change by at least half the largest change."""
     top = abs(vector).max()
     large = [i for i in range(len(vector)) if abs(vector[i]) >= 0.5 * top]
     sign = np.sign(vector[large[0]])

@@ -1,4 +1,4 @@
-"""Certificates: why a point is, or is not, a local minimum of an energy on a polyhedron.
+"""Certificates of local minima: a point and the evidence for or against it.
 
 Sign convention, for functions ``f_i >= 0`` and equations ``h_j = 0``:
 
@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.minimisation.analysis import Analysis, analyse
+from polycorner.minimisation.explanation import explanation
+from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.strata import (
@@ -25,66 +26,32 @@ from polycorner.polyhedra.strata import (
     TOLERANCE,
     Stratum,
     check_tolerance,
-    distances,
     stratum_at,
 )
-from polycorner.printing import Printed, Sheet
+from polycorner.printing import (
+    Printed,
+    Sheet,
+    Table,
+    angle_unit,
+    coordinates,
+    facts,
+    names,
+    number,
+    units,
+)
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """How far a certificate's conditions are from holding exactly; all dimensionless.
-
-    Attributes
-    ----------
-    infeasibility : float
-        Scaled distance by which the polyhedron is missed.
-    stationarity : float
-        Largest component of ``dE - sum lam df`` in scaled coordinates, as a fraction of the
-        energy's own size there: its largest first or second derivative.
-    complementarity : float
-        Largest ``|lam_i f_i|``, as the same fraction.
-    """
-
-    infeasibility: float
-    stationarity: float
-    complementarity: float
-
-    @property
-    def worst(self) -> float:
-        """The largest of the three."""
-        return max(self.infeasibility, self.stationarity, self.complementarity)
-
-
-@dataclass(frozen=True)
-class Condition:
-    """One hypothesis of the minimisation lemma ([GMBN] app. C), checked.
-
-    Attributes
-    ----------
-    statement : str
-        What is required.
-    holds : bool
-        Whether it does.
-    figure : float
-        The number that decides it.
-    """
-
-    statement: str
-    holds: bool
-    figure: float
-
-
 @dataclass(frozen=True, eq=False)
-class Certificate(Printed):
+class Certificate(Value, Printed):
     """A point, and the evidence for or against its being a local minimum.
 
-    Everything but the point is computed when asked for, from the problem the certificate keeps.
+    Everything but the point is computed on demand from the problem.
 
     Attributes
     ----------
@@ -93,15 +60,16 @@ class Certificate(Printed):
     point : (n,) array
         The point, circle coordinates wrapped; read-only.
     tolerance : float
-        What counts as zero: scaled distances, and derivatives relative to the energy's own.
+        Size up to which scaled distances, and derivatives relative to the energy's, count as zero.
     rank_tolerance : float
         Relative size below which a singular value of the active gradients counts as zero.
     method : str
-        What found the point.
+        The method that found the point; ``"certify"`` for a given point, ``"face"`` for
+        :func:`~polycorner.minimisation.methods.stationary_on`.
     iterations : int
-        How many steps that took.
+        Number of its steps.
     search : Verdict or None
-        Set when the search itself failed: INFEASIBLE, UNBOUNDED or NOT_CONVERGED.
+        Set when the search failed: INFEASIBLE, UNBOUNDED or NOT_CONVERGED.
     """
 
     problem: Problem
@@ -113,9 +81,8 @@ class Certificate(Printed):
     search: Verdict | None = field(default=None)
 
     def __post_init__(self) -> None:
-        point = self.problem.polyhedron.manifold.wrap(self.point)
-        point.setflags(write=False)
-        object.__setattr__(self, "point", point)
+        object.__setattr__(self, "point", self.problem.polyhedron.manifold.wrap(self.point))
+        super().__post_init__()
 
     @cached_property
     def analysis(self) -> Analysis:
@@ -140,26 +107,17 @@ class Certificate(Printed):
     @property
     def active(self) -> tuple[str, ...]:
         """Names of the active functions."""
-        return tuple(self.problem.polyhedron.names[i] for i in self.analysis.active)
+        return self.analysis.names
 
     @property
     def multipliers(self) -> dict[str, float]:
         """``dE/df`` for each active function and equation; one choice if they are not unique."""
-        return self._by_name(self.analysis.multipliers.values)
+        return self.analysis.named_multipliers
 
     @property
     def multiplier_ranges(self) -> dict[str, tuple[float, float]]:
-        """The least and largest value each multiplier can take."""
-        lower = self._by_name(self.analysis.multipliers.lower)
-        upper = self._by_name(self.analysis.multipliers.upper)
-        return {name: (lower[name], upper[name]) for name in lower}
-
-    def _by_name(self, values: Array) -> dict[str, float]:
-        d, analysis = self.problem.polyhedron, self.analysis
-        names = self.active + d.equation_names
-        sizes = np.linalg.norm(analysis.gradients, axis=1)
-        safe = np.where(sizes > 0, sizes, 1.0)
-        return dict(zip(names, (values / safe).tolist(), strict=True))
+        """The least and the largest value each multiplier can take."""
+        return self.analysis.named_ranges
 
     @property
     def multipliers_unique(self) -> bool:
@@ -213,76 +171,32 @@ class Certificate(Printed):
 
     @property
     def entrapment_counts(self) -> dict[str, int]:
-        """How many directions are half-V, half-U, U and free."""
+        """The numbers of directions that are half-V, half-U, U and free."""
         kinds = list(self.analysis.entrapment.values())
         return {kind.value: kinds.count(kind) for kind in Entrapment if kind is not Entrapment.NONE}
 
     @property
     def lemma(self) -> tuple[Condition, ...]:
         """The four hypotheses of the minimisation lemma, each with its deciding number."""
-        a = self.analysis
-        held = a.multipliers.values[[*a.strong_positions]]
-        curved = a.curvature.values[abs(a.curvature.values) > a.small_curvature]
-        least = float(curved.min()) if len(curved) else float("inf")
-        return (
-            Condition(
-                "(1) the energy grows to first order as each of the p contacts opens",
-                bool((held > 0).all()) and a.multipliers.exist,
-                float(held.min(initial=np.inf)),
-            ),
-            Condition(
-                "(2) its other first derivatives vanish (relative size)",
-                a.multipliers.exist,
-                a.multipliers.residual / a.reference,
-            ),
-            Condition(
-                "(3) its second derivatives in the q directions are positive definite",
-                least > 0,
-                least,
-            ),
-            Condition(
-                "(4) it does not depend on the remaining r coordinates",
-                a.flat_verified,
-                a.flat_change,
-            ),
-        )
+        return hypotheses(self.analysis)
 
     @property
     def residuals(self) -> Residuals:
-        """The residuals, recomputed from the functions and the stored multipliers."""
-        values, gradients, hessians = self.problem.evaluate(self.point, 2)
-        names = [*self.problem.polyhedron.names, *self.problem.polyhedron.equation_names]
-        multipliers = self.multipliers
-        pull, product = gradients[-1].copy(), 0.0
-        for row, name in enumerate(names):
-            if name in multipliers:
-                pull -= multipliers[name] * gradients[row]
-                product = max(product, abs(multipliers[name] * float(values[row])))
-        reference = max(abs(gradients[-1]).max(), abs(hessians[-1]).max()) or 1.0
-        return Residuals(
-            self._miss(), float(abs(pull).max() / reference), float(product / reference)
-        )
-
-    def _miss(self) -> float:
-        d = self.problem.polyhedron
-        values, gradients, *_ = self.problem.evaluate(self.point, 1)
-        away = distances(values[:-1], gradients[:-1])
-        m = self.problem.inequalities
-        short = -d.implicit_of(away[:m]) if m else 0.0
-        return float(max(0.0, short, abs(away[m:]).max(initial=0.0)))
+        """The residuals, recomputed from the functions and the multipliers."""
+        return residuals_at(self.problem, self.point, self.multipliers)
 
     def holds(self, tolerance: float | None = None) -> bool:
-        """Whether this is a minimum whose recomputed residuals are all within ``tolerance``."""
+        """Whether this is a minimum with all recomputed residuals at most ``tolerance``."""
         limit = self.tolerance if tolerance is None else tolerance
         return self.is_minimum and self.residuals.worst <= limit
 
     def explain(self, *, unit: str | None = None) -> str:
-        """Say in a few sentences why the point is, or is not, a local minimum.
+        """Explain in a few sentences why the point is, or is not, a local minimum.
 
         Parameters
         ----------
         unit : str, optional
-            Unit of the inequalities, such as ``"mm"``, for the rates that are told.
+            Unit of the inequalities, such as ``"mm"``, for gaps and rates in the text.
 
         Examples
         --------
@@ -291,23 +205,66 @@ class Certificate(Printed):
         >>> x, y = M.symbols
         >>> D = Polyhedron(M, {"floor": y, "wall": x})
         >>> print(certify(D, 2 * y - 3 * x, [0.0, 0.0]).explain(unit="mm").splitlines()[2])
-        Leaving wall, all others kept as they are, lowers the energy at the rate 3 per mm:
+        Opening wall, all other contacts kept closed, lowers the energy at the rate 3 per mm:
         its multiplier is negative.
         """
-        from polycorner.minimisation.explanation import explanation
-
-        return explanation(self, unit)
+        return explanation(self.analysis, self.stratum, self.verdict, self.search, unit)
 
     def __repr__(self) -> str:
         """Return the verdict, the point, the energy and the active functions in one line."""
-        from polycorner.minimisation.report import certificate_line
-
-        return certificate_line(self)
+        manifold = self.problem.polyhedron.manifold
+        point = ", ".join(
+            f"{name} = {number(x, 6)} {angle_unit(period)}".rstrip()
+            for name, period, x in zip(manifold.names, manifold.periods, self.point, strict=True)
+        )
+        active = names(self.active, 40) or "nothing"
+        return (
+            f"Certificate({self.verdict.name} at {point}; energy {number(self.energy, 6)}; "
+            f"on {active})"
+        )
 
     def _sheet(self) -> Sheet:
-        from polycorner.minimisation.report import certificate_sheet
+        """Return tables of the point, the active functions and the directions."""
+        manifold = self.problem.polyhedron.manifold
+        residuals = self.residuals
+        return Sheet(
+            "Certificate",
+            (
+                facts(
+                    (
+                        ("verdict", self.verdict.value),
+                        ("energy", number(self.energy, 12)),
+                        ("active", ", ".join(self.active) or "none"),
+                        ("signature", "(p, q, r) = ({}, {}, {})".format(*self.signature)),
+                        ("infeasibility", f"{residuals.infeasibility:.1e}"),
+                        ("stationarity", f"{residuals.stationarity:.1e}"),
+                        ("complementarity", f"{residuals.complementarity:.1e}"),
+                    )
+                ),
+                coordinates(manifold.names, manifold.periods, self.point.tolist()),
+                self._multiplier_table(),
+                "" if self.multipliers_unique else "The multipliers are one choice of several.",
+                Table(
+                    ("direction", "entrapment"),
+                    tuple((name, kind.value) for name, kind in self.entrapment.items()),
+                ),
+                units(manifold.periods),
+            ),
+        )
 
-        return certificate_sheet(self)
+    def _multiplier_table(self) -> Table:
+        d, values = self.problem.polyhedron, self.analysis.local.values[:-1].tolist()
+        value = dict(zip((*d.names, *d.equation_names), values, strict=True))
+        rows = [(name, number(value[name], 3), number(x)) for name, x in self.multipliers.items()]
+        head = ("active function", "value", "multiplier dE/df")
+        if self.multipliers_unique:
+            return Table(head, tuple(rows), (1, 2))
+        spans = [(number(low), number(high)) for low, high in self.multiplier_ranges.values()]
+        return Table(
+            (*head, "least", "largest"),
+            tuple((*row, *span) for row, span in zip(rows, spans, strict=True)),
+            (1, 2, 3, 4),
+        )
 
 
 def certify(
@@ -318,7 +275,7 @@ def certify(
     tolerance: float = TOLERANCE,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Certificate:
-    """Say why ``q`` is, or is not, a local minimum of the energy on the polyhedron.
+    """Analyse whether ``q`` is a local minimum of the energy on the polyhedron.
 
     Parameters
     ----------
@@ -330,6 +287,16 @@ def certify(
         The point.
     tolerance, rank_tolerance : float, optional
         See :class:`Certificate`.
+
+    Returns
+    -------
+    Certificate
+        Its verdict says whether the point is a minimum; it is ``OUTSIDE`` for a point not in ``D``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of the wrong kind, or an energy that is not finite at the point.
 
     Examples
     --------

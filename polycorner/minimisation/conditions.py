@@ -1,4 +1,4 @@
-"""First- and second-order conditions at a point of one convex piece of a polyhedron.
+"""First- and second-order optimality conditions at a point of one piece of a polyhedron.
 
 With ``g`` the gradient of the energy and ``a_i`` the gradients of active functions, all in scaled
 coordinates, the conditions are those of [NW] ch. 12:
@@ -15,15 +15,16 @@ import numpy as np
 
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space, unit_rows
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
-MAX_WEAK = 10
-# A curvature up to this many times what counts as zero is not trusted: beside an inflection it is
-# positive, too.  The direction is then followed as if the form vanished in it.
+MAX_WEAK = 10  # weakly active functions up to which the critical cone's faces are enumerated
+# A curvature up to this multiple of the tolerance is not trusted, as it is positive beside an
+# inflection, too; the direction is then treated as flat.
 NEARLY_FLAT = 30.0
 
 
-@dataclass(frozen=True)
-class Multipliers:
+@dataclass(frozen=True, eq=False)
+class Multipliers(Value):
     """Multipliers of unit gradients, in units of energy per scale unit.
 
     Attributes
@@ -46,32 +47,32 @@ class Multipliers:
 
     @property
     def unique(self) -> bool:
-        """Whether no other multipliers satisfy the same conditions."""
+        """Whether the multipliers are unique."""
         return bool((self.upper - self.lower <= 1e-7 * (1 + abs(self.values).max(initial=0))).all())
 
     def complementary(self, away: Array, small: float) -> bool:
-        """Whether every product of a multiplier and the distance to its contact is small."""
+        """Whether every product of a multiplier and its scaled gap is small."""
         if not self.exist:
             return True
         return bool((abs(self.values[: len(away)] * away) <= small).all())
 
 
 def find_multipliers(rows: Rows, k: int, gradient: Array, small: float, most: float) -> Multipliers:
-    """Return multipliers of unit gradients; the central ones where they are not unique.
+    """Return multipliers of unit gradients; central ones where they are not unique.
 
     Parameters
     ----------
     rows : Rows
         Gradients of the active functions, then of the equations.
     k : int
-        How many belong to inequalities.
+        Number of inequalities among them.
     gradient : (n,) array
         Gradient of the energy.
     small : float
-        A residual, or a negative multiplier, down to this size counts as zero.
+        Residuals and negative multipliers up to this size count as zero.
     most : float
-        Multipliers of dependent gradients beyond this size do not count: beside a cusp they
-        exist only because the gradients are not quite dependent.
+        Largest size accepted for multipliers of dependent gradients: next to a cusp, huge
+        multipliers exist only because the gradients are not exactly dependent.
     """
     values = rows.weights(gradient) if len(rows.units) else np.empty(0)
     if rows.independent:
@@ -99,16 +100,16 @@ def _central_multipliers(
 
 
 def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
-    """Return the least, the largest and a central choice, changed along the columns of ``free``."""
+    """Return the least, the largest and a central choice; ``free`` spans the relations."""
     count = len(values)
     largest = max(1e-300, float(abs(values).max()))
     bound = 1e6
     start = values / largest
-    room = np.maximum(start[:k], 0.0)
+    slack = np.maximum(start[:k], 0.0)
     lower, upper, vertices = start.copy(), start.copy(), []
     for i in range(count):
         for side, target in ((1.0, lower), (-1.0, upper)):
-            change = linear_programme(side * free[i], -free[:k], room, bound=bound)
+            change = linear_programme(side * free[i], -free[:k], slack, bound=bound)
             target[i] = start[i] + free[i] @ change
             if abs(change).max() < 0.5 * bound:
                 vertices.append(start + free @ change)
@@ -118,8 +119,8 @@ def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
     return lower * largest, upper * largest, centre * largest
 
 
-@dataclass(frozen=True)
-class Curvature:
+@dataclass(frozen=True, eq=False)
+class Curvature(Value):
     """The second-order condition on a critical cone.
 
     Attributes
@@ -130,8 +131,8 @@ class Curvature:
     vectors : (n, k) array
         Their orthonormal eigenvectors, in scaled coordinates.
     least : float
-        Least value of the form on unit vectors of the critical cone, ``inf`` when the cone is 0.
-        Where the form is positive on the whole tangent space, the least there: a lower bound.
+        Least value of the form on unit vectors of the critical cone, ``inf`` if the cone is 0;
+        where the form is positive on the whole tangent space, the least there, a lower bound.
     flat : (n, r) array
         Unit directions of the cone in which the form vanishes, or very nearly.
     decided : bool

@@ -1,4 +1,4 @@
-"""What decides about a point: where the energy falls, what is implied, the least curvature."""
+"""Decisive directions at a point: steepest feasible descent, implied functions, least curvature."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from polycorner.minimisation.conditions import find_curvature
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.spaces.manifold import Array
 
-IMPLIED = 1e-9  # distance of a unit gradient to the cone of others at which it lies in it
+IMPLIED = 1e-9  # distance up to which a unit gradient counts as lying in the cone of others
 
 
 def steepest_descent(a: Analysis) -> tuple[float, Array]:
-    """Return the rate at which the energy falls fastest on the linearised cone, and where to.
+    """Return the fastest rate of descent of the energy on the linearised cone, and its direction.
 
-    The part of ``dE`` that no admissible combination of active gradients balances is minus the
-    direction, its length the rate (Moreau's decomposition).
+    By Moreau's decomposition, the part of ``dE`` that no admissible combination of active
+    gradients balances is minus the direction times the rate.
     """
     from scipy.optimize import nnls
 
@@ -26,7 +26,7 @@ def steepest_descent(a: Analysis) -> tuple[float, Array]:
 
 
 def implied_functions(a: Analysis) -> list[int]:
-    """Return positions of active functions whose gradient the others' admit as a combination."""
+    """Return positions of active functions whose gradients lie in the cone of the others."""
     from scipy.optimize import nnls
 
     units, k = unit_rows(a.gradients), len(a.active)
@@ -39,10 +39,10 @@ def implied_functions(a: Analysis) -> list[int]:
 
 
 def least_curvature(a: Analysis) -> tuple[float, Array] | None:
-    """Return the least value of the Lagrangian's Hessian on the critical cone, and where it is.
+    """Return the least value of the Lagrangian's Hessian on the critical cone and its direction.
 
-    None where the cone is the origin.  Shifted by its least value the form vanishes exactly
-    in the directions that attain it, which is how they are found.
+    None if the cone is the origin.  Shifted by its least value, the form vanishes exactly in the
+    directions that attain it.
     """
     values, vectors = a.curvature.values, a.curvature.vectors
     if not len(values):
@@ -51,7 +51,7 @@ def least_curvature(a: Analysis) -> tuple[float, Array] | None:
         return float(values[0]), oriented(vectors[:, 0])
     rows = a.local.gradients[list(a.weak)]
     least = float(values[0])
-    for _ in range(2):  # the second time with the value found, and so with its directions
+    for _ in range(2):  # the second pass finds the directions of the value from the first
         form = (vectors * (values - least)) @ vectors.T
         found = find_curvature(form, vectors, rows, a.small_curvature)
         if not np.isfinite(found.least):

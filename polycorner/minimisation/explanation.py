@@ -1,16 +1,15 @@
-"""Why a point is, or is not, a local minimum: a certificate in a few sentences.
+"""Explanations of verdicts: the optimality conditions at a point in a few sentences.
 
 The sentences follow the conditions of [NW] ch. 12 in their order: does the point lie in the set;
-do multipliers of the right sign exist; what does the second order say on the critical cone.  Each
-names the function, coordinate or direction that decides, and the number.
+do multipliers of the right sign exist; is the second order positive on the critical cone.  Each
+names the function, coordinate or direction that decides, with its number.
 """
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.minimisation.analysis import PROBES
+from polycorner.minimisation.analysis import PROBES, Analysis
 from polycorner.minimisation.conditions import MAX_WEAK, NEARLY_FLAT
 from polycorner.minimisation.evidence import (
     implied_functions,
@@ -20,135 +19,133 @@ from polycorner.minimisation.evidence import (
 )
 from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
-from polycorner.polyhedra.strata import distances
+from polycorner.polyhedra.strata import Stratum, distances
 from polycorner.printing import angle_unit, number
-
-if TYPE_CHECKING:
-    from polycorner.minimisation.certificate import Certificate
-    from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array
 
 DIGITS = 6
-SEEN = 1e-6  # a component of a unit direction below this is not told
+SEEN = 1e-6  # smallest component of a unit direction that is shown
 
 
-def explanation(c: "Certificate", unit: str | None) -> str:
-    """Return why the point of a certificate is or is not a minimum, a sentence or two a line."""
-    lines = [_headline(c), _place(c, unit)]
-    if c.analysis.verdict is not Verdict.OUTSIDE:
-        lines += _first_order(c, unit)
-        lines += _dependence(c)
-        if _stationary(c):
-            lines += [*_second_order(c), *_entrapment(c)]
+def explanation(
+    a: Analysis, stratum: Stratum, verdict: Verdict, search: Verdict | None, unit: str | None
+) -> str:
+    """Return why a point is or is not a minimum, one or two sentences a line.
+
+    Parameters
+    ----------
+    a : Analysis
+        The optimality conditions at the point.
+    stratum : Stratum
+        The face it lies on.
+    verdict, search : Verdict
+        The verdict, and how the search for the point failed, if it did.
+    unit : str or None
+        Unit of the inequalities.
+    """
+    lines = [_headline(verdict, search), _position(a, stratum, unit)]
+    if a.verdict is not Verdict.OUTSIDE:
+        lines += _first_order(a, unit)
+        lines += _dependence(a)
+        if a.stationary:
+            lines += [*_second_order(a), *_entrapment(a)]
     return "\n".join(line for line in lines if line)
 
 
-def _headline(c: "Certificate") -> str:
-    words = c.verdict.value
-    searched = c.search is not None and c.search is not c.verdict
-    told = f" (the search: {c.search.value})" if searched and c.search is not None else ""
-    return f"{words[0].upper()}{words[1:]}{told}."
+def _headline(verdict: Verdict, search: Verdict | None) -> str:
+    words = verdict.value
+    why = f" (the search: {search.value})" if search and search is not verdict else ""
+    return f"{words[0].upper()}{words[1:]}{why}."
 
 
-# --------------------------------------------------------------- where the point is
+# --------------------------------------------------------------- position
 
 
-def _place(c: "Certificate", unit: str | None) -> str:
-    if c.analysis.verdict is Verdict.OUTSIDE:
-        return _missed(c, unit)
-    pieces = c.stratum.pieces
+def _position(a: Analysis, stratum: Stratum, unit: str | None) -> str:
+    if a.verdict is Verdict.OUTSIDE:
+        return _missed(a, unit)
+    pieces = stratum.pieces
     if len(pieces) > 1:
         shown = "; ".join(", ".join(piece) for piece in pieces)
         return (
             f"It lies in the polyhedron, where {len(pieces)} branches of the union meet "
-            f"({shown}); what follows is said of the branch that decides, {_names(c.active)}."
+            f"({shown}); the following concerns the branch that decides, {_names(a.names)}."
         )
-    dimension = c.stratum.dimension
-    if dimension == c.problem.dimension and not c.active:
+    dimension = stratum.dimension
+    if dimension == a.local.problem.dimension and not a.names:
         return "It lies in the interior of the polyhedron: no inequality is active."
-    active = f"active: {_names(c.active)}" if c.active else "no inequality is active"
+    active = f"active: {_names(a.names)}" if a.names else "no inequality is active"
     return f"It lies in the polyhedron, on a face of dimension {dimension}; {active}."
 
 
-def _missed(c: "Certificate", unit: str | None) -> str:
-    """Name the constraint by which the polyhedron is missed, and by how much."""
-    d, local = c.problem.polyhedron, c.analysis.local
+def _missed(a: Analysis, unit: str | None) -> str:
+    """Name the most violated constraint and the size of its violation."""
+    d, local = a.local.problem.polyhedron, a.local
     if not np.isfinite(local.values[-1]):
         return "The energy is not finite there."
     away = distances(local.values[:-1], local.gradients[:-1])
-    m = c.problem.inequalities
+    m = a.local.problem.inequalities
     if np.isnan(away).any():
         return f"{(d.names + d.equation_names)[int(np.isnan(away).argmax())]} is not finite there."
     short = float(d.implicit_of(away[:m])) if m else np.inf
     off = abs(away[m:])
     if len(off) and off.max() >= -short:
         worst = m + int(off.argmax())
-        words = f"the equation {d.equation_names[worst - m]} is not met: it is"
+        violated = f"the equation {d.equation_names[worst - m]}"
     else:
         worst = int(abs(away[:m] - short).argmin())
-        words = f"the inequality {d.names[worst]} fails: its function is"
-    told = (
-        f"Farthest from holding, {words} {_with(local.values[worst], unit)}, to first order "
-        f"{number(abs(away[worst]), DIGITS)} scale units from zero (tolerance {c.tolerance:g})."
+        violated = f"the inequality {d.names[worst]}"
+    text = (
+        f"The largest violation is that of {violated}: its function is "
+        f"{_with(local.values[worst], unit)}, to first order {number(abs(away[worst]), DIGITS)} "
+        f"scale units from zero (tolerance {local.tolerance:g})."
     )
-    failing = [d.names[i] for i in np.flatnonzero(away[:m] < -c.tolerance) if i != worst]
-    failing += [d.equation_names[j] for j in np.flatnonzero(off > c.tolerance) if m + j != worst]
-    return f"{told} Also violated: {_names(failing)}." if failing and not d.is_union else told
+    failing = [d.names[i] for i in np.flatnonzero(away[:m] < -local.tolerance) if i != worst]
+    failing += [
+        d.equation_names[j] for j in np.flatnonzero(off > local.tolerance) if m + j != worst
+    ]
+    return f"{text} Also violated: {_names(failing)}." if failing and not d.is_union else text
 
 
 # --------------------------------------------------------------- first order
 
 
-def _stationary(c: "Certificate") -> bool:
-    return c.analysis.multipliers.exist and not _open(c)
-
-
-def _open(c: "Certificate") -> list[int]:
-    """Return positions of active functions whose gap is not zero enough for their multiplier."""
-    a = c.analysis
-    if not a.multipliers.exist:
-        return []
-    k = len(a.active)
-    away = distances(a.local.values[list(a.active)], a.gradients[:k])
-    return np.flatnonzero(abs(a.multipliers.values[:k] * away) > 10 * a.local.small).tolist()
-
-
-def _first_order(c: "Certificate", unit: str | None) -> Iterator[str]:
-    a = c.analysis
+def _first_order(a: Analysis, unit: str | None) -> Iterator[str]:
     relative = number(a.multipliers.residual / a.reference, 2)
-    if _stationary(c):
+    if a.stationary:
         yield (
-            f"The first order holds, up to {relative} of the energy's own size: "
-            + (f"dE is {_combination(c)}." if c.multipliers else "dE vanishes.")
+            f"The first-order conditions hold, up to {relative} of the energy's own size: "
+            + (f"dE is {_combination(a)}." if a.named_multipliers else "dE vanishes.")
         )
-        yield _complementarity(c)
+        yield _complementarity(a)
         return
-    for i in _open(c):
-        name = c.active[i]
-        gap, force = float(a.local.values[a.active[i]]), c.multipliers[name]
+    for i in a.open_positions:
+        name = a.names[i]
+        gap, force = float(a.local.values[a.active[i]]), a.named_multipliers[name]
         yield (
-            f"{name} counts as closed, but its gap is {_with(gap, unit)} and its multiplier "
-            f"{number(force, DIGITS)}: to close it altogether would change the energy by "
-            f"{number(-gap * force, DIGITS)}, which is too much to be rounding."
+            f"{name} is active within the tolerance, but its gap is {_with(gap, unit)} and its "
+            f"multiplier {number(force, DIGITS)}: closing it would change the energy by "
+            f"{number(-gap * force, DIGITS)}, more than rounding does."
         )
     if a.multipliers.exist:
         return
     if a.verdict is Verdict.NO_MULTIPLIER:
         yield (
-            f"The gradients of {_names([*c.active, *c.problem.polyhedron.equation_names])} are "
+            f"The gradients of {_names(a.held_names)} are "
             "dependent and leave no inward direction, as at a cusp; no multipliers exist, and "
-            "these conditions decide nothing here."
+            "the conditions are inconclusive."
         )
         return
-    yield from _slopes(c, unit)
+    yield from _slopes(a, unit)
 
 
-def _combination(c: "Certificate") -> str:
-    terms = (f"{number(value, DIGITS)} d({name})" for name, value in c.multipliers.items())
+def _combination(a: Analysis) -> str:
+    terms = (f"{number(value, DIGITS)} d({name})" for name, value in a.named_multipliers.items())
     return " + ".join(terms).replace("+ -", "- ")
 
 
-def _complementarity(c: "Certificate") -> str:
-    a, names = c.analysis, c.problem.polyhedron.names
+def _complementarity(a: Analysis) -> str:
+    names = a.local.problem.polyhedron.names
     if not a.active:
         return ""
     if not a.weak:
@@ -157,97 +154,93 @@ def _complementarity(c: "Certificate") -> str:
     return f"Weakly active, with multiplier zero: {weak}."
 
 
-def _slopes(c: "Certificate", unit: str | None) -> Iterator[str]:
-    """Say which contacts the energy pulls open, and where it falls fastest."""
-    a = c.analysis
+def _slopes(a: Analysis, unit: str | None) -> Iterator[str]:
+    """List the contacts whose opening lowers the energy, and the direction of steepest descent."""
     per = f"per {unit}" if unit else "per unit of its gap"
     if a.independent:
         values = a.multipliers.values[: len(a.active)]
         for i in sorted(np.flatnonzero(values < -a.local.small), key=values.__getitem__):
-            name = c.active[i]
-            others = ", all others kept as they are," if len(a.gradients) > 1 else ""
+            name = a.names[i]
+            others = ", all other contacts kept closed," if len(a.gradients) > 1 else ""
             yield (
-                f"Leaving {name}{others} lowers the energy at the rate "
-                f"{number(-c.multipliers[name], DIGITS)} {per}: its multiplier is negative."
+                f"Opening {name}{others} lowers the energy at the rate "
+                f"{number(-a.named_multipliers[name], DIGITS)} {per}: its multiplier is negative."
             )
-        yield _slope_along(c)
+        yield _slope_along(a)
     rate, direction = steepest_descent(a)
     if rate <= a.local.small:
         yield (
-            "The active gradients are so nearly dependent that only multipliers of an "
-            "unreasonable size would balance the energy's slope."
+            "The active gradients are so nearly dependent that only excessively large multipliers "
+            "would balance the gradient of the energy."
         )
         return
     yield (
-        f"The energy falls fastest in the allowed direction {_direction(c, direction)}, at the "
-        f"rate {number(rate, DIGITS)} per scale unit."
+        f"The energy decreases fastest in the feasible direction {_direction(a, direction)}, at "
+        f"the rate {number(rate, DIGITS)} per scale unit."
     )
 
 
-def _slope_along(c: "Certificate") -> str:
-    a = c.analysis
+def _slope_along(a: Analysis) -> str:
     if a.multipliers.residual <= a.local.small or not len(a.gradients):
         return ""
-    basis = null_space(a.gradients, c.rank_tolerance)
+    basis = null_space(a.gradients, a.local.rank_tolerance)
     slope = basis @ (basis.T @ a.local.gradients[-1])
     rate = float(np.linalg.norm(slope))
     return (
-        f"Along the face, all of its functions kept at zero, it falls in the direction "
-        f"{_direction(c, -slope / rate)} at the rate {number(rate, DIGITS)} per scale unit."
+        "Along the face, all of its contacts kept closed, the energy decreases in the direction "
+        f"{_direction(a, -slope / rate)} at the rate {number(rate, DIGITS)} per scale unit."
     )
 
 
-def _dependence(c: "Certificate") -> Iterator[str]:
-    a = c.analysis
+def _dependence(a: Analysis) -> Iterator[str]:
     if a.independent:
         return
-    names = [*c.active, *c.problem.polyhedron.equation_names]
-    size = rank(a.gradients, c.rank_tolerance)
-    told = f"The {len(names)} gradients of {_names(names)} are dependent, of rank {size}"
+    names = a.held_names
+    size = rank(a.gradients, a.local.rank_tolerance)
+    text = f"The {len(names)} gradients of {_names(names)} are dependent, of rank {size}"
     if not a.multipliers.exist:
-        yield f"{told}."
-    elif c.multipliers_unique:
-        yield f"{told}, and yet the multipliers are unique."
+        yield f"{text}."
+    elif a.multipliers.unique:
+        yield f"{text}, and yet the multipliers are unique."
     else:
         ranges = (
             f"{name} from {number(low, DIGITS)} to {number(high, DIGITS)}"
-            for name, (low, high) in c.multiplier_ranges.items()
+            for name, (low, high) in a.named_ranges.items()
         )
-        yield f"{told}, so that the multipliers are one choice of several: {'; '.join(ranges)}."
+        yield f"{text}, so the multipliers are one choice of several: {'; '.join(ranges)}."
     implied = implied_functions(a)
     if implied:
-        every = "; ".join(c.active[i] for i in implied)
+        every = "; ".join(a.names[i] for i in implied)
         yield f"Redundant to first order, each implied by the others: {every}."
 
 
 # --------------------------------------------------------------- second order
 
 
-def _second_order(c: "Certificate") -> Iterator[str]:
-    a = c.analysis
+def _second_order(a: Analysis) -> Iterator[str]:
     if not a.curvature.decided:
         yield (
-            f"{len(a.weak)} functions are weakly active, more than the {MAX_WEAK} for which the "
+            f"{len(a.weak)} functions are weakly active, more than the {MAX_WEAK} up to which the "
             "second order is decided."
         )
         return
     found = least_curvature(a)
     if found is None:
-        yield "No direction is left to the second order: the first order decides alone."
+        yield "The critical cone is the origin: the first order alone decides."
         return
     least, direction = found
-    where = f"in the direction {_direction(c, direction)}"
+    where = f"in the direction {_direction(a, direction)}"
     if least < -a.small_curvature:
         yield (
-            f"Where the first order leaves the energy as it is, it falls to second order {where}: "
+            f"Stationary to first order, the energy decreases to second order {where}: "
             f"the curvature there is {number(least, DIGITS)} per squared scale unit."
         )
-        if not c.multipliers_unique:
-            yield "Another choice of the multipliers might still show a minimum."
+        if not a.multipliers.unique:
+            yield "Another choice of the multipliers may still prove a minimum."
     elif a.curvature.flat.shape[1]:
         yield f"The second order vanishes, or nearly so, {where}."
-        yield _followed(c)
-        yield _across(c)
+        yield _followed(a)
+        yield _across(a)
     else:
         yield (
             "The second order holds: on the critical cone the least curvature is "
@@ -255,9 +248,8 @@ def _second_order(c: "Certificate") -> Iterator[str]:
         )
 
 
-def _across(c: "Certificate") -> str:
-    """Say what holds the point across the directions in which the second order vanishes."""
-    a = c.analysis
+def _across(a: Analysis) -> str:
+    """State the least curvature across the directions in which the second order vanishes."""
     values, vectors = a.curvature.values, a.curvature.vectors
     held = np.flatnonzero(values > NEARLY_FLAT * a.small_curvature)
     if a.weak or not len(held):
@@ -265,28 +257,27 @@ def _across(c: "Certificate") -> str:
     first = held[0]
     return (
         f"Across them the least curvature is {number(values[first], DIGITS)} per squared scale "
-        f"unit, in the direction {_direction(c, oriented(vectors[:, first]))}."
+        f"unit, in the direction {_direction(a, oriented(vectors[:, first]))}."
     )
 
 
-def _followed(c: "Certificate") -> str:
-    a = c.analysis
+def _followed(a: Analysis) -> str:
     if not np.isfinite(a.flat_change):
-        return "It was not followed, so that nothing is decided."
-    told = (
+        return "It could not be followed, so nothing is decided."
+    text = (
         f"Followed both ways along the face by up to {abs(PROBES).max():g} scale units, such "
         f"directions change the energy by {number(a.flat_change, 2)} of its own size: "
     )
-    return told + ("they are free." if a.flat_verified else "nothing is decided.")
+    return text + ("they are free." if a.flat_verified else "nothing is decided.")
 
 
-def _entrapment(c: "Certificate") -> Iterator[str]:
-    kinds = c.entrapment
+def _entrapment(a: Analysis) -> Iterator[str]:
+    kinds = a.entrapment
     if not kinds:
         return
     groups: dict[str, list[str]] = {}
     for direction, kind in kinds.items():
-        vague = kind is Entrapment.FREE and not c.analysis.flat_verified
+        vague = kind is Entrapment.FREE and not a.flat_verified
         groups.setdefault("undecided" if vague else kind.value, []).append(direction)
     shown = "; ".join(f"{kind}: {', '.join(which)}" for kind, which in groups.items())
     yield f"Entrapment by direction: {shown}."
@@ -303,9 +294,9 @@ def _with(value: float, unit: str | None) -> str:
     return f"{number(value, DIGITS)} {unit or ''}".rstrip()
 
 
-def _direction(c: "Certificate", direction: "Array") -> str:
+def _direction(a: Analysis, direction: Array) -> str:
     """Return a direction of length one in scaled coordinates, in the coordinates themselves."""
-    manifold = c.problem.polyhedron.manifold
+    manifold = a.local.problem.polyhedron.manifold
     words = []
     rows = zip(manifold.names, manifold.periods, manifold.scales, direction, strict=True)
     for name, period, scale, x in rows:

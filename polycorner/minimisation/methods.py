@@ -1,17 +1,16 @@
-"""Where an energy comes to rest on a polyhedron, by three methods that must agree."""
+"""Local minimisation of an energy on a polyhedron by three methods that must agree."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from numbers import Integral
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.polishing import SETTLED, Endpoint
 from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.verdicts import Verdict
-from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
 from polycorner.spaces.manifold import Array
@@ -20,19 +19,9 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
 Method = Literal["newton", "slsqp", "scp"]
+Descent = Callable[[Problem, Piece, Array, int], Endpoint]  # from a point, inside one piece
 
-MAX_SWITCHES = 50
-FAR = 1e8  # a search that ends farther away, in scale units, found no rest
-NEAR = 1e-3  # scaled distance within which a function may be active at an unpolished minimum
-
-
-@dataclass(frozen=True)
-class Rest:
-    """Where a search ended inside one piece."""
-
-    point: Array
-    iterations: int
-    failure: Verdict | None
+MAX_SWITCHES = 50  # of branches in a union
 
 
 def minimise(
@@ -45,7 +34,7 @@ def minimise(
     tolerance: float = TOLERANCE,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Certificate:
-    """Let the energy come to rest on the polyhedron, starting at ``start``.
+    """Find a local minimum of the energy on the polyhedron by descent from ``start``.
 
     Parameters
     ----------
@@ -54,13 +43,13 @@ def minimise(
     energy : SmoothFunction or sympy.Expr
         The energy ``E``, on the same manifold.
     start : (n,) array or mapping from coordinate names
-        Where to start.  Outside ``D`` the start is first moved to the nearest point that
-        repeated linearisation finds; if there is none the verdict is ``INFEASIBLE``.
+        Where to start.  A start outside ``D`` is first projected onto ``D`` by repeated
+        linearisation; if that fails the verdict is ``INFEASIBLE``.
     method : {"newton", "slsqp", "scp"}, optional
         ``"newton"`` (default) descends inside ``D`` by an active-set method, every iterate
         feasible and lower than the last and never through a wall, then solves the KKT equations
         of the face to machine precision.  ``"slsqp"`` is SciPy's ([Kraft]), ``"scp"`` a sequence
-        of convex programmes stated in cvxpy; both are finished on the face in the same way.
+        of convex programmes in cvxpy; both end by solving the same KKT equations.
     max_iterations : int, optional
         Limit on the steps in each piece.
     tolerance, rank_tolerance : float, optional
@@ -69,14 +58,14 @@ def minimise(
     Returns
     -------
     Certificate
-        Always; its verdict says what was found.
+        Its verdict says what was found; a failed search gives a certificate, too.
 
     Raises
     ------
     TypeError, ValueError
         For arguments of the wrong kind, or an energy that is not finite at the start.
     SolverError
-        If a back end breaks.
+        If cvxpy does not find its solver.
 
     Examples
     --------
@@ -88,25 +77,19 @@ def minimise(
     >>> c.point.round(6).tolist(), c.active, c.verdict.name
     ([-0.5, 0.25], ('bowl',), 'STRICT_MINIMUM')
     """
-    search = _SEARCHES.get(method) if isinstance(method, str) else None
-    if search is None:
-        msg = f"method: expected one of {', '.join(map(repr, _SEARCHES))}; got {method!r}"
-        raise ValueError(msg)
-    whole = isinstance(max_iterations, Integral) and not isinstance(max_iterations, bool)
-    if not whole or max_iterations < 1:
-        msg = f"max_iterations: expected a positive whole number; got {max_iterations!r}"
-        raise ValueError(msg)
+    checks.choice("method", method, _DESCENTS)
+    checks.whole("max_iterations", max_iterations, least=1)
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
     q = polyhedron.manifold.point(start, "start")
-    if search is not _newton:
+    if method != "newton":
         problem.check_energy(q, "start")
-    rest = _descend_union(problem, q, search, max_iterations)
-    if rest.failure is Verdict.INFEASIBLE:
+    end = _descend_union(problem, q, _DESCENTS[method], int(max_iterations))
+    if end.failure is Verdict.INFEASIBLE:
         problem.check_energy(q, "start")
     return Certificate(
-        problem, rest.point, tolerance, rank_tolerance, method, rest.iterations, rest.failure
+        problem, end.point, tolerance, rank_tolerance, method, end.iterations, end.failure
     )
 
 
@@ -119,79 +102,95 @@ def stationary_on(
     tolerance: float = TOLERANCE,
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Certificate:
-    """Solve the KKT equations of one face near ``start``, whatever kind of point that gives.
+    """Solve the KKT equations of one face near ``start``, for any kind of stationary point.
 
-    The result may be a saddle or have negative multipliers: it is where the energy restricted to
-    ``{f_i = 0 for i active, h = 0}`` is stationary, and the certificate says what it is on ``D``.
-    The verdict is ``NOT_CONVERGED`` when Newton's method finds no such point.
+    The energy restricted to ``{f_i = 0 for i active, h = 0}`` is stationary at the result, which
+    may be a saddle or have negative multipliers; the certificate says what it is on ``D``.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        The set ``D``.
+    energy : SmoothFunction or sympy.Expr
+        The energy ``E``, on the same manifold.
+    start : (n,) array or mapping from coordinate names
+        Where Newton's method starts.
+    active : list or tuple of str
+        Names of the inequalities that vanish on the face.
+    tolerance, rank_tolerance : float, optional
+        See :class:`~polycorner.minimisation.certificate.Certificate`.
+
+    Returns
+    -------
+    Certificate
+        With the verdict ``NOT_CONVERGED`` if Newton's method finds no such point.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of the wrong kind, unknown names, or an energy that is not finite at the
+        start.
     """
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
     names = polyhedron.names
-    if not isinstance(active, list | tuple) or not all(isinstance(name, str) for name in active):
-        msg = f"active: expected a list of names among {', '.join(names)}; got {active!r}"
-        raise TypeError(msg)
-    unknown = [name for name in active if name not in names]
-    if unknown:
-        msg = f"active: expected names among {', '.join(names)}; got {', '.join(unknown)}"
-        raise ValueError(msg)
+    if not isinstance(active, list | tuple):
+        checks.refuse("active", f"a list of names among {', '.join(names)}", active, TypeError)
+    checks.names("active", active, names)
     q = polyhedron.manifold.point(start, "start")
     problem.check_energy(q, "start")
     face = frozenset(polyhedron.names.index(name) for name in active)
     point, last = problem.on_face(face, q)
-    failure = None if last < 1e-8 else Verdict.NOT_CONVERGED
+    failure = None if last < SETTLED else Verdict.NOT_CONVERGED
     return Certificate(
         problem, point if failure is None else q, tolerance, rank_tolerance, "face", 1, failure
     )
 
 
-def _descend_union(problem: Problem, q: Array, search: "Search", limit: int) -> Rest:
-    """Descend in one branch of the tree after another until none leads lower."""
+def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> Endpoint:
+    """Descend in one branch of the and/or tree after another until none leads lower."""
     d = problem.polyhedron
     first, *others = (
         d.selections(d.values(q).tolist())
         if d.is_union
         else [frozenset(range(problem.inequalities))]
     )
-    rest = search(problem, first, q, limit)
+    end = descent(problem, first, q, limit)
     for piece in others:
-        if rest.failure is not Verdict.INFEASIBLE:
+        if end.failure is not Verdict.INFEASIBLE:
             break
-        rest = search(problem, piece, q, limit)
+        end = descent(problem, piece, q, limit)
     if not d.is_union:
-        return rest
-    spent = rest.iterations
+        return end
+    spent = end.iterations
     for _ in range(MAX_SWITCHES):
-        if rest.failure is not None:
+        if end.failure is not None:
             break
-        lower = _lower_branch(problem, rest, search, limit)
+        lower = _lower_branch(problem, end, descent, limit)
         if lower is None:
             break
-        rest, spent = lower, spent + lower.iterations
-    return Rest(rest.point, spent, rest.failure)
+        end, spent = lower, spent + lower.iterations
+    return Endpoint(end.point, spent, end.failure)
 
 
-def _lower_branch(problem: Problem, rest: Rest, search: "Search", limit: int) -> Rest | None:
-    """Return a rest in another branch that meets here and leads lower, if there is one."""
+def _lower_branch(problem: Problem, end: Endpoint, descent: Descent, limit: int) -> Endpoint | None:
+    """Return the end of a descent in another branch at this point that leads lower, or None."""
     d = problem.polyhedron
-    values, gradients, hessians = problem.evaluate(rest.point, 2)
+    values, gradients, hessians = problem.evaluate(end.point, 2)
     m = problem.inequalities
     noise = 1e-10 * (abs(values[-1]) + abs(gradients[-1]).max() + abs(hessians[-1]).max())
     for piece in d.selections(distances(values[:m], gradients[:m]).tolist(), 1e-8):
-        other = search(problem, piece, rest.point, limit)
+        other = descent(problem, piece, end.point, limit)
         if other.failure is Verdict.INFEASIBLE:
             continue
-        if other.failure is Verdict.UNBOUNDED or _energy(problem, other.point) < values[-1] - noise:
+        lower = float(problem.energy.value(other.point)) < values[-1] - noise
+        if lower or other.failure is Verdict.UNBOUNDED:
             return other
     return None
 
 
-def _energy(problem: Problem, q: Array) -> float:
-    return float(problem.energy.value(q))
-
-
-def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
+def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
     from polycorner.minimisation.descent import sqp
 
     status, iterations, point, _ = problem.descend(piece, q, limit)
@@ -200,131 +199,13 @@ def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
         sqp.UNBOUNDED: Verdict.UNBOUNDED,
         sqp.STALLED: Verdict.NOT_CONVERGED,
     }
-    return Rest(point, iterations, failures.get(status))
+    return Endpoint(point, iterations, failures.get(status))
 
 
-def _slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
-    """SciPy's SLSQP in scaled coordinates, energy and gaps scaled to their own size."""
-    from scipy.optimize import minimize
+def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+    from polycorner.minimisation.scp import scp
 
-    scales, m = problem.scales, problem.inequalities
-    values, gradients, hessians = problem.evaluate(q, 2)
-    size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
-    rows = sorted(piece)
-    sections = list(range(m, problem.rows - 1))
-    floor = float(values[-1])
-    options: Any = {"ftol": 1e-15, "maxiter": limit}
-
-    def constraint(kind: str, kept: list[int]) -> Any:
-        return {
-            "type": kind,
-            "fun": lambda u: problem.evaluate(u * scales, 0)[0][kept],
-            "jac": lambda u: problem.evaluate(u * scales, 1)[1][kept],
-        }
-
-    def energy(u: Array) -> float:
-        return float(problem.evaluate(u * scales, 0)[0][-1] - floor) / size
-
-    def slope(u: Array) -> Array:
-        return np.asarray(problem.evaluate(u * scales, 1)[1][-1] / size)
-
-    found = minimize(
-        energy,
-        q / scales,
-        jac=slope,
-        method="SLSQP",
-        constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
-        options=options,
-    )
-    stopped = found.status in (0, 8)
-    return _finished(problem, piece, q, found.x * scales, int(found.nit), stopped=stopped)
+    return scp(problem, piece, q, limit)
 
 
-def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Rest:
-    from polycorner.minimisation.scp import sequential_convex
-
-    point, iterations, settled = sequential_convex(problem, piece, q, limit)
-    return _finished(problem, piece, q, point, iterations, stopped=settled)
-
-
-def _finished(
-    problem: Problem, piece: Piece, start: Array, q: Array, iterations: int, *, stopped: bool
-) -> Rest:
-    """Polish an approximate minimum on the face of the functions that hold it."""
-    if not np.isfinite(q).all():
-        q = start
-    values, gradients = problem.evaluate(q, 1)
-    if abs(q / problem.scales).max() > FAR and _missed(problem, piece, q, 1e-6) == frozenset():
-        return Rest(start, iterations, Verdict.UNBOUNDED)
-    if np.isfinite(values).all() and np.isfinite(gradients).all():
-        point = _polished(problem, piece, q, _holding(problem, piece, values, gradients))
-        if point is not None:
-            return Rest(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
-    for origin in (q, start):
-        reached, point = problem.restore(piece, origin)
-        if reached and np.isfinite(problem.energy.value(point)):
-            return Rest(point, iterations, Verdict.NOT_CONVERGED)
-    return Rest(q, iterations, Verdict.INFEASIBLE)
-
-
-def _polished(problem: Problem, piece: Piece, q: Array, face: Piece) -> Array | None:
-    """Return the stationary point of a face near ``q``, the face corrected as it turns out.
-
-    Functions that are missed join the face; functions with negative multipliers leave it.
-    """
-    seen: set[Piece] = set()
-    while face not in seen:
-        seen.add(face)
-        point, last = problem.on_face(face, q)
-        if not last < 1e-8 or abs((point - q) / problem.scales).max() > 0.1:
-            return None
-        missed = _missed(problem, piece, point)
-        if missed is None:
-            return None
-        pulling = _pulling(problem, face, point)
-        if not missed and not pulling:
-            return point
-        face = (face | missed) if missed else face - pulling
-    return None
-
-
-def _pulling(problem: Problem, face: Piece, point: Array) -> Piece:
-    """Return the functions of an independent face with negative multipliers."""
-    _, gradients = problem.evaluate(point, 1)
-    chosen = sorted(face)
-    rows = Rows(gradients[[*chosen, *range(problem.inequalities, problem.rows - 1)]], 1e-8)
-    if not chosen or not rows.independent:
-        return frozenset()
-    weights = rows.weights(gradients[-1])[: len(chosen)]
-    small = 1e-9 * float(abs(gradients[-1]).max())
-    return frozenset(i for i, weight in zip(chosen, weights, strict=True) if weight < -small)
-
-
-def _holding(problem: Problem, piece: Piece, values: Array, gradients: Array) -> Piece:
-    """Return the functions near zero that carry a share of the energy's gradient."""
-    from scipy.optimize import nnls
-
-    m = problem.inequalities
-    away = distances(values[:-1], gradients[:-1])
-    near = [i for i in sorted(piece) if away[i] <= NEAR]
-    if not near:
-        return frozenset()
-    sections = unit_rows(gradients[m:-1])
-    columns = np.vstack([unit_rows(gradients[near]), sections, -sections])
-    shares, _ = nnls(columns.T, gradients[-1])
-    size = abs(gradients[-1]).max()
-    return frozenset(i for i, share in zip(near, shares, strict=False) if share > 1e-6 * size)
-
-
-def _missed(problem: Problem, piece: Piece, q: Array, tolerance: float = 1e-10) -> Piece | None:
-    """Return the inequalities of a piece that fail at ``q``, or None where an equation does."""
-    values, gradients = problem.evaluate(q, 1)
-    away = distances(values[:-1], gradients[:-1])
-    m = problem.inequalities
-    if not (abs(away[m:]) <= tolerance).all():
-        return None
-    return frozenset(i for i in piece if not away[i] >= -tolerance)
-
-
-Search = Callable[[Problem, Piece, Array, int], Rest]
-_SEARCHES: dict[str, Search] = {"newton": _newton, "slsqp": _slsqp, "scp": _scp}
+_DESCENTS: dict[str, Descent] = {"newton": _newton, "slsqp": slsqp, "scp": _scp}

@@ -1,4 +1,4 @@
-"""The KKT equations of a face, with the parameters of the formulas as variables.
+"""KKT equations of a face, with the parameters of the formulas as variables.
 
 The equations
 
@@ -23,20 +23,20 @@ from polycorner.minimisation.conditions import NEARLY_FLAT
 from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.spaces.manifold import Array, Manifold
 
-# How fast parameters given by name move the parameters of the formulas.
+# The derivatives of the formulas' parameters, by name, by each parameter.
 Rates = Mapping[str, Mapping[str, float]]
 
-SINGULAR = 1e-13  # reciprocal condition at which the equations determine nothing
+SINGULAR = 1e-13  # reciprocal condition number of a matrix that counts as singular
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The KKT equations to first order; rows are the held functions, and last the energy.
+    """The KKT equations to first order; rows are the active functions, and last the energy.
 
     Attributes
     ----------
     values : (k,) array
-        The held functions.
+        The active functions and equations.
     gradients : (k + 1, n) array
         Derivatives by scaled coordinates.
     drift : (k + 1, p) array
@@ -63,9 +63,9 @@ class Linear:
     def solve(self, free: Array, reference: float) -> tuple[Array, Array, Array] | None:
         """Return derivatives of scaled coordinates and multipliers, and slopes along ``free``.
 
-        The slopes, ``(r, p)``, are relative to what they are the difference of.  Rows of gradients
-        are brought to length one and energies to units of ``reference``, so that the condition of
-        the matrix says something; None if it is singular.
+        The slopes, ``(r, p)``, are relative to the summands they are differences of.  Gradients are
+        scaled to unit length and energies by ``reference``, so that the condition number of the
+        matrix is meaningful; None if it is singular.
         """
         rows, (n, p) = self.gradients[:-1], self.turning.shape
         sizes, k = np.linalg.norm(rows, axis=1), len(rows)
@@ -88,14 +88,14 @@ def bordered(hessian: Array, rows: Array) -> Array:
 
 
 class Lifted:
-    """Active functions, equations and energy of a certificate, parameters being variables too.
+    """Active functions, equations and energy of a certificate, with parameters as variables.
 
     Attributes
     ----------
     names : tuple of str
         Names of the active functions, then of the equations.
     slots : dict from (str, float) to int
-        Where a parameter with its value stands among the additional variables.
+        Index among the additional variables, by a parameter's name and value.
     """
 
     def __init__(self, certificate: Certificate) -> None:
@@ -126,7 +126,7 @@ class Lifted:
         return Bundle(manifold, lifted)
 
     def directions(self, rates: Rates) -> Array:
-        """Return how fast each of these parameters moves each slot, ``(s, p)``."""
+        """Return the derivatives of the slots by the parameters, ``(s, p)``."""
         rows = [[moved.get(name, 0.0) for moved in rates.values()] for name, _ in self.slots]
         return np.array(rows, dtype=np.float64).reshape(len(self.slots), len(rates))
 
@@ -138,11 +138,11 @@ class Lifted:
         q : (n,) array
             The point.
         changes : (s,) array
-            How far the parameters are from those of the certificate.
+            Differences of the parameters from their values in the certificate.
         multipliers : (k,) array
             ``dE/df``.
         directions : (s, p) array
-            By what the parameters are differentiated.
+            Derivatives of the slots by the parameters.
         """
         n, scales = len(self._scales), self._scales
         at = np.concatenate([q, self._values + changes])
@@ -161,7 +161,7 @@ class Lifted:
 
 @lru_cache(maxsize=256)
 def lifted_family(family: Family, used: frozenset[str]) -> Family:
-    """Return the used functions of a family, written in its variables and parameters alike."""
+    """Return the used functions of a family as functions of its variables and parameters."""
     if not family.parameters:
         return family
     names = tuple(name for name in family.names if name in used)
@@ -171,7 +171,7 @@ def lifted_family(family: Family, used: frozenset[str]) -> Family:
 
 
 def partial_derivatives(function: SmoothFunction, point: Array, rates: Rates) -> Array:
-    """Return the derivatives ``(p,)`` of a function by parameters while the point stays."""
+    """Return the partial derivatives ``(p,)`` of a function by parameters at a fixed point."""
     family = function.family
     if not family.parameters:
         return np.zeros(len(rates))
@@ -186,9 +186,9 @@ def partial_derivatives(function: SmoothFunction, point: Array, rates: Rates) ->
 
 
 def check_rates(certificate: Certificate, parameters: Iterable[str] | Rates | None) -> Rates:
-    """Return parameters as what they move, checking every name.
+    """Return parameters with their rates, after checking every name.
 
-    Names stand for themselves; None stands for all that have one value throughout the problem.
+    A name stands for itself; None stands for all parameters with one value in the whole problem.
     """
     known: dict[str, set[float]] = {}
     d = certificate.problem.polyhedron
@@ -214,6 +214,6 @@ def check_rates(certificate: Certificate, parameters: Iterable[str] | Rates | No
     for name in used:
         if len(known[name]) > 1:
             values = ", ".join(f"{value:g}" for value in sorted(known[name]))
-            msg = f"parameters: expected one value of {name} in all functions; it is {values}"
+            msg = f"parameters: expected one value of {name} in all functions; got {values}"
             raise ValueError(msg)
     return {name: dict(moved) for name, moved in parameters.items()}

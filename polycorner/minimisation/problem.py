@@ -1,4 +1,4 @@
-"""An energy on a polyhedron, laid out for the compiled core."""
+"""Energies on polyhedra, and their layout as flat arrays for the compiled descent."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
@@ -28,7 +30,7 @@ Flat = tuple[
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Value):
     """Minimise ``energy`` over ``polyhedron``.
 
     Rows of the system are the inequalities, the equations, and last the energy; derivatives here
@@ -73,15 +75,15 @@ class Problem:
         return tuple(results)
 
     def check_energy(self, q: Array, argument: str) -> None:
-        """Refuse a point where the energy is not finite."""
+        """Raise ValueError for a point at which the energy is not finite."""
         value = self.energy.value(q)
         if not np.isfinite(value):
-            msg = f"{argument}: expected a point where the energy is finite; it is {value} there"
+            msg = f"{argument}: expected a point with a finite energy; its energy is {value}"
             raise ValueError(msg)
 
     @cached_property
     def flat(self) -> tuple[Flat, int]:
-        """The problem as arrays for the compiled core, and its scratch size."""
+        """The problem as arrays for the compiled descent, and its scratch size."""
         table: list[tuple[int, ...]] = []
         reads: list[int] = []
         rows: list[int] = []
@@ -111,7 +113,7 @@ class Problem:
         return np.ones(self.inequalities, dtype=np.bool_)
 
     def mask(self, piece: Piece) -> NDArray[np.bool_]:
-        """Return which inequalities belong to a piece."""
+        """Return the mask ``(m,)`` of the inequalities of a piece."""
         if len(piece) == self.inequalities:
             return self._everything
         use = np.zeros(self.inequalities, dtype=np.bool_)
@@ -119,7 +121,13 @@ class Problem:
         return use
 
     def descend(self, piece: Piece, q: Array, limit: int) -> tuple[int, int, Array, Array]:
-        """Run the compiled descent inside one piece; see the compiled ``descend``."""
+        """Run the compiled descent inside one piece.
+
+        Returns
+        -------
+        status, iterations, point, multipliers
+            As of the compiled ``descend``.
+        """
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
@@ -129,7 +137,7 @@ class Problem:
         return status, iterations, u * self.scales, lam
 
     def restore(self, piece: Piece, q: Array) -> tuple[bool, Array]:
-        """Return whether repeated linearisation finds a point of a piece near ``q``, and it."""
+        """Project ``q`` onto a piece by repeated linearisation; return success and the point."""
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
@@ -139,7 +147,7 @@ class Problem:
         return reached, u * self.scales
 
     def on_face(self, active: Piece, q: Array) -> tuple[Array, float]:
-        """Return the stationary point Newton's method finds on a face, and its last step."""
+        """Apply Newton's method on a face; return the point and the length of the last step."""
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
@@ -151,7 +159,7 @@ class Problem:
     def probe(
         self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
     ) -> float:
-        """Return how much the energy changes along directions; see the compiled ``probe``."""
+        """Return the change of the energy along directions on the face of ``strong``."""
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
@@ -164,7 +172,7 @@ class Problem:
 
 
 def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:
-    """Split (output, row) pairs so that no output occurs twice in a part: it has one place."""
+    """Split (output, row) pairs into parts in which every output occurs at most once."""
     layers: list[dict[int, int]] = []
     for column, row in zip(columns, rows, strict=True):
         free = next((layer for layer in layers if column not in layer), None)
@@ -177,25 +185,22 @@ def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, i
 
 def pose(polyhedron: Polyhedron, energy: "Energy") -> Problem:
     """Return the problem of an energy on a polyhedron, checking that they belong together."""
-    if not isinstance(polyhedron, Polyhedron):
-        msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
-        raise TypeError(msg)
+    checks.instance("polyhedron", polyhedron, Polyhedron)
     if not isinstance(energy, Hashable):
-        msg = f"energy: expected a SmoothFunction or a SymPy expression; got {energy!r}"
-        raise TypeError(msg)
+        checks.refuse("energy", "a SmoothFunction or a SymPy expression", energy, TypeError)
     return _posed(polyhedron, energy)
 
 
 @lru_cache(maxsize=64)
 def _posed(polyhedron: Polyhedron, energy: Any) -> Problem:
-    """Keep the latest problems, so that one posed again is not compiled again."""
+    """Return the problem, from a cache: its layout and kernels are reused."""
     manifold = polyhedron.manifold
     function: Any = energy
     if not isinstance(energy, SmoothFunction):
         function = SmoothFunction("energy", energy, manifold)
     if function.manifold != manifold:
         msg = (
-            f"energy: lives on the coordinates {', '.join(function.manifold.names)}; "
+            f"energy: is a function of the coordinates {', '.join(function.manifold.names)}; "
             f"expected those of the polyhedron, {', '.join(manifold.names)}"
         )
         raise ValueError(msg)

@@ -1,7 +1,7 @@
-"""Sequential convex programming, each step stated in cvxpy and solved by Clarabel.
+"""Sequential convex programming with cvxpy and Clarabel, applied to one piece.
 
-This is the readable form of a descent step: minimise a convex model of the energy over the
-linearised polyhedron inside a trust region ([BV] ch. 4, [NW] ch. 18).
+Each step minimises a convex model of the energy over the linearised polyhedron inside a trust
+region ([BV] ch. 4, [NW] ch. 18).
 """
 
 import warnings
@@ -11,22 +11,23 @@ import cvxpy as cp
 import numpy as np
 
 from polycorner.errors import SolverError
+from polycorner.minimisation.polishing import Endpoint, polished
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 
-FIRST_RADIUS, LEAST_RADIUS = 0.25, 1e-9
-PENALTY = 10.0
+FIRST_RADIUS, LEAST_RADIUS = 0.25, 1e-9  # of the trust region, in scale units
+PENALTY = 10.0  # initial weight of the constraint violation in the merit function
 
 
 @dataclass(frozen=True)
 class Model:
-    """The convex programme of one step, its data left open as cvxpy parameters.
+    """The convex programme of one step, with cvxpy parameters for its data.
 
     ``minimise g.d + |R d|^2 / 2 + penalty * (slack)`` subject to ``A d + b + slack >= 0``,
-    ``C d + c = excess``, ``|d_i| <= radius``: slack is what the linearised set is missed by.
+    ``C d + c = excess``, ``|d_i| <= radius``; slack and excess are the violations.
     """
 
     step: cp.Variable
@@ -40,7 +41,7 @@ class Model:
     contacts: cp.Constraint | None
 
     @classmethod
-    def state(cls, n: int, inequalities: int, equations: int) -> "Model":
+    def stated(cls, n: int, inequalities: int, equations: int) -> "Model":
         """State the programme for ``n`` coordinates."""
         step = cp.Variable(n)
         gradient, root, radius = cp.Parameter(n), cp.Parameter((n, n)), cp.Parameter(nonneg=True)
@@ -70,7 +71,7 @@ class Model:
             msg = "cvxpy does not find the solver Clarabel; install the package clarabel"
             raise SolverError(msg)
         with warnings.catch_warnings():
-            # An inaccurate step is as good as any: it is taken only if the merit falls.
+            # An inaccurate step does no harm: it is accepted only if the merit decreases.
             warnings.simplefilter("ignore", UserWarning)
             try:
                 self.programme.solve(solver=cp.CLARABEL)
@@ -82,18 +83,24 @@ class Model:
         return np.asarray(self.step.value), duals
 
 
+def scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+    """Run sequential convex programming and polish its result."""
+    point, iterations, settled = sequential_convex(problem, piece, q, limit)
+    return polished(problem, piece, q, point, iterations, stopped=settled)
+
+
 def sequential_convex(
     problem: Problem, piece: Piece, q: Array, limit: int
 ) -> tuple[Array, int, bool]:
-    """Return the last point, the number of programmes solved, and whether the steps died out.
+    """Return the last point, the number of programmes solved, and whether the steps converged.
 
-    Rows are scaled to unit gradients and the energy to its own size.  A step is accepted when
-    energy plus penalty falls, else the trust region shrinks; the penalty grows when the
-    multipliers come near it.
+    Rows are scaled to unit gradients and the energy to its own size.  A step is accepted if
+    energy plus penalty decreases, otherwise the trust region shrinks; the penalty grows as the
+    multipliers approach it.
     """
     kept = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     count, scales = len(piece), problem.scales
-    model = Model.state(problem.dimension, count, len(kept) - count)
+    model = Model.stated(problem.dimension, count, len(kept) - count)
     values, gradients, hessians = problem.evaluate(q, 2)
     size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
     duals = np.zeros(count)
@@ -133,10 +140,10 @@ def sequential_convex(
 
 
 def _corrected(problem: Problem, trial: Array, kept: list[int], count: int) -> Array:
-    """Return a trial point moved, to first order, onto the functions it fails.
+    """Return a trial point moved, to first order, onto the constraints it violates.
 
-    Without this second-order correction the curvature of the constraints makes every long step
-    along them look bad ([NW] sec. 15.5, the Maratos effect).
+    Without this second-order correction the merit function rejects long steps along curved
+    constraints ([NW] sec. 15.5, the Maratos effect).
     """
     values, gradients = problem.evaluate(trial, 1)
     away = distances(values[kept], gradients[kept])
@@ -149,7 +156,7 @@ def _corrected(problem: Problem, trial: Array, kept: list[int], count: int) -> A
 
 
 def _weights(rows: Array, slope: Array, duals: Array) -> Array:
-    """Return multipliers of all rows: least squares over equations and contacts that push."""
+    """Return least-squares multipliers of the equations and the rows with positive duals."""
     count = len(duals)
     chosen = [*np.flatnonzero(duals > 1e-6).tolist(), *range(count, len(rows))]
     weights = np.zeros(len(rows))

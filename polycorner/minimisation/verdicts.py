@@ -1,4 +1,4 @@
-"""What a certificate can say: enums whose values are sentences."""
+"""Verdicts on a point and kinds of entrapment: enums whose values are sentences."""
 
 from enum import Enum
 
@@ -9,13 +9,13 @@ class Verdict(Enum):
     STRICT_MINIMUM = "strict local minimum: no other point nearby is as low"
     MINIMUM_ALONG_LOCUS = "local minimum, attained along a locus on which the energy is constant"
     WEAK_MINIMUM = "strict local minimum with a weakly active function: its multiplier is zero"
-    NOT_STATIONARY = "not a minimum: the energy falls to first order in an allowed direction"
-    SADDLE = "not a minimum: first order holds, but the energy falls to second order"
-    NO_MULTIPLIER = "undecided: no multiplier exists, and no direction leads inward (a cusp)"
-    UNDECIDED = "undecided: first order holds, but the second order vanishes in a direction"
+    NOT_STATIONARY = "not a minimum: the energy decreases to first order in a feasible direction"
+    SADDLE = "not a minimum: stationary, but the energy decreases to second order"
+    NO_MULTIPLIER = "undecided: no multipliers exist, and no direction points inward (a cusp)"
+    UNDECIDED = "undecided: stationary, but the second order vanishes in a feasible direction"
     OUTSIDE = "the point does not lie in the polyhedron"
     INFEASIBLE = "no point of the polyhedron was reached from the start"
-    UNBOUNDED = "the energy keeps falling as far as the search went: unbounded below, or no rest"
+    UNBOUNDED = "the energy decreases without end: unbounded below, or no minimum is attained"
     NOT_CONVERGED = "the search stopped before it reached a stationary point"
 
     @property

@@ -11,8 +11,7 @@ import numpy as np
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import Box
-from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.problem import Problem
+from polycorner.minimisation import Certificate, Problem
 
 CHECK_BITS = 128
 SAME = 1e-5  # how far, relatively, a value may lie from what it was when it was certified

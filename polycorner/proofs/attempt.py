@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
-from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.verdicts import Entrapment
+from polycorner.minimisation import Certificate, Entrapment
 from polycorner.proofs.claims import Posed, faces, pose_claim
 from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import SUBJECT, newton

@@ -10,7 +10,7 @@ import numpy as np
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation import Certificate
 from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.proofs.findings import Claim, Finding, Status
 from polycorner.proofs.invariance import (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import bounds, decimals, dot, matrix
 from polycorner.intervals.enclosures import Undecided
-from polycorner.minimisation.problem import Problem
+from polycorner.minimisation import Problem
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.proofs.definite import pivots, tangent_form
 from polycorner.proofs.invariance import Generator, annihilated, slope_bounds

@@ -37,7 +37,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.balls import between, bounds, decimals, exact, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation import Certificate
 from polycorner.printing import Printed, Sheet
 from polycorner.proofs.arguments import check_domain, check_parameters, check_unchanged, check_whole
 from polycorner.proofs.attempt import Attempt, attempt, bits_for

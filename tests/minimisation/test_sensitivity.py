@@ -19,7 +19,7 @@ from polycorner import (
     stationary_on,
 )
 from polycorner.dumbbells import DumbbellPair
-from polycorner.minimisation.sensitivities import crossing, sensitivity
+from polycorner.minimisation import crossing, sensitivity
 
 M = Manifold.euclidean("x y")
 x, y = M.symbols
@@ -231,7 +231,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("reason", REFUSED)
 def test_points_that_need_not_move_smoothly_are_refused_with_the_reason(reason):
-    with pytest.raises(ValueError, match=f"certificate: expected a point that moves.*{reason}"):
+    with pytest.raises(ValueError, match=f"^certificate: .*{reason}"):
         sensitivity(REFUSED[reason](), ["a"])
 
 
@@ -239,44 +239,12 @@ def test_a_parameter_that_ends_a_freedom_is_refused():
     energy = function("e", y + b * x, b=0.0)
     c = minimise(Polyhedron(M, floor(0.0)), energy, [0.3, 1.0])
     np.testing.assert_allclose(sensitivity(c, ["a"]).point[:, 0], [0, 1], atol=1e-12)
-    with pytest.raises(ValueError, match="as b changes, the energy slopes along a direction"):
+    with pytest.raises(ValueError, match=r"^parameters: .* got b,"):
         sensitivity(c, ["a", "b"])
 
 
-def test_names_are_checked():
-    c = corner(PAIR)
-    with pytest.raises(ValueError, match=r"parameters: expected names among .*; got length"):
-        sensitivity(c, ["length"])
-    with pytest.raises(TypeError, match="list of names or a mapping; got the string 'l'"):
-        sensitivity(c, "l")
-    with pytest.raises(TypeError, match="mapping from names to rates of each"):
-        sensitivity(c, {"l": 1.0})
-    with pytest.raises(ValueError, match="got none"):
-        sensitivity(c, [])
-    with pytest.raises(TypeError, match="certificate: expected a Certificate; got DumbbellPair"):
-        sensitivity(PAIR)
-    s = sensitivity(c, ["l"])
-    with pytest.raises(ValueError, match="changes: expected names among l; got r"):
-        s.predict({"r": 0.1})
-
-
-def test_a_name_with_two_values_is_refused():
-    two = Polyhedron(M, [floor(0.0), function("wall", x - a, a=1.0)])
-    c = minimise(two, x + 2 * y, [2.0, 1.0])
-    with pytest.raises(ValueError, match="expected one value of a in all functions; it is 0, 1"):
-        sensitivity(c, ["a"])
-
-
-def test_quantities_are_checked():
+def test_coordinates_are_quantities():
     s = sensitivity(corner(PAIR), SIZES)
-    with pytest.raises(ValueError, match="eta1 changes along them"):
-        s.of("eta1")
-    with pytest.raises(ValueError, match=r"expected a coordinate among phi1.*got 'heading'"):
-        s.of("heading")
-    with pytest.raises(ValueError, match="expected a function on phi1"):
-        s.of(function("other", x))
-    with pytest.raises(ValueError, match="no coordinate and no parameter"):
-        s.of(x)
     assert s.of("theta1") == pytest.approx(s.of("theta2"), abs=1e-12)
 
 
@@ -306,8 +274,3 @@ def test_a_multiplier_that_never_vanishes_is_not_found():
         Polyhedron(M, {"wall": x, "floor": y}), function("e", sympy.exp(a) * x + y, a=1.0), [1, 1]
     )
     assert crossing(c, "wall", "a") is None
-
-
-def test_the_contact_has_to_be_active():
-    with pytest.raises(ValueError, match="contact: expected one among A2B1, A2b, aB1; got 'A1B1'"):
-        crossing(corner(PAIR), "A1B1", "t")

@@ -20,8 +20,7 @@ from polycorner.cli.manner import Command, console
 from polycorner.dumbbells.cli.options import chosen_pair, pair_settings, parameters
 
 if TYPE_CHECKING:
-    from polycorner.minimisation.certificate import Certificate
-    from polycorner.minimisation.search import Minima
+    from polycorner.minimisation import Certificate, Minima
 
 EPILOG = """\b
 Examples:
@@ -75,7 +74,7 @@ def pinball(starts: int, seed: int, as_json: bool, out: Path | None) -> None:
     with patience(WORDS):
         import numpy as np
 
-        from polycorner.minimisation.search import minima as search
+        from polycorner.minimisation import minima as search
         from polycorner.models import Pinball
 
         board = Pinball()

@@ -296,7 +296,7 @@ def minimiser_heading(drum: DumbbellDrum, *, azimuth: float = 0.0) -> float:
     """
     import sympy
 
-    from polycorner.minimisation.methods import minimise
+    from polycorner.minimisation import minimise
     from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 
     pair = replace(drum, count=2).pair

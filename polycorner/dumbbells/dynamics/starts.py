@@ -7,7 +7,7 @@ import numpy as np
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
-from polycorner.minimisation.methods import minimise
+from polycorner.minimisation import minimise
 from polycorner.spaces.manifold import Array
 
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered

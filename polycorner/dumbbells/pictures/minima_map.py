@@ -14,7 +14,7 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_room
 from polycorner.dumbbells.statics.skeleton import long_rod_length
-from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation import Certificate
 from polycorner.pictures.style import BODIES
 from polycorner.spaces.manifold import Array
 

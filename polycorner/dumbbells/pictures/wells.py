@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_escapes, hold_times
-from polycorner.minimisation.verdicts import Entrapment
+from polycorner.minimisation import Entrapment
 from polycorner.models.wells.escape import overdamped_escape_time
 from polycorner.models.wells.holding import NORMAL, Comparison, Escapes, kick_of, ladder, rests
 from polycorner.models.wells.wells import KINDS, Well

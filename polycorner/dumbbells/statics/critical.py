@@ -18,10 +18,7 @@ from numpy.typing import NDArray
 
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
-from polycorner.minimisation.certificate import Certificate, certify
-from polycorner.minimisation.methods import stationary_on
-from polycorner.minimisation.sensitivities import crossing
-from polycorner.minimisation.verdicts import Verdict
+from polycorner.minimisation import Certificate, Verdict, certify, crossing, stationary_on
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
-from polycorner.minimisation.methods import stationary_on
-from polycorner.minimisation.sensitivities import Sensitivity, sensitivity
+from polycorner.minimisation import Sensitivity, sensitivity, stationary_on
 
 if TYPE_CHECKING:
     from polycorner.minimisation.sensitivities import Quantity
@@ -70,7 +70,7 @@ def error_bar(
         For a name that is no parameter, a tolerance that is not a number from 0 on, or a quantity
         without a derivative.
     """
-    found.check_names("tolerances", tolerances)
+    checks.names("tolerances", tolerances, found.rates)
     for name, tolerance in tolerances.items():
         if not 0 <= float(tolerance) < math.inf:
             msg = f"tolerances: expected {name} as a number not below 0; got {tolerance!r}"

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
-from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.methods import minimise, stationary_on
+from polycorner.minimisation import Certificate, minimise, stationary_on
 from polycorner.spaces.manifold import Array
 
 CORNER = ("A2B1", "A2b", "aB1")

@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
-from polycorner.minimisation.certificate import Certificate, certify
-from polycorner.minimisation.search import Minima, minima
-from polycorner.minimisation.search import Progress as Falls
+from polycorner.minimisation import Certificate, Minima, certify, minima
 from polycorner.polyhedra.symmetry import Element, Symmetry
+from polycorner.progress import Progress as SearchProgress
+from polycorner.progress import silent
 from polycorner.spaces.manifold import Array, finite, reals
 
 CURVATURES = (0.128, 0.5, 1.0, 1.5)
@@ -114,7 +114,7 @@ def pair_minima(
     starts: int = 1000,
     rng: np.random.Generator | int | None = None,
     mirror: bool = False,
-    progress: Falls | None = None,
+    progress: SearchProgress = silent,
 ) -> Minima:
     """Find where a pair can rest, up to shifts and relabelling, from scattered placements.
 
@@ -129,7 +129,7 @@ def pair_minima(
     mirror : bool, optional
         Whether mirror images count as one.
     progress : callable, optional
-        As for :func:`~polycorner.minimisation.search.minima`.
+        As for :func:`~polycorner.minima`.
     """
     if isinstance(starts, bool) or not isinstance(starts, int) or starts < 1:
         msg = f"starts: expected a positive whole number; got {starts!r}"

@@ -12,8 +12,7 @@ import numpy as np
 
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_minima
-from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.verdicts import Entrapment
+from polycorner.minimisation import Certificate, Entrapment
 from polycorner.models.wells.escape import mean_escape_time
 from polycorner.models.wells.holding import Escapes, escapes
 from polycorner.models.wells.wells import Well

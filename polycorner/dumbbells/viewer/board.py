@@ -22,8 +22,7 @@ from polycorner.dumbbells.pictures.placements import relative_coordinates
 from polycorner.dumbbells.pictures.symbols import energy_unit, multiplier_unit
 from polycorner.dumbbells.viewer.sliders import SHAPE, Slider, coordinates, sliders_for
 from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descent
-from polycorner.minimisation.certificate import Certificate, certify
-from polycorner.minimisation.verdicts import Verdict
+from polycorner.minimisation import Certificate, Verdict, certify
 from polycorner.polyhedra.strata import LocalType
 from polycorner.spaces.manifold import Array
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.methods import minimise
+from polycorner.minimisation import Certificate, minimise
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array

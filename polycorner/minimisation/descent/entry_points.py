@@ -17,7 +17,7 @@ def _entry_points(sources: str) -> tuple[Any, ...]:
 
     @njit(cache=True)
     def descend(problem, use, m, rows, u, size, limit):
-        """Descend inside a piece; see :func:`sqp.descend`."""
+        """Descend inside a piece; see ``sqp.descend``."""
         _ = sources
         return sqp.descend(problem, use, m, rows, u, size, limit)
 
@@ -32,7 +32,7 @@ def _entry_points(sources: str) -> tuple[Any, ...]:
 
     @njit(cache=True)
     def on_face(problem, on, m, rows, u, size):
-        """Apply Newton's method on a face to a copy of ``u``; see :func:`newton.polish`."""
+        """Apply Newton's method on a face to a copy of ``u``; see ``newton.polish``."""
         _ = sources
         n = u.size
         F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
@@ -42,7 +42,7 @@ def _entry_points(sources: str) -> tuple[Any, ...]:
 
     @njit(cache=True)
     def probe(problem, on, use, m, rows, u, directions, held, steps, size):
-        """Follow directions along a face; see :func:`flat_directions.probe`."""
+        """Follow directions along a face; see ``flat_directions.probe``."""
         _ = sources
         return flat_directions.probe(problem, on, use, m, rows, u, directions, held, steps, size)
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.minimisation.verdicts import Entrapment
+from polycorner.minimisation import Entrapment
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold, reals, scalar
 

@@ -20,7 +20,7 @@ from polycorner.dumbbells.statics.minima_map import (
     scattered,
 )
 from polycorner.dumbbells.statics.skeleton import long_rod_length
-from polycorner.minimisation.search import minima
+from polycorner.minimisation import minima
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 PLANE = replace(PAIR, drum_radius=math.inf)

@@ -1,12 +1,13 @@
-"""How many kinds there are in all, judged by how often each was met."""
+"""Estimates of the number of kinds in a population from abundances in a sample."""
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from numbers import Integral
 
-NORMAL = 1.959963984540054  # half of a 95 % interval of the normal distribution, in deviations
-DOUBT = 0.05
+from polycorner import checks
+
+NORMAL = 1.959963984540054  # half the 95 % interval of a normal distribution, in deviations
+MISSED = 0.05  # probability from which on a kind may well have been missed
 
 
 @dataclass(frozen=True)
@@ -16,17 +17,17 @@ class Richness:
     Attributes
     ----------
     observed : int
-        Kinds that were met.
+        Number of kinds observed.
     draws : int
-        Draws in all.
+        Number of draws.
     singles, doubles : int
-        Kinds that were met once, and twice.
+        Numbers of kinds observed once and twice.
     estimate : float
-        Kinds in all, met or not.
+        Estimated number of all kinds.
     variance : float
         Variance of the estimate.
     interval : (float, float)
-        The number of kinds at a nominal level of 95 %.
+        Confidence interval of the number of kinds, at a nominal level of 95 %.
     """
 
     observed: int
@@ -39,7 +40,7 @@ class Richness:
 
     @property
     def coverage(self) -> float:
-        """Estimated share of the distribution that belongs to kinds that were met: ``1 - f1/n``.
+        """Estimated share of the observed kinds in the distribution: ``1 - f1/n``.
 
         The estimator of Good and Turing ([Good]); 0 without draws.
         """
@@ -47,38 +48,38 @@ class Richness:
 
     @property
     def unseen(self) -> float:
-        """Estimated number of kinds that were not met."""
+        """Estimated number of kinds not observed."""
         return self.estimate - self.observed
 
     @property
     def overlooked(self) -> float:
-        """Largest share of a kind that so many draws miss with a probability of 5 % or more."""
-        return 1 - DOUBT ** (1 / self.draws) if self.draws else 1.0
+        """Largest share of a kind that the draws miss with a probability of 5 % or more."""
+        return 1 - MISSED ** (1 / self.draws) if self.draws else 1.0
 
 
 def richness(counts: Iterable[int]) -> Richness:
-    r"""Estimate the number of kinds in a population by the abundances of rare ones in a sample.
+    r"""Estimate the number of kinds in a population from the rare ones in a sample.
 
-    With ``S`` kinds met in ``n`` draws, ``f1`` of them once and ``f2`` of them twice, the estimate
-    of Chao ([Chao]) in its bias-corrected form is
+    With ``S`` kinds observed in ``n`` draws, ``f1`` of them once and ``f2`` of them twice, the
+    bias-corrected estimate of Chao ([Chao]) is
 
     .. math:: S + \frac{n-1}{n} \frac{f_1 (f_1 - 1)}{2 (f_2 + 1)} .
 
-    It is a lower bound: kinds so rare that hardly one of them was met do not show in ``f1`` and
-    ``f2``.  Its interval is log-normal in the number of unseen kinds ([Chao87]); with only a few
-    draws for each kind it contains the truth less often than its level says.  Where the estimate
-    is ``S``, each kind met ``k`` times is taken to be missed with the probability ``exp(-k)`` of
-    a Poisson distribution of that mean.
+    It is a lower bound: ``f1`` and ``f2`` carry no information on kinds so rare that hardly any of
+    them was observed.  Its interval is log-normal in the number of unseen kinds ([Chao87]); with
+    few draws for each kind it covers the truth less often than its nominal level.  Where the
+    estimate is ``S``, a kind observed ``k`` times is assumed to be missed with the probability
+    ``exp(-k)`` of a Poisson distribution of that mean.
 
     Parameters
     ----------
     counts : sequence of int
-        How often each kind was met, at least once.
+        How often each kind was observed, at least once.
 
     Raises
     ------
-    ValueError
-        If a count is no positive whole number.
+    TypeError, ValueError
+        If a count is not a positive whole number.
 
     Examples
     --------
@@ -86,11 +87,7 @@ def richness(counts: Iterable[int]) -> Richness:
     >>> round(found.estimate, 2), round(found.coverage, 2)
     (7.43, 0.86)
     """
-    met = list(counts)
-    wrong = [c for c in met if not isinstance(c, Integral) or isinstance(c, bool) or c < 1]
-    if wrong:
-        msg = f"counts: expected positive whole numbers; got {wrong[0]!r}"
-        raise ValueError(msg)
+    met = [checks.whole("counts", c, least=1) for c in counts]
     observed, n, f1, f2 = len(met), sum(met), met.count(1), met.count(2)
     if not n:
         return Richness(0, 0, 0, 0, 0.0, 0.0, (0.0, math.inf))
@@ -110,7 +107,7 @@ def richness(counts: Iterable[int]) -> Richness:
 
 
 def _by_chance(met: list[int], n: int) -> tuple[float, tuple[float, float]]:
-    """Return variance and interval of the number of kinds if each of them may have been missed."""
+    """Return variance and interval if each kind was missed with its Poisson probability."""
     observed = len(met)
     missed = math.fsum(math.exp(-c) for c in met)
     variance = missed - math.fsum(math.exp(-2 * c) for c in met)

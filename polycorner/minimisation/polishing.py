@@ -1,0 +1,117 @@
+"""Refinement of approximate minima to solutions of the KKT equations of a face."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from polycorner.minimisation.problem import Problem
+from polycorner.minimisation.verdicts import Verdict
+from polycorner.polyhedra.cones import Rows, unit_rows
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.strata import distances
+from polycorner.spaces.manifold import Array
+
+FAR = 1e8  # distance from the origin, in scale units, beyond which a descent is unbounded
+NEAR = 1e-3  # scaled gap up to which a function may be active at an unpolished minimum
+SETTLED = 1e-8  # last step of Newton's method, in scale units, up to which it has converged
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """Where a descent ended inside one piece of a polyhedron, and how it failed, if it did."""
+
+    point: Array
+    iterations: int
+    failure: Verdict | None
+
+
+def polished(
+    problem: Problem, piece: Piece, start: Array, q: Array, iterations: int, *, stopped: bool
+) -> Endpoint:
+    """Solve the KKT equations of the face that carries an approximate minimum ``q``.
+
+    Parameters
+    ----------
+    problem : Problem
+    piece : frozenset of int
+        The piece of the polyhedron in which the method ran.
+    start, q : (n,) array
+        Where the method started, and where it ended.
+    iterations : int
+        Number of its steps.
+    stopped : bool
+        Whether it ended by its own stopping test.
+    """
+    if not np.isfinite(q).all():
+        q = start
+    values, gradients = problem.evaluate(q, 1)
+    if abs(q / problem.scales).max() > FAR and _violated(problem, piece, q, 1e-6) == frozenset():
+        return Endpoint(start, iterations, Verdict.UNBOUNDED)
+    if np.isfinite(values).all() and np.isfinite(gradients).all():
+        point = _on_face(problem, piece, q, _carrying(problem, piece, values, gradients))
+        if point is not None:
+            return Endpoint(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
+    for origin in (q, start):
+        reached, point = problem.restore(piece, origin)
+        if reached and np.isfinite(problem.energy.value(point)):
+            return Endpoint(point, iterations, Verdict.NOT_CONVERGED)
+    return Endpoint(q, iterations, Verdict.INFEASIBLE)
+
+
+def _on_face(problem: Problem, piece: Piece, q: Array, face: Piece) -> Array | None:
+    """Return the stationary point near ``q`` of a face that is corrected on the way.
+
+    Violated functions join the face; functions with negative multipliers leave it.
+    """
+    seen: set[Piece] = set()
+    while face not in seen:
+        seen.add(face)
+        point, last = problem.on_face(face, q)
+        if not last < SETTLED or abs((point - q) / problem.scales).max() > 0.1:
+            return None
+        violated = _violated(problem, piece, point)
+        if violated is None:
+            return None
+        negative = _negative(problem, face, point)
+        if not violated and not negative:
+            return point
+        face = (face | violated) if violated else face - negative
+    return None
+
+
+def _negative(problem: Problem, face: Piece, point: Array) -> Piece:
+    """Return the functions with negative multipliers, for a face with independent gradients."""
+    _, gradients = problem.evaluate(point, 1)
+    chosen = sorted(face)
+    rows = Rows(gradients[[*chosen, *range(problem.inequalities, problem.rows - 1)]], 1e-8)
+    if not chosen or not rows.independent:
+        return frozenset()
+    weights = rows.weights(gradients[-1])[: len(chosen)]
+    small = 1e-9 * float(abs(gradients[-1]).max())
+    return frozenset(i for i, weight in zip(chosen, weights, strict=True) if weight < -small)
+
+
+def _carrying(problem: Problem, piece: Piece, values: Array, gradients: Array) -> Piece:
+    """Return the nearly active functions with a share in the energy's gradient."""
+    from scipy.optimize import nnls
+
+    m = problem.inequalities
+    away = distances(values[:-1], gradients[:-1])
+    near = [i for i in sorted(piece) if away[i] <= NEAR]
+    if not near:
+        return frozenset()
+    sections = unit_rows(gradients[m:-1])
+    columns = np.vstack([unit_rows(gradients[near]), sections, -sections])
+    shares, _ = nnls(columns.T, gradients[-1])
+    size = abs(gradients[-1]).max()
+    return frozenset(i for i, share in zip(near, shares, strict=False) if share > 1e-6 * size)
+
+
+def _violated(problem: Problem, piece: Piece, q: Array, tolerance: float = 1e-10) -> Piece | None:
+    """Return the inequalities of a piece that are violated at ``q``; None if an equation is."""
+    values, gradients = problem.evaluate(q, 1)
+    away = distances(values[:-1], gradients[:-1])
+    m = problem.inequalities
+    if not (abs(away[m:]) <= tolerance).all():
+        return None
+    return frozenset(i for i in piece if not away[i] >= -tolerance)

@@ -1,0 +1,86 @@
+"""Start points of a multi-start search, given or sampled from a box."""
+
+from collections.abc import Sequence
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from polycorner import checks
+from polycorner.minimisation.problem import Problem
+from polycorner.spaces.manifold import Array, reals
+
+# Bounds for each coordinate; None for a whole circle.
+Box = Sequence[tuple[float, float] | None]
+
+TRIES = 10_000  # samples a start before a box is reported to miss the polyhedron
+
+
+def start_points(
+    problem: Problem, starts: Any, box: Box | None, rng: np.random.Generator | int | None
+) -> Array:
+    """Return the start points ``(k, n)``, given or sampled, after checking them."""
+    manifold = problem.polyhedron.manifold
+    if isinstance(starts, Integral):
+        count = checks.whole("starts", starts, least=1)
+        return _sampled(problem, count, *_bounds(problem, box), checks.generator("rng", rng))
+    if box is not None:
+        msg = f"box: expected None with starts given as points; got {box!r}"
+        raise ValueError(msg)
+    points = manifold.points(np.atleast_2d(reals(starts, "starts")), "starts")
+    if points.ndim != 2 or not len(points):
+        msg = f"starts: expected points of shape (k, {problem.dimension}); got {points.shape}"
+        raise ValueError(msg)
+    finite = np.isfinite(problem.energy.value(points))
+    if not finite.all():
+        k = int((~finite).argmax())
+        msg = f"starts: expected points with a finite energy; it is not finite at starts[{k}]"
+        raise ValueError(msg)
+    return points
+
+
+def _sampled(
+    problem: Problem, count: int, low: Array, high: Array, rng: np.random.Generator
+) -> Array:
+    """Return points sampled uniformly from where the inequalities hold and the energy is finite."""
+    d = problem.polyhedron
+    found = np.empty((0, problem.dimension))
+    tries = 0
+    while len(found) < count:
+        q = rng.uniform(low, high, (4 * count, problem.dimension))
+        inside = (d.implicit(q) >= 0) & np.isfinite(problem.energy.value(q))
+        found = np.concatenate([found, q[inside]])
+        tries += len(q)
+        if tries > TRIES * (len(found) + 1):
+            msg = f"box: expected one that meets the polyhedron; {len(found)} of {tries} points do"
+            raise ValueError(msg)
+    return found[:count]
+
+
+def _bounds(problem: Problem, box: Any) -> tuple[Array, Array]:
+    """Return the lower and the upper bounds of a box."""
+    manifold = problem.polyhedron.manifold
+    given = [None] * problem.dimension if box is None else box
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != problem.dimension:
+        msg = (
+            f"box: expected bounds (low, high) for each of {', '.join(manifold.names)}; got {box!r}"
+        )
+        raise ValueError(msg)
+    bounds = []
+    for name, period, pair in zip(manifold.names, manifold.periods, given, strict=True):
+        circle = pair is None and np.isfinite(period)
+        bound = (-period / 2, period / 2) if circle else pair
+        if not _is_interval(bound):
+            msg = f"box: expected low < high for {name}, to sample points; got {pair!r}"
+            raise ValueError(msg)
+        bounds.append(bound)
+    low, high = np.array(bounds, dtype=np.float64).T
+    return low, high
+
+
+def _is_interval(pair: Any) -> bool:
+    if not isinstance(pair, Sequence | np.ndarray) or len(pair) != 2:
+        return False
+    if not all(isinstance(x, Real) and np.isfinite(float(x)) for x in pair):
+        return False
+    return float(pair[0]) < float(pair[1])
