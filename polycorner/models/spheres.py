@@ -120,8 +120,9 @@ class SphereCluster:
         For fewer than four spheres a triangle or a pair.
         """
         centres = [np.zeros(3), np.array([1.0, 0, 0]), np.array([0.5, math.sqrt(0.75), 0])]
+        taken: set[tuple[int, ...]] = set()
         while len(centres) < self.count:
-            centres.append(_hollow(centres))
+            centres.append(_hollow(centres, taken))
         return np.concatenate(centres[: self.count])
 
     def starts(self) -> Array:
@@ -160,9 +161,17 @@ class SphereCluster:
         return found
 
 
-def _hollow(centres: list[Array]) -> Array:
-    """Return the first free place that touches three spheres."""
-    for a, b, c in combinations(centres, 3):
+def _hollow(centres: list[Array], taken: set[tuple[int, ...]]) -> Array:
+    """Return the first free place that touches three spheres.
+
+    Three spheres without such a place are added to ``taken``: they have none beside more spheres.
+    """
+    others = np.array(centres)
+    for triple in combinations(range(len(centres)), 3):
+        if triple in taken:
+            continue
+        taken.add(triple)
+        a, b, c = others[list(triple)]
         u, v = b - a, c - a
         normal = np.cross(u, v)
         if np.linalg.norm(normal) < 1e-9:
@@ -176,7 +185,8 @@ def _hollow(centres: list[Array]) -> Array:
         rise = math.sqrt(1 - foot @ foot) / np.linalg.norm(normal)
         for sign in (1, -1):
             place = a + foot + sign * rise * normal
-            if min(np.linalg.norm(place - other) for other in centres) > 1 - 1e-9:
+            if np.linalg.norm(place - others, axis=1).min() > 1 - 1e-9:
+                taken.discard(triple)
                 return np.asarray(place)
     msg = "a cluster of spheres always has a free hollow"
     raise AssertionError(msg)

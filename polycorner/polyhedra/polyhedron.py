@@ -170,6 +170,9 @@ class Polyhedron(Value):
         at least zero; a piece inside another is dropped.  No piece: the point is outside ``D``;
         the empty piece alone: it is inside.
         """
+        if not self.is_union:
+            outside = any(sign < 0 for sign in signs)
+            return [] if outside else [frozenset(i for i, s in enumerate(signs) if s == 0)]
         pieces = _pieces(self.tree, signs)
         return sorted(
             (p for p in pieces if not any(other < p for other in pieces)),

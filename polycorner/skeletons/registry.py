@@ -46,10 +46,14 @@ class CornerRegistry:
         self.records: list[CornerRecord] = []
         self.notes: dict[str, None] = {}
         self.lost = False
+        self._named: dict[frozenset[int], Names] = {}
 
     def names(self, rows: Iterable[int]) -> Names:
         """Return the names of functions."""
-        return frozenset(self.polyhedron.names[i] for i in rows)
+        key = frozenset(rows)
+        if key not in self._named:
+            self._named[key] = frozenset(self.polyhedron.names[i] for i in key)
+        return self._named[key]
 
     def written(self, rows: Iterable[int]) -> str:
         """Return the names of functions for a sentence."""
@@ -142,10 +146,11 @@ class CornerRegistry:
         among: Iterable[int],
     ) -> tuple[int, Relabelling] | None:
         """Return which ray of a corner a ray is, after one of the relabellings."""
-        among = list(among)
-        named = {i: self.names(record.figure.rays[i].active) for i in among}
+        alike: dict[Names, list[int]] = {}
+        for i in among:
+            alike.setdefault(self.names(record.figure.rays[i].active), []).append(i)
         active = self.names(ray.active)
-        possible = [(i, p) for p in relabellings for i in among if renamed(active, p) == named[i]]
+        possible = [(i, p) for p in relabellings for i in alike.get(renamed(active, p), [])]
         if possible and not record.figure.singular and not self.polyhedron.is_union:
             return possible[0]
         for i, p in possible:

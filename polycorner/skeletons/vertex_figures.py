@@ -275,21 +275,24 @@ def _sectors(
 ) -> tuple[Sector, ...]:
     """Return the sectors between rays that lie in a common two-dimensional flat."""
     n = slopes.shape[1]
+    # Some of independent rows are independent: no rank is computed for the many pairs of rays.
+    independent = rank(slopes, RANK_TOLERANCE) == len(slopes)
     flats: dict[frozenset[int], set[int]] = {}
     zero = [frozenset(np.flatnonzero(abs(slopes @ y) <= FLAT).tolist()) for y in rays]
     for i, j in combinations(range(len(rays)), 2):
         shared = zero[i] & zero[j]
         if abs(rays[i] @ rays[j]) < 1 - FLAT and len(shared) >= n - 2:
-            matrix = slopes[sorted(shared)]
-            if rank(matrix, RANK_TOLERANCE) == n - 2:
+            known = len(shared) if independent else rank(slopes[sorted(shared)], RANK_TOLERANCE)
+            if known == n - 2:
                 flats.setdefault(shared, set()).update((i, j))
     sectors = []
     for members in flats.values():
         for i, j, middle in _arcs(rays, sorted(members)):
             active = _active_along(point, rows, slopes @ middle)
-            if active is not None and (
-                not active if n == 2 else _rank_of(rows, slopes, active) == n - 2
-            ):
+            if active is None:
+                continue
+            known = len(active) if independent or n == 2 else _rank_of(rows, slopes, active)
+            if known == n - 2:
                 sectors.append(Sector((i, j), active))
     return tuple(sectors)
 
