@@ -40,7 +40,7 @@ def draw(rest: Certificate, path: Path) -> Path:
     ]
     held = ", ".join(f"{name}: {kind.value}" for name, kind in rest.entrapment.items())
     bounds = (-1.6, 1.6, 0.0, 2.6)
-    return save(draw_region(WEDGE, bounds, edges=sides, rests=[(held, rest.point)]), path)
+    return save(draw_region(WEDGE, bounds, edges=sides, minima=[(held, rest.point)]), path)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def draw(path: Path) -> Path:
 
     rests = [minimise(OUTSIDE, ENERGY, start) for start in STARTS]
     named = [(f"rest on {rest.active[0]}, E = {rest.energy:g}", rest.point) for rest in rests]
-    figure = draw_region(OUTSIDE, (-4, 3, -4, 3), corners=[("", [0.0, 0.0])], rests=named)
+    figure = draw_region(OUTSIDE, (-4, 3, -4, 3), corners=[("", [0.0, 0.0])], minima=named)
     (axes,) = figure.axes
     x, y = np.meshgrid(np.linspace(-4, 3, 141), np.linspace(-4, 3, 141))
     axes.contour(x, y, (x + 1) ** 2 + (y + 2) ** 2, range(1, 26, 3), colors="0.6", linewidths=0.6)

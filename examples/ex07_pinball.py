@@ -78,7 +78,7 @@ def draw(result: Result, path: Path) -> Path:
         BOARD.polyhedron,
         (-0.25, BOARD.width + 0.25, -0.25, BOARD.height + 0.25),
         corners=[("", c.point) for c in result.corners],
-        rests=balls,
+        minima=balls,
     )
     return save(figure, path)
 

@@ -175,7 +175,7 @@ def _planar(
             model.polyhedron,
             (low[0] - room, high[0] + room, low[1] - room, high[1] + room),
             corners=[
-                ("" if crowded else str(k), corner.point) for k, corner in enumerate(found.corners)
+                ("" if crowded else f"C{k}", corner.point) for k, corner in enumerate(found.corners)
             ],
             edges=curves,
         )

@@ -1,4 +1,4 @@
-"""Clusters of spheres: balls joined by bars where they touch, and the motions between them."""
+"""Figures of sphere clusters: balls joined by bars where they touch, and motions between them."""
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path
 from numpy.typing import ArrayLike
 
+from polycorner.checks import instance, refuse, whole
 from polycorner.models.spheres import SphereCluster
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.spaces.manifold import Array, finite, reals
@@ -20,13 +21,13 @@ BALL, SINGULAR_BALL = "#56B4E9", "#E69F00"  # Okabe and Ito
 BAR, OPENING, CLOSING = "0.25", "#D55E00", "#009E73"
 RADIUS = 0.3  # of a drawn ball, in diameters of a sphere: small enough to show the contacts
 THICKNESS = 0.09  # of a bar
-CLOSE = 1e-6  # distance from touching within which a contact is drawn, and symmetry is seen
-RINGS = (24, 12)  # circles that shade a ball: in one of a few pictures, in one of many
-LIGHT = np.array([-0.3, 0.35])  # where a ball is brightest, in radii from its middle
-FOG, HAZE = 0.45, 1.5  # how far a ball fades at most, and how deep it lies then
-TILTS = np.radians(np.arange(-40, 41, 5))  # turns tried on top of the principal axes
-NEWTON = 6  # steps that take a point of a chord, however long, to rounding
-CELL = (1.9, 1.5)  # inches across a picture: the same
+CLOSE = 1e-6  # tolerance of contacts and of symmetries
+RINGS = (24, 12)  # circles that shade a ball, if there are few pictures and if there are many
+LIGHT = np.array([-0.3, 0.35])  # the brightest point of a ball, in radii from its middle
+FOG, HAZE = 0.45, 1.5  # largest fading of a ball, and the depth at which it is reached
+TILTS = np.radians(np.arange(-40, 41, 5))  # rotations tried after the principal axes
+NEWTON = 6  # steps, enough for chords of any length to converge to rounding
+CELL = (1.9, 1.5)  # width of a picture in inches, for few and for many
 FEW = 12
 
 Pair = tuple[int, int]
@@ -40,11 +41,11 @@ def draw_clusters(
     labels: Sequence[str] | None = None,
     singular: Collection[int] = (),
 ) -> Figure:
-    """Draw clusters side by side, each turned so that few spheres hide each other.
+    """Draw clusters side by side, each rotated so that few spheres hide others.
 
     Spheres are drawn smaller than they are and joined by a bar where they touch; far ones are
-    paler.  All clusters have the same scale.  A caption has the label and the order of the
-    symmetry group: how many relabellings leave all distances as they are.
+    paler.  All clusters have the same scale.  A caption gives the label and the order of the
+    symmetry group, the number of relabellings that preserve all distances.
 
     Parameters
     ----------
@@ -53,14 +54,14 @@ def draw_clusters(
     points : (k, 3 n) array
         Clusters, in diameters; a single one may be ``(3 n,)``.
     labels : sequence of str, optional
-        Their names; default ``C0 C1 ...`` as in an atlas.
+        Their names; default ``C0 C1 ...`` as in a skeleton.
     singular : collection of int, optional
-        Positions of singular clusters, drawn in another colour and said to be so.
+        Positions of singular clusters, drawn in another colour with a remark.
 
     Raises
     ------
     TypeError, ValueError
-        For a model, points, labels or positions that are not what is said here.
+        For a model, points, labels or positions of another form.
     """
     clusters = _clusters(model, "points", points)
     names = _names(labels, len(clusters))
@@ -83,8 +84,8 @@ def draw_clusters(
 def draw_motion(model: SphereCluster, polyline: ArrayLike, frames: int = 6) -> Figure:
     """Draw frames of a one-dimensional motion, from one end to the other by arc length.
 
-    A contact that holds all along has a dark bar; one that opens at the beginning or closes at
-    the end has a bar of its own colour there and is named in the caption.
+    Contacts that persist have dark bars; contacts that open at the beginning or close at the end
+    have bars of another colour there and are named in the caption.
 
     Parameters
     ----------
@@ -98,15 +99,12 @@ def draw_motion(model: SphereCluster, polyline: ArrayLike, frames: int = 6) -> F
     Raises
     ------
     TypeError, ValueError
-        For a model, polyline or number of frames that is not what is said here.
+        For a model, polyline or number of frames of another form.
     """
     line = _clusters(model, "polyline", polyline)
     if len(line) < 2:
-        msg = f"polyline: expected at least two points; got {len(line)}"
-        raise ValueError(msg)
-    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 2:
-        msg = f"frames: expected a whole number of at least 2; got {frames!r}"
-        raise ValueError(msg)
+        refuse("polyline", "at least two points", len(line))
+    frames = whole("frames", frames, least=2)
     held = set.intersection(*(set(_touching(model, q)) for q in line))
     places, moments = _sampled(model, line, held, frames)
     opening, closing = (sorted(set(_touching(model, q)) - held) for q in (line[0], line[-1]))
@@ -133,22 +131,22 @@ def _touching(model: SphereCluster, q: Array) -> list[Pair]:
 
 
 def _named(pairs: Sequence[Pair]) -> str:
-    """Return contacts as a model calls them, or their number if a caption has no room."""
+    """Return the names of up to three contacts, or their number."""
     if len(pairs) > 3:
         return f"{len(pairs)} contacts"
     return ", ".join(f"{i + 1}-{j + 1}" for i, j in pairs)
 
 
 def _turned(shapes: Array, shown: Iterable[tuple[int, Pair]] = ()) -> Array:
-    """Return clusters ``(k, n, 3)``, turned together: across, upwards, and towards the eye.
+    """Return clusters ``(k, n, 3)`` under one rotation: across, upwards, and towards the eye.
 
-    The principal axes of all centres come first, the longest across.  Of some further turns the
-    one is taken that leaves the most between those centres that are nearest to each other on
-    the page; the middle of a bar that must be seen in some picture counts as a centre there.
+    The principal axes of all centres come first, the longest across.  Among some further rotations
+    we take the one that maximises the least distance between two centres on the page; the middle
+    of a bar that must be visible in some picture counts as a centre there.
     """
     centred = shapes - shapes.mean(axis=1, keepdims=True)
     _, _, axes = np.linalg.svd(centred.reshape(-1, 3), full_matrices=False)
-    # The sign of each axis follows from the shape, so that a turned copy is drawn alike.
+    # The sign of each axis follows from the shape, so that rotated copies are drawn alike.
     skewness = ((centred.reshape(-1, 3) @ axes[:2].T) ** 3).sum(axis=0)
     long, middle = np.where(skewness < 0, -1, 1)[:, None] * axes[:2]
     principal = centred @ np.array([long, middle, np.cross(long, middle)]).T
@@ -158,7 +156,7 @@ def _turned(shapes: Array, shown: Iterable[tuple[int, Pair]] = ()) -> Array:
     turns = np.array([_turn(a, b) for a in TILTS for b in TILTS])
     page = np.concatenate(apart) @ turns[:, :2].transpose(0, 2, 1)
     clear = (page**2).sum(axis=-1).min(axis=-1)
-    # The first of several that are equally good, whatever the rounding.
+    # The first of several that are equal up to rounding.
     best = turns[np.flatnonzero(clear > clear.max() - 1e-9)[0]]
     found = principal @ best.T
     return np.asarray(found - (found.min(axis=(0, 1)) + found.max(axis=(0, 1))) / 2)
@@ -176,7 +174,7 @@ def _sampled(
 ) -> tuple[Array, Array]:
     """Return points of an edge at equal steps of arc length, and the arc lengths.
 
-    A point of a chord is off the edge by its sagitta; Newton steps close the contacts again.
+    A point of a chord is off the edge by the sagitta; Newton steps close the contacts again.
     """
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     lengths = np.concatenate([[0.0], np.cumsum(steps)])
@@ -220,7 +218,7 @@ def _grid(
 
 
 def _columns(count: int) -> int:
-    """Return a number of columns, rather more than rows, that leaves few places empty."""
+    """Return a number of columns, at least that of rows, that leaves few cells empty."""
     if count <= 4:
         return count
     wide = range(math.ceil(math.sqrt(1.2 * count)), math.floor(math.sqrt(2.2 * count)) + 1)
@@ -252,7 +250,7 @@ def _ball(centre: Array, colour: Array, rings: int) -> Iterator[Layer]:
 
 
 def _bar(one: Array, other: Array, colour: Array) -> Iterator[Layer]:
-    """Yield the halves of a bar between the surfaces of two balls, none if it is seen end on."""
+    """Yield the halves of a bar between two balls, none if the bar is seen end on."""
     along = (other - one) / np.linalg.norm(other - one)
     seen = math.hypot(along[0], along[1])
     if seen < 1e-6:
@@ -277,30 +275,22 @@ def _faded(colour: str, depth: float) -> Array:
 
 
 def _clusters(model: Any, argument: str, given: ArrayLike) -> Array:
-    if not isinstance(model, SphereCluster):
-        msg = f"model: expected a SphereCluster; got {type(model).__name__}"
-        raise TypeError(msg)
+    instance("model", model, SphereCluster)
     points = np.atleast_2d(finite(reals(given, argument), argument))
     if points.ndim != 2 or points.shape[1] != 3 * model.count or not len(points):
-        msg = (
-            f"{argument}: expected points of shape (k, {3 * model.count}) with k >= 1; "
-            f"got shape {points.shape}"
-        )
-        raise ValueError(msg)
+        refuse(argument, f"points of shape (k, {3 * model.count}) with k >= 1", points.shape)
     return points
 
 
 def _names(labels: Sequence[str] | None, count: int) -> list[str]:
     names = [f"C{k}" for k in range(count)] if labels is None else list(labels)
     if len(names) != count:
-        msg = f"labels: expected one for each of {count} clusters; got {len(names)}"
-        raise ValueError(msg)
+        refuse("labels", f"one for each of {count} clusters", names)
     return names
 
 
 def _positions(singular: Collection[int], count: int) -> set[int]:
     positions = set(singular)
     if not positions <= set(range(count)):
-        msg = f"singular: expected positions from 0 to {count - 1}; got {sorted(positions)}"
-        raise ValueError(msg)
+        refuse("singular", f"positions from 0 to {count - 1}", sorted(positions))
     return positions

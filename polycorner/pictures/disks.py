@@ -1,4 +1,4 @@
-"""Disks on a torus: critical configurations with their images, contacts and forces."""
+"""Figures of disks on a torus: critical configurations with images, contacts and forces."""
 
 import math
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
+from polycorner.checks import refuse
 from polycorner.models.disks.critical import CriticalConfiguration
 from polycorner.models.disks.disks import TorusDisks
 from polycorner.spaces.manifold import Array
@@ -33,15 +34,14 @@ def draw_critical(
     Parameters
     ----------
     model : TorusDisks
-        What the configurations are of.
+        The model of the configurations.
     configurations : sequence of CriticalConfiguration
-        At least one, in the order in which they are drawn.
+        At least one, drawn in this order.
     columns : int, optional
-        How many stand side by side at most.
+        Largest number side by side.
     """
     if not configurations:
-        msg = "configurations: expected at least one; got none"
-        raise ValueError(msg)
+        refuse("configurations", "at least one", configurations)
     rows = math.ceil(len(configurations) / columns)
     columns = math.ceil(len(configurations) / rows)
     figure = Figure(figsize=(2.5 * columns, 3.0 * rows), layout="constrained")
@@ -91,7 +91,7 @@ def _draw_forces(
 
 
 def _both(axes: Axes, cell: Polygon, make: Any) -> None:
-    """Add what is made twice: faint everywhere, and full inside the cell."""
+    """Add two copies of an artist: faint everywhere, and opaque inside the cell."""
     for inside in (False, True):
         artist = make()
         if not inside:

@@ -1,4 +1,4 @@
-"""Boxes of parameters: what is proved, what fails, and what is left undecided."""
+"""Figures of proofs over boxes of parameters, coloured by outcome."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -7,6 +7,8 @@ import numpy as np
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
+
+from polycorner.checks import refuse
 
 if TYPE_CHECKING:
     from polycorner.proofs.proof import Proof
@@ -20,7 +22,7 @@ def draw_cells(proof: "Proof", units: Mapping[str, str] | None = None) -> Figure
     Parameters
     ----------
     proof : Proof
-        One over a box of parameters.
+        A proof over a box of parameters.
     units : mapping from str to str, optional
         Labels of the axes by parameter, such as ``{"t": "rod radius t (mm)"}``.
 
@@ -31,8 +33,7 @@ def draw_cells(proof: "Proof", units: Mapping[str, str] | None = None) -> Figure
     """
     names = list(proof.parameters)
     if len(names) not in (1, 2):
-        msg = f"proof: expected one over one or two parameters; got {len(names)}"
-        raise ValueError(msg)
+        refuse("proof", "one over one or two parameters", names)
     figure = Figure(figsize=(6.5, 5 if len(names) == 2 else 2), layout="constrained")
     axes = figure.add_subplot()
     for status, colour in COLOURS.items():

@@ -1,4 +1,4 @@
-"""Planar polyhedra: the region, its sides and corners, and where an energy rests on it."""
+"""Figures of planar polyhedra: the region, its sides and corners, and minima of an energy."""
 
 import math
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
+from polycorner.checks import instance, refuse, whole
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, stratum_at
 from polycorner.spaces.manifold import Array, finite, reals
@@ -19,12 +20,12 @@ Labelled = Sequence[tuple[str, ArrayLike]]
 Edges = Sequence[ArrayLike | tuple[str, ArrayLike]]
 
 SHADE, SIDE = "0.88", "#0072B2"
-RESTS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+MINIMA = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 CORNERS = (("locally convex corner", "black"), ("locally concave corner", "white"))
 LENGTH = 7.0  # inches of the longer side of the axes
 ON_CORNER = 1e-6  # tolerance within which a drawn corner is looked up
 OFF = 9.0  # points between a mark and its label
-NEAR = 0.01  # distance, relative to the drawn part, at which the region around a mark is felt
+NEAR = 0.01  # radius, relative to the drawn part, of the circle that finds the region beside a mark
 AROUND = 2 * np.pi * np.arange(72) / 72
 
 
@@ -34,16 +35,16 @@ def draw_region(
     *,
     corners: Labelled = (),
     edges: Edges = (),
-    rests: Labelled = (),
+    minima: Labelled = (),
     title: str = "",
     resolution: int = 800,
 ) -> Figure:
-    """Draw a polyhedron in the plane: where its implicit value is at least zero.
+    """Draw a polyhedron in the plane, ``{implicit >= 0}``.
 
-    Corners at which the region is locally convex are drawn full, corners at which it is a union
-    of several pieces are drawn hollow; which they are is asked of the polyhedron.  Labels of
-    corners and edges stand off the boundary, outside the region.  Labels of rests are explained
-    in a legend below, one colour for each, and so are the corners where there are both kinds.
+    Corners at which the region is locally convex are filled, those at which it is a union of
+    several pieces are hollow; :func:`~polycorner.stratum_at` decides.  Labels of corners and
+    edges stand outside the region.  A legend below lists the labels of minima, one colour for
+    each, and both kinds of corners where both occur.
 
     Parameters
     ----------
@@ -52,10 +53,10 @@ def draw_region(
     bounds : (left, right, bottom, top)
         The part of the plane that is drawn.
     corners : sequence of (label, point), optional
-        Points ``(2,)`` and what is written beside them; an empty label leaves the mark alone.
+        Points ``(2,)`` and their labels; an empty label writes none.
     edges : sequence of polylines ``(k, 2)`` or of (label, polyline), optional
         The boundary; default the zero contour of the implicit value.
-    rests : sequence of (label, point), optional
+    minima : sequence of (label, point), optional
         Points ``(2,)``; those that share a label share a colour.
     title : str, optional
         Above the figure.
@@ -65,15 +66,13 @@ def draw_region(
     Raises
     ------
     TypeError, ValueError
-        For a polyhedron that is not planar, or bounds, points, polylines or a resolution that
-        are not what is said here.
+        For a polyhedron that is not planar, or bounds, points, polylines or a resolution of
+        another form.
     """
     _check_planar(polyhedron)
     left, right, bottom, top = _bounds(bounds)
-    if isinstance(resolution, bool) or not isinstance(resolution, int) or resolution < 2:
-        msg = f"resolution: expected a whole number of at least 2; got {resolution!r}"
-        raise ValueError(msg)
-    marked, resting = _points("corners", corners), _points("rests", rests)
+    resolution = whole("resolution", resolution, least=2)
+    marked, held = _points("corners", corners), _points("minima", minima)
     lines = _polylines(edges)
     unit = max(right - left, top - bottom)
     size = (LENGTH * (right - left) / unit, LENGTH * (top - bottom) / unit)
@@ -85,7 +84,7 @@ def draw_region(
         middle = _middle(line)
         _label(axes, label, middle, -_inwards(polyhedron, middle, unit), SIDE)
     _draw_corners(axes, polyhedron, marked, unit)
-    _draw_rests(axes, resting)
+    _draw_minima(axes, held)
     _, names = axes.get_legend_handles_labels()
     if names:
         figure.legend(loc="outside lower center", ncols=2, frameon=False)
@@ -126,31 +125,23 @@ def _draw_corners(
         if chosen:
             x, y = np.array([point for _, point in chosen]).T
             name = kind if len(set(unions)) == 2 else None
-            order = 6 if union else 4  # a rest may hide the full corner it is at, not a hollow one
+            order = 6 if union else 4  # a minimum may hide a filled corner, not a hollow one
             axes.plot(x, y, "o", color=face, mec="black", ms=6, zorder=order, ls="", label=name)
     for label, point in corners:
         _label(axes, label, point, -_inwards(polyhedron, point, unit), "black")
 
 
-def _draw_rests(axes: Axes, rests: list[tuple[str, Array]]) -> None:
-    for colour, label in zip(cycle(RESTS), dict.fromkeys(name for name, _ in rests), strict=False):
-        x, y = np.array([point for name, point in rests if name == label]).T
-        axes.plot(
-            x,
-            y,
-            "o",
-            color=colour,
-            mec="white",
-            mew=0.5,
-            ms=7,
-            zorder=5,
-            ls="",
-            label=label or None,
-        )
+def _draw_minima(axes: Axes, minima: list[tuple[str, Array]]) -> None:
+    for colour, label in zip(
+        cycle(MINIMA), dict.fromkeys(name for name, _ in minima), strict=False
+    ):
+        x, y = np.array([point for name, point in minima if name == label]).T
+        style: dict[str, Any] = {"mec": "white", "mew": 0.5, "ms": 7, "zorder": 5, "ls": ""}
+        axes.plot(x, y, "o", color=colour, label=label or None, **style)
 
 
 def _label(axes: Axes, label: str, point: Array, direction: Array, colour: str) -> None:
-    """Write a label off a point, aligned so that it grows away from it."""
+    """Write a label beside a point, aligned so that the text extends away from it."""
     if not label:
         return
     across = {-1: "right", 0: "center", 1: "left"}[round(direction[0])]
@@ -169,7 +160,7 @@ def _label(axes: Axes, label: str, point: Array, direction: Array, colour: str) 
 
 
 def _inwards(polyhedron: Polyhedron, point: Array, unit: float) -> Array:
-    """Return the unit vector from a point to where most of the region is around it."""
+    """Return the unit vector from a point into the region, the mean over a small circle."""
     ring = np.stack([np.cos(AROUND), np.sin(AROUND)], axis=-1)
     mean = ring[polyhedron.contains(point + NEAR * unit * ring)].sum(axis=0)
     size = math.hypot(*mean)
@@ -190,9 +181,7 @@ def _middle(line: Array) -> Array:
 
 
 def _check_planar(polyhedron: Polyhedron) -> None:
-    if not isinstance(polyhedron, Polyhedron):
-        msg = f"polyhedron: expected a Polyhedron; got {type(polyhedron).__name__}"
-        raise TypeError(msg)
+    instance("polyhedron", polyhedron, Polyhedron)
     if polyhedron.dimension != 2 or polyhedron.equations:
         msg = (
             "polyhedron: expected two coordinates and no equations; got "
@@ -204,8 +193,7 @@ def _check_planar(polyhedron: Polyhedron) -> None:
 def _bounds(bounds: Any) -> tuple[float, float, float, float]:
     array = finite(reals(bounds, "bounds"), "bounds")
     if array.shape != (4,) or not (array[0] < array[1] and array[2] < array[3]):
-        msg = f"bounds: expected left < right and bottom < top; got {bounds!r}"
-        raise ValueError(msg)
+        refuse("bounds", "left < right and bottom < top", bounds)
     left, right, bottom, top = array.tolist()
     return left, right, bottom, top
 
@@ -215,8 +203,7 @@ def _points(argument: str, given: Labelled) -> list[tuple[str, Array]]:
     for entry in given:
         label, point = _pair(argument, entry)
         if point.shape != (2,):
-            msg = f"{argument}: expected points of shape (2,); got shape {point.shape}"
-            raise ValueError(msg)
+            refuse(argument, "points of shape (2,)", point.shape)
         marked.append((label, point))
     return marked
 
@@ -227,14 +214,12 @@ def _polylines(edges: Edges) -> list[tuple[str, Array]]:
         named = isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[0], str)
         label, line = _pair("edges", entry if named else ("", entry))
         if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2:
-            msg = f"edges: expected polylines of shape (k, 2) with k >= 2; got shape {line.shape}"
-            raise ValueError(msg)
+            refuse("edges", "polylines of shape (k, 2) with k >= 2", line.shape)
         lines.append((label, line))
     return lines
 
 
 def _pair(argument: str, entry: Any) -> tuple[str, Array]:
     if not isinstance(entry, tuple) or len(entry) != 2 or not isinstance(entry[0], str):
-        msg = f"{argument}: expected pairs of a label and numbers; got {entry!r}"
-        raise TypeError(msg)
+        refuse(argument, "pairs of a label and numbers", entry, TypeError)
     return entry[0], finite(reals(entry[1], argument), argument)

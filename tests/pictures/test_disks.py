@@ -41,8 +41,3 @@ def test_contacts_are_wide_by_force(two_disks):
     for line in lines:
         for start, end in line.get_segments():
             assert np.linalg.norm(end - start) == pytest.approx(2 * saddle.radius)
-
-
-def test_nothing_to_draw_is_refused(two_disks):
-    with pytest.raises(ValueError, match="configurations: expected at least one; got none"):
-        draw_critical(two_disks[0], [])

@@ -1,7 +1,5 @@
 """Cells of a proof as a picture."""
 
-import pytest
-
 from polycorner import Manifold, Polyhedron, SmoothFunction, minimise, prove
 from polycorner.pictures.parameter_boxes import draw_cells
 from polycorner.pictures.style import save
@@ -25,8 +23,3 @@ def test_every_cell_is_drawn(tmp_path):
     assert sum(len(c.get_paths()) for c in axes.collections) == len(proof.cells) > 0
     assert axes.get_xlabel() == "wall (mm)"
     assert save(figure, tmp_path / "cells.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_proof_without_parameters_has_no_cells():
-    with pytest.raises(ValueError, match=r"^proof: expected one over one or two parameters"):
-        draw_cells(prove(certificate()))

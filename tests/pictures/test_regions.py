@@ -7,7 +7,7 @@ from matplotlib.colors import to_rgb
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron
 from polycorner.models.tutorial import Tutorial
-from polycorner.pictures.regions import RESTS, SHADE, draw_region
+from polycorner.pictures.regions import MINIMA, SHADE, draw_region
 from polycorner.pictures.style import save
 
 PLANE = Manifold.euclidean("x y")
@@ -111,16 +111,16 @@ def test_labels_are_outside_and_keep_off_each_other():
         assert np.linalg.norm(outline - centre, axis=1).min() < 60
 
 
-def test_rests_are_coloured_by_label_and_explained_below():
-    rests = [("low", (0, 0)), ("", (2, 1)), ("low", (2, 0)), ("high", (0, 2))]
-    figure = draw_region(ELL, BOUNDS, rests=rests, resolution=100)
+def test_minima_are_coloured_by_label_and_explained_below():
+    found = [("low", (0, 0)), ("", (2, 1)), ("low", (2, 0)), ("high", (0, 2))]
+    figure = draw_region(ELL, BOUNDS, minima=found, resolution=100)
     drawn = {line.get_label(): line for line in figure.axes[0].lines}
     np.testing.assert_array_equal(drawn["low"].get_xydata(), [(0, 0), (2, 0)])
     np.testing.assert_array_equal(drawn["high"].get_xydata(), [(0, 2)])
     assert len({line.get_color() for line in drawn.values()}) == 3
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["low", "high"]
     _, pixels = rendered(figure)
-    assert colour_counts(pixels, RESTS[0]) > 20
+    assert colour_counts(pixels, MINIMA[0]) > 20
 
 
 def test_axes_are_named_after_coordinates_and_true_to_scale():
@@ -137,36 +137,3 @@ def test_a_view_without_boundary_is_drawn_too(tmp_path):
     for bounds in ((0.2, 0.4, 0.2, 0.4), (5, 6, 5, 6)):
         path = save(draw_region(ELL, bounds, resolution=20), tmp_path / "part.png")
         assert path.read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.parametrize(
-    ("error", "changes", "says"),
-    [
-        (TypeError, {"polyhedron": "L"}, "polyhedron: expected a Polyhedron; got str"),
-        (
-            ValueError,
-            {"polyhedron": Polyhedron(Manifold.euclidean("x y z"), [X])},
-            "polyhedron: expected two coordinates and no equations; got x, y, z and 0 equations",
-        ),
-        (
-            ValueError,
-            {"polyhedron": Polyhedron(PLANE, [X], [Y])},
-            "polyhedron: expected two coordinates and no equations; got x, y and 1 equations",
-        ),
-        (ValueError, {"bounds": (0, 1, 1, 0)}, "bounds: expected left < right and bottom < top"),
-        (ValueError, {"bounds": (0, 1)}, "bounds: expected left < right and bottom < top"),
-        (ValueError, {"bounds": (0, np.inf, 0, 1)}, "bounds: expected finite numbers; got inf"),
-        (ValueError, {"resolution": 1}, "resolution: expected a whole number of at least 2; got 1"),
-        (ValueError, {"resolution": 9.5}, "resolution: expected a whole number"),
-        (ValueError, {"corners": [("A", (0, 0, 0))]}, r"corners: expected points of shape \(2,\)"),
-        (TypeError, {"corners": [(0, 0)]}, "corners: expected pairs of a label and numbers; got"),
-        (TypeError, {"rests": [("A", "B")]}, "rests: expected real numbers; got dtype"),
-        (ValueError, {"rests": [("A", (0, np.nan))]}, "rests: expected finite numbers; got nan"),
-        (ValueError, {"edges": [[0, 1]]}, r"edges: expected polylines of shape \(k, 2\)"),
-        (ValueError, {"edges": [("a", [[0, 1]])]}, r"edges: expected polylines of shape \(k, 2\)"),
-    ],
-)
-def test_arguments_are_refused_in_a_sentence(error, changes, says):
-    arguments = {"polyhedron": ELL, "bounds": BOUNDS} | changes
-    with pytest.raises(error, match=f"^{says}"):
-        draw_region(arguments.pop("polyhedron"), arguments.pop("bounds"), **arguments)

@@ -205,9 +205,16 @@ def _linear(part: float) -> int:
 
 
 def solid_mesh(mesh: "trimesh.Trimesh", stretch: Array) -> "trimesh.Trimesh":
-    """Return a painted, slightly translucent copy of a mesh, its coordinates multiplied."""
-    vertices = np.asarray(mesh.vertices) * stretch
-    made = library().Trimesh(vertices, mesh.faces, process=False)
+    """Return a painted, slightly translucent copy of a mesh, its coordinates multiplied.
+
+    Parts of the mesh (``face_attributes["part"]``) get vertices of their own, so that shading is
+    smooth within parts and sharp between them; merged by place, the mesh is closed.
+    """
+    vertices, faces = np.asarray(mesh.vertices) * stretch, np.asarray(mesh.faces)
+    parts = np.asarray(mesh.face_attributes.get("part", np.zeros(len(faces))))
+    keys = np.stack([faces, np.broadcast_to(parts[:, None], faces.shape)], axis=-1).reshape(-1, 2)
+    kept, corners = np.unique(keys.astype(np.int64), axis=0, return_inverse=True)
+    made = library().Trimesh(vertices[kept[:, 0]], corners.reshape(faces.shape), process=False)
     _ = made.vertex_normals  # written with the file, so that it looks smooth
     return _painted(made, SOLID, opacity=0.8, rough=0.9)
 

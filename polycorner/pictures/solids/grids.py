@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
 
 Function = Callable[[Array], Array]
@@ -14,7 +15,7 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 AXES = 3
-# A vertex stays this fraction of a grid edge away from its ends, so that no face degenerates.
+# Least distance of a vertex from the ends of its grid edge, as a fraction; avoids slivers.
 CLEARANCE = 1e-3
 FALSE_POSITIONS = 12
 SLAB = 200_000
@@ -29,22 +30,18 @@ def grid(
     Raises
     ------
     TypeError, ValueError
-        Naming the argument that is not of the form needed.
+        For arguments of another form.
     """
     box = np.asarray(bounds, dtype=np.float64)
     if box.shape != (AXES, 2) or not (np.isfinite(box).all() and (box[:, 0] < box[:, 1]).all()):
-        msg = f"bounds: expected three pairs of increasing numbers; got {bounds!r}"
-        raise ValueError(msg)
+        refuse("bounds", "three pairs of increasing numbers", bounds)
     cells = np.asarray(resolution)
     if cells.dtype.kind != "i":
-        msg = f"resolution: expected an integer or three; got {resolution!r}"
-        raise TypeError(msg)
+        refuse("resolution", "one or three whole numbers", resolution, TypeError)
     if cells.shape not in {(), (AXES,)} or (cells < FEWEST_CELLS).any():
-        msg = f"resolution: expected one or three numbers from {FEWEST_CELLS}; got {resolution!r}"
-        raise ValueError(msg)
+        refuse("resolution", f"one or three whole numbers >= {FEWEST_CELLS}", resolution)
     if len(periodic) != AXES:
-        msg = f"periodic: expected three truth values; got {periodic!r}"
-        raise ValueError(msg)
+        refuse("periodic", "three truth values", periodic)
     return box, np.broadcast_to(cells, AXES).astype(np.int64), np.array(periodic, dtype=bool)
 
 
@@ -89,7 +86,7 @@ def layer(values: Any, axis: int, index: int) -> Any:
 
 
 def check_ends(values: Array, box: Array, wraps: Mask) -> None:
-    """Refuse values that differ at the ends of a periodic axis or are negative at other ends.
+    """Raise for values that differ at the ends of a periodic axis or are negative at other ends.
 
     Raises
     ------
@@ -119,13 +116,13 @@ def check_ends(values: Array, box: Array, wraps: Mask) -> None:
 def crossings(
     function: Function, values: Array, start: Indices, end: Indices, low: Array, spacing: Array
 ) -> Array:
-    """Return where ``f`` vanishes on edges of the grid, as fractions of the edges.
+    """Return the zeros of ``f`` on edges of the grid, as fractions of the edges.
 
-    False position; an end that is kept twice in a row has its value halved, so that the other
-    end moves too (the Illinois rule).
+    False position with the Illinois rule: an end retained twice in a row has its value halved, so
+    that the other end moves, too.
     """
     cells = np.array(values.shape) - 1
-    # Edges in the last layer of a periodic axis are evaluated in the first: seams fit exactly.
+    # Edges in the last layer of a periodic axis are evaluated in the first, so that seams match.
     base, step = low + (start % cells) * spacing, (end - start) * spacing
     first, second = values[tuple(start.T)].copy(), values[tuple(end.T)].copy()
     left, right = np.zeros(len(start)), np.ones(len(start))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.atomic import atomic
+from polycorner.checks import refuse
 from polycorner.errors import SolverError
 from polycorner.pictures.solids.grids import (
     AXES,
@@ -57,7 +58,7 @@ class Isosurface:
     euler_characteristic : int
         ``V - E + F`` of the surface, opposite sides of periodic axes identified.
     inside : (n1 + 1, n2 + 1, n3 + 1) bool
-        Where ``f < 0`` on the grid; the last layer of a periodic axis repeats the first.
+        Sign of ``f`` on the grid; the last layer of a periodic axis repeats the first.
     bounds : (3, 2) float
         The box.
     periodic : tuple of three bool
@@ -99,7 +100,7 @@ def isosurface(
     Marching cubes ([LLVT]) finds which edges of a grid the surface crosses and joins the
     crossings; each crossing is then found on its edge by false position.  For a continuous,
     piecewise smooth ``f`` volume and area are right to second order in the spacing.  The grid is
-    evaluated slab by slab; a crossing closer than ``1e-3`` of an edge to its end is put there.
+    evaluated slab by slab; crossings stay ``1e-3`` of an edge away from its ends.
 
     Parameters
     ----------
@@ -139,10 +140,10 @@ def isosurface(
 
 
 def components_of_complement(surface: Isosurface) -> int:
-    """Return the number of connected pieces of ``{f >= 0}``, seams identified.
+    """Return the number of connected components of ``{f >= 0}``, seams identified.
 
-    Two grid points are joined when they are neighbours along an axis, so a passage narrower than
-    a cell may be missed.
+    Grid points are joined to their neighbours along the axes, so passages narrower than a cell
+    may be missed.
     """
     from scipy.ndimage import label
     from scipy.sparse import coo_array
@@ -172,17 +173,17 @@ def write_mesh(
     Parameters
     ----------
     mesh : trimesh.Trimesh
-        What to write.
+        The surface.
     path : Path
-        Its suffix says the format; folders are made.
+        Its suffix determines the format; folders are created.
     curves : sequence of (name, (k, 3) array), optional
         Polylines for the scene of a GLB, broken at rows of NaN.
     points : (m, 3) array_like, optional
         Points for the scene of a GLB.
     scale : three float, optional
-        What the coordinates are multiplied with, such as millimetres per radian.
+        Factors of the coordinates, such as millimetres per radian.
     facts : mapping, optional
-        Numbers and words kept with the scene of a GLB.
+        Numbers and texts kept as metadata of a GLB scene.
 
     Raises
     ------
@@ -191,12 +192,10 @@ def write_mesh(
     """
     suffix = path.suffix.lower()
     if suffix not in (".glb", ".ply"):
-        msg = f"path: expected a name ending in .glb or .ply; got {path.name}"
-        raise ValueError(msg)
+        refuse("path", "a name ending in .glb or .ply", path.name)
     marks = np.asarray(points, dtype=np.float64).reshape(-1, AXES)
     if suffix == ".ply" and (len(curves) or len(marks) or facts):
-        msg = "path: expected a name ending in .glb for curves, points and facts; got .ply"
-        raise ValueError(msg)
+        refuse("path", "a name ending in .glb for curves, points and facts", path.name)
     factors, made = np.asarray(scale, dtype=np.float64), _objects()
     scene = made.Scene(metadata=dict(facts or {}))
     solid = made.Trimesh(np.asarray(mesh.vertices) * factors, mesh.faces, process=False)
@@ -226,10 +225,10 @@ def _march(signed: Array, capped: Mask) -> tuple[Array, Indices]:
 def _distinct(values: Array, wraps: Mask) -> Array:
     """Return values with the same signs, of size ``LEAST`` to 1, that marching cubes can handle.
 
-    It computes in single precision, so crossings are kept clear of the nodes.  Faces of cells
-    whose corners alternate are joined by comparing products of opposite corners, and a tie, common
-    on a symmetric region, would be settled differently on both sides of the face: small factors
-    without symmetry forbid ties.
+    The implementation works in single precision, so crossings are kept away from the nodes.  It
+    resolves faces whose corners alternate in sign by comparing products of opposite corners; ties,
+    common on symmetric regions, would be broken differently on both sides of a face, and small
+    asymmetric factors prevent them.
     """
     steps = [
         abs(np.diff(values, axis=axis))[np.diff(values < 0, axis=axis)].max(initial=0.0)
@@ -252,7 +251,7 @@ def _points(
     faces: Indices,
     box: Array,
 ) -> Array:
-    """Return the vertices in the box, those on edges moved to ``f = 0``."""
+    """Return the vertices in the units of the box, those on edges at ``f = 0``."""
     cells = np.array(values.shape) - 1
     spacing = (box[:, 1] - box[:, 0]) / cells
     nodes, kind = keys[:, :AXES], keys[:, AXES]
@@ -280,7 +279,7 @@ def _neighbours_mean(points: Array, faces: Indices, inner: Mask) -> Array:
 
 
 def _closed(points: Array, faces: Indices, keys: Indices) -> "tuple[trimesh.Trimesh, Mask]":
-    """Return the mesh with equal vertices joined, and which faces are left."""
+    """Return the mesh with equal vertices merged, and a mask of the faces kept."""
     vertices, joined = merged(keys, faces)
     kept = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
     return closed_mesh(points[vertices], joined[kept], "marching cubes"), kept
@@ -294,7 +293,7 @@ def closed_mesh(points: Array, faces: Indices, method: str, **attributes: Any) -
     Raises
     ------
     SolverError
-        If it is not closed: the method that made it failed.
+        If it is not closed.
     """
     import trimesh
 
@@ -306,7 +305,7 @@ def closed_mesh(points: Array, faces: Indices, method: str, **attributes: Any) -
 
 
 def _objects() -> Any:
-    """Return trimesh with its paths; parts of it have no types."""
+    """Return trimesh with its paths, which have no types."""
     import trimesh.path
 
     return trimesh

@@ -1,4 +1,4 @@
-"""Pictures of solids with curves and points on them, and what of those is in sight."""
+"""Figures of solids with curves and points on them, hidden parts drawn thin."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,6 +12,7 @@ from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
 
 Mask = NDArray[np.bool_]
@@ -19,7 +20,7 @@ Indices = NDArray[np.int64]
 
 # Red, green and blue of the solid and of the faces at which it is cut.
 _SOLID, _CUT = (0.80, 0.84, 0.88), (0.97, 0.94, 0.86)
-# Where light comes from: right, up, towards the eye.
+# Directions towards the lights: right, up, towards the eye.
 _KEY_LIGHT, _FILL_LIGHT = (-0.7, 0.8, 0.9), (0.9, 0.1, 0.6)
 CURVES = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
@@ -33,14 +34,14 @@ class Faces(Protocol):
 
 @dataclass(frozen=True)
 class View:
-    """A direction to look from, and the units and proportions of the axes.
+    """A direction of sight, and the units and proportions of the axes.
 
     Parameters
     ----------
     elevation, azimuth : float
-        Where the eye is, in degrees, as matplotlib counts.
+        Position of the eye in degrees, as in matplotlib.
     factors : three float
-        What coordinates are multiplied with for the axes, such as degrees per radian.
+        Factors of the coordinates on the axes, such as degrees per radian.
     height : float
         Length of the third axis on the page against the longer of the first two, which share
         one scale.
@@ -65,7 +66,7 @@ def draw_solid(
 ) -> Figure:
     """Draw a solid, lit from the upper left and the right, with curves and points over it.
 
-    What the solid hides is drawn thin and dashed (curves) or hollow (points).
+    Hidden curves are thin and dashed, hidden points hollow.
 
     Parameters
     ----------
@@ -77,11 +78,11 @@ def draw_solid(
     points : (m, 3) array_like, optional
         Points in the coordinates of the mesh.
     labels : sequence of m str, optional
-        What is written beside the points.
+        Texts beside the points.
     caps : (F,) bool, optional
         Faces at which the solid was cut, drawn paler.
     view : View, optional
-        From where, and in which units.
+        Direction of sight, and units of the axes.
     names : three str, optional
         Labels of the axes with their units.
     title : str, optional
@@ -94,8 +95,7 @@ def draw_solid(
     """
     marks = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     if len(labels) not in {0, len(marks)}:
-        msg = f"labels: expected one for each of {len(marks)} points; got {len(labels)}"
-        raise ValueError(msg)
+        refuse("labels", f"one for each of {len(marks)} points", list(labels))
     figure = Figure(figsize=(7.2, 7.2))
     axes: Any = figure.add_axes((-0.02, 0.0, 0.98, 0.96), projection="3d", computed_zorder=False)
     palette = dict(zip(dict.fromkeys(label for label, _ in curves), cycle(CURVES), strict=False))
@@ -119,7 +119,7 @@ def place_solid(
     view: View | None = None,
     names: tuple[str, str, str] = ("x (mm)", "y (mm)", "relative heading (°)"),
 ) -> None:
-    """Draw what :func:`draw_solid` draws on axes for three dimensions, in given colours.
+    """Draw a solid with curves and points on given axes, see :func:`draw_solid`.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def place_solid(
 
 
 def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
-    """Return which points ``(m, 3)`` on or outside a solid are not hidden behind it.
+    """Return a mask of the points ``(m, 3)``, on or outside a solid, that it does not hide.
 
     Points may lie behind the mesh by 2.5 times the median side of a face (at most 0.05 of the
     longer horizontal side of the box), since the inverted edges of the true surface lie beneath
@@ -150,7 +150,7 @@ def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
 
 
 class _Box:
-    """The box around a mesh as it is seen: from coordinates to places on the page."""
+    """The bounding box of a mesh in a view: from coordinates to places on the page."""
 
     def __init__(self, mesh: Faces, view: View) -> None:
         vertices = np.asarray(mesh.vertices)
@@ -174,7 +174,7 @@ class _Box:
 
 
 class _Depth:
-    """What the eye sees of a mesh first, on a raster with pixels finer than its faces."""
+    """A depth buffer of a mesh, with pixels finer than its faces."""
 
     def __init__(self, mesh: Faces, box: _Box) -> None:
         self.box = box

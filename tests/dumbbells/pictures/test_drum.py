@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drum_motions import moved
 from matplotlib.colors import to_rgb
 from PIL import Image
 
@@ -149,6 +150,23 @@ def test_dyads_are_coloured_and_who_left_is_not_drawn(many):
 def test_bottom_and_top_are_drawn(many, one):
     assert any(line.get_linestyle() == ":" for line in draw_drum(many).axes[0].lines)
     assert not any(line.get_linestyle() == ":" for line in draw_drum(one).axes[0].lines)
+
+
+@pytest.mark.parametrize(("count", "spin"), [(1, 0.0), (1, -0.5), (3, 0.5)])
+def test_the_legend_explains_every_colour_line_and_arrow(count, spin):
+    drum = DumbbellDrum(count=count, spin=spin)
+    places = np.zeros((2, count, 3)) + np.array([0.0, 30.0, 0.0]) * np.arange(count)[:, None]
+    figure = draw_drum(moved(drum, places))
+    (legend,) = figure.legends
+    handles = dict(
+        zip((t.get_text() for t in legend.get_texts()), legend.legend_handles, strict=True)
+    )
+    assert ("motion of the wall" in handles) is (spin != 0)
+    assert handles["lowest line of the drum"].get_linestyle() == "--"
+    if count > 1:
+        colours = {to_rgb(handle.get_color()) for handle in handles.values()}
+        drawn = {tuple(face[:3]) for face in figure.axes[0].collections[1].get_facecolor()}
+        assert drawn <= colours
 
 
 def test_figures_can_be_saved(one, two, many, tmp_path):

@@ -172,7 +172,16 @@ def test_an_atlas_has_its_solid_edges_and_corners(atlas):
         gap = atlas.pair.polyhedron.implicit([0, 0, 0, *(place / [1, 1, 7 / 2])])
         assert abs(gap) < 1e-5
     assert any(name.startswith("edge ") for name in names)
-    assert all(shape.is_watertight for shape in found.geometry.values())
+    for shape in found.geometry.values():
+        shape.merge_vertices(merge_norm=True, merge_tex=True)
+        assert shape.is_watertight
+
+
+def test_caps_and_creases_of_the_solid_are_shaded_sharply():
+    solid = forbidden_solid(PLANE, 24, period=math.pi)
+    mesh = scenes.solid_mesh(solid.mesh, np.ones(3))
+    upright = abs(mesh.vertex_normals[mesh.faces[solid.caps]][..., 2])
+    np.testing.assert_allclose(upright, 1, atol=1e-9)
 
 
 def test_the_solid_alone_is_the_same_one():

@@ -244,46 +244,6 @@ def test_pieces_of_the_complement_are_those_a_flood_finds(seed, share, periodic)
 # ----------------------------------------------------------------------------------- wrong uses
 
 
-@pytest.mark.parametrize(
-    ("changes", "error", "message"),
-    [
-        ({"bounds": [(-2, 2), (2, -2), (0, 1)]}, ValueError, "bounds: expected three pairs of inc"),
-        ({"bounds": [(-2, 2), (-2, 2)]}, ValueError, "bounds: expected three pairs"),
-        (
-            {"bounds": [(-2, 2), (-2, 0.5), (-2, 2)]},
-            ValueError,
-            "bounds: expected a region inside the box; it reaches the upper end 0.5 of axis 1",
-        ),
-        (
-            {"bounds": [(-2, 2), (-2, 2), (0, 2)]},
-            ValueError,
-            "bounds: expected a region inside the box; it reaches the lower end 0 of axis 2",
-        ),
-        ({"resolution": 3}, ValueError, "resolution: expected one or three numbers from 4; got 3"),
-        ({"resolution": (8, 8)}, ValueError, "resolution: expected one or three numbers"),
-        ({"resolution": 8.0}, TypeError, "resolution: expected an integer or three; got 8.0"),
-        ({"periodic": (True,)}, ValueError, "periodic: expected three truth values"),
-        (
-            {"function": lambda p: p[:, 0], "periodic": (True, False, False)},
-            ValueError,
-            "periodic: expected the same values at both ends of axis 0; got some that differ by 4",
-        ),
-        ({"function": lambda p: ball(p) + 9}, ValueError, "function: expected negative values"),
-        (
-            {"function": lambda p: ball(p) - 9, "periodic": (True, True, True)},
-            ValueError,
-            "function: expected values not below 0 in the box",
-        ),
-        ({"function": lambda p: p}, ValueError, "function: expected a finite number for each of"),
-        ({"function": lambda p: ball(p) * np.nan}, ValueError, "function: .*that are not finite"),
-    ],
-)
-def test_wrong_use_is_named(changes, error, message):
-    arguments = {"function": ball, "bounds": [(-2, 2)] * 3, "resolution": 8} | changes
-    with pytest.raises(error, match=message):
-        isosurface(**arguments)
-
-
 def test_values_are_asked_for_in_slabs(monkeypatch):
     """No call sees more points than a slab holds, and slabs make no difference."""
     whole = isosurface(ball, EVERYWHERE, 20)
@@ -337,19 +297,3 @@ def test_a_mesh_comes_back_from_a_ply(tmp_path):
     found = trimesh.load_mesh(write_mesh(mesh, tmp_path / "ball.ply"))
     assert found.volume == pytest.approx(mesh.volume, rel=1e-6)
     assert found.is_watertight
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "message"),
-    [
-        ("ball.stl", {}, "path: expected a name ending in .glb or .ply; got ball.stl"),
-        ("ball.ply", {"points": [(0, 0, 0)]}, "path: expected a name ending in .glb for curves"),
-        ("ball.ply", {"curves": [("c", np.eye(3))]}, "path: expected a name ending in .glb"),
-        ("ball.ply", {"facts": {"volume": 1.0}}, "path: expected a name ending in .glb for curves"),
-    ],
-)
-def test_files_that_cannot_be_written(name, options, message, tmp_path):
-    mesh = isosurface(ball, EVERYWHERE, 8).mesh
-    with pytest.raises(ValueError, match=message):
-        write_mesh(mesh, tmp_path / name, **options)
-    assert not list(tmp_path.iterdir())

@@ -166,8 +166,3 @@ def test_shading_is_smooth_within_parts_and_sharp_between_them():
 
     assert len(shades(face_attributes={"part": side})) == 2
     assert len(shades()) > 2
-
-
-def test_labels_belong_to_points(ball):
-    with pytest.raises(ValueError, match="labels: expected one for each of 1 points; got 2"):
-        draw_solid(ball, points=[(0, 0, 1)], labels=["a", "b"])

@@ -302,7 +302,9 @@ class Stage {
     pen.fillText(text, 48, 48);
     const map = new THREE.CanvasTexture(canvas);
     map.encoding = THREE.sRGBEncoding;
-    return new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
+    const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
+    sprite.renderOrder = 1; // after a translucent solid, which would pale it
+    return sprite;
   }
 
   // --------------------------------------------------------------------------------------- atlases
