@@ -1,10 +1,11 @@
 from .certificates import load_certificate, save_certificate
-from .graphs import save_graph, skeleton_graph
+from .graphs import load_graph, save_graph, skeleton_graph
 from .skeletons import load_skeleton, save_skeleton
 from .trajectories import load_trajectory, save_trajectory
 
 __all__ = [
     "load_certificate",
+    "load_graph",
     "load_skeleton",
     "load_trajectory",
     "save_certificate",

@@ -1,54 +1,46 @@
-"""Certificates as JSON: certified anew when they are loaded, and compared with what was written."""
+"""Certificates as JSON: the problem with its formulas, the point, and all results at it."""
 
 import os
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.files.certificate_entries import (
+from polycorner.checks import instance
+from polycorner.container import JSON, Kind, number, read_number
+from polycorner.files.polyhedra import (
     Entries,
-    difference,
-    energy_difference,
-    entries,
-    other_names,
+    manifold_entry,
+    mismatch,
+    polyhedron_entry,
+    read_polyhedron,
 )
-from polycorner.files.container import Kind, load_json, read_number, save_json
-from polycorner.files.models import described, rebuilt, units_of
 from polycorner.minimisation import Certificate, Verdict
-from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.strata import check_tolerance
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
-KIND = Kind("a certificate", "save_certificate", "polycorner certificate", schema=1)
+KIND = Kind("certificate", "save_certificate", JSON)
 TOLERANCE = 1e-9
+SOLVED = 1000  # times the tolerance, for what comes out of linear systems
 
 
-def save_certificate(
-    certificate: Certificate,
-    path: str | os.PathLike[str],
-    *,
-    model: object = None,
-    units: Mapping[str, str] | None = None,
-) -> Path:
-    """Write a certificate as JSON; the file appears whole or not at all.
+def save_certificate(certificate: Certificate, path: str | os.PathLike[str]) -> Path:
+    """Write a certificate as JSON, atomically.
+
+    The file holds the formulas of the polyhedron and of the energy as text, the point, and all
+    results at it: values, gradients, multipliers, curvatures, residuals and the verdict.
 
     Parameters
     ----------
     certificate : Certificate
     path : path
         The file; its folder is made if need be.
-    model : DumbbellPair, Pinball, SphereCluster, TorusDisks or Tutorial, optional
-        The model whose polyhedron it is, or for a pair a section of it.  The class and the
-        parameters are written too, and :func:`load_certificate` makes the problem from them.
-    units : mapping from str to str, optional
-        Units of coordinates, functions and ``energy`` by name.  Those of the package's models are
-        known, and a circle of period ``2 pi`` is an angle in ``rad``.
 
     Returns
     -------
@@ -56,18 +48,27 @@ def save_certificate(
 
     Raises
     ------
-    TypeError, ValueError
-        Naming the argument: if the certificate is not of the model's polyhedron, for instance.
+    TypeError
+        If ``certificate`` is none.
     OSError
         If the file cannot be written.
     """
-    if not isinstance(certificate, Certificate):
-        msg = f"certificate: expected a Certificate; got {type(certificate).__name__}"
-        raise TypeError(msg)
-    problem = certificate.problem
-    known = None if model is None else _of_model(certificate, model)
-    chosen = units_of(problem.polyhedron, problem.energy, units)
-    return save_json(KIND, path, entries(certificate, chosen) | {"model": known}, indent=1)
+    c = instance("certificate", certificate, Certificate)
+    polyhedron, energy = c.problem.polyhedron, c.problem.energy
+    point = zip(manifold_entry(polyhedron.manifold), c.point.tolist(), strict=True)
+    entries = {
+        "verdict": c.verdict.name,
+        "sentence": c.verdict.value,
+        "coordinates": [coordinate | {"value": number(x)} for coordinate, x in point],
+        **_results(c),
+        "tolerance": c.tolerance,
+        "rank tolerance": c.rank_tolerance,
+        "method": c.method,
+        "iterations": int(c.iterations),
+        "search": None if c.search is None else c.search.name,
+        "problem": polyhedron_entry(polyhedron, energy),
+    }
+    return KIND.save_json(path, entries)
 
 
 def load_certificate(
@@ -77,106 +78,52 @@ def load_certificate(
     *,
     tolerance: float = TOLERANCE,
 ) -> Certificate:
-    """Read a certificate back and certify it anew.
+    """Read a certificate back and certify its point again.
 
-    Everything that the file says is computed again and compared: names, periods and scales
-    exactly; values and gradients of all functions and of the energy up to ``tolerance``, relative
-    to the larger of the value and the scaled gradient; multipliers, curvatures and residuals up to
-    a thousand times that, relative to the energy's own size; active functions, signature,
-    entrapment and verdict exactly.
+    The certificate that is returned is a new one, computed from the formulas and the point.  Its
+    results have to be those in the file: values and gradients up to ``tolerance``, relative to the
+    larger of the value and the scaled gradient; multipliers and curvatures up to a thousand times
+    that, relative to the size of the energy; active functions, signature, entrapment and verdict
+    exactly.
 
     Parameters
     ----------
     path : path
         A file that :func:`save_certificate` wrote.
     polyhedron : Polyhedron, optional
+        The polyhedron it was computed for; default that of the file, whose annotations, being
+        Python functions, are not in it.
     energy : SmoothFunction or sympy.Expr, optional
-        Those it was computed for: formulas are not in the file.  They may be left out where the
-        file names a model that has them.
+        The energy it was computed for; default that of the file.
     tolerance : float, optional
         Default 1e-9.
 
     Raises
     ------
     ValueError
-        If the file is no certificate or was changed, if it says something else than what is
-        computed, naming it, or if the polyhedron or the energy is missing.
+        Naming the file, if it is no certificate or was changed, or if results differ, naming the
+        first that does.
     """
     check_tolerance("tolerance", tolerance)
-    content = load_json(KIND, path)
+    content = KIND.load_json(path)
     try:
-        problem = _problem(content, path, polyhedron, energy)
-        differs = other_names(content, problem.polyhedron)
+        if polyhedron is None or energy is None:
+            own, its = read_polyhedron(content["problem"])
+            polyhedron, energy = polyhedron or own, energy if energy is not None else its
+        differs = mismatch(content["problem"], polyhedron)
         if not differs:
-            found = _read(content, problem)
-            differs = difference(content, entries(found), tolerance)
-    except (AttributeError, IndexError, KeyError, TypeError) as error:
+            found = _certificate(content, polyhedron, energy)
+            differs = next(_differences(content, found, tolerance), "")
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
         raise KIND.refusal(path, f"is damaged ({error!r})") from error
     if differs:
-        raise KIND.refusal(path, f"is not what is computed here: {differs}")
+        raise KIND.refusal(path, f"is of another problem, or was not computed here: {differs}")
     return found
 
 
-def _of_model(c: Certificate, model: Any) -> Entries:
-    """Return the entry of a model, after a check that the certificate is of its polyhedron."""
-    entry, d = described(model), c.problem.polyhedron
-    heading = d.equations[0].parameters[0] if d.equation_names == ("heading",) else None
-    own = _polyhedron(model, heading)
-    mine = entries(c)
-    differs = other_names(mine, own)
-    if not differs:
-        twin = replace(c, problem=pose(own, c.problem.energy))
-        differs = difference(mine, entries(twin), TOLERANCE)
-    if differs:
-        msg = f"model: expected the one that the certificate is of; got {model!r}, but {differs}"
-        raise ValueError(msg)
-    energy = getattr(model, "energy", None)
-    its = energy is not None and not energy_difference(
-        mine, entries(replace(c, problem=pose(d, energy))), TOLERANCE
-    )
-    return {**entry, "heading": heading, "has the energy": its}
-
-
-def _polyhedron(model: Any, heading: float | None) -> "Polyhedron":
-    whole = heading is None or not hasattr(model, "section")
-    found: Polyhedron = model.polyhedron if whole else model.section(heading)
-    return found
-
-
-def _problem(
-    content: Entries,
-    path: str | os.PathLike[str],
-    polyhedron: "Polyhedron | None",
-    energy: "Energy | None",
-) -> Problem:
-    """Return the problem of the file's model, or of what is given in its place."""
-    entry: Entries | None = content["model"]
-    given = polyhedron is not None and energy is not None
-    model: Any = None if entry is None or given else _model(entry, path)
-    if polyhedron is None and entry is not None:
-        polyhedron = _polyhedron(model, entry["heading"])
-    if polyhedron is None:
-        names = ", ".join(row["name"] for row in content["functions"])
-        msg = f"polyhedron: expected that of {names}, for {path} names no model; got none"
-        raise ValueError(msg)
-    if energy is None and entry is not None and entry["has the energy"]:
-        energy = model.energy
-    if energy is None:
-        msg = f"energy: expected that of the certificate, for {path} names none; got none"
-        raise ValueError(msg)
-    return pose(polyhedron, energy)
-
-
-def _model(entry: Entries, path: str | os.PathLike[str]) -> Any:
-    try:
-        return rebuilt(entry)
-    except ValueError as error:
-        raise KIND.refusal(path, f"is of a model that cannot be made: {error}") from error
-
-
-def _read(content: Entries, problem: Problem) -> Certificate:
+def _certificate(content: Entries, polyhedron: "Polyhedron", energy: Any) -> Certificate:
     return Certificate(
-        problem,
+        pose(polyhedron, energy),
         np.array([read_number(c["value"]) for c in content["coordinates"]]),
         float(content["tolerance"]),
         float(content["rank tolerance"]),
@@ -184,3 +131,91 @@ def _read(content: Entries, problem: Problem) -> Certificate:
         int(content["iterations"]),
         None if content["search"] is None else Verdict[content["search"]],
     )
+
+
+# ------------------------------------------------------------------------------------------ results
+
+
+def _results(c: Certificate) -> Entries:
+    rows, m = _rows(c), len(c.problem.polyhedron.functions)
+    return {
+        "energy": rows[-1],
+        "functions": rows[:m],
+        "equations": rows[m:-1],
+        "multipliers unique": bool(c.multipliers_unique),
+        "signature": list(c.signature),
+        "curvatures": [number(x) for x in c.curvatures.tolist()],
+        "entrapment": {way: kind.value for way, kind in c.entrapment.items()},
+        "residuals": {name: number(x) for name, x in asdict(c.residuals).items()},
+    }
+
+
+def _rows(c: Certificate) -> list[Entries]:
+    """Return the results for every inequality, every equation and the energy, in this order."""
+    d, energy = c.problem.polyhedron, c.problem.energy
+    values, gradients = c.problem.evaluate(c.point, 1)
+    slopes = (gradients / c.problem.scales).tolist()
+    every = (*d.functions, *d.equations, energy)
+    rows: list[Entries] = [
+        {
+            "name": f.name,
+            "value": number(value),
+            "unit": f.unit,
+            "gradient": [number(x) for x in slope],
+        }
+        for f, value, slope in zip(every, values.tolist(), slopes, strict=True)
+    ]
+    active, multipliers, ranges = set(c.active), c.multipliers, c.multiplier_ranges
+    for row in rows[: len(d.functions)]:
+        row["active"] = row["name"] in active
+    for row in rows[:-1]:
+        if row["name"] in multipliers:
+            row["multiplier"] = number(multipliers[row["name"]])
+            row["multiplier range"] = [number(x) for x in ranges[row["name"]]]
+    return rows
+
+
+def _differences(written: Entries, c: Certificate, tolerance: float) -> Iterator[str]:
+    """Yield the results that are not those written, in words."""
+    found, scales, size = _results(c), c.problem.scales, SOLVED * c.analysis.reference
+    measured: list[tuple[str, Any, Any, Any]] = []  # and the size of an allowed difference
+    for one, other in zip(_every_row(written), _every_row(found), strict=True):
+        name, gradient = other["name"], _numbers(other["gradient"])
+        slope = float(abs(gradient * scales).max())
+        around = max(abs(read_number(other["value"])), slope)
+        measured.append((f"value of {name!r}", one["value"], other["value"], around))
+        measured.append(
+            (f"gradient of {name!r}", one["gradient"], other["gradient"], slope / scales)
+        )
+        key = "multiplier" if found["multipliers unique"] else "multiplier range"
+        pull = np.linalg.norm(gradient * scales) or 1.0
+        measured.append((f"{key} of {name!r}", one.get(key, []), other.get(key, []), size / pull))
+    measured.append(("curvatures", written["curvatures"], found["curvatures"], size))
+    ours, theirs = (list(entry["residuals"].values()) for entry in (written, found))
+    measured.append(("residuals", ours, theirs, float(SOLVED)))
+    for what, one, other, allowed in measured:
+        a, b = _numbers(one), _numbers(other)
+        limit = tolerance * allowed
+        if a.shape != b.shape or not np.allclose(a, b, rtol=0.0, atol=limit, equal_nan=True):
+            yield f"{what}: written {_words(a)}, found {_words(b)}"
+    for key in ("multipliers unique", "signature", "entrapment"):
+        if written[key] != found[key]:
+            yield f"{key}: written {written[key]}, found {found[key]}"
+    active = [[row["name"] for row in e["functions"] if row["active"]] for e in (written, found)]
+    if active[0] != active[1]:
+        yield f"active functions: written {active[0]}, found {active[1]}"
+    if written["verdict"] != c.verdict.name:
+        yield f"verdict: written {written['verdict']}, found {c.verdict.name}"
+
+
+def _every_row(e: Entries) -> list[Entries]:
+    return [*e["functions"], *e["equations"], e["energy"]]
+
+
+def _numbers(written: Any) -> Any:
+    values = written if isinstance(written, list) else [written]
+    return np.array([read_number(x) for x in values], dtype=np.float64)
+
+
+def _words(values: Any) -> str:
+    return ", ".join(f"{x:.12g}" for x in values) or "none"

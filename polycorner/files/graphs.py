@@ -2,13 +2,11 @@
 
 import json
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from polycorner.atomic import write_atomically
-from polycorner.files.container import versions
-from polycorner.files.models import units_of
+from polycorner.checks import instance
+from polycorner.container import XML, Kind, versions
 from polycorner.skeletons.elements import Corner, Edge, Skeleton
 from polycorner.skeletons.walks import End
 
@@ -17,13 +15,12 @@ if TYPE_CHECKING:
 
     from polycorner.spaces.manifold import Array
 
-SCHEMA = 1
+KIND = Kind("graph", "save_graph", XML)
+HEADER = '<?xml version="1.0" encoding="utf-8"?>'
 TAKEN = ("kind", "active", "rank", "dimension", "local_type", "singular", "chirality", "length")
 
 
-def skeleton_graph(
-    skeleton: Skeleton, *, units: Mapping[str, str] | None = None
-) -> "nx.MultiGraph":
+def skeleton_graph(skeleton: Skeleton) -> "nx.MultiGraph":
     """Return corners as nodes and edges as edges, with plain values only.
 
     Nodes are called by the position of the corner, ``"0"``, ``"1"``, ...  What is no corner gets a
@@ -33,8 +30,6 @@ def skeleton_graph(
     Parameters
     ----------
     skeleton : Skeleton
-    units : mapping from str to str, optional
-        Units of coordinates by name, as for :func:`~polycorner.files.save_skeleton`.
 
     Returns
     -------
@@ -42,18 +37,17 @@ def skeleton_graph(
     """
     import networkx as nx
 
-    if not isinstance(skeleton, Skeleton):
-        msg = f"skeleton: expected a Skeleton; got {type(skeleton).__name__}"
-        raise TypeError(msg)
-    names = skeleton.polyhedron.manifold.names
-    known = units_of(skeleton.polyhedron, None, units).coordinates
+    instance("skeleton", skeleton, Skeleton)
+    names, units = skeleton.polyhedron.manifold.names, skeleton.polyhedron.manifold.units
     about = {
-        "polycorner_graph": SCHEMA,
         "polycorner_version": versions()["polycorner"],
         "complete": skeleton.complete.name,
         "functions": json.dumps(skeleton.polyhedron.names),
         "length_units": "scale units",
-        **{f"{_column(name)}_units": known[name] or "not stated" for name in names},
+        **{
+            f"{_column(name)}_units": unit or "not stated"
+            for name, unit in zip(names, units, strict=True)
+        },
     }
     graph = nx.MultiGraph(**about)
     for k, corner in enumerate(skeleton.corners):
@@ -68,20 +62,16 @@ def skeleton_graph(
     return graph
 
 
-def save_graph(
-    skeleton: Skeleton, path: str | os.PathLike[str], *, units: Mapping[str, str] | None = None
-) -> Path:
-    """Write the graph of a skeleton as GraphML; the file appears whole or not at all.
+def save_graph(skeleton: Skeleton, path: str | os.PathLike[str]) -> Path:
+    """Write the graph of a skeleton (see :func:`skeleton_graph`) as GraphML, atomically.
 
-    What is in it says :func:`skeleton_graph`; ``networkx.read_graphml`` reads it again.
+    :func:`load_graph` checks the file and reads it; so does any other reader of GraphML.
 
     Parameters
     ----------
     skeleton : Skeleton
     path : path
         The file; its folder is made if need be.
-    units : mapping from str to str, optional
-        Units of coordinates by name.
 
     Returns
     -------
@@ -89,16 +79,30 @@ def save_graph(
 
     Raises
     ------
-    TypeError, ValueError
-        Naming the argument.
+    TypeError
+        If ``skeleton`` is none.
     OSError
         If the file cannot be written.
     """
     import networkx as nx
 
-    lines = nx.generate_graphml(skeleton_graph(skeleton, units=units))
-    text = "\n".join(['<?xml version="1.0" encoding="utf-8"?>', *lines, ""])
-    return write_atomically(path, text)
+    lines = nx.generate_graphml(skeleton_graph(skeleton))
+    return KIND.save(path, "\n".join([HEADER, *lines, ""]).encode())
+
+
+def load_graph(path: str | os.PathLike[str]) -> "nx.MultiGraph":
+    """Return the graph in a file that :func:`save_graph` wrote, after a check of its digest.
+
+    Raises
+    ------
+    ValueError
+        If the file is no such graph or was changed.
+    """
+    import networkx as nx
+
+    # Without its header, since networkx parses text, and text must not declare an encoding.
+    text = KIND.load(path).decode().removeprefix(HEADER)
+    return nx.parse_graphml(text, force_multigraph=True)
 
 
 def _corner(corner: Corner) -> dict[str, Any]:

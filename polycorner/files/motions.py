@@ -3,15 +3,14 @@
 import io
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from polycorner.atomic import write_atomically
-from polycorner.files.container import SEALED, Kind, sealed, unsealed, versions
+from polycorner.container import Kind, versions
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.trajectory import Touch, Trajectory
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from polycorner.motion.system import System
 
 EFFORT = tuple(field.name for field in fields(Effort))
+T = TypeVar("T")
 PLACES = ("body_1", "body_2", "contact")
 
 
@@ -154,7 +154,6 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
     """Return the attributes that every motion has, and what wrote them."""
     return {
         "Conventions": "CF-1.11",
-        SEALED: "the last line of the file is the SHA-256 digest of all before it",
         **{f"{name}_version": version for name, version in versions().items()},
         "dt": path.dt,
         "max_penetration": path.max_penetration,
@@ -167,7 +166,8 @@ def read_motion(
     content: "xr.Dataset", system: "System | IdenticalBodies", q: Array, v: Array
 ) -> Trajectory:
     """Return the motion in a dataset."""
-    at, names = content.attrs, _contacts(str(content.attrs["contacts"]))
+    at = content.attrs
+    names = json.loads(at["contacts"])
 
     def of(name: str) -> Any:
         return np.array(content[name].values)
@@ -202,47 +202,26 @@ def read_motion(
     )
 
 
-def _contacts(written: str) -> list[str]:
-    """Return names that are a list in JSON, or in the first version words."""
-    return list(json.loads(written)) if written.startswith("[") else written.split()
-
-
 # -------------------------------------------------------------------------------------------- files
 
 
 def save_dataset(kind: Kind, path: str | os.PathLike[str], content: "xr.Dataset") -> Path:
-    """Write a dataset as sealed NetCDF; the file appears whole or not at all."""
-    marked = content.assign_attrs({kind.key: np.int64(kind.schema)})
+    """Write a dataset as NetCDF, atomically."""
     packed = {"zlib": True, "complevel": 4}
-    encoding = {name: packed for name in marked.data_vars if marked[name].size > 1}
+    encoding = {name: packed for name in content.data_vars if content[name].size > 1}
     # HDF5 may bring the process down when a disk is full; bytes that are complete cannot.
-    written = bytes(marked.to_netcdf(engine="h5netcdf", encoding=encoding))
-    return write_atomically(path, sealed(written))
+    return kind.save(path, bytes(content.to_netcdf(engine="h5netcdf", encoding=encoding)))
 
 
 def load_dataset(
-    kind: Kind, path: str | os.PathLike[str], read: "Callable[[xr.Dataset], Trajectory | Any]"
-) -> Any:
-    """Return what ``read`` makes of the dataset in a file, refusing files that were changed."""
+    kind: Kind, path: str | os.PathLike[str], read: "Callable[[xr.Dataset], T]"
+) -> "T":
+    """Return what ``read`` makes of the dataset in a file, after a check of its digest."""
     import xarray as xr
 
-    content, has_seal = unsealed(kind, path)
+    content = kind.load(path)
     try:
         with xr.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False) as file:
-            found = file.load()
-    except Exception as error:  # bytes without a seal may be anything, and HDF5 raises whatever
+            return read(file.load())
+    except (ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError) as error:
         raise kind.refusal(path, f"is damaged ({error})") from error
-    at: Mapping[Any, Any] = found.attrs
-    if kind.key not in at:
-        raise kind.refusal(path, "is something else")
-    schema = kind.check_schema(path, _plain(at[kind.key]), str(at.get("polycorner_version", "")))
-    if schema > kind.unsealed and not has_seal:
-        raise kind.refusal(path, "was changed after it was written (no digest)")
-    try:
-        return read(found)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise kind.refusal(path, f"is damaged ({error})") from error
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

@@ -1,15 +1,15 @@
-"""Skeletons as JSON, finished or not: gone on with when they are loaded, after a check."""
+"""Skeletons as JSON, finished or not: a search resumes from them."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from polycorner.files.container import Kind, load_json, number, read_number, save_json
-from polycorner.files.models import units_of
-from polycorner.files.skeleton_checks import corner_entry, fault, symmetry_entry
+from polycorner.checks import refuse
+from polycorner.container import JSON, Kind, number, read_number
+from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
@@ -17,33 +17,29 @@ from polycorner.skeletons.elements import Completeness, Skeleton
 from polycorner.skeletons.explorer import Explorer, SearchState
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import End
 
-KIND = Kind("a skeleton", "save_skeleton", "polycorner skeleton", schema=1)
+KIND = Kind("skeleton", "save_skeleton", JSON)
 RANDOM = ("MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")
+VALUES = 1e-9  # largest difference of values at corners, relative to the value and the slope
 
 
-def save_skeleton(
-    skeleton: Skeleton,
-    path: str | os.PathLike[str],
-    *,
-    label: str = "",
-    units: Mapping[str, str] | None = None,
-) -> Path:
-    """Write a skeleton, finished or not, as JSON; the file appears whole or not at all.
+def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: str = "") -> Path:
+    """Write a skeleton, finished or not, as JSON, atomically.
+
+    The file holds the formulas of the polyhedron as text, corners, edges with all their points, and
+    all that a search needs to resume, the state of its random generator included.
 
     Parameters
     ----------
     skeleton : Skeleton
-        What :func:`~polycorner.skeletons.search.skeleton` returned.
+        As returned by :func:`~polycorner.skeletons.search.skeleton`.
     path : path
         The file; its folder is made if need be.
     label : str, optional
-        What the search is called; :func:`load_skeleton` can insist on it.
-    units : mapping from str to str, optional
-        Units of coordinates by name.  Those of the package's models are known, and a circle of
-        period ``2 pi`` is an angle in ``rad``.
+        A name of the search, which :func:`load_skeleton` can require.
 
     Returns
     -------
@@ -51,34 +47,23 @@ def save_skeleton(
 
     Raises
     ------
-    TypeError, ValueError
-        Naming the argument.
+    TypeError
+        If ``skeleton`` is none.
     OSError
         If the file cannot be written.
     """
     if not isinstance(skeleton, Skeleton) or not isinstance(skeleton.state, SearchState):
-        msg = f"skeleton: expected a Skeleton that skeleton returned; got {type(skeleton).__name__}"
-        raise TypeError(msg)
+        refuse("skeleton", "a Skeleton that skeleton returned", skeleton, TypeError)
     explorer = Explorer.resumed(skeleton.state)
-    d, manifold = skeleton.polyhedron, skeleton.polyhedron.manifold
-    known = units_of(d, None, units).coordinates
-    content = {
+    entries = {
         "label": label,
         "complete": skeleton.complete.name,
-        "coordinates": [
-            {"name": name, "unit": known[name], "period": number(period), "scale": scale}
-            for name, period, scale in zip(
-                manifold.names, manifold.periods, manifold.scales, strict=True
-            )
-        ],
-        "functions": list(d.names),
-        "equations": list(d.equation_names),
-        "symmetry": symmetry_entry(explorer),
+        "polyhedron": polyhedron_entry(skeleton.polyhedron),
+        "symmetry": _symmetry(explorer),
         "tolerance": explorer.quotient.tolerance,
         "extent": number(explorer.quotient.extent),
-        "corners": [corner_entry(explorer, record) for record in explorer.records],
-        "ends": [[[ray, edge] for ray, edge in p.edges.items()] for p in explorer.records],
-        "curves": [_curve(curve) for curve in explorer.curves],
+        "corners": [_corner(explorer, record) for record in explorer.records],
+        "edges": [_curve(curve) for curve in explorer.curves],
         "crossings": [[_flag(p.start), _flag(p.stop)] for p in explorer.crossings],
         "starts": [[count, start.tolist()] for count, start in explorer.starts],
         "pending": list(explorer.pending),
@@ -87,93 +72,68 @@ def save_skeleton(
         "lost": bool(explorer.registry.lost),
         "random": _listed(explorer.rng.bit_generator.state),
     }
-    return save_json(KIND, path, content)
+    return KIND.save_json(path, entries)
 
 
 def load_skeleton(
     path: str | os.PathLike[str],
-    polyhedron: Polyhedron,
+    polyhedron: Polyhedron | None = None,
     *,
     symmetry: Symmetry | None = None,
     label: str | None = None,
 ) -> Skeleton:
-    """Read a skeleton back; :func:`~polycorner.skeletons.search.resume` goes on with it.
+    """Read a skeleton back; :func:`~polycorner.skeletons.search.resume` continues its search.
 
-    Checked anew: that names, periods and scales are those of the polyhedron; that the functions
-    have the values written at every corner, to ``1e-9`` of their slopes; that the corners lie on
-    the functions written, and all points of edges on theirs and in the polyhedron.
+    A polyhedron that is passed must have the names, periods and scales of the file, and its
+    functions the same values at every corner, to ``1e-9`` of the larger of value and slope.
 
     Parameters
     ----------
     path : path
         A file that :func:`save_skeleton` wrote.
-    polyhedron, symmetry
-        Those it was computed for: formulas are not in the file.
+    polyhedron : Polyhedron, optional
+        The polyhedron it was computed for; default that of the file.  One with annotations has to
+        be passed, since these are Python functions.
+    symmetry : Symmetry, optional
+        The symmetry it was computed with, which is not in the file either.
     label : str, optional
-        What the search must be called.
+        The name the search must have.
 
     Raises
     ------
     ValueError
         If the file is no skeleton, was changed, or is of another polyhedron or symmetry.
     """
-    content = load_json(KIND, path)
-    if label is not None and content.get("label") != label:
-        msg = (
-            f"path: expected a skeleton called {label!r}; {path} is called {content.get('label')!r}"
-        )
-        raise ValueError(msg)
+    content = KIND.load_json(path)
+    if label is not None and content["label"] != label:
+        refuse("path", f"a skeleton called {label!r}", f"{path}, called {content['label']!r}")
+    annotations = content["polyhedron"]["annotations"]
+    if polyhedron is None and annotations:
+        expected = f"that of {path}, whose annotations {', '.join(annotations)} are functions"
+        refuse("polyhedron", expected, None)
     try:
-        _check_names(content, polyhedron, path)
-        return _restored(content, polyhedron, symmetry or Symmetry(), path)
-    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
+        d = polyhedron or read_polyhedron(content["polyhedron"])[0]
+        differs = mismatch(content["polyhedron"], d)
+        if not differs:
+            explorer = _explorer(content, d, symmetry or Symmetry())
+            differs = next(_differences(content, explorer), "")
+        found = None if differs else assembled(explorer, Completeness[content["complete"]])
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise KIND.refusal(path, f"is damaged ({error!r})") from error
+    if found is None:
+        raise KIND.refusal(path, f"is of another polyhedron or symmetry: {differs}")
+    return found
 
 
-def _check_names(
-    content: dict[str, Any], polyhedron: Polyhedron, path: str | os.PathLike[str]
-) -> None:
-    manifold = polyhedron.manifold
-    written = [(c["name"], read_number(c["period"]), c["scale"]) for c in content["coordinates"]]
-    columns = zip(manifold.names, manifold.periods, manifold.scales, strict=True)
-    for what, found, wanted in (
-        ("functions", content["functions"], polyhedron.names),
-        ("equations", content["equations"], polyhedron.equation_names),
-        ("coordinates, periods and scales", written, columns),
-    ):
-        if list(found) != list(wanted):
-            names = ", ".join(polyhedron.names if what == "functions" else manifold.names)
-            msg = f"path: expected a skeleton of {names}; {path} has other {what}"
-            raise ValueError(msg)
-
-
-def _restored(
-    content: dict[str, Any],
-    polyhedron: Polyhedron,
-    symmetry: Symmetry,
-    path: str | os.PathLike[str],
-) -> Skeleton:
-    extent = read_number(content["extent"])
+def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> Explorer:
+    extent, n = read_number(content["extent"]), polyhedron.dimension
     quotient = Quotient(polyhedron, symmetry, float(content["tolerance"]), extent)
     explorer = Explorer(quotient, [], _generator(content["random"]))
-    try:
-        _fill(explorer, content)
-        found = fault(explorer, content)
-        skeleton = None if found else assembled(explorer, Completeness[content["complete"]])
-    except ValueError as error:
-        raise KIND.refusal(path, f"is damaged ({error})") from error
-    if skeleton is None:
-        raise KIND.refusal(path, f"is not what is computed here: {found}")
-    return skeleton
-
-
-def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
-    n = explorer.manifold.dimension
     for corner in content["corners"]:
         explorer.registry.restore(_points(corner["point"], n, 1))
-    for record, ends in zip(explorer.records, content["ends"], strict=True):
-        record.edges.update(dict(ends))
-    explorer.curves += [_read_curve(entry, n) for entry in content["curves"]]
+    for record, corner in zip(explorer.records, content["corners"], strict=True):
+        record.edges.update(dict(corner["edges"]))
+    explorer.curves += [_read_curve(entry, n) for entry in content["edges"]]
     explorer.crossings += [
         Crossing(_read_flag(start), _read_flag(stop)) for start, stop in content["crossings"]
     ]
@@ -183,6 +143,44 @@ def _fill(explorer: Explorer, content: dict[str, Any]) -> None:
     for sentence in content["notes"]:
         explorer.registry.note(sentence)
     explorer.registry.lost = bool(content["lost"])
+    return explorer
+
+
+def _differences(content: Entries, explorer: Explorer) -> Iterator[str]:
+    """Yield in what the symmetry, or the functions at the corners, differ from the file."""
+    written, here = content["symmetry"], _symmetry(explorer)
+    if written != here:
+        words = [", ".join(f"{k} {v}" for k, v in entry.items()) for entry in (written, here)]
+        yield f"symmetry: written {words[0]}, found {words[1]}"
+    names = [*explorer.polyhedron.names, *explorer.polyhedron.equation_names]
+    for k, (record, entry) in enumerate(zip(explorer.records, content["corners"], strict=True)):
+        values = np.array([read_number(x) for x in entry["values"]])
+        found, slopes = record.point.values, np.linalg.norm(record.point.gradients, axis=1)
+        allowed = VALUES * np.maximum(slopes, abs(found))
+        for i in np.flatnonzero(~np.isclose(values, found, 0.0, allowed, equal_nan=True)):
+            yield f"{names[i]!r} at corner {k}: written {values[i]:.12g}, found {found[i]:.12g}"
+
+
+def _symmetry(explorer: Explorer) -> Entries:
+    """Return what is known of a symmetry without its functions."""
+    symmetry = explorer.symmetry
+    points = [record.point.q for record in explorer.records]
+    points += [curve.points[0] for curve in explorer.curves]
+    return {
+        "motions": len(symmetry.directions(explorer.manifold, points[0])) if points else None,
+        "elements": len(symmetry.elements),
+        "relabels": bool(symmetry.relabels),
+    }
+
+
+def _corner(explorer: Explorer, record: CornerRecord) -> Entries:
+    names = explorer.polyhedron.names
+    return {
+        "point": record.point.q.tolist(),
+        "active": [names[i] for i in sorted(record.active)],
+        "values": [number(x) for x in record.point.values.tolist()],
+        "edges": [[ray, edge] for ray, edge in record.edges.items()],
+    }
 
 
 def _points(written: Any, n: int, dimensions: int) -> Any:

@@ -36,7 +36,7 @@ def bouncing_ball(restitution: float = 1.0) -> System:
     ``2 t``, with ``e < 1`` it comes to rest after ``t (1 + e) / (1 - e)``, having bounced
     infinitely often.
     """
-    M = Manifold.euclidean("y")
+    M = Manifold.euclidean("y", unit="m")
     (y,), (v,) = M.symbols, velocities(M)
     return System(Polyhedron(M, {"floor": y}), v**2 / 2, GRAVITY * y, restitution=restitution)
 

@@ -1,10 +1,38 @@
-"""What was loaded is what was saved; and files changed by someone who makes the digest anew."""
-
-import json
+"""Comparison of what was loaded with what was saved; files that someone changed."""
 
 import numpy as np
 
-from polycorner.files import container as sealed
+from polycorner.motion import Event, EventKind, Trajectory
+from polycorner.motion.engine.driver import Effort
+
+
+def motion(system, bodies, coordinates, contact, *, instants=9, seed=0):
+    """Return a trajectory of random numbers, which no motion has and any file keeps."""
+    rng = np.random.default_rng(seed)
+
+    def numbers(*shape):
+        return rng.normal(size=(instants, *shape))
+
+    return Trajectory(
+        system=system,
+        dt=1e-3,
+        times=np.arange(instants) * 0.1,
+        q=numbers(bodies, coordinates),
+        v=numbers(bodies, coordinates),
+        rests=numbers(bodies) > 0,
+        present=numbers(bodies) > -1,
+        touching=tuple((((0,), contact, float(x)),) if x > 0 else () for x in numbers()),
+        kinetic=numbers(),
+        potential=numbers(),
+        dissipated={cause: numbers() for cause in ("impact", "sliding")},
+        work={"force": numbers()},
+        events=(
+            Event(0.25, EventKind.IMPACT, (0,), contact, 1.5),
+            Event(0.4, EventKind.REST, (0,), "", 0.0),
+        ),
+        max_penetration=1e-7,
+        effort=Effort(*range(5), residual=1e-12),
+    )
 
 
 def same_certificate(one, other):
@@ -54,15 +82,15 @@ def same_run(one, other):
         assert getattr(one, name) == getattr(other, name)
 
 
-def resealed(path, change):
-    """Change the entries of a JSON file and give it the digest of what is then in it."""
-    entries = json.loads(path.read_text())
+def rewritten(kind, path, change):
+    """Change the entries of a JSON file and give it the digest of the new content."""
+    entries = kind.load_json(path)
     change(entries)
-    entries[sealed.DIGEST] = sealed._digest(entries)
-    path.write_text(json.dumps(entries))
+    kind.save_json(path, entries)
 
 
-def written(data, path):
-    """Write a dataset as it is, with the digest of what is then in it."""
-    path.write_bytes(sealed.sealed(bytes(data.to_netcdf(engine="h5netcdf"))))
-    return path
+def same_graph(one, other):
+    """Check that two graphs have the same nodes, edges and attributes."""
+    assert one.graph.items() >= other.graph.items()
+    assert dict(one.nodes(data=True)) == dict(other.nodes(data=True))
+    assert sorted(map(repr, one.edges(data=True))) == sorted(map(repr, other.edges(data=True)))

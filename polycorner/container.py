@@ -1,0 +1,142 @@
+"""The checksummed container of all kinds of files: kind, version and digest in the last line.
+
+JSON, GraphML, NetCDF and NumPy archives end in a line that their own readers take for an entry, a
+comment, or do not read at all::
+
+    "polycorner": "certificate 1 sha256 5f1d..."}
+    <!-- polycorner graph 1 sha256 5f1d... -->
+    polycorner trajectory 1 sha256 5f1d...
+
+The digest is that of all bytes before it, kind and version included, and is checked before
+anything is read.  It guards against damage, not against someone who computes it anew.
+"""
+
+import hashlib
+import json
+import math
+import os
+import platform
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polycorner import __version__
+from polycorner.atomic import write_atomically
+
+JSON = (b' "polycorner": "', b'"}\n')
+XML = (b"<!-- polycorner ", b" -->\n")
+BINARY = (b"\npolycorner ", b"\n")
+_SEAL = re.compile(rb"(?P<name>[a-z ]+) (?P<version>\d+) sha256 (?P<digest>[0-9a-f]{64})")
+_WORDS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Attributes
+    ----------
+    name : str
+        Its content, such as ``"certificate"``; lower-case letters and spaces.
+    writer : str
+        The function that writes it.
+    around : tuple of (bytes, bytes)
+        Beginning and end of the last line: ``JSON``, ``XML`` or ``BINARY``.
+    version : int
+        Version of the format; files of a newer one are refused.
+    """
+
+    name: str
+    writer: str
+    around: tuple[bytes, bytes]
+    version: int = 1
+
+    def refusal(self, path: str | os.PathLike[str], why: object) -> ValueError:
+        """Return the error for a file that is not of this kind, or is damaged."""
+        sentence = " ".join(str(why).split())  # what libraries report may have lines
+        return ValueError(
+            f"path: expected a {self.name} that {self.writer} wrote; {path} {sentence}"
+        )
+
+    def save(self, path: str | os.PathLike[str], body: bytes) -> Path:
+        """Write bytes with their last line, atomically.
+
+        Raises
+        ------
+        OSError
+            See :func:`~polycorner.atomic.atomic`.
+        """
+        before = body + self.around[0] + f"{self.name} {self.version} sha256 ".encode()
+        digest = hashlib.sha256(before).hexdigest().encode()
+        return write_atomically(path, before + digest + self.around[1])
+
+    def load(self, path: str | os.PathLike[str]) -> bytes:
+        """Return the bytes before the last line.
+
+        Raises
+        ------
+        ValueError
+            Naming the file, if it is of another kind, was changed, or has a newer version.
+        OSError
+            If it cannot be read.
+        """
+        content = Path(path).read_bytes()
+        around = next((a for a in (JSON, XML, BINARY) if _last_line(content, a)), self.around)
+        seal = _last_line(content, around)
+        if seal is None:
+            damaged = b"polycorner" in content
+            raise self.refusal(path, "was changed or cut off" if damaged else "is something else")
+        before = content[: -len(around[1]) - len(seal["digest"])]
+        if hashlib.sha256(before).hexdigest().encode() != seal["digest"]:
+            raise self.refusal(path, "was changed after it was written: its digest does not fit")
+        if seal["name"] != self.name.encode() or around != self.around:
+            raise self.refusal(path, f"is a {seal['name'].decode()}")
+        if int(seal["version"]) > self.version:
+            newer = f"has version {int(seal['version'])}"
+            why = f"{newer}, and polycorner {__version__} reads up to version {self.version}"
+            raise self.refusal(path, why)
+        return content[: -len(around[0]) - len(seal.group()) - len(around[1])]
+
+    def save_json(self, path: str | os.PathLike[str], entries: dict[str, Any]) -> Path:
+        """Write entries as JSON, and which versions wrote them."""
+        text = json.dumps(entries | {"written by": versions()}, indent=1, allow_nan=False)
+        return self.save(path, f"{text[:-2]},\n".encode())
+
+    def load_json(self, path: str | os.PathLike[str]) -> dict[str, Any]:
+        """Return the entries that :meth:`save_json` wrote."""
+        entries: dict[str, Any] = json.loads(self.load(path).rstrip().removesuffix(b",") + b"}")
+        return entries
+
+
+def _last_line(content: bytes, around: tuple[bytes, bytes]) -> "re.Match[bytes] | None":
+    """Return kind, version and digest in the last line, if it is that of a format."""
+    start, end = around
+    _, found, line = content.rpartition(start)
+    return _SEAL.fullmatch(line[: -len(end)]) if found and line.endswith(end) else None
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that matter to whoever reads a file."""
+    return {
+        "polycorner": __version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def number(x: float) -> float | str:
+    """Return a number as strict JSON has it: infinities and NaN are words."""
+    return float(x) if math.isfinite(x) else str(float(x))
+
+
+def read_number(written: Any) -> float:
+    """Return the number that :func:`number` wrote."""
+    if isinstance(written, str):
+        return _WORDS[written]
+    if isinstance(written, bool) or not isinstance(written, int | float):
+        msg = f"{written!r} is no number"
+        raise TypeError(msg)
+    return float(written)

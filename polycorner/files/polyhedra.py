@@ -1,0 +1,142 @@
+"""Polyhedra and functions as entries of a file, formulas included, and made again from these."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from polycorner.container import number, read_number
+from polycorner.files.formulas import formula_text, read_formula, symbols
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
+from polycorner.spaces.manifold import Manifold
+
+Entries = dict[str, Any]
+
+
+def manifold_entry(manifold: Manifold) -> list[Entries]:
+    """Return coordinates with their units, periods and scales."""
+    columns = zip(manifold.names, manifold.units, manifold.periods, manifold.scales, strict=True)
+    return [
+        {"name": name, "unit": unit, "period": number(period), "scale": scale}
+        for name, unit, period, scale in columns
+    ]
+
+
+def read_manifold(entry: Sequence[Entries]) -> Manifold:
+    """Return the manifold of :func:`manifold_entry`."""
+    return Manifold(
+        tuple(c["name"] for c in entry),
+        tuple(read_number(c["period"]) for c in entry),
+        tuple(float(c["scale"]) for c in entry),
+        tuple(c["unit"] for c in entry),
+    )
+
+
+def polyhedron_entry(polyhedron: Polyhedron, energy: SmoothFunction | None = None) -> Entries:
+    """Return a polyhedron, and an energy on it, with all formulas as text.
+
+    Annotations are Python functions, of which only the names are written.
+    """
+    functions = [*polyhedron.functions, *polyhedron.equations, *([energy] if energy else [])]
+    families = {id(f.family): f.family for f in functions}
+    position = {key: k for k, key in enumerate(families)}
+
+    def entry(f: SmoothFunction) -> Entries:
+        return {
+            "name": f.name,
+            "family": position[id(f.family)],
+            "member": f.member_name,
+            "reads": [f.manifold.names[i] for i in f.reads],
+            "parameters": list(f.parameters),
+        }
+
+    return {
+        "coordinates": manifold_entry(polyhedron.manifold),
+        "families": [_family_entry(family) for family in families.values()],
+        "functions": [entry(f) for f in polyhedron.functions],
+        "equations": [entry(h) for h in polyhedron.equations],
+        "energy": None if energy is None else entry(energy),
+        "tree": _tree_entry(polyhedron.tree),
+        "annotations": list(polyhedron.annotations),
+    }
+
+
+def read_polyhedron(entry: Entries) -> tuple[Polyhedron, SmoothFunction | None]:
+    """Return the polyhedron and the energy of :func:`polyhedron_entry`, without annotations."""
+    manifold = read_manifold(entry["coordinates"])
+    families = [_read_family(family) for family in entry["families"]]
+
+    def function(f: Entries) -> SmoothFunction:
+        return SmoothFunction.member(
+            families[f["family"]],
+            f["member"],
+            manifold,
+            parameters=f["parameters"],
+            reads=f["reads"],
+            label=f["name"],
+        )
+
+    functions = [function(f) for f in entry["functions"]]
+    parts = [_read_tree(child, functions) for child in entry["tree"]["all"]]
+    polyhedron = Polyhedron(manifold, parts, [function(h) for h in entry["equations"]])
+    return polyhedron, None if entry["energy"] is None else function(entry["energy"])
+
+
+def mismatch(entry: Entries, polyhedron: Polyhedron) -> str:
+    """Return in which names, periods or scales a polyhedron differs from entries, or nothing."""
+    manifold, written = polyhedron.manifold, read_manifold(entry["coordinates"])
+    rows = [
+        ("names of the coordinates", written.names, manifold.names),
+        ("periods of the coordinates", written.periods, manifold.periods),
+        ("scales of the coordinates", written.scales, manifold.scales),
+        ("functions", tuple(f["name"] for f in entry["functions"]), polyhedron.names),
+        ("equations", tuple(h["name"] for h in entry["equations"]), polyhedron.equation_names),
+    ]
+    for what, one, other in rows:
+        if one != other:
+            return f"{what}: written {_words(one)}, found {_words(other)}"
+    return ""
+
+
+def _words(values: Sequence[Any]) -> str:
+    return ", ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in values) or "none"
+
+
+def _family_entry(family: Family) -> Entries:
+    definitions, expressions = family.formulas()
+    return {
+        "variables": list(family.variables),
+        "parameters": list(family.parameters),
+        "definitions": {name: formula_text(e) for name, e in definitions.items()},
+        "formulas": {name: formula_text(expressions[name]) for name in family.names},
+        "unit": family.unit,
+    }
+
+
+def _read_family(entry: Mapping[str, Any]) -> Family:
+    variables, parameters = entry["variables"], entry["parameters"]
+    known = symbols([*variables, *parameters, *entry["definitions"]])
+
+    def read(texts: Mapping[str, str]) -> dict[str, Any]:
+        return {name: read_formula(text, known) for name, text in texts.items()}
+
+    return Family.of(
+        read(entry["formulas"]),
+        variables,
+        parameters,
+        read(entry["definitions"]),
+        unit=entry["unit"],
+    )
+
+
+def _tree_entry(tree: Any) -> Any:
+    if isinstance(tree, int):
+        return tree
+    return {"any" if tree.union else "all": [_tree_entry(child) for child in tree.children]}
+
+
+def _read_tree(entry: Any, functions: Sequence[SmoothFunction]) -> Any:
+    if isinstance(entry, int):
+        return functions[entry]
+    ((word, children),) = entry.items()
+    return {"any": AnyOf, "all": AllOf}[word](*[_read_tree(c, functions) for c in children])

@@ -1,0 +1,88 @@
+"""The container: a last line with kind, version and digest, in every format."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner import __version__
+from polycorner.container import BINARY, JSON, XML, Kind, number, read_number
+
+KIND = Kind("thing", "save_thing", JSON)
+CONTENT = {"name": "x", "values": [1.5, -0.0, 1e-300], "nested": {"deep": None}}
+REFUSAL = r"^path: expected a thing that save_thing wrote; .*thing\.json "
+
+
+def test_entries_are_read_back_and_any_reader_of_json_sees_them(tmp_path):
+    path = KIND.save_json(tmp_path / "new" / "folder" / "thing.json", CONTENT)
+    read = KIND.load_json(path)
+    assert {name: read[name] for name in CONTENT} == CONTENT
+    assert read["written by"]["polycorner"] == __version__
+    written = json.loads(path.read_text())
+    kind, version, *_ = written.pop("polycorner").split()
+    assert (written, kind, version) == (read, "thing", "1")
+
+
+@pytest.mark.parametrize("around", [JSON, XML, BINARY])
+@given(body=st.binary(max_size=300))
+def test_any_bytes_are_read_back(tmp_path_factory, around, body):
+    kind = replace(KIND, around=around)
+    path = kind.save(tmp_path_factory.mktemp("any") / "thing.json", body)
+    assert kind.load(path) == body
+
+
+@pytest.mark.parametrize("around", [JSON, XML, BINARY])
+def test_every_flipped_bit_is_noticed(tmp_path, around):
+    kind = replace(KIND, around=around)
+    path = kind.save(tmp_path / "thing.json", b"some content\n")
+    whole = path.read_bytes()
+    for position in range(8 * len(whole)):
+        content = bytearray(whole)
+        content[position // 8] ^= 1 << position % 8
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=REFUSAL):
+            kind.load(path)
+
+
+@pytest.mark.parametrize("around", [JSON, XML, BINARY])
+def test_every_other_length_is_noticed(tmp_path, around):
+    kind = replace(KIND, around=around)
+    path = kind.save(tmp_path / "thing.json", b"some content\n")
+    whole = path.read_bytes()
+    for content in (*(whole[:n] for n in range(len(whole))), whole + b"\n", whole + whole):
+        path.write_bytes(content)
+        if content == whole + whole:
+            assert kind.around != JSON or len(content) == 2 * len(whole)
+        with pytest.raises(ValueError, match=REFUSAL):
+            kind.load(path)
+
+
+@pytest.mark.parametrize("text", [b"", b"{", b"[]", b'{"other": 1}\n', b"\0" * 4096, b"\xff\xfe"])
+def test_other_files_are_something_else(tmp_path, text):
+    (tmp_path / "thing.json").write_bytes(text)
+    with pytest.raises(ValueError, match=REFUSAL + "is something else"):
+        KIND.load(tmp_path / "thing.json")
+
+
+def test_another_kind_and_a_newer_version_are_named(tmp_path):
+    path = replace(KIND, name="heap").save_json(tmp_path / "thing.json", CONTENT)
+    with pytest.raises(ValueError, match=REFUSAL + "is a heap$"):
+        KIND.load_json(path)
+    replace(KIND, version=4).save_json(path, CONTENT)
+    told = f"has version 4, and polycorner {__version__} reads up to version 1$"
+    with pytest.raises(ValueError, match=REFUSAL + told):
+        KIND.load_json(path)
+
+
+@given(st.floats())
+def test_every_number_survives(x):
+    again = read_number(json.loads(json.dumps(number(x), allow_nan=False)))
+    assert repr(again) == repr(x)  # nan and the sign of zero as well
+
+
+@pytest.mark.parametrize("written", ["word", True, None, [1.0]])
+def test_only_numbers_are_read_as_numbers(written):
+    with pytest.raises((KeyError, TypeError)):
+        read_number(written)
