@@ -26,5 +26,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """
     from difflib import get_close_matches
 
-    close = get_close_matches(name.lower(), list(known), n=1)
-    return f"{name} (did you mean {close[0]}?)" if close else name
+    words = {word.lower(): word for word in known}
+    close = get_close_matches(name.lower(), list(words), n=1)
+    return f"{name} (did you mean {words[close[0]]}?)" if close else name

@@ -1,7 +1,7 @@
-"""Tables that read alike in a terminal and in a notebook: described once, rendered twice.
+"""Tables and sentences of results, rendered as plain text and as HTML.
 
-The text is plain and aligned, numbers at their decimal points.  The HTML is a fragment without
-colours, fonts or scripts of its own, so that it takes on whatever theme it is shown in.
+The text is aligned, numbers at their decimal points.  The HTML is a fragment without colours,
+fonts or scripts of its own, so that it follows the theme of the page that shows it.
 """
 
 import math
@@ -9,9 +9,10 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from itertools import islice
+from itertools import islice, zip_longest
 
-WIDTH = 96  # columns at which sentences are broken in text
+WIDTH = 96  # columns at which sentences are wrapped unless a width is given
+GAP = 2  # columns between two columns of a table
 MOST = 20  # rows that are shown of a long table
 
 
@@ -22,13 +23,13 @@ class Table:
     Attributes
     ----------
     head : tuple of str
-        Titles of the columns; none, and the first column names what is in the others.
+        Titles of the columns.  Without titles the first column names the contents of the others.
     rows : tuple of tuple of str
         The cells.
     numbers : tuple of int
         Positions of the columns that hold numbers.
     caption : str
-        What it is a table of, and what was left out.
+        A line above the table.
     """
 
     head: tuple[str, ...]
@@ -36,17 +37,64 @@ class Table:
     numbers: tuple[int, ...] = ()
     caption: str = ""
 
-    def text(self) -> str:
-        """Return it as aligned lines."""
+    def text(self, width: int | None = None) -> str:
+        """Return aligned lines.
+
+        Parameters
+        ----------
+        width : int, optional
+            Columns at which cells of words are wrapped, between words.  Where that is not enough,
+            each row becomes lines of titles and values.  No word is ever cut.
+        """
         columns = [
             _column(title, cells, number=k in self.numbers)
             for k, (title, *cells) in enumerate(zip(*self._lines(), strict=True))
         ]
-        lines = ["  ".join(line).rstrip() for line in zip(*columns, strict=True)]
-        return "\n".join([self.caption] * bool(self.caption) + lines[0 if self.head else 1 :])
+        widths = None if width is None else self._widths(columns, width)
+        if width is not None and widths is None:
+            lines = self._records(width)
+        else:
+            lines = [
+                line
+                for row in list(zip(*columns, strict=True))[0 if self.head else 1 :]
+                for line in _wrapped(row, widths)
+            ]
+        caption = self.caption if width is None else _filled(self.caption, width)
+        return "\n".join([caption] * bool(caption) + lines)
+
+    def _widths(self, columns: list[list[str]], width: int) -> list[int] | None:
+        """Return widths of the columns that fit, or None where no wrapping makes them fit."""
+        widths = [len(cells[0]) for cells in columns]
+        least = [
+            size if k in self.numbers else max(map(_longest_word, cells))
+            for k, (size, cells) in enumerate(zip(widths, columns, strict=True))
+        ]
+        room = width - GAP * (len(widths) - 1)
+        if sum(least) > room:
+            return None
+        while sum(widths) > room:
+            shrinkable = [k for k, size in enumerate(widths) if size > least[k]]
+            widths[max(shrinkable, key=lambda k: widths[k])] -= 1
+        return widths
+
+    def _records(self, width: int) -> list[str]:
+        """Return the table as lines of titles and values, a blank line between its rows."""
+        head, *rows = self._lines()
+        if not self.head:
+            return [line for name, *rest in rows for line in (name, *_indented(rest, width))]
+        size = max(map(len, head))
+        lines: list[str] = []
+        for row in rows:
+            lines += [""] * bool(lines)
+            for title, cell in zip(head, row, strict=True):
+                if size + GAP + _longest_word(cell) <= width:
+                    lines += _wrapped((f"{title:<{size}}", cell), [size, width - size - GAP])
+                else:
+                    lines += [title, *_indented([cell], width)]
+        return lines
 
     def html(self) -> str:
-        """Return it as a ``<table>``."""
+        """Return a ``<table>``."""
         caption = f'<caption style="text-align: left">{escape(self.caption)}</caption>'
         head = "".join(self._cell("th", k, title, "col") for k, title in enumerate(self.head))
         body = "".join(
@@ -83,9 +131,9 @@ class Sheet:
     Attributes
     ----------
     title : str
-        What is shown.
+        A line above the rest; may be empty.
     parts : tuple of Table or str
-        In this order; tables without rows and empty sentences are passed over.
+        Tables and sentences in this order; those without rows or words are skipped.
     """
 
     title: str
@@ -94,42 +142,42 @@ class Sheet:
     def _shown(self) -> "list[Table | str]":
         return [part for part in self.parts if (part if isinstance(part, str) else part.rows)]
 
-    def text(self) -> str:
-        """Return it as plain text."""
+    def text(self, width: int | None = None) -> str:
+        """Return plain text, in lines of a given width as far as its words allow."""
         parts = [
-            textwrap.fill(part, WIDTH, break_long_words=False, break_on_hyphens=False)
-            if isinstance(part, str)
-            else part.text()
+            _filled(part, width or WIDTH) if isinstance(part, str) else part.text(width)
             for part in self._shown()
         ]
-        return "\n\n".join([f"{self.title}\n{parts[0]}", *parts[1:]] if parts else [self.title])
+        title = [_filled(self.title, width or 10**6)] * bool(self.title)
+        return "\n\n".join(["\n".join([*title, *parts[:1]]), *parts[1:]])
 
     def html(self) -> str:
-        """Return it as an HTML fragment."""
+        """Return an HTML fragment."""
         parts = [
             f"<p>{escape(part)}</p>" if isinstance(part, str) else part.html()
             for part in self._shown()
         ]
-        return f"<div><p><strong>{escape(self.title)}</strong></p>{''.join(parts)}</div>"
+        title = f"<p><strong>{escape(self.title)}</strong></p>" if self.title else ""
+        return f"<div>{title}{''.join(parts)}</div>"
 
 
 class Printed:
-    """What is shown as a sheet by ``print`` and in a notebook."""
+    """Base of results that ``print`` and notebooks show as a sheet."""
 
     def _sheet(self) -> Sheet:
         raise NotImplementedError
 
     def __str__(self) -> str:
-        """Return it as aligned plain text."""
+        """Return aligned plain text."""
         return self._sheet().text()
 
     def _repr_html_(self) -> str:
-        """Return it as an HTML fragment, for notebooks."""
+        """Return an HTML fragment for notebooks."""
         return self._sheet().html()
 
 
 def facts(pairs: Iterable[tuple[str, str]]) -> Table:
-    """Return a table of names and what they stand for."""
+    """Return a table of names and values without titles."""
     return Table((), tuple(pairs))
 
 
@@ -140,19 +188,19 @@ def listed(
     count: int,
     numbers: tuple[int, ...] = (),
 ) -> Table:
-    """Return a table of the first of ``count`` rows whose caption says how many are left out."""
+    """Return the first of ``count`` rows as a table whose caption says that rows are left out."""
     shown = tuple(islice(rows, MOST))
     left = f" (the first {MOST} of {count})" if count > len(shown) else ""
     return Table(tuple(head), shown, numbers, f"{caption}{left}")
 
 
 def number(value: float, digits: int = 9) -> str:
-    """Return a number in so many significant digits, zero without a sign."""
+    """Return a number with the given significant digits, zero without a sign."""
     return f"{value + 0.0:.{digits}g}"
 
 
 def names(words: Iterable[str], most: int = 60) -> str:
-    """Return names in a row, or how many there are where they would take too much room."""
+    """Return names separated by commas, or their number where the list would be too long."""
     every = list(words)
     row = ", ".join(every)
     return row if len(row) <= most else f"{len(every)} functions"
@@ -161,7 +209,8 @@ def names(words: Iterable[str], most: int = 60) -> str:
 def angle_unit(period: float) -> str:
     """Return ``"rad"`` for a circle measured in radians, nothing for any other coordinate.
 
-    A full turn, or a whole part of it as for headings modulo a half-turn, is such a period.
+    Such a circle has the period of a full turn, or of a whole fraction of it: headings modulo a
+    half-turn have half of it.
 
     >>> [angle_unit(period) for period in (math.tau, math.pi, 1.0, math.inf)]
     ['rad', 'rad', '', '']
@@ -171,7 +220,7 @@ def angle_unit(period: float) -> str:
 
 
 def units(periods: Iterable[float]) -> str:
-    """Say in which units the numbers are that bear none.
+    """Return a sentence on the units of numbers that are printed without one.
 
     >>> units([math.tau, math.inf])
     'Angles are in radians, all else in the units of the model.'
@@ -192,7 +241,7 @@ def titled(name: str, period: float) -> str:
 
 
 def coordinates(names: Sequence[str], periods: Sequence[float], point: Sequence[float]) -> Table:
-    """Return the coordinates of a point, angles in radians and beside it in degrees."""
+    """Return a table of the coordinates of a point, angles in radians and in degrees."""
     units = [angle_unit(period) for period in periods]
     rows = [(name, number(x)) for name, x in zip(names, point, strict=True)]
     if not any(units):
@@ -205,7 +254,7 @@ def coordinates(names: Sequence[str], periods: Sequence[float], point: Sequence[
 
 
 def _column(title: str, cells: Sequence[str], *, number: bool) -> list[str]:
-    """Return title and cells of one width, numbers with their points below each other."""
+    """Return title and cells padded to one width, numbers aligned at their decimal points."""
     if number:
         parts = [_split(cell) for cell in cells]
         before = max((len(a) for a, _ in parts), default=0)
@@ -216,6 +265,39 @@ def _column(title: str, cells: Sequence[str], *, number: bool) -> list[str]:
 
 
 def _split(cell: str) -> tuple[str, str]:
-    """Return what stands before and after the place of the decimal point."""
+    """Return the text before and from the decimal point."""
     whole, point, rest = cell.partition(".")
     return whole, point + rest
+
+
+def _wrapped(row: Sequence[str], widths: Sequence[int] | None) -> list[str]:
+    """Return the lines of a row, its cells wrapped where widths are given."""
+    if widths is None:
+        return [(" " * GAP).join(row).rstrip()]
+    cells = [
+        [cell] if len(cell) <= width else _filled(cell.rstrip(), width).split("\n")
+        for cell, width in zip(row, widths, strict=True)
+    ]
+    return [
+        (" " * GAP)
+        .join(f"{part:<{width}}" for part, width in zip(parts, widths, strict=True))
+        .rstrip()
+        for parts in zip_longest(*cells, fillvalue="")
+    ]
+
+
+def _indented(cells: Iterable[str], width: int) -> list[str]:
+    """Return wrapped cells on indented lines of their own."""
+    return [
+        " " * GAP + line
+        for cell in cells
+        for line in _filled(cell.strip(), width - GAP).split("\n")
+    ]
+
+
+def _filled(text: str, width: int) -> str:
+    return textwrap.fill(text, width, break_long_words=False, break_on_hyphens=False)
+
+
+def _longest_word(cell: str) -> int:
+    return max(map(len, cell.split()), default=0)

@@ -1,6 +1,8 @@
-"""``polycorner completion``: what makes a shell complete subcommands, options and choices."""
+"""``polycorner completion``: scripts by which a shell completes commands, options and choices."""
 
 import click
+
+from polycorner.cli.options import command
 
 VARIABLE = "_POLYCORNER_COMPLETE"
 EPILOG = """\b
@@ -11,10 +13,10 @@ Examples:
 """
 
 
-@click.command(epilog=EPILOG)
+@command(epilog=EPILOG)
 @click.argument("shell", metavar="SHELL", type=click.Choice(["bash", "zsh", "fish"]))
 def completion(shell: str) -> None:
-    """Print the script by which SHELL (bash, zsh, fish) completes what is typed."""
+    """Print the completion script of SHELL: bash, zsh or fish."""
     from click.shell_completion import get_completion_class
 
     found = get_completion_class(shell)

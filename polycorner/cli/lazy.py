@@ -1,4 +1,4 @@
-"""A group of commands whose members are imported when they are first named."""
+"""Groups of commands whose members are imported when they are needed."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from polycorner.cli.manner import everywhere
+from polycorner.cli.options import GroupedCommand, everywhere
 
 
 class LazyGroup(click.Group):
@@ -15,8 +15,10 @@ class LazyGroup(click.Group):
     Parameters
     ----------
     members : mapping from str to str
-        Where each command is defined; it is imported when it runs, or its help is shown.
+        Module and attribute of each command, imported when it runs or its help is shown.
     """
+
+    command_class = GroupedCommand
 
     def __init__(
         self, *args: Any, members: Mapping[str, str] | None = None, **options: Any
@@ -25,7 +27,7 @@ class LazyGroup(click.Group):
         self.members = dict(members or {})
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
-        """Add a command, with the options that every command has."""
+        """Add a command, together with the options that all commands share."""
         super().add_command(everywhere(cmd), name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -33,7 +35,7 @@ class LazyGroup(click.Group):
         return sorted({*super().list_commands(ctx), *self.members})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a command, importing it if need be."""
+        """Return a command, importing it if necessary."""
         if cmd_name in self.members and cmd_name not in self.commands:
             module, _, attribute = self.members[cmd_name].partition(":")
             self.add_command(getattr(import_module(module), attribute), cmd_name)

@@ -1,14 +1,14 @@
 """The command ``polycorner``: subcommands, errors in one line, exit codes.
 
-=====  ============================================================
+=====  ====================================================================
 0      an answer, whatever it says
-1      a check of ``polycorner paper`` broke
+1      a check of ``polycorner paper`` failed to run
 2      bad input, or a file that cannot be read or written
-70     an unexpected error: a mistake in the program
+70     unexpected error: a defect of the program
 74     standard output cannot be written
-130    interrupted; what was found is kept where the command says so
-141    whoever read standard output has gone
-=====  ============================================================
+130    interrupted; results so far are kept where the command says so
+141    broken pipe
+=====  ====================================================================
 """
 
 import os
@@ -23,49 +23,57 @@ import click
 from polycorner import __version__
 from polycorner.cli.completion import VARIABLE
 from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.manner import Manner, manner_options
+from polycorner.cli.options import examples, verbosity_options
+from polycorner.cli.output import Verbosity, notices
 
-UNEXPECTED, NO_OUTPUT, INTERRUPTED, UNREAD = 70, 74, 130, 141
+UNEXPECTED, NO_OUTPUT, INTERRUPTED, BROKEN_PIPE = 70, 74, 130, 141
 EXIT_CODES = {
     0: "an answer, whatever it says",
-    1: "a check of polycorner paper broke",
+    1: "a check of polycorner paper failed to run",
     2: "bad input, or a file that cannot be read or written",
-    UNEXPECTED: "an unexpected error: a mistake in the program",
+    UNEXPECTED: "unexpected error: a defect of the program",
     NO_OUTPUT: "standard output cannot be written",
-    INTERRUPTED: "interrupted; what was found is kept where the command says so",
-    UNREAD: "whoever read standard output has gone",
+    INTERRUPTED: "interrupted; results so far are kept where the command says so",
+    BROKEN_PIPE: "broken pipe",
 }
 COMMANDS = {
-    **{name: f"polycorner.cli.{name}:{name}" for name in ("atlas", "completion", "sweep")},
+    **{
+        name: f"polycorner.cli.{name}:{name}"
+        for name in ("atlas", "cache", "completion", "minima", "sweep")
+    },
     **{
         name: f"polycorner.dumbbells.cli.{name}:{name}"
-        for name in ("drum", "dyad", "minima", "paper", "prove", "view")
+        for name in ("drum", "dyad", "paper", "prove", "view")
     },
 }
-EXAMPLES = """\b
-Examples:
-  polycorner dyad
-  polycorner dyad --rod 1 --drum inf --json
-  polycorner atlas spheres --count 7
-  polycorner dyad --help
+EXAMPLES = examples(
+    "dyad", "dyad --rod 1 --drum inf --json", "atlas spheres --count 6", "dyad --help"
+)
+UNITS = """
+Lengths are in mm, times in s.  Angles on the command line and in tables are in degrees; in JSON the
+keys of angles in degrees end in _deg, all other angles are in radians.
 
 \b
 Exit codes:
 """
-EPILOG = EXAMPLES + "\n".join(f"  {code:<3}  {words}" for code, words in EXIT_CODES.items())
+EPILOG = EXAMPLES + UNITS + "\n".join(f"  {code:<3}  {words}" for code, words in EXIT_CODES.items())
 
 
 @click.group(
     cls=LazyGroup,
     members=COMMANDS,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "show_default": True,
+        "max_content_width": 100,
+    },
     epilog=EPILOG,
     no_args_is_help=True,
 )
 @click.version_option(__version__, message="polycorner %(version)s")
-@manner_options
+@verbosity_options
 def cli() -> None:
-    """Faces of curvilinear polyhedra, and where energies come to rest on them."""
+    """Corners, minima and proofs on curvilinear polyhedra, and motion on them."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -74,24 +82,25 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Parameters
     ----------
     arguments : sequence of str, optional
-        What follows the name of the command; those of the process unless given.
+        Arguments after the command's name; default those of the process.
     """
     given = None if arguments is None else list(arguments)
-    manner, start = Manner(), perf_counter()
+    chosen, start = Verbosity(), perf_counter()
     try:
-        code = _answered(given, manner)
+        with notices(chosen):
+            code = _answered(given, chosen)
         sys.stdout.flush()
     except OSError as error:
         code = _unwritten(error)
-    if manner.verbose and not manner.quiet:
+    if chosen.verbose and not chosen.quiet:
         _say(f"exit code {code} after {perf_counter() - start:.2f} s")
     sys.exit(code)
 
 
-def _answered(given: list[str] | None, manner: Manner) -> int:
-    """Run a command and return its exit code; also that of whatever went wrong."""
+def _answered(given: list[str] | None, chosen: Verbosity) -> int:
+    """Run a command and return its exit code, also where it raises."""
     try:
-        code = cli.main(given, prog_name="polycorner", standalone_mode=False, obj=manner)
+        code = cli.main(given, prog_name="polycorner", standalone_mode=False, obj=chosen)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         code = 0
@@ -101,12 +110,12 @@ def _answered(given: list[str] | None, manner: Manner) -> int:
     except click.exceptions.Abort:
         _say("interrupted")
         code = INTERRUPTED
-    except SystemExit as stopped:  # by click and rich where the reader of a pipe has gone
-        code = stopped.code if VARIABLE in os.environ else _given_up()
+    except SystemExit as stopped:  # by click and rich for a broken pipe
+        code = stopped.code if VARIABLE in os.environ else _give_up_output()
     except OSError:
         raise
     except Exception as error:
-        code = _unexpected(error, verbose=manner.verbose)
+        code = _unexpected(error, verbose=chosen.verbose)
     return code if isinstance(code, int) else 0
 
 
@@ -119,17 +128,17 @@ def _unexpected(error: Exception, *, verbose: bool) -> int:
     return UNEXPECTED
 
 
-def _given_up() -> int:
-    """Give up standard output, so that Python does not try again at its end."""
+def _give_up_output() -> int:
+    """Redirect standard output to nowhere, so that Python does not flush it again at exit."""
     with suppress(OSError):  # not a file of the system, as in tests
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return UNREAD
+    return BROKEN_PIPE
 
 
 def _unwritten(error: OSError) -> int:
-    unread = _given_up()
+    broken = _give_up_output()
     if isinstance(error, BrokenPipeError):
-        return unread
+        return broken
     what = "standard output" if error.filename is None else error.filename
     _say(f"{what} cannot be read or written ({error.strerror or error})")
     return NO_OUTPUT if error.filename is None else 2

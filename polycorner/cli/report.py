@@ -1,78 +1,95 @@
-"""An atlas as a table in the terminal."""
+"""Tables of atlases for the terminal."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from polycorner.cli.manner import console
-
-if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table
-
+from polycorner.printing import Sheet, Table
 
 COUNTS = {
     "components": "components of the strata",
     "components_ordered": "for ordered pairs of dumbbells whose balls are alike",
     "components_unordered": "for unordered pairs",
 }
+MOST = 60  # characters of the active functions of a corner; above it only their number is shown
 
 
 def keys(counts: dict[int, int]) -> dict[str, int]:
-    """Return counts by dimension as JSON has them."""
+    """Return counts by dimension with the keys of JSON."""
     return {str(dimension): count for dimension, count in sorted(counts.items())}
 
 
-def print_answer(answer: dict[str, Any]) -> None:
-    """Print an answer as a table for people."""
-    if "critical" in answer:
-        console().print(_critical(answer))
-    else:
-        _print_atlas(console(), answer)
+def label(corner: int | None) -> str:
+    """Return the name of a corner by its position, ``-`` where an edge has no corner at an end."""
+    return "-" if corner is None else f"C{corner}"
 
 
-def _critical(answer: dict[str, Any]) -> "Table":
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in answer["critical"][0]:
-        table.add_column(title, justify="right")
-    for row in answer["critical"]:
-        table.add_row(f"{row['radius']:.9f}", *(str(row[k]) for k in list(row)[1:]))
-    return table
-
-
-def _print_atlas(terminal: "Console", answer: dict[str, Any]) -> None:
-    for key, words in COUNTS.items():
-        if key in answer:
-            counts = ", ".join(f"{n} of dimension {d}" for d, n in answer[key].items())
-            terminal.print(f"{words}: {counts}")
+def atlas_sheet(answer: dict[str, Any]) -> Sheet:
+    """Return an atlas as a sheet."""
+    parts: list[Table | str] = [f"{words}: {_counts(answer[key])}" for key, words in _told(answer)]
     if "singular_count" in answer:
-        terminal.print(
+        parts.append(
             f"{answer['corners_count']} rigid clusters ({answer['singular_count']} singular), "
             f"{answer['edges_count']} one-dimensional motions"
         )
-    if answer["corners"]:
-        terminal.print(_corners(answer))
-    terminal.print(f"Euler characteristic: {answer['euler_characteristic']}")
-    terminal.print(f"complete: {answer['complete']}")
-    for note in answer["notes"]:
-        terminal.print(f"note: {note}")
+    characteristic = answer["euler_characteristic"]
+    if characteristic is None:
+        characteristic = (
+            "not determined (it takes a finished search and closed faces bounded by finite edges)"
+        )
+    return Sheet(
+        "",
+        (
+            *parts,
+            _corners(answer),
+            f"Euler characteristic: {characteristic}",
+            f"complete: {answer['complete']}",
+            *(f"note: {note}" for note in answer["notes"]),
+        ),
+    )
 
 
-def _corners(answer: dict[str, Any]) -> "Table":
-    from rich import box
-    from rich.table import Table
+def critical_sheet(answer: dict[str, Any]) -> Sheet:
+    """Return the critical configurations of disks as a sheet."""
+    head = ("radius", "index", "nullity", "contacts", "hits")
+    rows = (
+        (f"{row['radius']:.9f}", *(str(row[key]) for key in head[1:])) for row in answer["critical"]
+    )
+    caption = "Critical radii, in units of the torus's side"
+    return Sheet("", (Table(head, tuple(rows), tuple(range(len(head))), caption),))
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in ("corner", "active", "rank", "type", "edges to"):
-        table.add_column(title)
-    edges = answer["edges"]
-    for k, corner in enumerate(answer["corners"]):
-        ends = [e["ends"] for e in edges if k in e["ends"]]
-        others = [b if a == k else a for a, b in ends]
-        reached = ", ".join("-" if other is None else str(other) for other in others)
-        active = " ".join(corner["active"])
-        shown = active if len(active) < 60 else f"{len(corner['active'])} contacts"
-        kind = corner["local_type"] + (", singular" if corner["singular"] else "")
-        table.add_row(f"{k} {corner['name']}", shown, str(corner["rank"]), kind, reached)
-    return table
+
+def _told(answer: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(key, words) for key, words in COUNTS.items() if key in answer]
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{n} of dimension {d}" for d, n in counts.items())
+
+
+def _corners(answer: dict[str, Any]) -> Table:
+    kinds = any("kind" in corner for corner in answer["corners"])
+    head = ("corner", *["kind"] * kinds, "active", "rank", "type", "edges to")
+    return Table(
+        head,
+        tuple(
+            (
+                corner["name"],
+                *[corner.get("kind", "")] * kinds,
+                _active(corner["active"]),
+                str(corner["rank"]),
+                corner["local_type"] + (", singular" if corner["singular"] else ""),
+                ", ".join(map(label, _reached(k, answer["edges"]))),
+            )
+            for k, corner in enumerate(answer["corners"])
+        ),
+    )
+
+
+def _active(names: list[str]) -> str:
+    shown = " ".join(names)
+    return shown if len(shown) < MOST else f"{len(names)} contacts"
+
+
+def _reached(corner: int, edges: list[dict[str, Any]]) -> list[int | None]:
+    """Return the other ends of the edges at a corner."""
+    ends = [edge["ends"] for edge in edges if corner in edge["ends"]]
+    return [b if a == corner else a for a, b in ends]

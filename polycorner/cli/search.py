@@ -1,45 +1,52 @@
-"""One search for an atlas: progress, saving, going on, and the answer."""
+"""A search for an atlas that is saved as it goes, resumed, and reported."""
 
 import hashlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import (
+from polycorner.cli.output import (
     deliver,
     fail,
     prepare,
-    progress_bar,
+    shown,
+    timed,
     unfinished,
+    working,
     write_answer,
     writing,
 )
-from polycorner.cli.manner import timed
-from polycorner.cli.report import keys, print_answer
+from polycorner.cli.report import atlas_sheet, keys, label
 
 if TYPE_CHECKING:
     from polycorner.polyhedra.polyhedron import Polyhedron
     from polycorner.polyhedra.symmetry import Symmetry
-    from polycorner.progress import Progress
+    from polycorner.printing import Sheet
     from polycorner.skeletons.elements import Skeleton
 
-
-# Seconds between two savings of a long search.
-SAVED_EVERY = 10.0
+SAVED_EVERY = 10.0  # seconds between two savings of a long search
 
 
 class Search:
-    """One search with its progress bar, its savings and its report."""
+    """A search with its progress bar, its saved state and its report.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model.
+    chosen : dict
+        Its parameters.
+    out : path, optional
+        Folder of the answer, where an unfinished search is kept too; else it is kept in the cache.
+    seed, budget : int
+        Seed of the random directions; how many edges may be traced.
+    """
 
     def __init__(
-        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int
+        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int = 1
     ) -> None:
-        if budget < 1:
-            fail(f"--budget: expected a positive number of edges; got {budget}")
         self.model, self.parameters, self.out = model, chosen, out
         self.seed, self.budget = seed, budget
         prepare(out)
@@ -47,12 +54,12 @@ class Search:
 
     @property
     def label(self) -> str:
-        """What the search is called in a file."""
+        """The name of the search in its file."""
         return repr((self.model, sorted(self.parameters.items()), self.seed))
 
     @property
     def state(self) -> Path:
-        """Where an unfinished search is kept."""
+        """The file that keeps an unfinished search."""
         if self.out is not None:
             return self.out / "atlas-state.json"
         from polycorner.formulas.cache import cache_folder
@@ -67,16 +74,15 @@ class Search:
         *,
         resume: bool,
     ) -> "Skeleton":
-        """Search, or resume, saving by the clock; also what an interrupted search found."""
+        """Search, or resume, saving by the clock; return also what an interruption left."""
         import numpy as np
 
-        from polycorner.files import save_skeleton
         from polycorner.skeletons import Budget, skeleton
         from polycorner.skeletons import resume as resumed
         from polycorner.skeletons.elements import Completeness
 
         known = 0
-        with self.patience() as progress:
+        with working(f"searching {self.model}", "edges") as progress:
             if resume:
                 found = self._load(polyhedron, symmetry)
                 known = len(found.edges)
@@ -92,7 +98,7 @@ class Search:
                 )
             while resume or found.complete is Completeness.BUDGET:
                 resume = False
-                save_skeleton(found, self.state, label=self.label)
+                self._save(found)
                 left = self.budget - (len(found.edges) - known)
                 if left < 1:
                     break
@@ -101,10 +107,16 @@ class Search:
         if self.finished:
             self.state.unlink(missing_ok=True)
         else:
-            save_skeleton(found, self.state, label=self.label)
+            self._save(found)
         self.drawn = self.finished
         self.interrupted = found.complete is Completeness.INTERRUPTED
         return found
+
+    def _save(self, found: "Skeleton") -> None:
+        from polycorner.files import save_skeleton
+
+        with writing(self.state):
+            save_skeleton(found, self.state, label=self.label)
 
     def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
         from polycorner.files import load_skeleton
@@ -116,67 +128,49 @@ class Search:
         except ValueError as error:
             fail(f"--resume: {error}")
 
-    @contextmanager
-    def patience(self) -> "Iterator[Progress | None]":
-        """Show a bar with rate and estimate on a terminal, nothing in a pipe."""
-        begun = perf_counter()
-        with timed(f"searching {self.model}"), progress_bar(self.model) as change:
-            if change is None:
-                yield None
-                return
-
-            def progress(done: float, total: float | None, note: str, /) -> None:
-                pace = done / (perf_counter() - begun)
-                left = f", {(total - done) / pace:.0f} s left" if total and done else ""
-                change(
-                    completed=done,
-                    total=total,
-                    description=f"{self.model}: {note}",
-                    note=f"{pace:.0f}/s{left}",
-                )
-
-            yield progress
-
     def answer(
-        self, found: "Skeleton", extra: dict[str, Any], names: list[str] | None = None
+        self, found: "Skeleton", extra: dict[str, Any], kinds: list[str] | None = None
     ) -> dict[str, Any]:
-        """Return what is printed as JSON."""
-        labels = names or [f"C{k}" for k in range(len(found.corners))]
+        """Return the atlas as JSON."""
+        corners = [
+            {
+                "name": label(k),
+                **({} if kinds is None else {"kind": kinds[k]}),
+                "active": list(corner.active),
+                "rank": corner.rank,
+                "dimension": corner.stratum.dimension,
+                "local_type": corner.local_type.name.lower(),
+                "chirality": corner.chirality,
+                "singular": corner.singular,
+                "point": corner.point.tolist(),
+            }
+            for k, corner in enumerate(found.corners)
+        ]
+        edges = [
+            {
+                "ends": list(edge.ends),
+                "active": list(edge.active),
+                "length": edge.length,
+                "kinds": [kind.name.lower() for kind in edge.kinds],
+            }
+            for edge in found.edges
+        ]
+        faces = [
+            {
+                "active": list(face.active),
+                "boundary": [list(curve) for curve in face.boundary],
+                "closed": face.closed,
+            }
+            for face in found.faces
+        ]
         return {
             "model": self.model,
             "parameters": self.parameters,
             "components": keys(dict(found.components)),
             **extra,
-            "corners": [
-                {
-                    "name": label,
-                    "active": list(corner.active),
-                    "rank": corner.rank,
-                    "dimension": corner.stratum.dimension,
-                    "local_type": corner.local_type.name.lower(),
-                    "chirality": corner.chirality,
-                    "singular": corner.singular,
-                    "point": corner.point.tolist(),
-                }
-                for label, corner in zip(labels, found.corners, strict=True)
-            ],
-            "edges": [
-                {
-                    "ends": list(edge.ends),
-                    "active": list(edge.active),
-                    "length": edge.length,
-                    "kinds": [kind.name.lower() for kind in edge.kinds],
-                }
-                for edge in found.edges
-            ],
-            "faces": [
-                {
-                    "active": list(face.active),
-                    "boundary": [list(curve) for curve in face.boundary],
-                    "closed": face.closed,
-                }
-                for face in found.faces
-            ],
+            "corners": corners,
+            "edges": edges,
+            "faces": faces,
             "euler_characteristic": found.euler_characteristic,
             "complete": found.complete.name.lower(),
             "notes": list(found.notes),
@@ -187,17 +181,19 @@ class Search:
         answer: dict[str, Any],
         *,
         as_json: bool,
-        draw: Callable[[Path], list[Path]] | None = None,
+        draw: Callable[[Path], list[Path]],
+        sheet: "Callable[[dict[str, Any]], Sheet]" = atlas_sheet,
     ) -> None:
         """Print the answer, write the files, and end the process if it was interrupted."""
 
         def write() -> Iterator[Path]:
             if self.out is not None:
                 yield write_answer(answer, self.out, "atlas.json")
-                with writing(self.out), timed("drawing"):
-                    yield from draw(self.out) if draw is not None and self.drawn else []
+                if self.drawn:
+                    with writing(self.out), timed("drawing"):
+                        yield from draw(self.out)
 
-        deliver(answer, lambda: print_answer(answer), write, as_json=as_json)
+        deliver(answer, lambda: shown(sheet(answer)), write, as_json=as_json)
         if not self.finished:
             unfinished(self.state)
         if self.interrupted:

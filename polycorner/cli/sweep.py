@@ -12,23 +12,22 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from polycorner.checks import missing_extra
-from polycorner.cli.common import (
+from polycorner.cli.options import GroupedCommand, answer_options, option
+from polycorner.cli.output import (
     deliver,
     fail,
-    output_options,
     prepare,
-    progress_bar,
+    shown,
+    working,
     write_answer,
     writing,
 )
-from polycorner.cli.manner import console
 from polycorner.errors import nearest
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from polycorner.progress import Progress
+    from polycorner.printing import Sheet
     from polycorner.sweeps.study_files import NamedStudy, StudyFile
 
 NAMED = "polycorner.dumbbells.studies"  # package with the table STUDIES and its study files
@@ -70,7 +69,7 @@ A study "module:function" runs your code; the module is also looked for beside t
 """
 
 
-class SweepCommand(click.Command):
+class SweepCommand(GroupedCommand):
     """A command whose help lists the installed studies."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -81,12 +80,12 @@ class SweepCommand(click.Command):
 
 @click.command(cls=SweepCommand)
 @click.argument("study")
-@click.option("--scheduler", metavar="ADDRESS", help="Compute on the Dask cluster at this address.")
-@click.option("--workers", type=int, help="Processes on this machine. [its processors]")
-@click.option("--resume", is_flag=True, help="Resume a study that was interrupted or killed.")
-@click.option("--retry", is_flag=True, help="Like --resume, and compute failed points again.")
-@click.option("--seed", type=int, help="Seed of the random streams. [that of the file, or 0]")
-@output_options
+@option("--scheduler", metavar="ADDRESS", help="Compute on the Dask cluster at this address.")
+@option("--workers", type=int, help="Processes on this machine. [its processors]")
+@option("--resume", is_flag=True, help="Resume a study that was interrupted or killed.")
+@option("--retry", is_flag=True, help="Like --resume, and compute failed points again.")
+@option("--seed", type=int, help="Seed of the random streams. [that of the file, or 0]")
+@answer_options
 def sweep(
     study: str, scheduler: str | None, workers: int | None, resume: bool, retry: bool,
     seed: int | None, as_json: bool, out: Path | None,
@@ -112,7 +111,7 @@ def sweep(
     def write() -> list[Path]:
         return [] if out is None else _write(plan, found, answer, out)
 
-    deliver(answer, lambda: _print(answer), write, as_json=as_json)
+    deliver(answer, lambda: shown(_sheet(answer)), write, as_json=as_json)
     if answer["interrupted"]:
         _end_interrupted(store)
 
@@ -178,7 +177,7 @@ def _computed(
     if seed is not None and not plan.random:
         fail(f"--seed: expected none, for {plan.study} draws no random numbers; got {seed}")
     chosen = (seed if seed is not None else plan.seed or 0) if plan.random else None
-    with _executor(scheduler, workers) as executor, _shown(title) as progress:
+    with _executor(scheduler, workers) as executor, working(title, "points") as progress:
         return compute(
             plan.function,
             plan.grid,
@@ -200,6 +199,8 @@ def _executor(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
+        from polycorner.checks import missing_extra
+
         fail(str(missing_extra("distributed", "dask")))
     connect: Any = Client
     try:
@@ -208,18 +209,6 @@ def _executor(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         fail(f"--scheduler: expected the address of one that answers; got {scheduler} ({error})")
     with client:
         yield client
-
-
-@contextmanager
-def _shown(name: str) -> "Iterator[Progress]":
-    """Show how many points are finished, how many failed, and the time left."""
-    with progress_bar(name, left=True) as change:
-
-        def progress(done: float, total: float | None, note: str, /) -> None:
-            if change is not None:
-                change(completed=done, total=total, note=note)
-
-        yield progress
 
 
 def _end_interrupted(store: Path | None) -> NoReturn:
@@ -306,27 +295,30 @@ def _write(plan: "StudyFile", found: "xr.Dataset", answer: dict[str, Any], out: 
     return written
 
 
-def _print(answer: dict[str, Any]) -> None:
-    from rich import box
-    from rich.table import Table
+def _sheet(answer: dict[str, Any]) -> "Sheet":
+    from polycorner.printing import Sheet, Table
 
-    screen = console()
-    screen.print(
+    rows = (
+        (row["name"], row["unit"], *(_number(row[end]) for end in ("least", "greatest")))
+        for row in answer["results"]
+    )
+    head = ("result", "unit", "least", "greatest")
+    failures = [
+        f"failed at {row['count']} points, first {_point(row['point'])}: {row['message']}"
+        for row in answer["failures"][:SHOWN]
+    ]
+    if len(answer["failures"]) > SHOWN:
+        failures.append(f"and {len(answer['failures']) - SHOWN} other messages")
+    title = (
         f"{answer['study']}: {answer['done']} of {answer['total']} points done, "
         f"{answer['failed']} failed, {answer['pending']} pending"
     )
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in ("result", "unit", "least", "greatest"):
-        table.add_column(title)
-    for row in answer["results"]:
-        ends = ["-" if row[k] is None else f"{row[k]:.6g}" for k in ("least", "greatest")]
-        table.add_row(row["name"], row["unit"], *ends)
-    if answer["results"]:
-        screen.print(table)
-    for row in answer["failures"][:SHOWN]:
-        where = ", ".join(f"{name} = {value}" for name, value in row["point"].items())
-        screen.print(
-            f"failed at {row['count']} points, first {where}: {row['message']}", markup=False
-        )
-    if len(answer["failures"]) > SHOWN:
-        screen.print(f"and {len(answer['failures']) - SHOWN} other messages")
+    return Sheet(title, (Table(head, tuple(rows), (2, 3)), *failures))
+
+
+def _point(values: dict[str, Any]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in values.items())
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.6g}"

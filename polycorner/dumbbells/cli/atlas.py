@@ -1,4 +1,4 @@
-"""``polycorner atlas dyad``: corners, edges and components of the placements of a pair."""
+"""``polycorner atlas dyad``: corners, edges and faces of the placements of a pair."""
 
 import math
 from dataclasses import replace
@@ -7,38 +7,46 @@ from typing import Any
 
 import click
 
-from polycorner.cli.atlas import KEPT, examples, search_options
-from polycorner.cli.common import fail, given
+from polycorner.cli.atlas import RESUMING, search_options
+from polycorner.cli.options import GroupedCommand, examples, given, option
+from polycorner.cli.output import fail
 from polycorner.cli.report import keys
 from polycorner.cli.search import Search
-from polycorner.dumbbells.cli.options import chosen_pair, pair_settings, parameters
+from polycorner.dumbbells.cli.options import GROUP, chosen_pair, pair_options, parameters
 
 UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
 
 
-@click.command(epilog=examples("dyad --plane --json", "dyad --heading 5 --out out") + KEPT)
-@pair_settings
-@click.option("--plane", is_flag=True, help="The developed plane: the same as --drum inf.")
-@click.option("--heading", type=float, help="Mean heading in the drum, degrees. [0]")
+@click.command(
+    cls=GroupedCommand,
+    epilog=examples("atlas dyad --plane", "atlas dyad --heading 5 --out out") + RESUMING,
+)
+@pair_options
+@option("--plane", is_flag=True, help="The developed plane, like --drum inf.", group=GROUP)
+@option(
+    "--heading", type=float, default=0.0, help="Mean heading in the drum, degrees.", group=GROUP
+)
 @search_options
 def dyad(
-    plane: bool, heading: float | None, as_json: bool, out: Path | None, seed: int, budget: int,
-    resume: bool, **options: float | None,
+    plane: bool, heading: float, as_json: bool, out: Path | None, seed: int, budget: int,
+    resume: bool, **options: float,
 ) -> None:  # fmt: skip
-    """Walk through the placements of two dumbbells: corners, and the motions that join them."""
+    """List corners and edges of the placements of two dumbbells.
+
+    In the drum the placements are a section at one mean heading.
+    """
     if given("plane") and given("drum"):
         fail(f"--plane: expected no --drum beside it; got {options['drum']:g}")
     if plane:
         options["drum"] = math.inf
-    pair = chosen_pair(None, options)
-    if heading is not None and (pair.is_plane or not math.isfinite(heading)):
-        fail(f"--heading: expected an angle in degrees, of a pair in a drum; got {heading:g}")
-    degrees = heading or 0.0
+    pair = chosen_pair(options)
+    if not math.isfinite(heading) or (pair.is_plane and heading):
+        fail(f"--heading: expected an angle in degrees, for a pair in a drum; got {heading:g}")
     from polycorner.dumbbells.statics.skeleton import PairAtlas, pair_starts
 
-    angle = math.radians(degrees)
+    angle = math.radians(heading)
     polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
-    search = Search("dyad", parameters(pair) | {"heading": degrees}, out, seed, budget)
+    search = Search("dyad", parameters(pair) | {"heading_deg": heading}, out, seed, budget)
     found = search.run(
         polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
     )
@@ -51,7 +59,7 @@ def dyad(
     except ValueError:
         search.drawn = False
         found = replace(found, notes=(*found.notes, UNMATCHED))
-    answer = search.answer(found, extra, names=[whole.kind(c) for c in found.corners])
+    answer = search.answer(found, extra, kinds=[whole.kind(c) for c in found.corners])
     for corner in answer["corners"]:
         corner["dimension"] += 0 if pair.is_plane else 1
         corner["rank"] -= 0 if pair.is_plane else 1

@@ -1,4 +1,4 @@
-"""``polycorner drum``: dumbbells in motion in a slowly rotating, tilted drum."""
+"""``polycorner drum``: motion of dumbbells in a slowly rotating, tilted drum."""
 
 import math
 from collections.abc import Iterator
@@ -8,39 +8,41 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import (
+from polycorner.cli.options import command, examples
+from polycorner.cli.output import (
     deliver,
     fail,
-    output_options,
     prepare,
-    progress_bar,
+    shown,
+    timed,
     unfinished,
+    working,
     write_answer,
     writing,
 )
-from polycorner.cli.manner import timed
-from polycorner.dumbbells.cli.drum_options import drum_options, merged
-from polycorner.dumbbells.cli.drum_report import drum_answer, print_drum
+from polycorner.dumbbells.cli.drum_options import drum_options, without_hidden
+from polycorner.dumbbells.cli.drum_report import drum_answer, drum_sheet
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.runs import DrumRun
     from polycorner.motion.noise import Noise
 
-EPILOG = """\b
-Examples:
-  polycorner drum --heading 10 --out out
-  polycorner drum --pair R --noise 0.2 --duration 120 --json
-  polycorner drum --count 60 --noise 0.3 --top 400 --duration 1200 --out out --movie
-A single dumbbell or a pair starts on the lowest line at eta = 0, far from bottom and top;
-a bunch (--count without --heading or --start) lies at the bottom of the drum.
-Ctrl-C ends a run, keeps it and reports what was done (exit code 130);
-the same command with --resume goes on from there, also after the process was killed.
+EPILOG = (
+    examples(
+        "drum --heading 10 --out out",
+        "drum --pair R --noise 0.2 --duration 120 --json",
+        "drum --count 60 --noise 0.3 --top 400 --duration 1200 --out out --movie",
+    )
+    + """
+A single dumbbell or a pair starts on the lowest line at eta = 0, far from bottom and top; a bunch
+(--count without --heading or --start) lies at the bottom of the drum.
+
+Ctrl-C ends a run, keeps it and reports what was done (exit code 130); the same command with
+--resume continues it, also after the process was killed.
 """
-
-
-MOST = 5000  # dumbbells; scattering more would take longer than anyone waits
-# The library's names for what the options say.
+)
+# Options by the library's names of what they set.
 NAMES = {
     "count": "count",
     "length": "length",
@@ -65,24 +67,11 @@ NAMES = {
 }
 
 
-@click.command(epilog=EPILOG)
+@command(epilog=EPILOG)
 @drum_options
-@click.option("--resume", is_flag=True, help="Go on with the run that was stopped or killed.")
-@click.option(
-    "--movie",
-    is_flag=False,
-    flag_value="",
-    default=None,
-    metavar="[FILE]",
-    help="Movie, .mp4 or .gif; without a name, in the folder of --out.",
-)
-@output_options
-def drum(
-    config: Path | None, resume: bool, movie: str | None, as_json: bool, out: Path | None,
-    **options: Any,
-) -> None:  # fmt: skip
-    """Simulate dumbbells in a slowly rotating, tilted drum: zigzags, keel effect, dyads."""
-    values = merged(config, options)
+def drum(resume: bool, movie: str | None, as_json: bool, out: Path | None, **options: Any) -> None:
+    """Simulate dumbbells in a slowly rotating, tilted drum."""
+    values = without_hidden(options)
     film = _film(movie, out)
     prepare(out)
     with _named_options():
@@ -95,7 +84,7 @@ def drum(
 
 @contextmanager
 def _named_options() -> Iterator[None]:
-    """Turn the library's complaints into one line that begins with the option."""
+    """Turn the library's errors into one line that begins with the option."""
     try:
         yield
     except (ValueError, TypeError) as error:
@@ -105,7 +94,7 @@ def _named_options() -> Iterator[None]:
         fail(f"--{NAMES[name].replace('_', '-')}:{rest}")
 
 
-# ------------------------------------------------------------------------------------ what is asked
+# ------------------------------------------------------------------------------------- the problem
 
 
 def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, Any]":
@@ -170,7 +159,7 @@ def _check_angles(values: dict[str, Any]) -> None:
 
 
 def _count(values: dict[str, Any]) -> int:
-    """Return how many dumbbells there are."""
+    """Return the number of dumbbells."""
     placed = 2 if values["pair"] else len(values["start"] or values["heading"] or ())
     count = values["count"]
     if count is None:
@@ -178,8 +167,6 @@ def _count(values: dict[str, Any]) -> int:
     if placed and count != placed:
         how = "--pair is two" if values["pair"] else f"{placed} are placed"
         fail(f"--count: expected none, or {placed} as {how}; got {count}")
-    if count > MOST:
-        fail(f"--count: expected at most {MOST}; got {count}")
     return int(count)
 
 
@@ -189,7 +176,7 @@ def _count(values: dict[str, Any]) -> int:
 def _folder(
     model: "DumbbellDrum", q: Any, values: dict[str, Any], noise: "Noise", out: Path | None
 ) -> Path:
-    """Return where an unfinished run is kept."""
+    """Return the folder of an unfinished run."""
     if out is not None:
         return out / "drum-state"
     from polycorner.dumbbells.dynamics.checkpoints import Checkpoint
@@ -207,12 +194,7 @@ def _run(
     from polycorner.dumbbells.dynamics.runs import Saving, run
 
     seconds = values["duration"]
-    shown = "{task.completed:.1f} of {task.total:g} s"
-    with (
-        writing(folder),
-        timed("simulating"),
-        progress_bar("simulated", total=seconds, count=shown, left=True) as change,
-    ):
+    with writing(folder), working("simulating", "s") as progress:
         return run(
             model,
             q,
@@ -220,7 +202,7 @@ def _run(
             dt=values["dt"],
             noise=noise,
             saving=Saving(folder, resume=resume),
-            progress=change and (lambda done: change(completed=done)),
+            progress=lambda done: progress(done, seconds, ""),
         )
 
 
@@ -228,7 +210,7 @@ def _run(
 
 
 def _film(movie: str | None, out: Path | None) -> Path | None:
-    """Return where the movie goes, after checking that it can be written."""
+    """Return the file of the movie, after checking that it can be written."""
     if movie is None:
         return None
     if movie == "" and out is None:
@@ -254,7 +236,7 @@ def _finish(
         if film is not None:
             yield _write_film(run, film)
 
-    deliver(answer, lambda: print_drum(answer), write, as_json=as_json)
+    deliver(answer, lambda: shown(drum_sheet(answer)), write, as_json=as_json)
     if not run.finished:
         unfinished(folder)
         raise click.exceptions.Exit(130)
@@ -280,6 +262,5 @@ def _write(run: "DrumRun", answer: dict[str, Any], out: Path) -> list[Path]:
 def _write_film(run: "DrumRun", film: Path) -> Path:
     from polycorner.dumbbells.pictures.movies import write_movie
 
-    with writing(film, "--movie"), timed("filming"), progress_bar("movie", left=True) as change:
-        told = change and (lambda done, count: change(completed=done, total=count))
-        return write_movie(run, film, progress=told)
+    with writing(film, "--movie"), working("filming", "pictures") as progress:
+        return write_movie(run, film, progress=lambda done, total: progress(done, total, ""))

@@ -1,17 +1,16 @@
-"""What ``polycorner drum`` answers: one JSON object, or a table."""
+"""Answers of ``polycorner drum`` as JSON and as a table."""
 
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from polycorner.cli.manner import console
-
 if TYPE_CHECKING:
     from polycorner.dumbbells.dynamics.runs import DrumRun
+    from polycorner.printing import Sheet
 
 
 def drum_answer(run: "DrumRun", values: dict[str, Any]) -> dict[str, Any]:
-    """Return what is printed as JSON."""
+    """Return the answer as JSON."""
     import numpy as np
 
     from polycorner.dumbbells.dynamics import pairs as drum_pairs
@@ -52,15 +51,11 @@ def _upright(degrees: float) -> float:
     return degrees - 180 * math.ceil(degrees / 180 - 0.5)
 
 
-def print_drum(answer: dict[str, Any]) -> None:
-    """Print an answer as a table for people."""
-    from rich import box
-    from rich.table import Table
+def drum_sheet(answer: dict[str, Any]) -> "Sheet":
+    """Return the answer as a table for people."""
+    from polycorner.printing import Sheet, facts
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_header=False)
-    for name, value in _rows(answer):
-        table.add_row(name, value)
-    console().print(table)
+    return Sheet("", (facts(_rows(answer)),))
 
 
 def _rows(answer: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -1,37 +1,34 @@
 """``polycorner dyad``: the minima of a pair of dumbbells, certified."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from polycorner.cli.common import deliver, output_options, patience, prepare, write_answer, writing
-from polycorner.cli.manner import console
-from polycorner.dumbbells.cli.options import chosen_pair, pair_settings, parameters
+from polycorner.cli.options import command, examples, output_options
+from polycorner.cli.output import deliver, prepare, shown, working, write_answer, writing
+from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from polycorner.dumbbells import DumbbellPair, DyadMinimum
+    from polycorner.printing import Sheet
 
-DRAWING = "drawing"
-WORDS = "finding and certifying (the first run on a machine compiles for about 20 seconds)"
-EPILOG = """\b
-Examples:
-  polycorner dyad --length 16 --ball 3 --rod 1.5 --drum 125
-  polycorner dyad --drum inf --json
-  polycorner dyad --config examples/dyads.toml --rod 1 --out out
-"""
+    Minima = tuple[DyadMinimum, ...]
+
+EPILOG = examples(
+    "dyad --length 16 --ball 3 --rod 1.5 --drum 125",
+    "dyad --drum inf --json",
+    "dyad --rod 1 --out out",
+)
 
 
-@click.command(epilog=EPILOG)
-@pair_settings
+@command(epilog=EPILOG)
+@pair_options
 @output_options
-def dyad(as_json: bool, out: Path | None, **options: float | None) -> None:
-    """Find delta_R, delta_L and G of two dumbbells in a drum, and certify them."""
-    pair = chosen_pair(None, options)
+def dyad(as_json: bool, out: Path | None, **options: float) -> None:
+    """Find and certify the minima delta_R, delta_L and G of two dumbbells."""
+    pair = chosen_pair(options)
     prepare(out)
-    with patience(WORDS):
+    with working("minimising and certifying"):
         from polycorner.dumbbells import dyad_minima
 
         entries = dyad_minima(pair)
@@ -40,13 +37,13 @@ def dyad(as_json: bool, out: Path | None, **options: float | None) -> None:
     def write() -> list[Path]:
         if out is None:
             return []
-        with patience(DRAWING):
+        with working("drawing"):
             return _write(pair, entries, answer, out)
 
-    deliver(answer, lambda: _print_tables(pair, entries, answer), write, as_json=as_json)
+    deliver(answer, lambda: shown(_sheet(pair, entries, answer)), write, as_json=as_json)
 
 
-def _answer(pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]") -> dict[str, Any]:
+def _answer(pair: "DumbbellPair", entries: "Minima") -> dict[str, Any]:
     import math
 
     from polycorner.dumbbells import critical_rod_radius, paper_heading
@@ -89,81 +86,70 @@ def _entry(entry: "DyadMinimum") -> dict[str, Any]:
 
 
 def _write(
-    pair: "DumbbellPair",
-    entries: "tuple[DyadMinimum, ...]",
-    answer: dict[str, Any],
-    out: Path,
+    pair: "DumbbellPair", entries: "Minima", answer: dict[str, Any], out: Path
 ) -> list[Path]:
     import numpy as np
 
     from polycorner.dumbbells.pictures import dyads
-    from polycorner.pictures import style as plots
+    from polycorner.pictures import style
 
     written = [write_answer(answer, out, "dyad.json")]
     with writing(out):
-        written += [plots.save(dyads.draw_pair(e), out / f"{e.name}.png") for e in entries]
+        written += [style.save(dyads.draw_pair(e), out / f"{e.name}.png") for e in entries]
     longest = 2 * (pair.drum_radius - pair.ball_radius)
     lengths = np.linspace(2 * pair.ball_radius, min(10 * pair.ball_radius, longest), 49)
     rods = sorted({0.25 * pair.ball_radius, pair.rod_radius, 0.8 * pair.ball_radius})
     figure = dyads.draw_heading(pair, lengths.tolist(), rods)
     with writing(out):
-        return [*written, plots.save(figure, out / "heading.png")]
+        return [*written, style.save(figure, out / "heading.png")]
 
 
-def _print_tables(
-    pair: "DumbbellPair", entries: "tuple[DyadMinimum, ...]", answer: dict[str, Any]
-) -> None:
-    terminal = console()
-    where = "the developed plane" if pair.is_plane else f"a drum of radius {pair.drum_radius:g} mm"
-    terminal.print(
-        f"Two dumbbells (l = {pair.length:g}, r = {pair.ball_radius:g}, "
-        f"t = {pair.rod_radius:g} mm) in {where}"
-    )
-    terminal.print(_table(entries))
-    for entry in entries:
-        terminal.print(f"{entry.name}: {entry.certificate.verdict.value}")
-    computed = abs(entries[0].headings[0])
-    terminal.print(
-        f"heading: computed {computed:.6f} deg, plane {answer['plane_heading_deg']:.6f} deg, "
+def _sheet(pair: "DumbbellPair", entries: "Minima", answer: dict[str, Any]) -> "Sheet":
+    from polycorner.printing import Sheet, Table, facts
+
+    place = "the developed plane" if pair.is_plane else f"a drum of radius {pair.drum_radius:g} mm"
+    names = tuple(entry.name for entry in entries)
+    unit = "mm" if pair.is_plane else "dE/dgap"
+    minima = answer["minima"]
+    headings = (
+        f"heading: computed {abs(minima[0]['heading_deg'][0]):.6f} deg, "
+        f"plane {answer['plane_heading_deg']:.6f} deg, "
         f"paper's arctan(r/l) {answer['paper_heading_deg']:.6f} deg"
     )
-
-
-def _table(entries: "tuple[DyadMinimum, ...]") -> "Table":
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("")
-    for entry in entries:
-        table.add_column(entry.name)
-    for label, cells in _rows(entries):
-        table.add_row(label, *cells)
-    return table
-
-
-def _rows(entries: "tuple[DyadMinimum, ...]") -> list[tuple[str, list[str]]]:
-    certificates = [entry.certificate for entry in entries]
-    unit = "mm" if entries[0].pair.is_plane else "dE/dgap"
-    residuals = [certificate.residuals for certificate in certificates]
-    return [
-        ("heading (deg)", ["{:.6f}  {:.6f}".format(*e.headings) for e in entries]),
-        ("azimuth (deg)", ["{:.6f}  {:.6f}".format(*e.azimuths) for e in entries]),
-        ("axial gap (mm)", [f"{e.axial_gap:.6f}" for e in entries]),
-        ("height (mm)", [f"{e.height:.9f}" for e in entries]),
-        ("minimum", ["yes" if c.is_minimum else "no" for c in certificates]),
-        (f"multipliers ({unit})", [_lines(e.multipliers, "{:.9f}") for e in entries]),
-        ("(p, q, r)", ["({}, {}, {})".format(*c.signature) for c in certificates]),
+    return Sheet(
+        f"Two dumbbells (l = {pair.length:g}, r = {pair.ball_radius:g}, "
+        f"t = {pair.rod_radius:g} mm) in {place}",
         (
-            "entrapment",
-            [_lines({d: k.value for d, k in c.entrapment.items()}, "{}") for c in certificates],
+            Table(("", *names), _placements(minima)),
+            Table((f"multiplier ({unit})", *names), _union(minima, "multipliers", "{:.9f}")),
+            Table(("entrapment", *names), _union(minima, "entrapment_by_direction", "{}")),
+            facts((m["name"], m["verdict"]) for m in minima),
+            headings,
         ),
-        ("infeasibility", [f"{r.infeasibility:.1e}" for r in residuals]),
-        ("stationarity", [f"{r.stationarity:.1e}" for r in residuals]),
-        ("complementarity", [f"{r.complementarity:.1e}" for r in residuals]),
-    ]
+    )
 
 
-def _lines(values: dict[str, Any], form: str) -> str:
-    width = max((len(name) for name in values), default=0)
-    return "\n".join(f"{name:<{width}}  {form.format(v)}" for name, v in values.items()) or "none"
+def _placements(minima: list[dict[str, Any]]) -> tuple[tuple[str, ...], ...]:
+    rows: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (
+        ("heading of A (deg)", lambda m: f"{m['heading_deg'][0]:.6f}"),
+        ("heading of B (deg)", lambda m: f"{m['heading_deg'][1]:.6f}"),
+        ("azimuth of A (deg)", lambda m: f"{m['azimuth_deg'][0]:.6f}"),
+        ("azimuth of B (deg)", lambda m: f"{m['azimuth_deg'][1]:.6f}"),
+        ("axial gap (mm)", lambda m: f"{m['axial_gap']:.6f}"),
+        ("height (mm)", lambda m: f"{m['height']:.9f}"),
+        ("minimum", lambda m: "yes" if m["is_minimum"] else "no"),
+        ("(p, q, r)", lambda m: "({}, {}, {})".format(*m["signature"])),
+        ("infeasibility", lambda m: f"{m['residuals']['infeasibility']:.1e}"),
+        ("stationarity", lambda m: f"{m['residuals']['stationarity']:.1e}"),
+        ("complementarity", lambda m: f"{m['residuals']['complementarity']:.1e}"),
+    )
+    return tuple((label, *map(shown_as, minima)) for label, shown_as in rows)
+
+
+def _union(minima: list[dict[str, Any]], key: str, form: str) -> tuple[tuple[str, ...], ...]:
+    """Return a row for each name that any of the minima has under a key."""
+    names = dict.fromkeys(name for m in minima for name in m[key])
+    return tuple(
+        (name, *(form.format(m[key][name]) if name in m[key] else "-" for m in minima))
+        for name in names
+    )

@@ -2,67 +2,88 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
-from polycorner.atomic import write_atomically
-from polycorner.cli.common import (
+from polycorner.cli.options import command, examples, option, output_options
+from polycorner.cli.output import (
+    columns,
     deliver,
     fail,
     json_text,
-    output_options,
-    patience,
     prepare,
-    progress_bar,
-    settings_option,
+    verbosity,
+    working,
     writing,
 )
-from polycorner.cli.manner import manner, timed
+from polycorner.dumbbells.cli.paper_names import check_names, claim_ids, figure_names, sections
 
 if TYPE_CHECKING:
     from paper_checks.framework.running import Run
 
-EPILOG = """\b
-Examples:
-  polycorner paper
-  polycorner paper E4 L5 --out out
-  polycorner paper --section 6 --section C --json
-  polycorner paper --slow --out out
-  polycorner paper figures heading solid --out out
-Exit code 0 when every check ran, whatever it found; 1 when a check broke.
-Ctrl-C keeps what was found and says what was not run (exit code 130).
-`python -m paper_checks` is the same command.
+EPILOG = (
+    examples(
+        "paper",
+        "paper --list",
+        "paper E4 L5 --out out",
+        "paper --section 6 --section C --json",
+        "paper --slow --out out",
+        "paper figures heading_length solid --out out",
+    )
+    + """
+Exit code 0 if every check ran, whatever it found; 1 if a check failed to run.  Ctrl-C keeps what
+was found and names what was not run (exit code 130).  `python -m paper_checks` is the same command.
 """
+)
 FIGURES = "figures"
 
 
-@click.command(epilog=EPILOG)
-@click.argument("words", nargs=-1, metavar="[ID]... | figures [NAME]...")
-@click.option(
-    "--section", "sections", multiple=True, metavar="S",
-    help="Claims of a section of the paper, 2 to 8, A, B or C; may be given several times.",
+def _completed(
+    context: click.Context, parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    del parameter
+    words = context.params.get("words") or ()
+    known = figure_names() if words[:1] == (FIGURES,) else [*claim_ids(), FIGURES]
+    return [CompletionItem(name) for name in known if name.startswith(incomplete)]
+
+
+@command(epilog=EPILOG)
+@click.argument("words", nargs=-1, metavar="[ID]... | figures [NAME]...", shell_complete=_completed)
+@option(
+    "--section", "chosen", multiple=True, metavar="S", group="Claims",
+    help="Claims of a section of the paper, 2 to 8, A, B or C; repeat for several.",
 )  # fmt: skip
-@click.option("--slow", is_flag=True, help="Also what takes long: simulations, for minutes.")
-@click.option(
-    "--workers", type=click.IntRange(1, 64), default=2, show_default=True, help="Processes."
-)
-@settings_option
+@option("--slow", is_flag=True, group="Claims", help="Also run simulations of several minutes.")
+@option("--list", "listing", is_flag=True, group="Claims", help="List the claims, check nothing.")
+@option(
+    "--workers", type=click.IntRange(1, 64), default=2, group="Claims",
+    help="Number of processes.",
+)  # fmt: skip
 @output_options
 def paper(
-    words: tuple[str, ...], sections: tuple[str, ...], slow: bool, workers: int, as_json: bool,
-    out: Path | None,
+    words: tuple[str, ...], chosen: tuple[str, ...], slow: bool, listing: bool, workers: int,
+    as_json: bool, out: Path | None,
 ) -> None:  # fmt: skip
-    """Check the statements of the paper, or draw its figures anew.
+    """Check the statements of the paper, or draw its figures.
 
-    Without arguments every claim is checked that does not take long; the folder of --out gets a
+    Without arguments every claim is checked that does not take long.  The folder of --out gets a
     report to read, report.html, and report.json.  With --quiet the table is the counts alone.
     """
-    prepare(out)
     if words[:1] == (FIGURES,):
-        _draw(words[1:], out, sections, slow=slow, as_json=as_json)
+        known = figure_names()
+        check_names(f"figures: expected {', '.join(known)}", words[1:], known)
+        _draw(words[1:], out, chosen, slow=slow, as_json=as_json)
         return
-    run = _checked(words, sections, slow=slow, workers=workers)
+    check_names("ID: expected a claim that --list shows", words, claim_ids())
+    known = sections()
+    check_names(f"--section: expected one of {', '.join(known)}", chosen, known)
+    if listing:
+        _list(words, chosen, as_json=as_json)
+        return
+    prepare(out)
+    run = _checked(words, chosen, slow=slow, workers=workers)
     from paper_checks.framework import table
     from paper_checks.framework.records import records
 
@@ -75,8 +96,10 @@ def paper(
         undrawn.extend(found)
         return written
 
-    shown = records(run)
-    deliver(shown, lambda: table.print_run(run, quiet=manner().quiet), write, as_json=as_json)
+    def text() -> str:
+        return table.run_text(run, quiet=verbosity().quiet, width=columns())
+
+    deliver(records(run), text, write, as_json=as_json)
     problems = [*table.problems(run), *undrawn]
     for problem in problems:
         click.echo(f"polycorner: {problem}", err=True)
@@ -84,20 +107,52 @@ def paper(
         raise click.exceptions.Exit(130 if run.missed else 1)
 
 
-def _checked(ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers: int) -> "Run":
+def _list(ids: Sequence[str], chosen: Sequence[str], *, as_json: bool) -> None:
+    from paper_checks import CLAIMS
+    from paper_checks.framework.running import select
+    from paper_checks.framework.typesetting import plain, sentence
+
+    claims, _ = select(CLAIMS, chosen, ids, slow=True)
+    answer: list[dict[str, Any]] = [
+        {
+            "id": claim.id,
+            "section": claim.section,
+            "means": claim.means.value,
+            "slow": claim.slow,
+            "claim": claim.statement,
+        }
+        for claim in claims
+    ]
+
+    def text() -> str:
+        from polycorner.printing import Table
+
+        rows = (
+            (
+                row["id"],
+                row["section"],
+                row["means"] + (", slow" if row["slow"] else ""),
+                plain(sentence(row["claim"])),
+            )
+            for row in answer
+        )
+        return Table(("id", "section", "means", "claim"), tuple(rows)).text(columns())
+
+    deliver(answer, text, as_json=as_json)
+
+
+def _checked(ids: Sequence[str], chosen: Sequence[str], *, slow: bool, workers: int) -> "Run":
     from dataclasses import replace
 
     from paper_checks import CLAIMS
     from paper_checks.framework.running import run, select
 
-    try:
-        claims, left_out = select(CLAIMS, sections, ids, slow=slow)
-    except ValueError as error:
-        message = str(error)
-        fail(f"--{message}" if message.startswith("section") else message)
-    words = f"{len(claims)} to be checked"
-    with timed(words), progress_bar("checked", total=len(claims)) as change:
-        told = change and (lambda done, ids: change(completed=done, note=", ".join(ids)))
+    claims, left_out = select(CLAIMS, chosen, ids, slow=slow)
+    with working(f"checking {len(claims)} claims", "claims") as progress:
+
+        def told(done: int, ids: Sequence[str]) -> None:
+            progress(done, len(claims), ", ".join(ids))
+
         return replace(run(claims, workers=workers, progress=told), slow=left_out)
 
 
@@ -105,12 +160,13 @@ def _checked(ids: Sequence[str], sections: Sequence[str], *, slow: bool, workers
 
 
 def _write(run: "Run", out: Path, *, slow: bool) -> tuple[list[Path], list[str]]:
-    """Write the report and return its files, and why figures of it could not be drawn."""
+    """Write the report; return its files, and the reasons why figures could not be drawn."""
     from paper_checks.figures.embedding import embedded_figures
     from paper_checks.framework.records import markdown, records
     from paper_checks.framework.report import html_report
+    from polycorner.atomic import write_atomically
 
-    with patience("drawing the figures"):
+    with working("drawing the figures"):
         figures = embedded_figures(run, slow=slow)
     texts = {
         "report.html": html_report(run, figures),
@@ -125,27 +181,24 @@ def _write(run: "Run", out: Path, *, slow: bool) -> tuple[list[Path], list[str]]
 
 
 def _draw(
-    names: tuple[str, ...], out: Path | None, sections: Sequence[str],
+    names: tuple[str, ...], out: Path | None, chosen: Sequence[str],
     *, slow: bool, as_json: bool,
 ) -> None:  # fmt: skip
+    if out is None:
+        fail("figures: expected --out DIR, the folder they go to; got none")
+    if chosen:
+        fail(f"--section: expected none beside figures; got {chosen[0]}")
+    prepare(out)
     from paper_checks.figures import FIGURES as KNOWN
     from paper_checks.figures import write
 
-    if out is None:
-        fail("figures: expected --out DIR, the folder they go to; got none")
-    if sections:
-        fail("--section: expected none beside figures; got one")
-    for name in names:
-        if name not in KNOWN:
-            fail(f"figures: expected {', '.join(KNOWN)}; got {name!r}")
     drawn: list[str] = []
     total = len(names or [f for f in KNOWN.values() if slow or not f.slow])
-    with writing(out), timed(f"{total} to be drawn"), progress_bar("drawn", total=total) as change:
+    with writing(out), working("drawing", "figures") as progress:
 
-        def progress(name: str) -> None:
+        def told(name: str) -> None:
             drawn.append(name)
-            if change is not None:
-                change(completed=len(drawn))
+            progress(len(drawn), total, name)
 
-        written = write(out, names or None, slow=slow, progress=progress)
-    deliver([str(path) for path in written], lambda: None, lambda: written, as_json=as_json)
+        written = write(out, names or None, slow=slow, progress=told)
+    deliver([str(path) for path in written], str, lambda: written, as_json=as_json)

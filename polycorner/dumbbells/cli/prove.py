@@ -1,68 +1,77 @@
-"""``polycorner prove``: a place of rest of the pair, proved in interval arithmetic."""
+"""``polycorner prove``: a minimum of the pair, proved in interval arithmetic."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import (
+from polycorner.cli.options import command, examples, option, output_options
+from polycorner.cli.output import (
     deliver,
     fail,
-    output_options,
-    patience,
     prepare,
+    shown,
+    working,
     write_answer,
     writing,
 )
-from polycorner.dumbbells.cli.options import chosen_pair, pair_settings, parameters
+from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
+    from polycorner.printing import Sheet
     from polycorner.proofs.proof import Proof
 
-EPILOG = """\b
-Examples:
-  polycorner prove
-  polycorner prove --drum inf --digits 100 --json
-  polycorner prove --box t=1.2:1.8 --box l=14:18 --out out
-"""
-WORDS = "proving (a box of parameters can take minutes)"
-# Parameters that formulas contain as they are; the others enter through R - r.
+EPILOG = examples(
+    "prove", "prove --drum inf --digits 100 --json", "prove --box t=1.49:1.51 --box l=15.9:16.1"
+)
+# Parameters that stand in the formulas; the others enter through R - r.
 BOXES = {"l": "l", "length": "l", "t": "t", "rod": "t"}
 UNITS = {"l": "length l (mm)", "t": "rod radius t (mm)"}
 
 
-@click.command(epilog=EPILOG)
-@pair_settings
-@click.option("--digits", type=int, default=30, help="Significant digits, 1 to 10000. [30]")
-@click.option(
+@command(epilog=EPILOG)
+@pair_options
+@option(
+    "--digits",
+    type=click.IntRange(1, 10_000),
+    default=30,
+    group="Proof",
+    help="Significant digits.",
+)
+@option(
     "--box",
     "boxes",
     multiple=True,
     metavar="NAME=LOW:HIGH",
-    help="Prove it for all t or l in an interval; may be given for both.",
+    group="Proof",
+    help="Prove it for all rod radii t or lengths l in an interval, mm; repeat for both.",
 )
-@click.option(
+@option(
     "--minimum",
     type=click.Choice(["delta_R", "delta_L", "G"]),
     default="delta_R",
-    help="Which place of rest. [delta_R]",
+    group="Proof",
+    help="The minimum to prove.",
 )
 @output_options
 def prove(
     digits: int, boxes: tuple[str, ...], minimum: str, as_json: bool, out: Path | None,
-    **options: float | None,
+    **options: float,
 ) -> None:  # fmt: skip
-    """Prove that a place of rest is a local minimum, and enclose it."""
-    pair = chosen_pair(None, options)
+    """Prove that a point is a local minimum, and enclose it.
+
+    A box of parameters can take minutes.
+    """
+    pair = chosen_pair(options)
     region = _region(boxes)
     prepare(out)
-    with patience(WORDS):
+    with working("proving"):
         from polycorner.dumbbells import dyad_minima
-        from polycorner.proofs.proof import prove as established
+        from polycorner.proofs.proof import prove as proved
 
         (entry,) = [found for found in dyad_minima(pair) if found.name == minimum]
         try:
-            proof = established(entry.certificate, digits=digits, parameters=region or None)
+            proof = proved(entry.certificate, digits=digits, parameters=region or None)
         except ValueError as error:
             fail(f"--{error}" if str(error).startswith("digits") else f"--box: {error}")
         answer = {
@@ -75,15 +84,23 @@ def prove(
     def write() -> list[Path]:
         return [] if out is None else _write(proof, answer, out)
 
-    deliver(answer, lambda: _print(answer, proof), write, as_json=as_json)
+    deliver(answer, lambda: shown(_sheet(answer, proof)), write, as_json=as_json)
 
 
-def _print(answer: dict[str, Any], proof: "Proof") -> None:
-    click.echo(f"{answer['minimum']}\n{proof}")
-    for angle in ("theta1", "theta2"):
-        if f"{angle}_deg" in answer["enclosures"]:
-            lower, upper = answer["enclosures"][f"{angle}_deg"]
-            click.echo(f"{angle} in degrees: [{lower}, {upper}]")
+def _sheet(answer: dict[str, Any], proof: "Proof") -> "Sheet":
+    from polycorner.printing import Sheet, Table
+    from polycorner.proofs.report import proof_sheet
+
+    degrees = Table(
+        ("angle in degrees", "lower bound", "upper bound"),
+        tuple(
+            (angle, *answer["enclosures"][f"{angle}_deg"])
+            for angle in ("theta1", "theta2")
+            if f"{angle}_deg" in answer["enclosures"]
+        ),
+        (1, 2),
+    )
+    return Sheet(answer["minimum"], (*proof_sheet(proof).parts, degrees))
 
 
 def _region(boxes: tuple[str, ...]) -> dict[str, tuple[float, float]]:

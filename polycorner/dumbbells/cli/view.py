@@ -1,4 +1,4 @@
-"""``polycorner view``: a page to play with in the browser, served on this machine only."""
+"""``polycorner view``: pages for the browser, served on this machine only."""
 
 import importlib.util
 import math
@@ -8,30 +8,38 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.common import fail, patience, writing
-from polycorner.cli.manner import Command, manner, manner_options, remark
-from polycorner.dumbbells.cli.options import chosen_pair, pair_settings
+from polycorner.cli.options import (
+    Command,
+    GroupedCommand,
+    config_option,
+    examples,
+    option,
+    verbosity_options,
+)
+from polycorner.cli.output import fail, remark, verbosity, working, writing
+from polycorner.dumbbells.cli.options import GROUP, chosen_pair, pair_options
 
 if TYPE_CHECKING:
     from tornado.web import Application
 
 PORT = 8760
 HOST = "127.0.0.1"
-WORDS = "getting ready (the first run on a machine compiles for about 20 seconds)"
+WORDS = "preparing the page"
 EXAMPLES = {
-    "dyad": "polycorner view dyad --rod 1 --drum inf --port 9000 --no-browser",
-    "atlas": "polycorner view atlas --drum inf --out atlas.html",
-    "trajectory": "polycorner view trajectory out/trajectory.nc",
+    "dyad": "view dyad --rod 1 --drum inf --port 9000 --no-browser",
+    "atlas": "view atlas --drum inf --out atlas.html",
+    "trajectory": "view trajectory out/trajectory.nc",
 }
 
 
 def _epilog(*names: str) -> str:
-    lines = "\n".join(f"  {EXAMPLES[name]}" for name in names)
-    return f"\b\nExamples:\n{lines}\nCtrl-C ends the server (exit code 0)."
+    return examples(*(EXAMPLES[name] for name in names)) + "Ctrl-C ends the server (exit code 0)."
 
 
 class _Group(click.Group):
-    """A group whose first subcommand is meant where none is named."""
+    """A group whose subcommand is ``dyad`` unless one is named."""
+
+    command_class = GroupedCommand
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names):
@@ -41,53 +49,59 @@ class _Group(click.Group):
 
 @click.group(cls=_Group, epilog=_epilog(*EXAMPLES))
 def view() -> None:
-    """Show a pair, its atlas or a recorded motion on a page in the browser; default dyad."""
+    """Show a pair, its atlas or a recorded motion in the browser; dyad by default."""
 
 
-def serving_options(command: Command) -> Command:
-    """Add ``--port``, ``--host``, ``--no-browser``, ``--quiet`` and ``--verbose``."""
-    for option in (
-        click.option("--no-browser", is_flag=True, help="Print the address and open nothing."),
-        click.option("--host", default=HOST, help=f"Address to listen on. [{HOST}]"),
-        click.option(
-            "--port", type=click.IntRange(0, 65535), default=PORT,
-            help=f"Port; 0 is any that is free. [{PORT}]",
+def serving_options(function: Command) -> Command:
+    """Add ``--port``, ``--host``, ``--no-browser`` and the general options."""
+    for add in (
+        option(
+            "--no-browser", is_flag=True, group="Server", help="Print the address, open nothing."
+        ),
+        option("--host", default=HOST, group="Server", help="Address to listen on."),
+        option(
+            "--port", type=click.IntRange(0, 65535), default=PORT, group="Server",
+            help="Port; 0 for any that is free.",
         ),
     ):  # fmt: skip
-        command = option(command)
-    return manner_options(command)
+        function = add(function)
+    return verbosity_options(config_option(function))
 
 
-out_option = click.option(
+out_option = option(
     "--out",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Write this file instead, .html or .glb, and serve nothing.",
+    metavar="FILE",
+    group="Output",
+    help="Write this file, .html or .glb, and serve nothing.",
 )
 
 
 @view.command(epilog=_epilog("dyad"))
-@pair_settings
+@pair_options
 @serving_options
-def dyad(port: int, host: str, no_browser: bool, **options: float | None) -> None:
-    """Sliders for two dumbbells, and what the library says of them at once."""
-    pair = chosen_pair(None, options)
+def dyad(port: int, host: str, no_browser: bool, **options: float) -> None:
+    """Show two dumbbells with sliders: energy, gaps, headings and descents."""
+    pair = chosen_pair(options)
     _serve(lambda: _viewer().live_application(pair, host), host, port, browser=not no_browser)
 
 
 @view.command(epilog=_epilog("atlas"))
-@pair_settings
-@click.option("--heading", type=float, default=0.0, help="Mean heading in the drum, degrees. [0]")
+@pair_options
+@option(
+    "--heading", type=float, default=0.0, help="Mean heading in the drum, degrees.", group=GROUP
+)
 @out_option
 @serving_options
 def atlas(
     heading: float, out: Path | None, port: int, host: str,
-    no_browser: bool, **options: float | None,
+    no_browser: bool, **options: float,
 ) -> None:  # fmt: skip
-    """Show the forbidden solid of two dumbbells with its edges and corners."""
-    pair = chosen_pair(None, options)
+    """Show the solid of overlapping placements with its edges and corners."""
+    pair = chosen_pair(options)
     if not math.isfinite(heading):
         fail(f"--heading: expected an angle in degrees; got {heading:g}")
-    with patience(WORDS):
+    with working(WORDS):
         from polycorner.dumbbells.pictures import scenes
         from polycorner.dumbbells.statics.skeleton import pair_atlas
         from polycorner.dumbbells.viewer import page as scene_page
@@ -104,13 +118,13 @@ def atlas(
 @out_option
 @serving_options
 def trajectory(file: Path, out: Path | None, port: int, host: str, no_browser: bool) -> None:
-    """Play a motion in the drum that ``polycorner drum --out`` wrote."""
+    """Play a motion in the drum, FILE being written by polycorner drum --out."""
     from polycorner.dumbbells.dynamics.files import load_run
 
     try:
         run = load_run(file)
     except (OSError, ValueError, KeyError) as error:
-        fail(f"FILE: expected a trajectory as of polycorner drum --out; got {file} ({error})")
+        fail(f"FILE: expected a trajectory written by polycorner drum --out; got {file} ({error})")
     from polycorner.dumbbells.pictures import film as scene_film
     from polycorner.dumbbells.pictures import scenes
     from polycorner.dumbbells.viewer import page as scene_page
@@ -141,27 +155,29 @@ def _deliver(
             scene_page.write_page(page(), out)
         else:
             scenes.write_scene(scene(), out)
-    if not manner().quiet:
+    if not verbosity().quiet:
         click.echo(f"wrote {out}")
 
 
 def _viewer() -> Any:
-    """Return the pages that are served, whose library is an extra."""
+    """Return the module of the pages, which needs an extra."""
     from polycorner.dumbbells.viewer import applications
 
     return applications
 
 
-def _serve(made: "Callable[[], Application]", host: str, port: int, *, browser: bool) -> None:
-    """Take the port, get the pages ready, and serve until Ctrl-C."""
+def _serve(make: "Callable[[], Application]", host: str, port: int, *, browser: bool) -> None:
+    """Bind the port, prepare the pages and serve them until Ctrl-C."""
     if importlib.util.find_spec("tornado") is None:
-        fail("expected tornado to be installed, as by pip install 'polycorner[view]'; got none")
+        from polycorner.checks import missing_extra
+
+        fail(str(missing_extra("tornado", "view")))
     from polycorner.dumbbells.viewer import server as viewer_server
 
     def ready(address: str) -> None:
         click.echo(f"{address}   (Ctrl-C ends)")
         if host not in (HOST, "localhost", "::1"):
-            remark(f"others on the network can reach {host}")
+            remark(f"{host} can be reached from the network")
         if browser:
             click.launch(address)
 
@@ -172,6 +188,6 @@ def _serve(made: "Callable[[], Application]", host: str, port: int, *, browser: 
     except OSError as error:
         fail(f"--host: {host} cannot be listened on ({error.strerror or error})")
     with listener:
-        with patience(WORDS):
-            application = made()
+        with working(WORDS):
+            application = make()
         viewer_server.serve(application, listener, ready)

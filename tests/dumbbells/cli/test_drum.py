@@ -255,7 +255,7 @@ def test_a_stopped_run_goes_on(capsys, tmp_path, how):
     assert process.returncode == (130 if how is signal.SIGINT else -how)
     if how is signal.SIGINT:
         assert json.loads(said)["finished"] is False
-        assert "--resume goes on" in err
+        assert "--resume continues it" in err
         assert not load_run(out / "trajectory.nc").finished
     code, said, _ = run(capsys, *LONG, "--out", str(out), "--resume")
     assert code == 0

@@ -99,8 +99,9 @@ def test_figures(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("--section", "9"), "--section: expected one of 2, 3, 4, 5, 6, 7, 8, A, B, C; got '9'"),
-        (("X1",), "id: expected one such as G1a or L7b; got 'X1'"),
+        (("--section", "9"), "--section: expected one of 2, 3, 4, 5, 6, 7, 8, A, B, C; got 9"),
+        (("X1",), "ID: expected a claim that --list shows; got X1"),
+        (("e4",), "ID: expected a claim that --list shows; got e4 (did you mean E4?)"),
         (("figures",), "figures: expected --out DIR, the folder they go to; got none"),
         (("--workers", "0"), "Invalid value for '--workers': 0 is not in the range 1<=x<=64."),
     ],
@@ -112,7 +113,10 @@ def test_mistakes_get_one_line(capsys, arguments, sentence):
 def test_mistakes_with_figures_and_folders(capsys, tmp_path):
     out = ("--out", str(tmp_path))
     code, _, err = run(capsys, "figures", "nosuch", *out)
-    assert (code, err) == (2, f"polycorner: figures: expected {', '.join(FIGURES)}; got 'nosuch'\n")
+    assert (code, err) == (
+        2,
+        f"polycorner: figures: expected {', '.join(sorted(FIGURES))}; got nosuch\n",
+    )
     code, _, err = run(capsys, "figures", "--section", "2", *out)
     assert (code, err.count("\n")) == (2, 1)
     (tmp_path / "file").touch()

@@ -1,0 +1,116 @@
+"""Searches for an atlas: saved, interrupted, resumed, and shown as they go."""
+
+import json
+import re
+import subprocess
+
+import pytest
+from atlas_commands import answer, on_terminal, run, started
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_cache(tmp_path_factory):
+    """Keep unfinished searches, and compiled kernels, away from the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.mark.parametrize(
+    ("arguments", "budget"),
+    [
+        (("tutorial",), 3),
+        (("spheres", "--count", "6"), 2),
+        (("dyad", "--plane"), 15),
+        (("dyad", "--heading", "20", "--drum", "60", "--length", "20"), 20),
+    ],
+    ids=str,
+)
+def test_parts_add_up_to_the_whole(arguments, budget):
+    whole = answer(*arguments)
+    code, out, err = run(*arguments, "--budget", str(budget), "--json")
+    part, edges = json.loads(out), 0
+    while part["complete"] != "exhausted":
+        edges += budget
+        assert (code, part["complete"], len(part["edges"])) == (0, "budget", edges)
+        assert re.fullmatch(r"polycorner: unfinished, kept in \S+; --resume continues it\n", err)
+        code, out, err = run(*arguments, "--budget", str(budget), "--resume", "--json")
+        part = json.loads(out)
+    assert edges
+    assert part == whole
+    code, out, err = run(*arguments, "--resume")
+    assert (code, out) == (2, "")
+    assert err.startswith("polycorner: --resume: expected an unfinished search")
+
+
+def test_a_folder_keeps_its_own_search(tmp_path):
+    code, _, err = run("spheres", "--budget", "2", "--out", str(tmp_path))
+    assert code == 0
+    assert str(tmp_path) in err
+    assert json.loads((tmp_path / "atlas.json").read_text())["complete"] == "budget"
+    code, _, err = run("spheres", "--resume")
+    assert (code, "--resume" in err) == (2, True)
+    code, _, err = run("spheres", "--resume", "--out", str(tmp_path))
+    assert (code, err) == (0, "")
+    assert json.loads((tmp_path / "atlas.json").read_text()) == answer("spheres")
+    assert {path.name for path in tmp_path.iterdir()} == {"atlas.json", "clusters.png"}
+
+
+OTHERS = {
+    ("spheres", "--count", "5"): ("spheres", "--count", "6"),
+    ("dyad", "--plane"): ("dyad", "--plane", "--length", "20"),
+    ("tutorial",): ("pinball",),
+    ("tutorial", "--seed", "0"): ("tutorial", "--seed", "1"),
+}
+
+
+@pytest.mark.parametrize("folder", [False, True], ids=["cache", "folder"])
+@pytest.mark.parametrize("one", OTHERS, ids=" ".join)
+def test_only_the_same_search_goes_on(tmp_path, one, folder):
+    where = ("--out", str(tmp_path)) if folder else ()
+    code, _, err = run(*one, "--budget", "1", *where)
+    assert (code, "unfinished" in err) == (0, True)
+    code, out, err = run(*OTHERS[one], "--resume", *where)
+    assert (code, out) == (2, "")
+    assert err.startswith("polycorner: --resume: ")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", "{}", '{"polycorner atlas": 1}', "\x00\xff"])
+def test_a_damaged_search_is_refused(tmp_path, content):
+    run("tutorial", "--budget", "1", "--out", str(tmp_path))
+    (state,) = tmp_path.glob("*state*")
+    state.write_text(content, encoding="latin-1")
+    code, out, err = run("tutorial", "--resume", "--out", str(tmp_path))
+    assert (code, out) == (2, "")
+    assert err.startswith("polycorner: --resume: ")
+    assert err.count("\n") == 1
+
+
+def test_ctrl_c_keeps_what_was_found():
+    """Nine spheres take long; the bar tells when there is something to interrupt."""
+    search = ("spheres", "--count", "9", "--json")
+    code, out, shown = on_terminal(*search, interrupt_at=r"[1-9]\d* of \d+ edges")
+    found = json.loads(out)
+    assert (code, found["complete"]) == (130, "interrupted")
+    assert found["edges"]
+    assert "unfinished, kept in" in shown
+    process = started(*search, "--resume", "--budget", "3", stderr=subprocess.PIPE)
+    out, err = process.communicate(timeout=300)
+    later = json.loads(out)
+    assert (process.returncode, later["complete"]) == (0, "budget")
+    assert len(later["edges"]) == len(found["edges"]) + 3
+    assert later["edges"][: len(found["edges"])] == found["edges"]
+    known = [corner["point"] for corner in found["corners"]]
+    assert [corner["point"] for corner in later["corners"][: len(known)]] == known
+    assert err.count("\n") == 1
+
+
+def test_a_terminal_shows_progress_and_a_pipe_does_not():
+    code, out, shown = on_terminal("spheres", "--count", "6", "--json")
+    assert code == 0
+    assert json.loads(out)["complete"] == "exhausted"
+    assert re.search(r"searching spheres .* \d+ of \d+ edges, .*2 corners", shown)
+    process = started("spheres", "--count", "6", "--json", stderr=subprocess.PIPE)
+    piped, err = process.communicate(timeout=300)
+    assert (process.returncode, piped, err) == (0, out, "")
