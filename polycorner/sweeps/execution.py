@@ -119,15 +119,15 @@ def sweep(
 def _compute(table: Table, job: Job, executor: Any, retry: bool, progress: Progress) -> bool:
     """Compute the missing points, until Ctrl-C; return whether all are finished."""
     grid, stop = table.study.grid, threading.Event()
-    reported = -1
+    reported = (-1, -1)
 
     def record(outcomes: list[Outcome]) -> None:
         nonlocal reported
         table.add(outcomes)
-        failed = table.failed
-        if table.done + failed != reported or outcomes:
-            reported = table.done + failed
-            progress(reported, grid.size, f"{failed} failed" if failed else "")
+        done, failed = table.done, table.failed
+        if (done, failed) != reported:
+            reported = (done, failed)
+            progress(done + failed, grid.size, f"{failed} failed" if failed else "")
 
     record([])
     if table.done + (0 if retry else table.failed) == grid.size:

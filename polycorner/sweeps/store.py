@@ -14,8 +14,7 @@ file appears whole or not at all, and the status last: what has a status is ther
 import json
 import math
 import os
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from importlib.util import find_spec
@@ -23,11 +22,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.checks import missing_extra
 from polycorner.sweeps.checksums import ROOT, check_store, checked_root, write_root
 from polycorner.sweeps.grid import Axis, Grid
-from polycorner.sweeps.points import Column, Outcome
+from polycorner.sweeps.points import Column
 from polycorner.sweeps.study import Study, SweepError, difference, versions
 from polycorner.sweeps.tables import (
     Table,
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 POINTS = 4096  # in a chunk, at most
 BYTES = 4 << 20  # in a chunk, at most, unless one point has more
-SHARE = 0.05  # of the time, for writing
 
 
 class Store(Table):
@@ -69,8 +68,7 @@ class Store(Table):
         from filelock import FileLock, Timeout
 
         super().__init__(study)
-        self.path, self.waiting = path, list[Outcome]()
-        self.cost, self.written = 0.0, -math.inf
+        self.path = path
         self.present: list[str] = []  # names of the arrays on disk
         check_study(path, study)
         with self._writing():
@@ -102,10 +100,14 @@ class Store(Table):
                 self._create(new, new.shape)
                 self.arrays[new.name][...] = new.fill
         self.create()
-        self.status = np.asarray(self.arrays["status"][...]).reshape(-1)
+        self.set_status(np.asarray(self.arrays["status"][...]).reshape(-1))
 
     def create(self) -> None:
         """Make the arrays that do not exist yet; they count once the root lists them."""
+        with self._writing():
+            self._create_missing()
+
+    def _create_missing(self) -> None:
         import zarr
 
         for new in variables(self.study.grid, self.columns):
@@ -137,31 +139,13 @@ class Store(Table):
         )
         self.arrays[new.name] = array
 
-    def add(self, outcomes: Sequence[Outcome]) -> None:
-        """Take the outcomes of points, and write what waits when it is time."""
-        with self._writing():
-            self.waiting += [self.fitting(outcome) for outcome in outcomes]
-            if time.monotonic() - self.written > self.cost / SHARE:
-                self.flush()
-
-    def flush(self) -> None:
-        """Write all rows that wait."""
-        if self.waiting:
-            start = time.monotonic()
-            with self._writing():
-                self.write(self.waiting)
-            self.waiting.clear()
-            self.written = time.monotonic()
-            self.cost = self.written - start
-
-    def write(self, outcomes: Sequence[Outcome]) -> None:
-        """Write rows into the chunks."""
-        self._note_start()
-        numbers, rows = self.rows(outcomes)
+    def write(self, numbers: NDArray[np.int64], rows: Mapping[str, Any]) -> None:
+        """Write rows into the chunks, the status last."""
         index = np.stack(np.unravel_index(numbers, self.study.grid.shape), axis=1)
-        for name, values in rows.items():
-            self._write_points(name, index, values)
-        self.status[numbers] = rows["status"]
+        with self._writing():
+            self._note_start()
+            for name, values in rows.items():
+                self._write_points(name, index, values)
 
     def _note_start(self) -> None:
         """Note, before rows are written, that the study is unfinished and which versions work."""

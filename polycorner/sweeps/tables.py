@@ -1,7 +1,8 @@
 """Tables of results: a row for every point of a grid, kept in memory."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 PENDING, DONE, FAILED = 0, 1, 2
 BLOCK = 4096  # points whose status is looked up at a time
+SHARE = 0.05  # of the time, for writing
 TEXT = np.dtypes.StringDType()
 
 
@@ -87,18 +89,24 @@ class Table:
     def __init__(self, study: Study) -> None:
         self.study, self.complete = study, "unfinished"
         self.columns: tuple[Column, ...] = ()
-        self.status = np.zeros(study.grid.size, dtype=np.int8)
         self.arrays: dict[str, Any] = {}  # of NumPy or zarr
+        self.waiting: list[Outcome] = []  # to be written
+        self.written, self.cost = -math.inf, 0.0  # s: when rows were written, and how long it took
+        self.set_status(np.zeros(study.grid.size, dtype=np.int8))
+
+    def set_status(self, status: NDArray[np.int8]) -> None:
+        """Take the states of all points, and count them."""
+        self.status, self.counts = status, np.bincount(status, minlength=3)
 
     @property
     def done(self) -> int:
         """Number of points that are done."""
-        return int((self.status == DONE).sum())
+        return int(self.counts[DONE])
 
     @property
     def failed(self) -> int:
         """Number of points that failed."""
-        return int((self.status == FAILED).sum())
+        return int(self.counts[FAILED])
 
     def missing(self, *, retry: bool) -> Iterator[int]:
         """Yield the points that are still to be computed; with ``retry`` the failed ones as well.
@@ -111,8 +119,23 @@ class Table:
             yield from (start + np.flatnonzero(wanted)).tolist()
 
     def add(self, outcomes: Sequence[Outcome]) -> None:
-        """Take the outcomes of points."""
-        self.write([self.fitting(outcome) for outcome in outcomes])
+        """Take the outcomes of points, and write what waits when it is time."""
+        self.waiting += [self.fitting(outcome) for outcome in outcomes]
+        if time.monotonic() - self.written > self.cost / SHARE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write all rows that wait."""
+        if self.waiting:
+            start = time.monotonic()
+            self.create()
+            numbers, rows = self.rows(self.waiting)
+            self.write(numbers, rows)
+            self.status[numbers] = rows["status"]
+            self.set_status(self.status)
+            self.waiting.clear()
+            self.written = time.monotonic()
+            self.cost = self.written - start
 
     def fitting(self, outcome: Outcome) -> Outcome:
         """Return an outcome with the columns of the study, or a failure that names both.
@@ -140,15 +163,11 @@ class Table:
             if new.name not in self.arrays:
                 self.arrays[new.name] = np.full(new.shape, new.fill, dtype=new.dtype)
 
-    def write(self, outcomes: Sequence[Outcome]) -> None:
-        """Write rows."""
-        if outcomes:
-            self.create()
-            numbers, rows = self.rows(outcomes)
-            index = np.unravel_index(numbers, self.study.grid.shape)
-            for name, values in rows.items():
-                self.arrays[name][index] = values
-            self.status[numbers] = rows["status"]
+    def write(self, numbers: NDArray[np.int64], rows: Mapping[str, Any]) -> None:
+        """Write the values of every array at some points."""
+        index = np.unravel_index(numbers, self.study.grid.shape)
+        for name, values in rows.items():
+            self.arrays[name][index] = values
 
     def rows(self, outcomes: Sequence[Outcome]) -> tuple[NDArray[np.int64], dict[str, Any]]:
         """Return the numbers of points and the values of every array there."""
@@ -165,11 +184,9 @@ class Table:
             found["status"][row] = FAILED if outcome.message else DONE
         return np.array([outcome.number for outcome in outcomes]), found
 
-    def flush(self) -> None:
-        """Write rows that wait; in memory none does."""
-
     def close(self, *, complete: str) -> None:
         """Note how the study ended: "finished" or "interrupted"."""
+        self.flush()
         self.complete = complete
 
     def dataset(self) -> "xr.Dataset":

@@ -176,7 +176,7 @@ def test_stopped_anywhere_the_same_call_comes_to_the_same(tmp_path, monkeypatch,
     """Whatever was reported as finished is not computed again."""
     log, whole, reported = tmp_path / "log", drawn(None, tmp_path / "other"), [0]
     with monkeypatch.context() as patch:
-        patch.setattr("polycorner.sweeps.store.SHARE", 1e9)  # rows are written after every point
+        patch.setattr("polycorner.sweeps.tables.SHARE", 1e9)  # rows are written after every point
         stopping(at, patch, Store, name, after=after)
         unsettled(patch)
         with pytest.raises(Stop):
@@ -200,7 +200,7 @@ def test_a_full_disk_is_said_and_room_lets_the_study_go_on(tmp_path, monkeypatch
         return real(*arguments) if len(calls) < at else full()
 
     with monkeypatch.context() as patch:
-        patch.setattr("polycorner.sweeps.store.SHARE", 1e9)  # rows are written after every point
+        patch.setattr("polycorner.sweeps.tables.SHARE", 1e9)  # rows are written after every point
         patch.setattr(Store, "_write_points", method)
         with pytest.raises(
             SweepError, match=r"No space left on device; \d+ of 42 points are"
