@@ -235,4 +235,4 @@ def step(system: System, state: State, dt: float) -> State:
         raise SolverError(msg)
     motion = engine.motion
     q, v = motion.q[0].copy(), motion.v[0].copy()
-    return State(state.time + dt, q, v, motion.stick[0].astype(np.bool_))
+    return State(state.time + dt, q, v, motion.sticks[0].astype(np.bool_))

@@ -1,0 +1,298 @@
+"""Arrays of the engine, each declared once: name, type, shape and meaning.
+
+Allocation, the records that are handed to compiled code, checkpoints and growth follow from these
+declarations.  Shapes are written in the letters of :class:`Sizes`; ``*`` is any length.
+"""
+
+from collections.abc import Mapping
+from math import prod
+from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
+
+import numpy as np
+
+from polycorner.motion.bodies import IdenticalBodies
+
+# Indices into `State.counts` and `State.sums`; the dissipation by cause follows DISSIPATED.
+CONTACTS, STEPS, UNSOLVED, SWEEPS, NEWTON_STEPS, ISLANDS = range(6)
+SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = range(6)
+
+# Kinds of blocks: contacts with the surroundings, and contacts between bodies.
+OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
+
+MAX_BAND = 192  # columns of the widest band matrix that is solved
+EVENTS = 4096  # events recorded, at least, before the engine returns
+
+
+class Sizes(NamedTuple):
+    """Sizes on which the shapes depend."""
+
+    N: int  # bodies
+    k: int  # coordinates of a body
+    F: int  # friction contacts of a body with its surroundings
+    R: int  # rows of their slip velocities
+    L: int  # known loads of a body, at least 1
+    m: int  # gaps between a body and its surroundings
+    G: int  # gaps between two bodies
+    D: int  # causes of dissipation
+    C: int  # contacts between bodies for which there is room
+    P: int  # pairs of neighbours for which there is room
+    B: int  # blocks
+    E: int  # events
+    S: int  # keys to be sorted
+    W: int  # numbers that go in and come out of a kernel
+    M: int  # entries of the band matrix
+
+    @classmethod
+    def of(cls, bodies: IdenticalBodies, contacts: int) -> "Sizes":
+        """Return the sizes of bodies with room for so many contacts between them."""
+        body, N, k = bodies.body, bodies.count, bodies.dimension
+        F, m, R = len(body.friction), len(body.contacts), sum(c.rows for c in body.friction)
+        families = [body.formulation.forces, *(call.family for call in body.gaps)]
+        if bodies.contacts is not None:
+            families += [bodies.contacts.gaps, *(slip for slip, _, _ in bodies.contacts.slips)]
+        kernels = [len(f.names) * (1 + len(f.variables)) + len(f.variables) for f in families]
+        pairs = min(N * (N - 1) // 2, 64 * N) if N > 1 else 0
+        return cls(
+            N=N,
+            k=k,
+            F=F,
+            R=R,
+            L=max(1, body.formulation.loads),
+            m=m,
+            G=len(bodies.pair_contacts),
+            D=len(bodies.causes),
+            C=contacts,
+            P=pairs,
+            B=N * (F + m) + 2 * contacts,
+            E=EVENTS + 4 * contacts,
+            S=max(contacts, pairs, 1),
+            W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
+            M=N * k * min(2 * N * k, MAX_BAND),
+        )
+
+
+class Declaration(NamedTuple):
+    """Type, shape and initial value of an array, or of a number if the shape is empty."""
+
+    kind: type[np.float64] | type[np.int64]
+    shape: str
+    initial: float
+
+    def extents(self, sizes: Sizes) -> tuple[int, ...]:
+        """Return the shape; -1 stands for any length."""
+        return tuple(_extent(token, sizes) for token in self.shape.split())
+
+
+def _extent(token: str, sizes: Sizes) -> int:
+    """Return the value of a sum of products such as ``2*k`` or ``N+1``."""
+    if token == "*":
+        return -1
+    return sum(
+        prod(
+            int(factor) if factor.isdigit() else getattr(sizes, factor)
+            for factor in term.split("*")
+        )
+        for term in token.split("+")
+    )
+
+
+def real(shape: str = "", initial: float = 0.0) -> Declaration:
+    """Declare real numbers."""
+    return Declaration(np.float64, shape, initial)
+
+
+def whole(shape: str = "", initial: int = 0) -> Declaration:
+    """Declare whole numbers: counts, indices, flags and addresses."""
+    return Declaration(np.int64, shape, initial)
+
+
+class Model(NamedTuple):
+    """Model constants: what does not change during a simulation."""
+
+    bodies: Annotated[Any, whole()]  # N
+    dimension: Annotated[Any, whole()]  # k
+    force_kernel: Annotated[Any, whole()]  # address: upper triangle of M, F, applied forces, loads
+    slip_kernel: Annotated[Any, whole()]  # address: slip velocities
+    parameters: Annotated[Any, real("*")]  # of all kernels
+    loads: Annotated[Any, whole()]  # number of known loads
+    slip_start: Annotated[Any, whole("F+1")]  # first slip row of each friction contact
+    friction_sets: Annotated[Any, whole("F 2")]  # static and dynamic set
+    pressing_gap: Annotated[Any, whole("F")]  # gap whose contact presses, or -1
+    load_sources: Annotated[Any, whole("F L")]  # whether a known load presses
+    friction_causes: Annotated[Any, whole("F")]  # cause under which its dissipation is booked
+    set_kinds: Annotated[Any, whole("*")]
+    set_sizes: Annotated[Any, real("* 4")]
+    first_vertex: Annotated[Any, whole("*")]  # of each set, and one more
+    vertices: Annotated[Any, real("* 2")]  # of polygons
+    gap_calls: Annotated[
+        Any, whole("* 6")
+    ]  # address, variables, outputs; first read, row, parameter
+    gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call
+    gap_rows: Annotated[Any, whole("*")]  # gap of each output, or -1
+    restitution: Annotated[Any, real("m")]  # of a body's contacts with its surroundings
+    pair_kernel: Annotated[Any, whole()]  # address: gaps of a pair, or 0
+    pair_parameters: Annotated[Any, whole()]  # their first parameter
+    pair_reads: Annotated[Any, whole("* 2")]  # body 0 or 1, coordinate
+    pair_gaps: Annotated[Any, whole()]  # number of gaps of a pair
+    pair_slips: Annotated[Any, whole("* 3")]  # address, whether bodies are exchanged, parameters
+    pair_sets: Annotated[Any, whole("2")]  # static and dynamic set
+    pair_cause: Annotated[Any, whole()]  # cause under which dissipation between bodies is booked
+    pair_restitution: Annotated[Any, real()]
+    position: Annotated[Any, whole("2")]  # coordinates that are a body's position
+    units: Annotated[Any, real("k")]  # length of a unit of each coordinate
+    substrate_speed: Annotated[Any, real()]  # along the first component of the position
+    reach: Annotated[Any, real()]  # distance of positions beyond which bodies cannot touch
+    exit_coordinate: Annotated[Any, whole()]  # or -1
+    exit_limit: Annotated[Any, real()]
+    gap_unit: Annotated[Any, real()]  # length by which gaps are scaled
+    chatter: Annotated[Any, real()]  # relative amplitude of the noise of known loads
+    correlation_time: Annotated[Any, real()]  # for which one of its values holds
+    kicks: Annotated[Any, real("k")]  # intensities of random impulses
+    seed: Annotated[Any, whole()]
+    tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
+    sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island
+    constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
+
+
+class State(NamedTuple):
+    """State of the motion: together these arrays determine its future, bit for bit."""
+
+    q: Annotated[Any, real("N k")]  # coordinates
+    v: Annotated[Any, real("N k")]  # velocities
+    sticks: Annotated[Any, whole("N F")]  # whether a friction contact with the surroundings sticks
+    friction: Annotated[Any, real("N F 2")]  # its impulse
+    normal: Annotated[Any, real("N m")]  # normal impulses of contacts with the surroundings
+    touches: Annotated[Any, whole("N m")]  # whether they touch
+    alive: Annotated[Any, whole("N", initial=1)]  # whether a body has not left
+    rests: Annotated[Any, whole("N")]  # whether it has exactly the velocity of rest
+    asleep: Annotated[Any, whole("N")]  # whether its rest is proved and it is not solved for
+    booked_friction: Annotated[Any, real("N F 2")]  # friction impulses when work was booked last
+    check_due: Annotated[Any, whole("N")]  # step in which a sleeper is checked again
+    booked_to: Annotated[Any, whole("N")]  # step up to which its work is booked
+    neighbour_impulse: Annotated[Any, real("N k")]  # generalised impulses from other bodies
+    keys: Annotated[Any, whole("C")]  # contacts between bodies, in ascending order
+    pair_impulse: Annotated[Any, real("C 3")]  # their impulses: normal, friction
+    pair_action: Annotated[Any, real("C 2*k")]  # generalised impulses on both bodies
+    pair_flags: Annotated[Any, whole("C 2")]  # whether they stick, whether they touch
+    counts: Annotated[Any, whole("8")]
+    sums: Annotated[Any, real("D+5")]
+
+
+class Work(NamedTuple):
+    """Workspace of a step."""
+
+    scratch: Annotated[Any, real("W")]  # arguments and results of kernels
+    q_mid: Annotated[Any, real("N k")]  # coordinates at the midpoint of the step
+    force: Annotated[Any, real("N k")]  # impulse of all forces in the step
+    applied: Annotated[Any, real("N k")]  # that of the applied forces among them
+    kick: Annotated[Any, real("N k")]  # random impulse
+    inverse_mass: Annotated[Any, real("N k k")]
+    slip_rows: Annotated[Any, real("N R k")]  # Jacobian of the slip velocities
+    slip_offset: Annotated[Any, real("N R")]  # slip velocity at zero velocity
+    load: Annotated[Any, real("N F")]  # known normal impulse
+    gap: Annotated[Any, real("N m", initial=np.inf)]
+    gradient: Annotated[Any, real("N m k")]  # of the gaps
+    q_next: Annotated[Any, real("N k")]  # prediction for the next midpoint
+    gap_next: Annotated[Any, real("N m")]  # gaps there
+    gradient_next: Annotated[Any, real("N m k")]
+    pair_gap_next: Annotated[Any, real("G")]
+    awake: Annotated[Any, whole("N")]
+    evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
+    speed: Annotated[Any, real("N")]
+    island_speed: Annotated[Any, real("N")]  # largest velocity in the body's island
+    island_residual: Annotated[Any, real("N")]  # of the island that a body represents
+    curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
+    parent: Annotated[Any, whole("N")]  # in the union-find forest
+    v_free: Annotated[Any, real("N k")]  # velocities after forces alone
+    v_new: Annotated[Any, real("N k")]  # velocities after the step
+    neighbour_impulse: Annotated[Any, real("N k")]
+    disturbed: Annotated[Any, whole("N")]  # whether a sleeper's contacts changed
+    proof_friction: Annotated[Any, real("N F 2")]  # impulses that prove rest
+    proof_normal: Annotated[Any, real("N m")]
+    rested: Annotated[Any, whole("N")]  # `State.rests` before the step
+    own_block: Annotated[Any, whole("m")]  # block of each gap of the body at hand, or -1
+    island_start: Annotated[Any, whole("N+1")]  # in `order`, for the body that represents it
+    cursor: Annotated[Any, whole("N+1")]
+    neighbours: Annotated[Any, whole("P 2")]
+    list_status: Annotated[Any, whole("2")]  # number of neighbours, whether the list is valid
+    examined: Annotated[Any, whole("P")]  # whether a pair was examined in this step
+    listed_position: Annotated[Any, real("N 2")]  # positions when the list was made
+    contact: Annotated[Any, whole("C 3")]  # body, body, gap
+    contact_gap: Annotated[Any, real("C")]
+    contact_before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
+    contact_impulse: Annotated[Any, real("C 3")]  # initial impulses
+    contact_gradient: Annotated[Any, real("C 2*k")]
+    block_bodies: Annotated[Any, whole("B 2")]  # the second is -1 for the surroundings
+    block_rows: Annotated[Any, whole("B")]  # rows of friction; 0 for a unilateral contact
+    pressing: Annotated[Any, whole("B")]  # block of the contact that presses, or -1
+    block_set: Annotated[Any, whole("B")]  # set of admissible friction
+    origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches
+    block_load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
+    offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
+    jacobian: Annotated[Any, real("B 2 2*k")]  # J
+    response: Annotated[Any, real("B 2 2*k")]  # M^-1 J'
+    delassus: Annotated[Any, real("B 4")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm of W
+    impulse: Annotated[Any, real("B 2")]
+    order: Annotated[Any, whole("B")]  # blocks, island after island
+    mass: Annotated[Any, real("N k k")]
+    reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
+    best: Annotated[Any, real("B 2")]  # impulses of the least residual; Newton direction
+    initial: Annotated[Any, real("B 2")]  # impulses before an equilibrium was sought
+    carries: Annotated[Any, real("B")]  # whether a block can carry load at rest
+    derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows
+    constant: Annotated[Any, real("B 2")]  # a of the Newton step dp = a - G J dv
+    schur_row: Annotated[Any, real("B 2*k")]  # normal after elimination of friction
+    load_slope: Annotated[Any, real("B 2")]  # change of friction with its load
+    stacked: Annotated[Any, real("3 2*k")]  # rows of a block and of the contact that presses
+    weighted: Annotated[Any, real("3 2*k")]  # G times these
+    body_matrix: Annotated[Any, real("k k")]
+    body_vector: Annotated[Any, real("k")]
+    rest_velocity: Annotated[Any, real("k")]
+    slip: Annotated[Any, real("2")]
+    image: Annotated[Any, real("12")]  # of a projection or barrier, with derivatives
+    sort_keys: Annotated[Any, whole("S")]
+    members: Annotated[Any, whole("N")]  # bodies of an island
+    number: Annotated[Any, whole("N")]  # number of a body in its island
+    first_side: Annotated[Any, whole("N")]  # first contact of a body, as 2 block + side
+    next_side: Annotated[Any, whole("B 2")]  # the one after it
+    island_vector: Annotated[Any, real("N*k")]
+    envelope: Annotated[Any, whole("N*k")]  # end of each row of the band matrix
+    band: Annotated[Any, real("M")]  # the band matrix, row by row
+    events: Annotated[Any, whole("E 4")]  # kind, bodies (-1: none), contact (-1: none)
+    event_numbers: Annotated[Any, real("E 2")]  # time, impulse
+
+
+Record = TypeVar("Record", Model, State, Work)
+
+
+def declarations(record: Any) -> Mapping[str, Declaration]:
+    """Return the declarations of a record's arrays."""
+    hints = get_type_hints(record, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items()}
+
+
+def allocate(record: type[Record], sizes: Sizes) -> Record:
+    """Return new arrays with their initial values."""
+    return record(
+        **{
+            name: np.full(declared.extents(sizes), declared.initial, dtype=declared.kind)
+            for name, declared in declarations(record).items()
+        }
+    )
+
+
+def filled(record: type[Record], sizes: Sizes, values: Mapping[str, Any]) -> Record:
+    """Return a record of given values, brought to their declared types and shapes."""
+    arrays: dict[str, Any] = {}
+    for name, declared in declarations(record).items():
+        array = np.array(values[name], dtype=declared.kind).reshape(declared.extents(sizes))
+        arrays[name] = array if declared.shape else array.item()
+    return record(**arrays)
+
+
+def restored(record: type[Record], sizes: Sizes, saved: Mapping[str, Any]) -> Record:
+    """Return new arrays with saved ones at their beginning: there may be more room than before."""
+    arrays = allocate(record, sizes)
+    for name, array in arrays._asdict().items():
+        array[: len(saved[name])] = saved[name]
+    return arrays

@@ -1,0 +1,245 @@
+"""Blocks of a step: the rows of contacts and of friction, their velocities and impulses."""
+
+import numpy as np
+
+from polycorner.formulas.compilation import call_kernel
+from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
+from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
+from polycorner.motion.engine.jit import NONE, TWO, ZERO, compiled, inlined
+from polycorner.motion.engine.neighbours import detection_distance, heap_sort, key_of
+
+ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
+
+
+@inlined
+def finish_block(model, work, b):
+    """Compute ``M^-1 J'`` and the Delassus matrix of a block, and apply its initial impulse."""
+    k = model.dimension
+    rows = max(1, work.block_rows[b])
+    for r in range(rows):
+        for side in range(2):
+            i = work.block_bodies[b, side]
+            for c in range(k):
+                value = 0.0
+                if i >= 0 and work.awake[i]:
+                    for a in range(k):
+                        value += work.inverse_mass[i, c, a] * work.jacobian[b, r, side * k + a]
+                    work.v_new[i, c] += value * work.impulse[b, r]
+                work.response[b, r, side * k + c] = value
+    d00 = d01 = d11 = 0.0
+    for c in range(2 * k):
+        d00 += work.jacobian[b, 0, c] * work.response[b, 0, c]
+        if rows == 2:
+            d01 += work.jacobian[b, 0, c] * work.response[b, 1, c]
+            d11 += work.jacobian[b, 1, c] * work.response[b, 1, c]
+    half = 0.5 * (d00 + d11)
+    top = half + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
+    if rows == 1:
+        top = d00
+    work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2] = d00, d01, d11
+    work.delassus[b, 3] = 1.0 / top if top > 0.0 else 1.0
+
+
+@compiled
+def curvature_change(gap, before, following, h, scale):
+    """Return the change of a gap by curvature alone where bodies slide or roll past each other."""
+    change = following - gap - h * before
+    if abs(change) <= ZERO_GAP * scale or abs(h * before) > 4.0 * abs(change):
+        return 0.0
+    return change
+
+
+@compiled
+def least_velocity(gap, before, free, change, bounce, h, scale):
+    """Return the least normal velocity that a contact allows after the step."""
+    if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(free - before):
+        return -bounce * before
+    reached = gap + change
+    if -ZERO_GAP * scale < reached < 0.0:
+        return 0.0
+    if reached < 0.0:  # separated no faster than by forces and curvature within a step
+        return min(-reached / h, abs(free - before) + abs(change) / h)
+    return -reached / h
+
+
+@inlined
+def new_block(work, b, k, first, second, rows):
+    """Initialise a block with a Jacobian of zeros."""
+    work.block_bodies[b, 0], work.block_bodies[b, 1], work.block_rows[b] = first, second, rows
+    work.pressing[b] = -1
+    work.block_load[b] = 0.0
+    for r in range(2):
+        work.offset[b, r] = 0.0
+        work.impulse[b, r] = 0.0
+        for c in range(2 * k):
+            work.jacobian[b, r, c] = 0.0
+
+
+@inlined
+def add_body_blocks(model, state, work, i, h, limit, count):
+    """Append the blocks of a body's contacts with its surroundings; return the block count."""
+    k, m = model.dimension, model.restitution.size
+    block_of, predicted = work.own_block, False
+    for g in range(m):
+        block_of[g] = -1
+        before, free = 0.0, 0.0
+        for c in range(k):
+            before += work.gradient[i, g, c] * state.v[i, c]
+            free += work.gradient[i, g, c] * work.v_free[i, c]
+        gap = work.gap[i, g]
+        close = gap + h * min(before, free, 0.0) < limit
+        if not close and not state.touches[i, g]:
+            state.normal[i, g] = 0.0
+            continue
+        if not predicted:
+            evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
+            predicted = True
+        b = count
+        count += 1
+        block_of[g] = b
+        new_block(work, b, k, i, NONE, ZERO)
+        for c in range(k):
+            work.jacobian[b, 0, c] = work.gradient[i, g, c]
+        change = curvature_change(gap, before, work.gap_next[i, g], h, model.gap_unit)
+        work.offset[b, 0] = -least_velocity(
+            gap, before, free, change, model.restitution[g], h, model.gap_unit
+        )
+        work.block_load[b] = -change
+        work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
+        work.impulse[b, 0] = state.normal[i, g]
+        finish_block(model, work, b)
+    for f in range(model.friction_sets.shape[0]):
+        pressing = model.pressing_gap[f]
+        if (pressing < 0 and work.load[i, f] <= 0.0) or (pressing >= 0 and block_of[pressing] < 0):
+            state.friction[i, f, 0], state.friction[i, f, 1] = 0.0, 0.0
+            state.sticks[i, f] = 0
+            continue
+        b = count
+        count += 1
+        first = model.slip_start[f]
+        new_block(work, b, k, i, NONE, model.slip_start[f + 1] - first)
+        for r in range(work.block_rows[b]):
+            work.offset[b, r] = work.slip_offset[i, first + r]
+            work.impulse[b, r] = state.friction[i, f, r]
+            for c in range(k):
+                work.jacobian[b, r, c] = work.slip_rows[i, first + r, c]
+        work.block_set[b] = model.friction_sets[f, 0 if state.sticks[i, f] else 1]
+        if pressing >= 0:
+            work.pressing[b] = block_of[pressing]
+        else:
+            work.block_load[b] = work.load[i, f]
+        work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_FRICTION, i, f
+        finish_block(model, work, b)
+    return count
+
+
+@inlined
+def add_pair_blocks(model, state, work, contact, h, count):
+    """Append the blocks of a contact between two bodies; return the block count."""
+    k, scratch = model.dimension, work.scratch
+    i, j, g = work.contact[contact, 0], work.contact[contact, 1], work.contact[contact, 2]
+    before, free = 0.0, 0.0
+    for c in range(k):
+        before += work.contact_gradient[contact, c] * state.v[i, c]
+        before += work.contact_gradient[contact, k + c] * state.v[j, c]
+        free += work.contact_gradient[contact, c] * work.v_free[i, c]
+        free += work.contact_gradient[contact, k + c] * work.v_free[j, c]
+    index = work.contact_before[contact]
+    n = count
+    new_block(work, n, k, i, j, ZERO)
+    for c in range(2 * k):
+        work.jacobian[n, 0, c] = work.contact_gradient[contact, c]
+    gap = work.contact_gap[contact]
+    change = curvature_change(gap, before, work.pair_gap_next[g], h, model.gap_unit)
+    work.offset[n, 0] = -least_velocity(
+        gap, before, free, change, model.pair_restitution, h, model.gap_unit
+    )
+    work.block_load[n] = -change
+    work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
+    work.impulse[n, 0] = work.contact_impulse[contact, 0]
+    finish_block(model, work, n)
+    if model.pair_slips.shape[0] == 0:
+        return count + 1
+    address, exchanged, p0 = model.pair_slips[g]
+    first, second = (j, i) if exchanged else (i, j)
+    reads = model.pair_reads.shape[0]
+    for a in range(reads):
+        body = first if model.pair_reads[a, 0] == 0 else second
+        scratch[a] = work.q_mid[body, model.pair_reads[a, 1]]
+    for c in range(k):
+        scratch[reads + c], scratch[reads + k + c] = state.v[first, c], state.v[second, c]
+    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    v0 = reads + 2 * k
+    call_kernel(address, start, base + 8 * p0, start + 8 * v0, start + 8 * (v0 + 2), start)
+    b = count + 1
+    new_block(work, b, k, first, second, TWO)
+    for r in range(2):
+        value = scratch[v0 + r]
+        for c in range(2 * k):
+            slope = scratch[v0 + 2 + r * v0 + reads + c]
+            work.jacobian[b, r, c] = slope
+            value -= slope * scratch[reads + c]
+        work.offset[b, r] = value
+        work.impulse[b, r] = work.contact_impulse[contact, 1 + r]
+    stuck = index >= 0 and state.pair_flags[index, 0]
+    work.block_set[b] = model.pair_sets[0 if stuck else 1]
+    work.pressing[b] = n
+    work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = PAIR_FRICTION, contact, g
+    finish_block(model, work, b)
+    return count + 2
+
+
+@inlined
+def velocity_of(model, work, b, v, out):
+    """Evaluate the velocities ``J v + d`` of a block's rows."""
+    k = model.dimension
+    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    for r in range(max(1, work.block_rows[b])):
+        value = work.offset[b, r]
+        for c in range(k):
+            value += work.jacobian[b, r, c] * v[i, c]
+        if j >= 0:
+            for c in range(k):
+                value += work.jacobian[b, r, k + c] * v[j, c]
+        out[r] = value
+
+
+@inlined
+def apply_impulse(model, work, b, r, change):
+    """Add an impulse of one row to the velocities of its bodies."""
+    k = model.dimension
+    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    if change == 0.0:
+        return
+    for c in range(k):
+        work.v_new[i, c] += work.response[b, r, c] * change
+    if j >= 0:
+        for c in range(k):
+            work.v_new[j, c] += work.response[b, r, k + c] * change
+
+
+@inlined
+def assemble_blocks(model, state, work, h, contacts):
+    """Assemble the blocks of all awake bodies and of all contacts detected; return their number."""
+    blocks = ZERO
+    for i in range(model.bodies):
+        for c in range(model.dimension):
+            work.q_next[i, c] = work.q_mid[i, c] + h * state.v[i, c]
+    limit = detection_distance(model, work, h)
+    for i in range(model.bodies):
+        if state.alive[i] and work.awake[i]:
+            blocks = add_body_blocks(model, state, work, i, h, limit, blocks)
+    keys = work.sort_keys
+    for s in range(contacts):  # by key, whatever the order of detection
+        keys[s] = key_of(model, work, s) * contacts + s
+    heap_sort(keys, contacts)
+    first, second = NONE, NONE
+    for s in range(contacts):
+        contact = keys[s] % contacts
+        if work.contact[contact, 0] != first or work.contact[contact, 1] != second:
+            first, second = work.contact[contact, 0], work.contact[contact, 1]
+            evaluate_pair(model, work, first, second, work.q_next)
+            for g in range(model.pair_gaps):
+                work.pair_gap_next[g] = work.scratch[model.pair_reads.shape[0] + g]
+        blocks = add_pair_blocks(model, state, work, contact, h, blocks)
+    return blocks

@@ -1,0 +1,194 @@
+"""Contacts between steps, and events."""
+
+import numpy as np
+
+from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
+from polycorner.motion.engine.blocks import velocity_of
+from polycorner.motion.engine.jit import NONE, inlined
+from polycorner.motion.engine.neighbours import key_of
+
+TOUCHING = 1e-7  # scaled gap up to which a contact is made
+PARTING = 100.0 * TOUCHING  # scaled gap beyond which it is lost
+MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
+REST, MOTION, EXIT = np.int64(3), np.int64(4), np.int64(5)
+
+
+@inlined
+def store_impulses(state, work, blocks):
+    """Store the impulses: for the next step, or as the start of another round of this one."""
+    for b in range(blocks):
+        kind, i, f = work.origin[b, 0], work.origin[b, 1], work.origin[b, 2]
+        if kind == OWN_GAP:
+            state.normal[i, f] = work.impulse[b, 0]
+        elif kind == PAIR_GAP:
+            work.contact_impulse[i, 0] = work.impulse[b, 0]
+        for r in range(work.block_rows[b]):
+            if kind == OWN_FRICTION:
+                state.friction[i, f, r] = work.impulse[b, r]
+            else:
+                work.contact_impulse[i, 1 + r] = work.impulse[b, r]
+
+
+@inlined
+def store_sticking(model, state, work, blocks):
+    """Store which friction contacts between bodies and surroundings stick."""
+    for b in range(blocks):
+        if work.origin[b, 0] == OWN_FRICTION:
+            i, f = work.origin[b, 1], work.origin[b, 2]
+            state.sticks[i, f] = 1 if sticks(model, work, b, work.slip) else 0
+
+
+@inlined
+def sticks(model, work, b, u):
+    """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
+    velocity_of(model, work, b, work.v_new, u)
+    slip = abs(u[0]) + (abs(u[1]) if work.block_rows[b] == 2 else 0.0)
+    speed = work.island_speed[work.block_bodies[b, 0]]
+    if work.block_bodies[b, 1] >= 0:
+        speed = max(speed, work.island_speed[work.block_bodies[b, 1]])
+    return slip <= 2.0 * model.tolerance * speed
+
+
+@inlined
+def record(work, count, kind, i, j, which, time, value):
+    """Record an event; return the number of events."""
+    work.events[count, 0], work.events[count, 1] = kind, i
+    work.events[count, 2], work.events[count, 3] = j, which
+    work.event_numbers[count, 0], work.event_numbers[count, 1] = time, value
+    return count + 1
+
+
+@inlined
+def classify(work, b, was, gap, h, time, scale, u, out):
+    """Compare a contact with what it was; out: whether it touches, the event or -1, its time."""
+    closes = work.block_load[b] / h
+    bounces = work.offset[b, 0] + closes < 0.0 < gap
+    after = u[0] - work.offset[b, 0] - closes
+    touches = gap + h * after <= (PARTING if was else TOUCHING) * scale
+    out[0], out[1], out[2] = 1.0 if touches else 0.0, -1.0, time + h
+    if work.impulse[b, 0] > 0.0 and bounces and not touches and not was:
+        out[1] = IMPACT
+    elif touches and not was:
+        out[1] = MADE
+    elif was and not touches:
+        out[1] = LOST
+
+
+@inlined
+def record_contacts(model, state, work, blocks, h, time, count):
+    """Record contacts made, lost and bounced; update the list of contacts between bodies."""
+    u, out, C = work.slip, work.image, 0
+    for b in range(blocks):
+        kind = work.origin[b, 0]
+        if work.block_rows[b] > 0:
+            continue
+        i, g = work.origin[b, 1], work.origin[b, 2]
+        velocity_of(model, work, b, state.v, u)
+        before = u[0] - work.offset[b, 0]
+        velocity_of(model, work, b, work.v_new, u)
+        if kind == OWN_GAP:
+            gap, was = work.gap[i, g], state.touches[i, g]
+            j = NONE
+        else:
+            work.sort_keys[C] = b
+            C += 1
+            gap = work.contact_gap[i]
+            j, index = work.contact[i, 1], work.contact_before[i]
+            was = index >= 0 and state.pair_flags[index, 1]
+            i = work.contact[i, 0]
+        state.sums[PENETRATION] = max(state.sums[PENETRATION], -gap)
+        classify(work, b, was, gap, h, time, model.gap_unit, u, out)
+        if out[1] >= 0.0:
+            when = out[2]
+            if out[1] != LOST and before < 0.0 and gap > 0.0:
+                when = min(time + 0.5 * h + gap / -before, time + 1.5 * h)
+            count = record(work, count, int(out[1]), i, j, g, when, work.impulse[b, 0])
+        if kind == OWN_GAP:
+            state.touches[i, g] = 1 if out[0] > 0.0 else 0
+        else:
+            work.origin[b, 3] = 1 if out[0] > 0.0 else 0
+    if model.pair_kernel != 0:
+        size, count = keep_contacts(model, state, work, C, h, time, count)
+        add_contacts(model, state, work, C, size)
+        sort_contacts(state, state.counts[CONTACTS])
+    return count
+
+
+@inlined
+def keep_contacts(model, state, work, C, h, time, count):
+    """Keep the contacts between two sleepers, record those lost; return list size and events."""
+    k, size = model.dimension, 0
+    for s in range(state.counts[CONTACTS]):
+        pair = state.keys[s] // model.pair_gaps
+        i, j = pair // model.bodies, pair % model.bodies
+        if work.awake[i] or work.awake[j] or not (state.alive[i] and state.alive[j]):
+            if state.pair_flags[s, 1] and not listed(model, work, C, state.keys[s]):
+                g = state.keys[s] % model.pair_gaps
+                count = record(work, count, LOST, i, j, g, time + h, 0.0)
+            continue
+        state.keys[size] = state.keys[s]
+        for a in range(3):
+            state.pair_impulse[size, a] = state.pair_impulse[s, a]
+        for a in range(2):
+            state.pair_flags[size, a] = state.pair_flags[s, a]
+        for a in range(2 * k):
+            state.pair_action[size, a] = state.pair_action[s, a]
+        size += 1
+    return size, count
+
+
+@inlined
+def add_contacts(model, state, work, C, size):
+    """Append this step's contacts to the list, with their impulses."""
+    k = model.dimension
+    for s in range(C):
+        b = work.sort_keys[s]
+        state.keys[size] = key_of(model, work, work.origin[b, 1])
+        state.pair_impulse[size, 0] = work.impulse[b, 0]
+        state.pair_impulse[size, 1] = state.pair_impulse[size, 2] = 0.0
+        state.pair_flags[size, 0] = 0
+        for a in range(2 * k):
+            state.pair_action[size, a] = work.jacobian[b, 0, a] * work.impulse[b, 0]
+        if model.pair_slips.shape[0] > 0:
+            f = b + 1
+            state.pair_flags[size, 0] = 1 if sticks(model, work, f, work.slip) else 0
+            shift = 0 if work.block_bodies[f, 0] == work.block_bodies[b, 0] else k
+            for r in range(2):
+                p = work.impulse[f, r]
+                state.pair_impulse[size, 1 + r] = p
+                for a in range(2 * k):
+                    state.pair_action[size, (a + shift) % (2 * k)] += work.jacobian[f, r, a] * p
+        state.pair_flags[size, 1] = work.origin[b, 3]
+        size += 1
+    state.counts[CONTACTS] = size
+
+
+@inlined
+def listed(model, work, C, key):
+    """Return whether a contact is in this step's list."""
+    found = False
+    for s in range(C):
+        found = found or key_of(model, work, work.origin[work.sort_keys[s], 1]) == key
+    return found
+
+
+@inlined
+def sort_contacts(state, size):
+    """Sort contacts by key, by insertion: they are nearly sorted already."""
+    for s in range(1, size):
+        t = s
+        while t > 0 and state.keys[t - 1] > state.keys[t]:
+            state.keys[t - 1], state.keys[t] = state.keys[t], state.keys[t - 1]
+            for a in range(3):
+                x = state.pair_impulse[t, a]
+                state.pair_impulse[t, a] = state.pair_impulse[t - 1, a]
+                state.pair_impulse[t - 1, a] = x
+            for a in range(state.pair_action.shape[1]):
+                x = state.pair_action[t, a]
+                state.pair_action[t, a] = state.pair_action[t - 1, a]
+                state.pair_action[t - 1, a] = x
+            for a in range(2):
+                y = state.pair_flags[t, a]
+                state.pair_flags[t, a] = state.pair_flags[t - 1, a]
+                state.pair_flags[t - 1, a] = y
+            t -= 1

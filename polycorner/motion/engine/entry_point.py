@@ -1,0 +1,41 @@
+"""Entry point of the compiled engine, cached under a key over the sources of all stages."""
+
+from typing import Any
+
+from numba import njit
+
+from polycorner.formulas.compilation import sources_digest
+from polycorner.motion.engine.arrays import STEPS
+from polycorner.motion.engine.jit import ZERO
+from polycorner.motion.engine.sleep import stays_asleep
+from polycorner.motion.engine.stepping import step
+
+DONE, CONTACTS_FULL, EVENTS_FULL = 0, 1, 2  # why `advance` returns
+
+
+def _entry_point(sources: str) -> Any:
+    """Return the compiled function; it reads ``sources``, which puts it into its cache key."""
+
+    @njit(cache=True, error_model="numpy")
+    def advance(model, state, work, h, steps):
+        """Advance by several steps; return why it stopped, and how many steps and events."""
+        _ = sources
+        count = ZERO
+        most = 2 * work.contact.shape[0] + model.bodies * (2 + model.restitution.size)
+        for done in range(steps):
+            if count + most > work.events.shape[0]:
+                return EVENTS_FULL, done, count
+            fits, count = step(model, state, work, h, count)
+            if not fits:
+                work.list_status[1] = 0
+                return CONTACTS_FULL, done, count
+        index = state.counts[STEPS]
+        for i in range(model.bodies):
+            if state.alive[i] and state.asleep[i] and state.booked_to[i] < index:
+                stays_asleep(model, state, work, i, state.neighbour_impulse, h, index * h, index)
+        return DONE, steps, count
+
+    return advance
+
+
+advance = _entry_point(sources_digest(__package__))

@@ -1,0 +1,93 @@
+"""Evaluation of bodies and gaps, by kernels called by address."""
+
+import numpy as np
+
+from polycorner.formulas.compilation import call_kernel
+from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.linear_algebra import invert
+from polycorner.motion.engine.random import gaussian
+
+
+@compiled
+def evaluate_body(model, state, work, i, h, time, index):
+    """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
+    k, F = model.dimension, model.friction_sets.shape[0]
+    scratch = work.scratch
+    for c in range(k):
+        work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
+        scratch[c] = work.q_mid[i, c]
+        scratch[k + c] = state.v[i, c]
+    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    f0 = 2 * k
+    call_kernel(model.force_kernel, start, base, start + 8 * f0, start, start)
+    upper = k * (k + 1) // 2
+    if not (model.constant_mass and work.mass[i, 0, 0] > 0.0):
+        invert(scratch[f0 : f0 + upper], k, work.mass[i], work.inverse_mass[i])
+    at = f0 + upper
+    for c in range(k):
+        work.force[i, c] = h * scratch[at + c]
+        work.applied[i, c] = h * scratch[at + k + c]
+        work.kick[i, c] = 0.0
+        if model.kicks[c] > 0.0:
+            work.kick[i, c] = model.kicks[c] * np.sqrt(h) * gaussian(model.seed, index, i, 32 + c)
+    at += 2 * k
+    if model.chatter > 0.0:
+        when = np.int64(np.floor(time / model.correlation_time))
+        for j in range(model.loads):
+            factor = 1.0 + model.chatter * gaussian(model.seed, when, i, j)
+            scratch[at + j] *= max(0.0, factor)
+    for f in range(F):
+        load = 0.0
+        for j in range(model.loads):
+            if model.load_sources[f, j]:
+                load += scratch[at + j]
+        work.load[i, f] = max(0.0, h * load)
+    if F > 0:
+        S = model.slip_start[F]
+        call_kernel(model.slip_kernel, start, base, start + 8 * f0, start + 8 * (f0 + S), start)
+        for r in range(S):
+            value = scratch[f0 + r]
+            size = abs(value)
+            for c in range(k):
+                slope = scratch[f0 + S + r * 2 * k + k + c]
+                work.slip_rows[i, r, c] = slope
+                value -= slope * state.v[i, c]
+                size += abs(slope * state.v[i, c])
+            work.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
+    evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+
+
+@inlined
+def evaluate_gaps(model, work, i, q, gap, gradient):
+    """Evaluate the gaps between a body and its surroundings, and their gradients."""
+    scratch = work.scratch
+    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    for call in range(model.gap_calls.shape[0]):
+        address, n, m, r0, w0, p0 = model.gap_calls[call]
+        for a in range(n):
+            scratch[a] = q[i, model.gap_reads[r0 + a]]
+        j0 = n + m
+        call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
+        for o in range(m):
+            g = model.gap_rows[w0 + o]
+            if g >= 0:
+                gap[i, g] = scratch[n + o]
+                for c in range(model.dimension):
+                    gradient[i, g, c] = 0.0
+                for a in range(n):
+                    gradient[i, g, model.gap_reads[r0 + a]] += scratch[j0 + o * n + a]
+
+
+@inlined
+def evaluate_pair(model, work, a, b, q):
+    """Evaluate the gaps of a pair of bodies and their gradients.
+
+    The scratch array gets the coordinates that the gaps read, the gaps, and their gradients.
+    """
+    scratch, n, m = work.scratch, model.pair_reads.shape[0], model.pair_gaps
+    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    for r in range(n):
+        body = a if model.pair_reads[r, 0] == 0 else b
+        scratch[r] = q[body, model.pair_reads[r, 1]]
+    j0, p0 = n + m, model.pair_parameters
+    call_kernel(model.pair_kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)

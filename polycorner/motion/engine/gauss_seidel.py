@@ -1,0 +1,98 @@
+"""Gauss-Seidel sweeps over the blocks of an island."""
+
+import numpy as np
+
+from polycorner.motion.engine.blocks import apply_impulse, velocity_of
+from polycorner.motion.engine.jit import ONE, ZERO, compiled, inlined
+from polycorner.motion.engine.sets import contains, project
+
+
+@inlined
+def relax_block(model, work, b, u, out):
+    """Solve one block with all others fixed; return its residual, as a speed."""
+    pressing = work.pressing[b]
+    if (
+        pressing >= 0
+        and work.impulse[pressing, 0] <= 0.0
+        and work.impulse[b, 0] == 0.0
+        and work.impulse[b, 1] == 0.0
+    ):
+        return 0.0
+    velocity_of(model, work, b, work.v_new, u)
+    rho = work.delassus[b, 3]
+    if work.block_rows[b] == 0:
+        p = work.impulse[b, 0]
+        new = max(0.0, p - u[0] * rho)
+        if new != p:
+            apply_impulse(model, work, b, ZERO, new - p)
+            work.impulse[b, 0] = new
+        return abs(new - p) / rho
+    load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+    shape = work.block_set[b]
+    x, y = work.impulse[b, 0], work.impulse[b, 1]
+    if work.block_rows[b] == 1:
+        project(model, shape, x - u[0] * rho, 0.0, load, out)
+        far = abs(out[0] - x) / rho
+        if out[0] != x:
+            apply_impulse(model, work, b, ZERO, out[0] - x)
+            work.impulse[b, 0] = out[0]
+        return far
+    project(model, shape, x - u[0] * rho, y - u[1] * rho, load, out)
+    far = np.sqrt((out[0] - x) ** 2 + (out[1] - y) ** 2) / rho
+    d00, d01, d11 = work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2]
+    determinant = d00 * d11 - d01 * d01
+    if load > 0.0 and determinant > 1e-12 * d00 * d11:
+        sx = x - (d11 * u[0] - d01 * u[1]) / determinant
+        sy = y - (d00 * u[1] - d01 * u[0]) / determinant
+        if contains(model, shape, sx, sy, load, 0.0):
+            out[0], out[1] = sx, sy
+    apply_impulse(model, work, b, ZERO, out[0] - x)
+    apply_impulse(model, work, b, ONE, out[1] - y)
+    work.impulse[b, 0], work.impulse[b, 1] = out[0], out[1]
+    return far
+
+
+@inlined
+def residual(model, work, first, last, u, out):
+    """Return the largest residual of the natural map over the blocks of an island, as a speed."""
+    worst = 0.0
+    for s in range(first, last):
+        b = work.order[s]
+        velocity_of(model, work, b, work.v_new, u)
+        rho = work.delassus[b, 3]
+        if work.block_rows[b] == 0:
+            far = abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
+        else:
+            pressing = work.pressing[b]
+            load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+            y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0
+            project(model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load, out)
+            far = abs(out[0] - work.impulse[b, 0]) / rho
+            if work.block_rows[b] == 2:
+                far = max(far, abs(out[1] - work.impulse[b, 1]) / rho)
+        worst = max(worst, far)
+    return worst
+
+
+@compiled
+def copy_impulses(work, first, last, source, target):
+    """Copy the impulses of an island."""
+    for s in range(first, last):
+        b = work.order[s]
+        for r in range(2):
+            target[b, r] = source[b, r]
+
+
+@compiled
+def recompute_velocities(model, work, first, last):
+    """Compute the velocities of an island from its impulses."""
+    for s in range(first, last):
+        for side in range(2):
+            i = work.block_bodies[work.order[s], side]
+            if i >= 0:
+                for c in range(model.dimension):
+                    work.v_new[i, c] = work.v_free[i, c]
+    for s in range(first, last):
+        b = work.order[s]
+        for r in range(max(1, work.block_rows[b])):
+            apply_impulse(model, work, b, r, work.impulse[b, r])

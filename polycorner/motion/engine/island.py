@@ -1,0 +1,192 @@
+"""Solution of the islands of a step."""
+
+import numpy as np
+
+from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
+from polycorner.motion.engine.band import number_bodies
+from polycorner.motion.engine.blocks import velocity_of
+from polycorner.motion.engine.equilibrium import find_equilibrium
+from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
+from polycorner.motion.engine.gauss_seidel import relax_block, residual
+from polycorner.motion.engine.jit import NONE, compiled, inlined
+from polycorner.motion.engine.newton import newton_steps
+from polycorner.motion.engine.partition import island_of
+
+FIRST_SOFTNESS = 1e2  # relative softness of contacts in the first round, over the tolerance
+MAX_SOFTNESS = 1e-2  # its largest value; the next rounds multiply this by powers of three
+CYCLE_ROUNDS = 3
+ROUND_SWEEPS = 10
+CURVATURE_DEPTH = 1e-4  # scaled depth to which a gap may close by its curvature within a step
+
+
+@compiled
+def iterate(model, state, work, first, last, speed, sweeps):
+    """Alternate Gauss-Seidel sweeps and Newton steps on an island; return the residual.
+
+    Contacts are made softer from round to round, and hard again after the last of a cycle.  It ends
+    when the residual has reached its goal, when ``sweeps`` are done, or when a cycle has not halved
+    the residual of its first round.
+    """
+    u, out = work.slip, work.image
+    goal = model.tolerance * speed
+    worst = residual(model, work, first, last, u, out)
+    if worst <= goal:
+        return worst
+    n, width = number_bodies(model, state, work, first, last)
+    done, cycle, former = 0, 0, np.inf
+    while True:
+        for _ in range(2 if done == 0 else ROUND_SWEEPS):
+            worst = 0.0
+            for s in range(first, last):
+                worst = max(worst, relax_block(model, work, work.order[s], u, out))
+            done += 1
+            if worst <= goal:
+                break
+        worst = residual(model, work, first, last, u, out)
+        if worst > goal and n > 0:
+            softness = MAX_SOFTNESS * 3.0**cycle
+            if cycle == 0:
+                softness = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
+            steps, worst = newton_steps(
+                model, work, first, last, n, width, goal, softness, worst, u, out
+            )
+            state.counts[NEWTON_STEPS] += steps
+        if worst <= goal or done >= sweeps:
+            break
+        if n > 0:
+            if cycle == 0:
+                former = worst
+            elif cycle == CYCLE_ROUNDS - 1 and worst > 0.5 * former:
+                break
+            cycle = (cycle + 1) % CYCLE_ROUNDS
+    state.counts[SWEEPS] += done
+    return worst
+
+
+@inlined
+def switch_reversed_slips(model, state, work, first, last):
+    """Give the static set to contacts whose slip reversed; return whether any was switched.
+
+    Slip that reverses within a step was zero within it, where the static set decides whether the
+    contact slips again.
+    """
+    found = False
+    u = work.slip
+    for s in range(first, last):
+        b = work.order[s]
+        if work.block_rows[b] == 0 or work.reversed[b]:
+            continue
+        velocity_of(model, work, b, state.v, u)
+        x, y = u[0], u[1] if work.block_rows[b] == 2 else 0.0
+        velocity_of(model, work, b, work.v_new, u)
+        along = x * u[0] + (y * u[1] if work.block_rows[b] == 2 else 0.0)
+        if along < 0.0:
+            work.reversed[b] = 1
+            kind, f = work.origin[b, 0], work.origin[b, 2]
+            shape = model.friction_sets[f, 0] if kind == OWN_FRICTION else model.pair_sets[0]
+            if shape != work.block_set[b]:
+                work.block_set[b] = shape
+                found = True
+    return found
+
+
+@inlined
+def solve_island(model, state, work, first, last):
+    """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
+
+    For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
+    """
+    u = work.slip
+    speed, at_rest = 0.0, True
+    for s in range(first, last):
+        b = work.order[s]
+        work.reversed[b] = 0
+        velocity_of(model, work, b, work.v_free, u)
+        for r in range(max(1, work.block_rows[b])):
+            speed = max(speed, abs(u[r]))
+    for s in range(first, last):
+        for side in range(2):
+            i = work.block_bodies[work.order[s], side]
+            if i >= 0:
+                work.island_speed[i] = max(work.island_speed[i], speed)
+                if work.awake[i] and not state.rests[i]:
+                    at_rest = False
+    state.counts[ISLANDS] += 1
+    if speed == 0.0:  # no motion and no force
+        for s in range(first, last):
+            for r in range(2):
+                work.impulse[work.order[s], r] = 0.0
+        for s in range(first, last):
+            for side in range(2):
+                i = work.block_bodies[work.order[s], side]
+                if i >= 0:
+                    for c in range(model.dimension):
+                        work.v_new[i, c] = work.v_free[i, c]
+        return 0.0
+    if at_rest and find_equilibrium(model, state, work, first, last, speed):
+        return residual(model, work, first, last, u, work.image) / speed
+    while True:
+        worst = iterate(model, state, work, first, last, speed, model.sweeps)
+        if worst > model.tolerance * speed or not switch_reversed_slips(
+            model, state, work, first, last
+        ):
+            break
+    return worst / speed
+
+
+@inlined
+def solve_islands(model, state, work, blocks, h):
+    """Solve all islands; those in which gaps would close by their curvature, a second time."""
+    starts = work.island_start
+    for attempt in range(2):
+        for i in range(model.bodies):
+            if starts[i + 1] > starts[i] and (attempt == 0 or work.curves_shut[i]):
+                work.island_residual[i] = solve_island(model, state, work, starts[i], starts[i + 1])
+        if attempt == 1 or not correct_curvature(model, state, work, blocks, h):
+            break
+
+
+@inlined
+def correct_curvature(model, state, work, blocks, h):
+    """Raise the velocity bounds of gaps that close by their curvature; return whether any does.
+
+    The linearised gap misses what curvature adds within the step.  The bound becomes that of
+    Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough.
+    """
+    k, u, found = model.dimension, work.slip, False
+    for i in range(model.bodies):
+        work.curves_shut[i] = 0
+        speed = 0.0
+        for c in range(k):
+            work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
+            carried = model.substrate_speed if c == model.position[0] else 0.0
+            speed += abs(work.v_new[i, c] * model.units[c] - carried)
+        work.speed[i] = speed
+    fast = np.sqrt(0.5 * CURVATURE_DEPTH) * model.gap_unit / h
+    first, second = NONE, NONE
+    for b in range(blocks):
+        if work.block_rows[b] > 0:
+            continue
+        i, g = work.block_bodies[b, 0], work.origin[b, 2]
+        if work.origin[b, 0] == OWN_GAP:
+            if i != first:
+                evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
+            first, second = i, NONE
+            gap, following = work.gap[i, g], work.gap_next[i, g]
+        else:
+            j = work.block_bodies[b, 1]
+            if work.speed[i] + work.speed[j] <= fast:
+                continue
+            if i != first or j != second:
+                evaluate_pair(model, work, i, j, work.q_next)
+            first, second = i, j
+            gap = work.contact_gap[work.origin[b, 1]]
+            following = work.scratch[model.pair_reads.shape[0] + g]
+        target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
+        if following < target - CURVATURE_DEPTH * model.gap_unit:
+            velocity_of(model, work, b, work.v_new, u)
+            work.block_load[b] = gap + h * (u[0] - work.offset[b, 0]) - following
+            work.offset[b, 0] = (gap - work.block_load[b] - target) / h
+            work.curves_shut[island_of(work, b)] = 1
+            found = True
+    return found

@@ -1,0 +1,169 @@
+"""Neighbour lists, and detection of contacts between bodies."""
+
+from polycorner.formulas.compilation import never_inline
+from polycorner.motion.engine.arrays import CONTACTS
+from polycorner.motion.engine.evaluation import evaluate_pair
+from polycorner.motion.engine.jit import NONE, compiled, inlined
+
+DETECTION = 1e-2  # scaled gap up to which contacts are detected, at least
+SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
+
+
+@inlined
+def position_of(model, state, i, a, time):
+    """Return one component of a body's position, as a length, relative to the moving substrate."""
+    c = model.position[a]
+    x = state.q[i, c] * model.units[c]
+    return x - model.substrate_speed * time if a == 0 else x
+
+
+@inlined
+def outdated(model, state, work, time):
+    """Return whether a body has moved so far that the neighbour list may lack a pair."""
+    if work.list_status[1] == 0:
+        return True
+    limit = (0.25 * SKIN * model.reach) ** 2
+    for i in range(model.bodies):
+        if state.alive[i]:
+            far = 0.0
+            for a in range(2):
+                far += (position_of(model, state, i, a, time) - work.listed_position[i, a]) ** 2
+            if far > limit:
+                return True
+    return False
+
+
+@compiled
+def heap_sort(values, count):
+    """Sort the first ``count`` numbers of an array in place."""
+    never_inline()
+    for top in range(count // 2 - 1, -count, -1):
+        start, end = top, count
+        if top < 0:  # the largest, on top, moves to the end
+            end = count + top
+            values[0], values[end] = values[end], values[0]
+            start = 0
+        while 2 * start + 1 < end:
+            child = 2 * start + 1
+            if child + 1 < end and values[child + 1] > values[child]:
+                child += 1
+            if values[start] >= values[child]:
+                break
+            values[start], values[child] = values[child], values[start]
+            start = child
+
+
+@compiled
+def list_neighbours(model, state, work, time):
+    """List the pairs of bodies that may meet soon, ascending; return whether there was room."""
+    N = model.bodies
+    for i in range(N):
+        for a in range(2):
+            work.listed_position[i, a] = position_of(model, state, i, a, time)
+    far = model.reach * (1.0 + SKIN)
+    found, ordered, position = work.sort_keys, work.parent, work.listed_position
+    for i in range(N):
+        t = i
+        while t > 0 and position[ordered[t - 1], 1] > position[i, 1]:
+            ordered[t] = ordered[t - 1]
+            t -= 1
+        ordered[t] = i
+    count = 0
+    for s in range(N):
+        i = ordered[s]
+        if not state.alive[i]:
+            continue
+        for t in range(s + 1, N):
+            j = ordered[t]
+            along = position[j, 1] - position[i, 1]
+            if along > far:
+                break
+            across = position[j, 0] - position[i, 0]
+            if state.alive[j] and across * across + along * along < far * far:
+                if count == work.neighbours.shape[0]:
+                    return False
+                found[count] = min(i, j) * N + max(i, j)
+                count += 1
+    heap_sort(found, count)
+    for s in range(count):
+        work.neighbours[s, 0], work.neighbours[s, 1] = found[s] // N, found[s] % N
+    work.list_status[0], work.list_status[1] = count, 1
+    return True
+
+
+@inlined
+def detect_pair(model, state, work, a, b, limit, count):
+    """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full."""
+    k, scratch = model.dimension, work.scratch
+    n, m = model.pair_reads.shape[0], model.pair_gaps
+    evaluate_pair(model, work, a, b, work.q_mid)
+    for g in range(m):
+        if scratch[n + g] < limit:
+            # contacts between sleepers, which are kept, need room as well
+            if count + state.counts[CONTACTS] >= work.contact.shape[0]:
+                return -1
+            work.contact[count, 0], work.contact[count, 1], work.contact[count, 2] = a, b, g
+            work.contact_gap[count] = scratch[n + g]
+            index = find_contact(state, (a * model.bodies + b) * m + g)
+            work.contact_before[count] = index
+            for c in range(3):
+                work.contact_impulse[count, c] = state.pair_impulse[index, c] if index >= 0 else 0.0
+            for c in range(2 * k):
+                work.contact_gradient[count, c] = 0.0
+            for r in range(n):
+                c = model.pair_reads[r, 0] * k + model.pair_reads[r, 1]
+                work.contact_gradient[count, c] = scratch[n + m + g * n + r]
+            count += 1
+    return count
+
+
+@inlined
+def detection_distance(model, work, h):
+    """Return the gap up to which contacts are detected: any body may be hit by the fastest."""
+    fastest = 0.0
+    for i in range(model.bodies):
+        if work.awake[i]:
+            fastest = max(fastest, work.speed[i])
+    return DETECTION * model.gap_unit + 2.0 * h * fastest
+
+
+@inlined
+def detect_contacts(model, state, work, h, count):
+    """Add the small gaps of all pairs with an awake body; return the contact count, or -1."""
+    limit = detection_distance(model, work, h)
+    for s in range(work.list_status[0]):
+        a, b = work.neighbours[s, 0], work.neighbours[s, 1]
+        if work.examined[s] or not (work.awake[a] or work.awake[b]):
+            continue
+        work.examined[s] = 1
+        if not (state.alive[a] and state.alive[b]):
+            continue
+        far = 0.0
+        for d in range(2):
+            c = model.position[d]
+            far += ((work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]) ** 2
+        if far < (model.reach + limit) ** 2:
+            count = detect_pair(model, state, work, a, b, limit, count)
+            if count < 0:
+                return NONE
+    return count
+
+
+@compiled
+def find_contact(state, key):
+    """Return the index of a contact in the sorted list of the last step, or -1."""
+    low, high = 0, state.counts[CONTACTS]
+    while low < high:
+        middle = (low + high) // 2
+        if state.keys[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < state.counts[CONTACTS] and state.keys[low] == key else -1
+
+
+@inlined
+def key_of(model, work, slot):
+    """Return the key of a contact between bodies: a number that sorts by bodies and gap."""
+    a, b, g = work.contact[slot, 0], work.contact[slot, 1], work.contact[slot, 2]
+    return (a * model.bodies + b) * model.pair_gaps + g

@@ -1,0 +1,49 @@
+"""Partition of the blocks of a step into islands of touching bodies."""
+
+from polycorner.motion.engine.jit import compiled, inlined
+
+
+@inlined
+def root_of(root, i):
+    """Return the representative of a body in the union-find forest."""
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@compiled
+def island_of(work, b):
+    """Return the island of a block: that of one of its bodies that is awake."""
+    first = work.block_bodies[b, 0]
+    return work.parent[first if work.awake[first] else work.block_bodies[b, 1]]
+
+
+@inlined
+def find_islands(model, work, blocks):
+    """Order the blocks by islands of touching bodies, which start at ``work.island_start``."""
+    N = model.bodies
+    for i in range(N):
+        work.parent[i] = i
+    for b in range(blocks):
+        i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+        if j >= 0 and work.awake[i] and work.awake[j]:
+            x, y = root_of(work.parent, i), root_of(work.parent, j)
+            if x != y:
+                work.parent[max(x, y)] = min(x, y)
+    starts, cursor = work.island_start, work.cursor
+    starts[0] = 0
+    for i in range(N):
+        starts[i + 1] = 0
+    for i in range(N):
+        work.parent[i] = root_of(work.parent, i)
+    for b in range(blocks):
+        starts[island_of(work, b) + 1] += 1
+    for i in range(N):
+        starts[i + 1] += starts[i]
+    for i in range(N):
+        cursor[i] = starts[i]
+    for b in range(blocks):
+        r = island_of(work, b)
+        work.order[cursor[r]] = b
+        cursor[r] += 1

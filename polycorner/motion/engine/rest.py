@@ -1,0 +1,172 @@
+"""Rest of a single body: its velocity, and the impulses that prove it."""
+
+from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.linear_algebra import add_square, solve_spd
+from polycorner.motion.engine.sets import contains
+
+SET_SLACK = 1e-9  # relative slack with which forces at rest may lie outside their sets
+SLEEP_MARGIN = 0.01  # share of friction left unused by sleepers that need no check
+REST_FACTOR = 10.0  # multiple of the tolerance up to which a velocity counts as that of rest
+
+
+@inlined
+def load_of(model, work, lam, i, f):
+    """Return the normal impulse that presses on a friction contact of a body."""
+    if model.pressing_gap[f] < 0:
+        return work.load[i, f]
+    return lam[i, model.pressing_gap[f]]
+
+
+@compiled
+def find_rest_velocity(model, work, lam, i, out):
+    """Find the velocity at which no loaded contact slips or opens; return whether there is one."""
+    k, F = model.dimension, model.friction_sets.shape[0]
+    A = work.body_matrix
+    for c in range(k):
+        out[c] = 0.0
+        for a in range(k):
+            A[c, a] = 0.0
+    for g in range(model.restitution.size):
+        if lam[i, g] > 0.0:
+            add_square(A, work.gradient[i, g], 1.0, k)
+    for f in range(F):
+        if load_of(model, work, lam, i, f) > 0.0:
+            for r in range(model.slip_start[f], model.slip_start[f + 1]):
+                add_square(A, work.slip_rows[i, r], 1.0, k)
+                for c in range(k):
+                    out[c] -= work.slip_offset[i, r] * work.slip_rows[i, r, c]
+    if not solve_spd(A, out, k):
+        return False
+    top = 0.0
+    for c in range(k):
+        top = max(top, abs(out[c]) * model.units[c])
+    for c in range(k):
+        if abs(out[c]) * model.units[c] <= 1e-13 * top:
+            out[c] = 0.0
+    return keeps_contacts(model, work, lam, i, out)
+
+
+@compiled
+def keeps_contacts(model, work, lam, i, v):
+    """Return whether no loaded contact of a body slips or opens at a velocity."""
+    k = model.dimension
+    for g in range(model.restitution.size):
+        if lam[i, g] > 0.0:
+            value, size = 0.0, 0.0
+            for c in range(k):
+                value += work.gradient[i, g, c] * v[c]
+                size += abs(work.gradient[i, g, c] * v[c])
+            if abs(value) > 1e-11 * size:
+                return False
+    for f in range(model.friction_sets.shape[0]):
+        if load_of(model, work, lam, i, f) > 0.0:
+            for r in range(model.slip_start[f], model.slip_start[f + 1]):
+                value = work.slip_offset[i, r]
+                size = abs(value)
+                for c in range(k):
+                    value += work.slip_rows[i, r, c] * v[c]
+                    size += abs(work.slip_rows[i, r, c] * v[c])
+                if abs(value) > 1e-11 * size:
+                    return False
+    return True
+
+
+@compiled
+def remains_at_rest(model, state, work, i, others):
+    """Return whether a body at rest provably remains so; see :func:`balances`.
+
+    First the impulses of the last step are tried, if they leave some friction unused, then others.
+    """
+    return (
+        balances(model, state, work, i, others, True, -SLEEP_MARGIN)
+        or balances(model, state, work, i, others, False, SET_SLACK)
+        or balances(model, state, work, i, others, True, SET_SLACK)
+    )
+
+
+@compiled
+def balances(model, state, work, i, others, again, slack):
+    """Return whether admissible impulses balance the forces on a body at rest, which proves rest.
+
+    The impulses of the last step (friction under a known load only with ``again``, else zero) get
+    the smallest change, weighted by the loads, that restores balance.  If the result lies in its
+    sets, up to a relative slack, it proves that the body remains at rest.  It is left in
+    ``work.proof_friction`` and ``work.proof_normal``.
+    """
+    k, F, m = model.dimension, model.friction_sets.shape[0], model.restitution.size
+    A, r = work.body_matrix, work.body_vector
+    lam, friction = work.proof_normal, work.proof_friction
+    for c in range(k):
+        r[c] = -(work.force[i, c] + work.kick[i, c]) - others[i, c]
+        for a in range(k):
+            A[c, a] = 0.0
+    for g in range(m):
+        lam[i, g] = state.normal[i, g]
+        if lam[i, g] > 0.0:
+            add_square(A, work.gradient[i, g], lam[i, g] ** 2, k)
+            for c in range(k):
+                r[c] -= lam[i, g] * work.gradient[i, g, c]
+    for f in range(F):
+        load = load_of(model, work, state.normal, i, f)
+        central = model.pressing_gap[f] < 0 and not again
+        for a in range(2):
+            friction[i, f, a] = 0.0 if central else state.friction[i, f, a]
+        if load > 0.0:
+            for row in range(model.slip_start[f], model.slip_start[f + 1]):
+                add_square(A, work.slip_rows[i, row], load * load, k)
+                for c in range(k):
+                    r[c] -= friction[i, f, row - model.slip_start[f]] * work.slip_rows[i, row, c]
+    if not keeps_contacts(model, work, state.normal, i, state.v[i]) or not solve_spd(A, r, k):
+        return False
+    for g in range(m):
+        if lam[i, g] > 0.0:
+            change = 0.0
+            for c in range(k):
+                change += work.gradient[i, g, c] * r[c]
+            lam[i, g] += state.normal[i, g] ** 2 * change
+            if lam[i, g] < 0.0:
+                return False
+    for f in range(F):
+        before = load_of(model, work, state.normal, i, f)
+        if before <= 0.0:
+            continue
+        for row in range(model.slip_start[f], model.slip_start[f + 1]):
+            change = 0.0
+            for c in range(k):
+                change += work.slip_rows[i, row, c] * r[c]
+            friction[i, f, row - model.slip_start[f]] += before * before * change
+        load = load_of(model, work, lam, i, f)
+        if not contains(
+            model, model.friction_sets[f, 0], friction[i, f, 0], friction[i, f, 1], load, slack
+        ):
+            return False
+    return True
+
+
+@inlined
+def comes_to_rest(model, state, work, i, rest):
+    """Return whether a body is at rest after the step; then it gets exactly the velocity of rest.
+
+    It falls asleep if it was at rest before, so that its impulses are in balance, and if they prove
+    that it remains at rest.
+    """
+    k = model.dimension
+    for f in range(model.friction_sets.shape[0]):
+        if load_of(model, work, state.normal, i, f) > 0.0 and not state.sticks[i, f]:
+            return False
+    if not find_rest_velocity(model, work, state.normal, i, rest):
+        return False
+    size, far, old = work.island_speed[i], 0.0, 0.0
+    for c in range(k):
+        unit = model.units[c]
+        size = max(size, abs(rest[c]) * unit)
+        far = max(far, abs(work.v_new[i, c] - rest[c]) * unit)
+        old = max(old, abs(state.v[i, c] - rest[c]) * unit)
+    if far > REST_FACTOR * model.tolerance * size:
+        return False
+    still = old <= 1e-13 * size
+    for c in range(k):
+        work.v_new[i, c] = state.v[i, c] if still else rest[c]
+    if still and remains_at_rest(model, state, work, i, work.neighbour_impulse):
+        state.asleep[i] = 1
+    return True

@@ -1,0 +1,184 @@
+"""Sleeping bodies: when they are checked, and what wakes them."""
+
+import numpy as np
+
+from polycorner.motion.engine.arrays import CONTACTS, PAIR_FRICTION, PAIR_GAP, SUBSTRATE_WORK
+from polycorner.motion.engine.evaluation import evaluate_body
+from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.partition import root_of
+from polycorner.motion.engine.rest import SLEEP_MARGIN, comes_to_rest, load_of, remains_at_rest
+from polycorner.motion.engine.sets import contains
+
+LONGEST_SLEEP = np.int64(50)  # most steps between two checks of a sleeper
+
+
+@inlined
+def wake(model, state, work, h, time, index):
+    """Wake the sleepers whose forces no longer balance; return whether any body is awake.
+
+    A sleeper with friction to spare is not checked until the reserve could be used up, at the rate
+    at which its forces changed before the last check.
+    """
+    any_awake = False
+    for i in range(model.bodies):
+        work.awake[i], work.evaluated[i], work.disturbed[i] = 0, 0, 0
+        if not state.alive[i]:
+            continue
+        if state.asleep[i] and state.check_due[i] > index:
+            for c in range(model.dimension):
+                work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
+            continue
+        if not stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index):
+            work.awake[i], any_awake = 1, True
+    if any_awake and model.pair_kernel != 0:
+        wake_piles(model, state, work, h, time, index)
+    return any_awake
+
+
+@inlined
+def wake_piles(model, state, work, h, time, index):
+    """Wake the whole pile at rest around each body that woke; see :func:`find_equilibrium`."""
+    N, root, disturbed, moving = model.bodies, work.parent, work.disturbed, work.cursor
+    woken = False
+    for i in range(N):
+        root[i] = i
+        disturbed[i], moving[i] = 0, 0
+        woken = woken or (state.asleep[i] and work.awake[i])
+    if not woken:
+        return
+    for s in range(state.counts[CONTACTS]):
+        if state.pair_flags[s, 1]:
+            pair = state.keys[s] // model.pair_gaps
+            x, y = root_of(root, pair // N), root_of(root, pair % N)
+            root[max(x, y)] = min(x, y)
+    for i in range(N):
+        if state.alive[i]:
+            r = root_of(root, i)
+            if not state.rests[i]:
+                moving[r] = 1
+            if state.asleep[i] and work.awake[i]:
+                disturbed[r] = 1
+    for i in range(N):
+        r = root_of(root, i)
+        if state.alive[i] and not work.awake[i] and disturbed[r] and not moving[r]:
+            if not work.evaluated[i]:
+                stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index)
+            work.awake[i] = 1
+
+
+@compiled
+def stays_asleep(model, state, work, i, others, h, time, index):
+    """Evaluate a body; return whether it stays asleep, and book the work of its friction since."""
+    work.evaluated[i] = 1
+    evaluate_body(model, state, work, i, h, time, index)
+    if not state.asleep[i]:
+        return False
+    asleep = remains_at_rest(model, state, work, i, others)
+    steps = index - state.booked_to[i]
+    if steps > 0:  # by the trapezoidal rule, if there is a new value
+        share = 0.5 * steps if asleep else 0.0
+        for f in range(model.friction_sets.shape[0]):
+            for r in range(model.slip_start[f + 1] - model.slip_start[f]):
+                before, now = state.booked_friction[i, f, r], work.proof_friction[i, f, r]
+                p = (steps - share) * before + share * now
+                state.sums[SUBSTRATE_WORK] -= p * work.slip_offset[i, model.slip_start[f] + r]
+                if asleep:
+                    state.booked_friction[i, f, r] = now
+        state.booked_to[i] = index
+    return asleep
+
+
+@compiled
+def next_check(model, state, work, i, h, index):
+    """Return the step in which a sleeper is checked again."""
+    rate = 0.0
+    for f in range(model.friction_sets.shape[0]):
+        load = load_of(model, work, work.proof_normal, i, f)
+        if load <= 0.0:
+            continue
+        x, y = work.proof_friction[i, f, 0], work.proof_friction[i, f, 1]
+        if not contains(model, model.friction_sets[f, 0], x, y, load * (1.0 - SLEEP_MARGIN), 0.0):
+            return index + 1
+        change = abs(x - state.friction[i, f, 0]) + abs(y - state.friction[i, f, 1])
+        rate = max(rate, change / load)
+    steps = LONGEST_SLEEP
+    if rate * LONGEST_SLEEP > 0.1 * SLEEP_MARGIN:
+        steps = np.int64(0.1 * SLEEP_MARGIN / rate)
+    for c in range(model.dimension):
+        if model.kicks[c] > 0.0:
+            return index + 1
+    for g in range(model.restitution.size):
+        if work.proof_normal[i, g] > 0.0:
+            return index + 1
+    if model.chatter > 0.0:  # the next draw comes at a known time
+        now = np.floor((index + 0.5) * h / model.correlation_time)
+        while steps > 0 and np.floor((index + steps + 0.5) * h / model.correlation_time) != now:
+            steps -= 1
+    return index + 1 + steps
+
+
+@inlined
+def wake_neighbours(model, state, work, blocks, h, time, index):
+    """Sum the impulses of neighbours on each body; wake those not at rest under them."""
+    k, N = model.dimension, model.bodies
+    for i in range(N):
+        work.disturbed[i] = 0
+        for c in range(k):
+            work.neighbour_impulse[i, c] = 0.0
+    for s in range(state.counts[CONTACTS]):
+        pair = state.keys[s] // model.pair_gaps
+        i, j = pair // N, pair % N
+        if work.awake[i] or work.awake[j]:
+            work.disturbed[i] = work.disturbed[j] = 1
+            continue
+        for c in range(k):
+            work.neighbour_impulse[i, c] += state.pair_action[s, c]
+            work.neighbour_impulse[j, c] += state.pair_action[s, k + c]
+    for b in range(blocks):
+        if work.origin[b, 0] in (PAIR_GAP, PAIR_FRICTION):
+            for side in range(2):
+                i = work.block_bodies[b, side]
+                work.disturbed[i] = 1
+                for r in range(max(1, work.block_rows[b])):
+                    for c in range(k):
+                        work.neighbour_impulse[i, c] += (
+                            work.jacobian[b, r, side * k + c] * work.impulse[b, r]
+                        )
+    woken = False
+    for i in range(N):
+        if work.disturbed[i] and state.alive[i] and not work.awake[i]:
+            if not work.evaluated[i]:
+                stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index)
+            if not remains_at_rest(model, state, work, i, work.neighbour_impulse):
+                work.awake[i] = 1
+                woken = True
+    return woken
+
+
+@inlined
+def settle(model, state, work, h, index):
+    """Give bodies that came to rest exactly the velocity of rest; update sleepers."""
+    k = model.dimension
+    rest = work.rest_velocity
+    for i in range(model.bodies):
+        if not state.alive[i]:
+            continue
+        if work.awake[i]:
+            state.rests[i], state.asleep[i] = 0, 0
+            if comes_to_rest(model, state, work, i, rest):
+                state.rests[i] = 1
+        if work.awake[i] or work.disturbed[i]:
+            for c in range(k):
+                state.neighbour_impulse[i, c] = work.neighbour_impulse[i, c]
+        if work.awake[i]:
+            state.booked_to[i], state.check_due[i] = index + 1, index + 1
+        if state.asleep[i] and work.evaluated[i]:
+            if not work.awake[i]:
+                state.booked_to[i] = index + 1
+                state.check_due[i] = next_check(model, state, work, i, h, index)
+            for f in range(model.friction_sets.shape[0]):
+                for r in range(2):
+                    state.friction[i, f, r] = work.proof_friction[i, f, r]
+                    state.booked_friction[i, f, r] = work.proof_friction[i, f, r]
+            for g in range(model.restitution.size):
+                state.normal[i, g] = work.proof_normal[i, g]

@@ -1,0 +1,178 @@
+"""One time step of all bodies.
+
+There are ``N`` identical bodies with ``k`` coordinates each; a system that is not repeated is one
+body.  Their equations of motion, gaps and slip velocities are kernels called by address.  The
+unknowns of a step are impulses in *blocks*: a unilateral contact is a block of one row, a friction
+contact one of one or two.  Each block knows the bodies it acts on, its Jacobian and, for friction,
+the block of the contact that presses on it.  A step (:func:`step`)
+
+1. drifts half a step, evaluates the bodies, and wakes those that can no longer remain at rest;
+2. assembles the blocks of the awake bodies and of the contacts between them, and partitions them
+   into islands;
+3. solves each island by Gauss-Seidel sweeps over the blocks and Newton's method on the natural map
+   ``p = proj(p - rho u)`` ([Acary]); for an island at rest, an equilibrium is sought first;
+4. gives bodies at rest within the solver's accuracy exactly the velocity of rest; a body at rest
+   whose impulses are in balance and in their sets falls asleep, and is only checked thereafter;
+5. records events, books work, and drifts the other half of the step.
+"""
+
+from polycorner.motion.engine.arrays import (
+    APPLIED_WORK,
+    CONTACTS,
+    DISSIPATED,
+    NOISE_WORK,
+    PAIR_FRICTION,
+    RESIDUAL,
+    STEPS,
+    SUBSTRATE_WORK,
+    UNSOLVED,
+)
+from polycorner.motion.engine.blocks import assemble_blocks, velocity_of
+from polycorner.motion.engine.contact_list import (
+    EXIT,
+    MOTION,
+    REST,
+    record,
+    record_contacts,
+    store_impulses,
+    store_sticking,
+)
+from polycorner.motion.engine.island import solve_islands
+from polycorner.motion.engine.jit import NONE, ZERO, inlined
+from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
+from polycorner.motion.engine.partition import find_islands
+from polycorner.motion.engine.sleep import settle, wake, wake_neighbours
+
+
+@inlined
+def start_bodies(model, state, work):
+    """Set the free velocities, due to forces alone, of awake bodies, and measure all speeds."""
+    k = model.dimension
+    for i in range(model.bodies):
+        if not state.alive[i]:
+            continue
+        for c in range(k):
+            value = state.v[i, c]
+            if work.awake[i]:
+                for a in range(k):
+                    value += work.inverse_mass[i, c, a] * (work.force[i, a] + work.kick[i, a])
+            work.v_free[i, c] = value
+            work.v_new[i, c] = value
+        speed = 0.0
+        for c in range(k):
+            carried = model.substrate_speed / model.units[c] if c == model.position[0] else 0.0
+            before = abs(state.v[i, c] - carried) * model.units[c]
+            speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
+        work.speed[i], work.island_speed[i] = speed, speed
+
+
+@inlined
+def book_work(model, state, work, blocks, h):
+    """Book the work done in this step, by cause."""
+    k, u = model.dimension, work.slip
+    for b in range(blocks):
+        kind = work.origin[b, 0]
+        if work.block_rows[b] == 0:
+            velocity_of(model, work, b, state.v, u)
+            x = u[0]
+            velocity_of(model, work, b, work.v_new, u)
+            state.sums[DISSIPATED] -= work.impulse[b, 0] * (0.5 * (x + u[0]) - work.offset[b, 0])
+            continue
+        cause = (
+            model.pair_cause if kind == PAIR_FRICTION else model.friction_causes[work.origin[b, 2]]
+        )
+        for r in range(work.block_rows[b]):
+            velocity_of(model, work, b, state.v, u)
+            x = u[r]
+            velocity_of(model, work, b, work.v_new, u)
+            state.sums[DISSIPATED + cause] -= work.impulse[b, r] * 0.5 * (x + u[r])
+            state.sums[SUBSTRATE_WORK] -= work.impulse[b, r] * work.offset[b, r]
+    for i in range(model.bodies):
+        if not state.alive[i]:
+            continue
+        if not (work.awake[i] or work.evaluated[i]):
+            continue
+        for c in range(k):
+            mean = 0.5 * (state.v[i, c] + work.v_new[i, c])
+            state.sums[APPLIED_WORK] += mean * work.applied[i, c]
+            state.sums[NOISE_WORK] += mean * work.kick[i, c]
+        if not work.awake[i] and work.evaluated[i]:
+            for f in range(model.friction_sets.shape[0]):
+                for r in range(model.slip_start[f + 1] - model.slip_start[f]):
+                    drift = work.slip_offset[i, model.slip_start[f] + r]
+                    state.sums[SUBSTRATE_WORK] -= work.proof_friction[i, f, r] * drift
+
+
+@inlined
+def solve(model, state, work, h, time, index):
+    """Solve a step for the bodies that are awake and those that they wake.
+
+    Return whether all contacts fit in the workspace, and the number of blocks.
+    """
+    contacts, blocks = ZERO, ZERO
+    if model.pair_kernel != 0:
+        if outdated(model, state, work, time) and not list_neighbours(model, state, work, time):
+            return False, blocks
+        for s in range(work.list_status[0]):
+            work.examined[s] = 0
+    while True:
+        if model.pair_kernel != 0:
+            contacts = detect_contacts(model, state, work, h, contacts)
+            if contacts < 0:
+                return False, blocks
+        blocks = assemble_blocks(model, state, work, h, contacts)
+        find_islands(model, work, blocks)
+        solve_islands(model, state, work, blocks, h)
+        store_impulses(state, work, blocks)
+        if model.pair_kernel == 0 or not wake_neighbours(
+            model, state, work, blocks, h, time + 0.5 * h, index
+        ):
+            break
+        start_bodies(model, state, work)
+    for i in range(model.bodies):
+        if work.island_start[i + 1] > work.island_start[i]:
+            state.sums[RESIDUAL] = max(state.sums[RESIDUAL], work.island_residual[i])
+            state.counts[UNSOLVED] += 1 if work.island_residual[i] > model.tolerance else 0
+    return True, blocks
+
+
+@inlined
+def step(model, state, work, h, count):
+    """Advance by one step; return whether there was room for all contacts, and the event count."""
+    k, N = model.dimension, model.bodies
+    index = state.counts[STEPS]
+    time = index * h
+    blocks, any_awake = ZERO, wake(model, state, work, h, time + 0.5 * h, index)
+    start_bodies(model, state, work)
+    if any_awake:
+        fits, blocks = solve(model, state, work, h, time, index)
+        if not fits:
+            return False, count
+    book_work(model, state, work, blocks, h)
+    if any_awake:
+        count = record_contacts(model, state, work, blocks, h, time, count)
+    store_sticking(model, state, work, blocks)
+    for i in range(N):
+        work.rested[i] = state.rests[i]
+    settle(model, state, work, h, index)
+    for i in range(N):
+        if not state.alive[i]:
+            continue
+        if work.awake[i] and state.rests[i] != work.rested[i]:
+            kind = REST if state.rests[i] else MOTION
+            when = time + h if state.rests[i] else time
+            count = record(work, count, kind, i, NONE, NONE, when, 0.0)
+        for c in range(k):
+            if work.awake[i]:
+                state.v[i, c] = work.v_new[i, c]
+            state.q[i, c] = work.q_mid[i, c] + 0.5 * h * state.v[i, c]
+        if model.exit_coordinate >= 0 and state.q[i, model.exit_coordinate] > model.exit_limit:
+            state.alive[i] = 0
+            count = record(work, count, EXIT, i, NONE, NONE, time + h, 0.0)
+            for s in range(state.counts[CONTACTS]):
+                pair = state.keys[s] // model.pair_gaps
+                if i in (pair // N, pair % N):
+                    state.check_due[pair // N] = state.check_due[pair % N] = 0
+                    state.asleep[pair // N] = state.asleep[pair % N] = 0
+    state.counts[STEPS] = index + 1
+    return True, count

@@ -1,0 +1,64 @@
+"""Piles at rest, against the largest share of friction that they can do without, by Clarabel."""
+
+import cvxpy as cp
+import numpy as np
+
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.starts import bunch
+from polycorner.motion.engine.arrays import OWN_FRICTION
+from polycorner.motion.engine.sets import DISC
+
+
+def spare(engine, before):
+    """Return the largest share of the drum's friction without which a pile would remain at rest.
+
+    From the definition, by Clarabel: are there forces in their sets that balance at rest?  The
+    rows of contacts and the loads are those of the engine's last step.
+    """
+    work, model = engine.work, engine.model
+    k, count = model.dimension, int(work.island_start[-1])
+    p, share = cp.Variable((count, 2)), cp.Variable()
+    sums = {i: work.mass[i] @ (work.v_free[i] - before[i]) for i in np.flatnonzero(work.awake)}
+    rules = [share <= 1]
+    for b in range(count):
+        rows, owner = max(1, work.block_rows[b]), work.pressing[b]
+        J, bodies = work.jacobian[b, :rows], [i for i in work.block_bodies[b] if i >= 0]
+        for side, i in enumerate(bodies):
+            if i in sums:
+                sums[i] = sums[i] + J[:, k * side : k * side + k].T @ p[b, :rows]
+        if work.block_rows[b] == 0:
+            ends = [J[0, k * side : k * side + k] @ before[i] for side, i in enumerate(bodies)]
+            opens = sum(ends) + work.offset[b, 0] > 1e-2
+            rules.append(p[b, 0] == 0 if opens else p[b, 0] >= 0)
+            continue
+        drum = work.origin[b, 0] == OWN_FRICTION
+        shape = model.friction_sets[work.origin[b, 2], 0] if drum else model.pair_sets[0]
+        mu = model.set_sizes[shape, 0 if model.set_kinds[shape] == DISC else 1]
+        load = (1 - share) * work.block_load[b] if drum else p[owner, 0]
+        rules.append(cp.norm(p[b, :rows]) <= mu * load)
+    rules += [total == 0 for total in sums.values()]
+    problem = cp.Problem(cp.Maximize(share), rules)
+    problem.solve(solver=cp.CLARABEL)
+    return share.value
+
+
+def test_a_pile_remains_at_rest_as_long_as_it_can():
+    """Carried up by the drum, it slides when forces can no longer balance, and not before.
+
+    Friction is left to spare whenever the engine finds an equilibrium; within the solver's accuracy
+    there is none when the pile starts to slide.
+    """
+    drum = DumbbellDrum(count=8, floor=True)
+    engine = drum.engine(bunch(drum, np.random.default_rng(3)))
+    engine.advance(9500)
+    left, slides = [], []
+    while engine.time < 30:
+        before, rested = engine.motion.v.copy(), engine.motion.rests.all()
+        engine.advance(1)
+        if rested and engine.work.awake.any():
+            found = left if engine.motion.rests.all() else slides
+            found.append(spare(engine, before))
+    assert max(left) > 0.1
+    assert min(left) > -1e-3
+    assert len(slides) > 1
+    assert max(map(abs, slides)) < 2e-3
