@@ -1,22 +1,24 @@
 """The checksummed container of all kinds of files: kind, version and digest in the last line.
 
-JSON, GraphML, NetCDF and NumPy archives end in a line that their own readers take for an entry, a
-comment, or do not read at all::
+JSON, GraphML, NetCDF and NumPy archives end in a line that other readers of these formats take for
+an entry or a comment, or ignore::
 
     "polycorner": "certificate 1 sha256 5f1d..."}
     <!-- polycorner graph 1 sha256 5f1d... -->
     polycorner trajectory 1 sha256 5f1d...
 
-The digest is that of all bytes before it, kind and version included, and is checked before
-anything is read.  It guards against damage, not against someone who computes it anew.
+The digest is that of all bytes before it, kind and version included, and is checked before the
+content is read.  It protects against damage, not against forgery.
 """
 
 import hashlib
+import io
 import json
 import math
 import os
 import platform
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,6 +111,17 @@ class Kind:
         """Return the entries that :meth:`save_json` wrote."""
         entries: dict[str, Any] = json.loads(self.load(path).rstrip().removesuffix(b",") + b"}")
         return entries
+
+    def save_arrays(self, path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> Path:
+        """Write arrays as a NumPy archive."""
+        archive = io.BytesIO()
+        np.savez(archive, **arrays)
+        return self.save(path, archive.getvalue())
+
+    def load_arrays(self, path: str | os.PathLike[str]) -> dict[str, Any]:
+        """Return the arrays that :meth:`save_arrays` wrote."""
+        with np.load(io.BytesIO(self.load(path)), allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
 
 
 def _last_line(content: bytes, around: tuple[bytes, bytes]) -> "re.Match[bytes] | None":

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -33,6 +34,18 @@ def test_any_bytes_are_read_back(tmp_path_factory, around, body):
     assert kind.load(path) == body
 
 
+def test_arrays_are_read_back_and_numpy_sees_them(tmp_path):
+    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.array("word"), "c": np.zeros(0)}
+    kind = replace(KIND, around=BINARY)
+    path = kind.save_arrays(tmp_path / "thing.npz", arrays)
+    for read in (kind.load_arrays(path), np.load(path)):
+        assert list(read) == list(arrays)
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(read[name], array, strict=True)
+    with pytest.raises(ValueError, match="Object arrays cannot be loaded"):
+        kind.load_arrays(kind.save_arrays(path, {"code": np.array([print])}))
+
+
 @pytest.mark.parametrize("around", [JSON, XML, BINARY])
 def test_every_flipped_bit_is_noticed(tmp_path, around):
     kind = replace(KIND, around=around)
@@ -53,8 +66,6 @@ def test_every_other_length_is_noticed(tmp_path, around):
     whole = path.read_bytes()
     for content in (*(whole[:n] for n in range(len(whole))), whole + b"\n", whole + whole):
         path.write_bytes(content)
-        if content == whole + whole:
-            assert kind.around != JSON or len(content) == 2 * len(whole)
         with pytest.raises(ValueError, match=REFUSAL):
             kind.load(path)
 

@@ -23,9 +23,9 @@ TAKEN = ("kind", "active", "rank", "dimension", "local_type", "singular", "chira
 def skeleton_graph(skeleton: Skeleton) -> "nx.MultiGraph":
     """Return corners as nodes and edges as edges, with plain values only.
 
-    Nodes are called by the position of the corner, ``"0"``, ``"1"``, ...  What is no corner gets a
-    node of its own, called by the edge: ``"edge 3 from"`` and ``"edge 3 to"`` for ends that are
-    open, ``"edge 3"`` for a closed edge, which is a loop there.  Lists of names are JSON.
+    Corners are the nodes ``"0"``, ``"1"``, ...  Open ends of an edge have nodes of their own, such
+    as ``"edge 3 from"`` and ``"edge 3 to"``; a closed edge is a loop at the node ``"edge 3"``.
+    Lists of names are JSON.
 
     Parameters
     ----------

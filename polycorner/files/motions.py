@@ -1,4 +1,4 @@
-"""Motions as xarray datasets and NetCDF files: what runs in the drum and all others share."""
+"""Datasets and NetCDF files of motions: the part that all systems have in common."""
 
 import io
 import json
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 EFFORT = tuple(field.name for field in fields(Effort))
 T = TypeVar("T")
-PLACES = ("body_1", "body_2", "contact")
+PARTICIPANTS = ("body_1", "body_2", "contact")
 
 
 @dataclass(frozen=True)
 class MotionUnits:
-    """Units of what every motion has."""
+    """Units of the quantities that every motion has."""
 
     time: str = "s"
     energy: str = "not stated"
@@ -94,34 +94,36 @@ def read_events(table: Any, names: Sequence[str]) -> list[Event]:
 
 
 def column(dimensions: tuple[str, ...], values: Any, unit: str, words: str) -> Any:
-    """Return a variable of a dataset with its unit and what it is."""
+    """Return a variable of a dataset with its unit and its description."""
     return dimensions, values, {"units": unit, "long_name": words}
 
 
 def motion_data(path: Trajectory, names: Sequence[str], units: MotionUnits) -> dict[str, Any]:
-    """Return the variables that every motion has, places and velocities apart."""
+    """Return the variables of a motion other than coordinates and velocities."""
     data: dict[str, Any] = {
         "rests": column(
-            ("time", "body"), path.rests.astype(np.int8), "1", "rests on the substrate"
+            ("time", "body"), path.rests.astype(np.int8), "1", "at rest on the substrate"
         ),
-        "present": column(("time", "body"), path.present.astype(np.int8), "1", "has not left"),
+        "present": column(
+            ("time", "body"), path.present.astype(np.int8), "1", "still in the system"
+        ),
     }
     for name, values in (("kinetic", path.kinetic), ("potential", path.potential)):
-        words = f"{name} energy of those present"
+        words = f"{name} energy of the bodies present"
         data[name] = column(("time",), values, units.energy, words)
     for name, causes in (("dissipated", path.dissipated), ("work", path.work)):
         values = np.stack(list(causes.values()), axis=1)
-        data[name] = column(("time", f"{name}_by"), values, units.energy, f"{name} until then")
+        data[name] = column(("time", f"{name}_by"), values, units.energy, f"{name} up to this time")
     return data | _touches(path, names, units) | _events(path, names, units)
 
 
 def _touches(path: Trajectory, names: Sequence[str], units: MotionUnits) -> dict[str, Any]:
     table = touch_table(path.touching, names)
     data: dict[str, Any] = {}
-    for k, name in enumerate(("instant", *PLACES)):
-        words = f"contacts that touch: {name}, counted from 0 (-1: none)"
+    for k, name in enumerate(("instant", *PARTICIPANTS)):
+        words = f"touching contacts: {name}, counted from 0 (-1: none)"
         data[f"touch_{name}"] = column(("touch",), table["touch"][:, k], "1", words)
-    force = column(("touch",), table["touch_force"], units.force, "force that presses")
+    force = column(("touch",), table["touch_force"], units.force, "normal force")
     return data | {"touch_force": force}
 
 
@@ -130,7 +132,7 @@ def _events(path: Trajectory, names: Sequence[str], units: MotionUnits) -> dict[
     meanings = " ".join(kind.name.lower() for kind in EventKind)
     kinds = {"flag_values": [int(kind) for kind in EventKind], "flag_meanings": meanings}
     data: dict[str, Any] = {}
-    for k, name in enumerate(("kind", *PLACES)):
+    for k, name in enumerate(("kind", *PARTICIPANTS)):
         words = f"events: {name}, counted from 0 (-1: none)"
         dimensions, values, about = column(("event",), table["event"][:, k], "1", words)
         data[f"event_{name}"] = (dimensions, values, about | (kinds if k == 0 else {}))
@@ -141,7 +143,7 @@ def _events(path: Trajectory, names: Sequence[str], units: MotionUnits) -> dict[
 
 
 def motion_coordinates(path: Trajectory, units: MotionUnits) -> dict[str, Any]:
-    """Return the coordinates that every motion has."""
+    """Return the coordinates of the dataset of a motion."""
     return {
         "time": column(("time",), path.times, units.time, "time"),
         "body": np.arange(path.q.shape[1]),
@@ -151,7 +153,7 @@ def motion_coordinates(path: Trajectory, units: MotionUnits) -> dict[str, Any]:
 
 
 def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
-    """Return the attributes that every motion has, and what wrote them."""
+    """Return the attributes of the dataset of a motion, with the versions that wrote it."""
     return {
         "Conventions": "CF-1.11",
         **{f"{name}_version": version for name, version in versions().items()},
@@ -165,7 +167,7 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
 def read_motion(
     content: "xr.Dataset", system: "System | IdenticalBodies", q: Array, v: Array
 ) -> Trajectory:
-    """Return the motion in a dataset."""
+    """Return the trajectory in a dataset, given its coordinates and velocities."""
     at = content.attrs
     names = json.loads(at["contacts"])
 
@@ -176,7 +178,7 @@ def read_motion(
         return {str(cause): of(name)[:, k] for k, cause in enumerate(of(f"{name}_by"))}
 
     def table(kind: str, first: str) -> Any:
-        columns = [of(f"{kind}_{name}") for name in (first, *PLACES)]
+        columns = [of(f"{kind}_{name}") for name in (first, *PARTICIPANTS)]
         return np.stack(columns, axis=1).astype(np.int64)
 
     touches = {"touch": table("touch", "instant"), "touch_force": of("touch_force")}

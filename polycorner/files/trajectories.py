@@ -40,22 +40,25 @@ def trajectory_dataset(
     Parameters
     ----------
     trajectory : Trajectory
-        What :func:`~polycorner.motion.simulation.simulate` returned.
+        As returned by :func:`~polycorner.motion.simulation.simulate`.
     units : mapping from str to str, optional
-        Units of ``time`` (default s), ``energy``, ``force``, ``impulse`` and ``gap``; those of
-        coordinates are the manifold's.
+        Units of ``time`` (default s), ``energy``, ``force``, ``impulse`` and ``gap`` (default that
+        of the contacts' functions); those of coordinates are the manifold's.
 
     Returns
     -------
     xarray.Dataset
         ``q`` and ``v`` over ``time``, ``body`` and ``coordinate``, ``gaps`` over ``time`` and
-        ``gap``, energies, contacts, events, where the energy went, and what it cost.
+        ``gap``, energies, contacts, events, dissipation and work by cause, and the computational
+        effort.
     """
     import xarray as xr
 
     system = _system(trajectory)
     names("units", units or {}, OTHERS)
-    every = dict.fromkeys(OTHERS, NOT_STATED) | {"time": "s"} | dict(units or {})
+    gaps = {f.unit for f in system.polyhedron.functions if f.unit}
+    known = {"time": "s", "gap": gaps.pop() if len(gaps) == 1 else NOT_STATED}
+    every = dict.fromkeys(OTHERS, NOT_STATED) | known | dict(units or {})
     motion = MotionUnits(*(every[key] for key in OTHERS[:-1]))
     own = [unit or NOT_STATED for unit in system.manifold.units]
     dimensions = ("time", "body", "coordinate")
@@ -79,12 +82,12 @@ def save_trajectory(
     *,
     units: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write the trajectory of a system as NetCDF; the file appears whole or not at all.
+    """Write the trajectory of a system as NetCDF, atomically.
 
     Parameters
     ----------
     trajectory : Trajectory
-        What :func:`~polycorner.motion.simulation.simulate` returned.
+        As returned by :func:`~polycorner.motion.simulation.simulate`.
     path : path
         The file; its folder is made if need be.
     units : mapping from str to str, optional
@@ -97,7 +100,7 @@ def save_trajectory(
     Raises
     ------
     TypeError, ValueError
-        Naming the argument.  Runs in the drum are kept by
+        Naming the argument.  Runs in the drum are saved by
         :func:`~polycorner.dumbbells.dynamics.files.save_run`.
     OSError
         If the file cannot be written.

@@ -93,7 +93,7 @@ def _attributes(run: DrumRun, names: list[str]) -> dict[str, Any]:
 
 
 def save_run(run: DrumRun, path: str | os.PathLike[str]) -> Path:
-    """Write a run as NetCDF; the file appears whole or not at all.
+    """Write a run as NetCDF, atomically.
 
     Raises
     ------
