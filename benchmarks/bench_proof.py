@@ -18,7 +18,7 @@ from side_by_side import ROOT, print_table, seconds, write
 
 from polycorner import Certificate, minimise
 from polycorner.dumbbells import DumbbellPair
-from polycorner.proofs.proof import Proof, prove
+from polycorner.proofs import Proof, prove
 
 sys.path.append(str(Path(ROOT, "tests")))
 from minima.exact_kinds import KINDS, departures, programme

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 from polycorner.checks import refuse
 
 if TYPE_CHECKING:
-    from polycorner.proofs.proof import Proof
+    from polycorner.proofs import Proof
 
 COLOURS = {"proved": "#009E73", "failed": "#D55E00", "undecided": "#E69F00"}
 

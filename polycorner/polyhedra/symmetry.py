@@ -4,13 +4,20 @@ A continuous symmetry is given by its tangent vectors and by invariants that tel
 apart; a discrete one by the relabellings that carry one point to another.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
+
+if TYPE_CHECKING:
+    from polycorner.formulas.functions import SmoothFunction
 
 # From the names of functions at one point to the names of the same bodies' functions at another.
 Relabelling = Mapping[str, str]
@@ -55,6 +62,9 @@ class Symmetry(Value):
     relabel : callable, optional
         ``(p, q, tolerance) -> relabellings`` that carry ``p`` to the orbit of ``q``, for groups
         that are too large to list; replaces ``elements``.
+    fields : sequence of vector fields, optional
+        The continuous symmetries as formulas, which :func:`~polycorner.prove` checks by exact
+        algebra; see :func:`vector_field`.  They span the orbits where ``tangents`` is not given.
     """
 
     tangents: Callable[[Array], Array] | None = None
@@ -62,6 +72,12 @@ class Symmetry(Value):
     elements: Sequence[Element] = ()
     key: Callable[[Array], Array] | None = None
     relabel: Callable[[Array, Array, float], Sequence[Relabelling]] | None = None
+    fields: Sequence[Any] = ()
+
+    @cached_property
+    def _compiled(self) -> "dict[Manifold, list[tuple[SmoothFunction, ...]]]":
+        """The vector fields on the manifolds they were evaluated on."""
+        return {}
 
     @property
     def relabels(self) -> bool:
@@ -77,9 +93,12 @@ class Symmetry(Value):
 
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
-        if self.tangents is None:
-            return np.empty((0, manifold.dimension))
-        return np.asarray(self.tangents(q), dtype=np.float64) / manifold.scale_array
+        if self.tangents is not None:
+            return np.asarray(self.tangents(q), dtype=np.float64) / manifold.scale_array
+        if manifold not in self._compiled:
+            self._compiled[manifold] = [vector_field(manifold, field) for field in self.fields]
+        vectors = [[f.value(q) for f in field] for field in self._compiled[manifold]]
+        return np.array(vectors).reshape(-1, manifold.dimension) / manifold.scale_array
 
     def separation(self, manifold: Manifold, p: Array, q: Array) -> float:
         """Return how far the continuous orbits of two points are apart, in scale units."""
@@ -111,3 +130,45 @@ def _same(q: Array) -> Array:
 def renamed(names: frozenset[str], relabelling: Relabelling) -> frozenset[str]:
     """Return the names after a relabelling."""
     return frozenset(relabelling.get(name, name) for name in names)
+
+
+def vector_field(manifold: Manifold, components: Any) -> "tuple[SmoothFunction, ...]":
+    """Return the components of a vector field as functions.
+
+    Parameters
+    ----------
+    manifold : Manifold
+    components : mapping or sequence
+        A mapping from coordinate names to components, zero where not listed, or a sequence of
+        ``n`` components: numbers, SymPy expressions or SmoothFunctions.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For anything else.
+    """
+    import sympy
+
+    from polycorner.formulas.functions import SmoothFunction
+
+    if isinstance(components, Mapping) and components:
+        checks.names("symmetry", components, manifold.names)
+        components = [components.get(name, 0) for name in manifold.names]
+    if isinstance(components, str | Mapping) or not isinstance(components, Iterable):
+        checks.refuse(
+            "symmetry", "components by name, or a sequence of them", components, TypeError
+        )
+    given = list(components)
+    if len(given) != manifold.dimension:
+        expected = f"{manifold.dimension} components, for {', '.join(manifold.names)}"
+        checks.refuse("symmetry", expected, len(given))
+    return tuple(
+        f
+        if isinstance(f, SmoothFunction)
+        else SmoothFunction(
+            name,
+            sympy.Rational(f.numerator, f.denominator) if isinstance(f, Fraction) else f,
+            manifold,
+        )
+        for name, f in zip(manifold.names, given, strict=True)
+    )

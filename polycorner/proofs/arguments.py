@@ -1,36 +1,28 @@
-"""What a proof is asked for, checked at the door."""
+"""Checks of the arguments of a proof."""
 
 from collections.abc import Mapping
 from itertools import product
 from math import isfinite
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Problem
+from polycorner.proofs.parameter_boxes import Interval
 
 CHECK_BITS = 128
-SAME = 1e-5  # how far, relatively, a value may lie from what it was when it was certified
-
-Interval = tuple[float, float]
-
-
-def check_whole(argument: str, value: Any, most: int) -> None:
-    """Refuse anything but a whole number from 1 to ``most``."""
-    whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not whole or not 1 <= value <= most:
-        msg = f"{argument}: expected a whole number from 1 to {most}; got {value!r}"
-        raise ValueError(msg)
+SAME = 1e-5  # relative change of a value since certification that counts as none
 
 
 def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
-    """Refuse a certificate whose functions no longer have the values it was made with.
+    """Raise ValueError for a certificate whose functions have changed since it was made.
 
-    The kernels that a certificate computes with are bound once; the formulas are read anew.
+    A certificate computes with kernels bound once, a proof with the formulas as they are now.
     """
     problem = certificate.problem
     point = certificate.point
@@ -55,19 +47,14 @@ def check_parameters(problem: Problem, parameters: Any) -> tuple[dict[str, Inter
     if parameters is None:
         return {}, []
     if not isinstance(parameters, Mapping) or not parameters:
-        msg = f"parameters: expected a mapping from names to (lower, upper); got {parameters!r}"
-        raise TypeError(msg)
+        checks.refuse("parameters", "a mapping from names to (lower, upper)", parameters, TypeError)
     known = _bound(problem)
-    unknown = [str(name) for name in parameters if name not in known]
-    if unknown:
-        listed = ", ".join(known) or "none, since no function has a parameter"
-        msg = f"parameters: expected names among {listed}; got {', '.join(unknown)}"
-        raise ValueError(msg)
+    checks.names("parameters", parameters, known)
     sides = {name: _side(name, side) for name, side in parameters.items()}
     for name in sides:
         if len(known[name]) > 1:
             values = ", ".join(f"{value:g}" for value in sorted(known[name]))
-            msg = f"parameters: expected one value of {name} in all functions; it is {values}"
+            msg = f"parameters: expected one value of {name} in all functions; got {values}"
             raise ValueError(msg)
     return sides, [min(known[name]) for name in sides]
 
@@ -95,7 +82,7 @@ def _side(name: str, side: Any) -> Interval:
 
 
 def check_domain(formulas: Formulas, sides: Mapping[str, Interval]) -> None:
-    """Refuse a box of parameters with a corner at which a function has no value anywhere."""
+    """Raise ValueError for a box of parameters with a corner at which a function is undefined."""
     with precision(CHECK_BITS):
         for corner in product(*sides.values()):
             name = formulas.undefined([ball(x) for x in corner])

@@ -1,4 +1,4 @@
-"""What a certificate claims, made ready for proof: the face, its symmetries, and a start."""
+"""Claims to be proved: the face of a certificate, its symmetries and approximate unknowns."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate
 from polycorner.polyhedra.cones import Rows, unit_rows
-from polycorner.proofs.findings import Claim, Finding, Status
+from polycorner.proofs.hypotheses import Claim, ConditionResult, Status
 from polycorner.proofs.invariance import (
     Generator,
     annihilated,
-    generator,
+    generators,
     slope_bounds,
     translations,
 )
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
     from polycorner.spaces.manifold import Array
 
-MOST_SUBSETS, MOST_FACES = 1000, 8  # looked at where gradients are dependent
-DEPENDENT = 1e-6  # sine of the angle at which a field adds no direction of its own
+MOST_SUBSETS, MOST_FACES = 1000, 8  # examined where gradients are dependent
+DEPENDENT = 1e-6  # sine of the angle up to which a field depends on the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +40,13 @@ class Posed:
         What is to be proved.
     start : list of Ball
         Approximate unknowns of its system.
-    refused : Finding or None
-        Why a declared field is not used.
+    refused : ConditionResult or None
+        The result for a declared field that is not a symmetry, if there is one.
     """
 
     claim: Claim
     start: "list[Ball]"
-    refused: Finding | None
+    refused: ConditionResult | None
 
 
 def faces(certificate: Certificate) -> Iterator[tuple[int, ...]]:
@@ -54,7 +54,7 @@ def faces(certificate: Certificate) -> Iterator[tuple[int, ...]]:
 
     Where gradients are independent there is one: the functions whose multipliers are not zero.
     Where they are dependent, every independent set with positive multipliers is one, and the
-    functions outside it are then looked at as if they were not active.
+    functions outside it are then treated as inactive.
     """
     analysis = certificate.analysis
     active, k = analysis.active, len(analysis.active)
@@ -102,7 +102,7 @@ def pose_claim(
             return forms
         kept, refused = _invariant(forms, declared, box)
         for basis in translations(forms):
-            kept.append(generator(problem.polyhedron.manifold, basis))
+            kept += generators(problem.polyhedron.manifold, [basis])
         fields, gauges = _independent(kept, box, problem.scales)
         system = System(formulas, rows, gauges, point, _units(certificate, rows, gauges))
         multipliers = _multipliers(certificate, rows)
@@ -134,19 +134,19 @@ def _multipliers(certificate: Certificate, rows: Sequence[int]) -> list[float]:
 
 def _invariant(
     forms: SmoothForms, declared: Sequence[Generator], box: Box
-) -> tuple[list[Generator], Finding | None]:
-    """Return the declared fields along which nothing changes, and what is wrong with another."""
+) -> tuple[list[Generator], ConditionResult | None]:
+    """Return the declared fields that are symmetries, and the result for one that is not."""
     kept: list[Generator] = []
-    refused: Finding | None = None
+    refused: ConditionResult | None = None
     for field in declared:
         if all(annihilated(forms, field)):
             kept.append(field)
         elif any(slope != 0 for slope in slope_bounds(forms, field, box)):
             reason = f"energy or active functions change along {field}"
-            refused = Finding(Status.FAILED, reason)
+            refused = ConditionResult(Status.FAILED, reason)
         else:
             reason = f"exact algebra does not show that nothing changes along {field}"
-            refused = refused or Finding(Status.UNDECIDED, reason)
+            refused = refused or ConditionResult(Status.UNDECIDED, reason)
     return kept, refused
 
 

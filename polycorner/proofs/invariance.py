@@ -1,14 +1,16 @@
-"""Directions along which a problem is exactly invariant, by exact algebra.
+"""Vector fields along which a problem is exactly invariant, by exact algebra.
 
-A vector field ``xi`` is a *generator* of a symmetry when ``sum xi_i df/dq_i`` is identically zero
-for the energy and for every function that holds the point.  That is an identity, which no
-evaluation in intervals can show; it is derived here by forward differentiation along ``xi`` in
-exact rational arithmetic, slopes being polynomials in the nodes of the functions' own graph.  What
-cancels there cancels for all arguments.  What does not may still be an identity that this algebra
-does not see: then the answer is "not shown".
+A vector field ``xi`` is a *generator* of a symmetry if ``sum xi_i df/dq_i`` is identically zero
+for the energy and for every active function.  No evaluation in intervals can show this identity; it
+is derived by forward differentiation along ``xi`` in exact rational arithmetic, with slopes as
+polynomials in the nodes of the functions' own graph.  What cancels there cancels for all arguments;
+an identity that this algebra does not recognise counts as not shown.
+
+The polynomials have no fixed set of variables, as differentiation adds nodes; they are therefore
+kept as mappings from monomials to coefficients.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -19,6 +21,7 @@ from polycorner.formulas.programs import Graph
 from polycorner.intervals.balls import dot
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided, write
 from polycorner.intervals.tapes import Box, arguments, needed
+from polycorner.polyhedra.symmetry import vector_field
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
@@ -29,11 +32,11 @@ if TYPE_CHECKING:
 # A sum of products of nodes: exponents are repetitions, and 1 is the empty product.
 Polynomial = dict[tuple[int, ...], Fraction]
 
-MOST_TERMS = 20_000
+MOST_TERMS = 20_000  # products of terms up to which polynomials are multiplied
 
 
 class _TooLargeError(Exception):
-    """A polynomial has grown beyond what is worth expanding."""
+    """A polynomial exceeds ``MOST_TERMS``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +46,9 @@ class Generator:
     Attributes
     ----------
     manifold : Manifold
-        Where it lives.
+        The manifold it is defined on.
     components : tuple of SmoothFunction
-        What it is; constants are functions, too.
+        One for each coordinate; constants are functions, too.
     """
 
     manifold: Manifold
@@ -80,64 +83,16 @@ def _term(component: "sympy.Expr", name: str) -> str:
     return f"{exact} d/d{name}" if number else f"({exact}) d/d{name}"
 
 
-def generator(manifold: Manifold, components: Iterable[Any]) -> Generator:
-    """Return the vector field with given components: numbers, expressions or functions."""
-    import sympy
-
-    fields = [
-        f
-        if isinstance(f, SmoothFunction)
-        else SmoothFunction(
-            name,
-            sympy.Rational(f.numerator, f.denominator) if isinstance(f, Fraction) else f,
-            manifold,
-        )
-        for name, f in zip(manifold.names, components, strict=True)
-    ]
-    return Generator(manifold, tuple(fields))
-
-
-def declared(manifold: Manifold, symmetry: Any) -> list[Generator]:
-    """Return the generators a user gave, checking them.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If one is no mapping from coordinate names and no sequence of ``n`` components.
-    """
-    if isinstance(symmetry, Mapping | str) or not isinstance(symmetry, Iterable):
-        msg = f"symmetry: expected a sequence of vector fields; got {symmetry!r}"
-        raise TypeError(msg)
-    return [_declared(manifold, field) for field in symmetry]
-
-
-def _declared(manifold: Manifold, field: Any) -> Generator:
-    names = ", ".join(manifold.names)
-    if isinstance(field, Mapping):
-        unknown = [str(name) for name in field if name not in manifold.names]
-        if unknown or not field:
-            msg = f"symmetry: expected components for some of {names}; got {', '.join(unknown)}"
-            raise ValueError(msg)
-        field = [field.get(name, 0) for name in manifold.names]
-    try:
-        components = list(field)
-    except TypeError as error:
-        msg = f"symmetry: expected a mapping or a sequence of components; got {field!r}"
-        raise TypeError(msg) from error
-    if len(components) != manifold.dimension:
-        msg = (
-            f"symmetry: expected {manifold.dimension} components, for {names}; "
-            f"got {len(components)}"
-        )
-        raise ValueError(msg)
-    return generator(manifold, components)
+def generators(manifold: Manifold, fields: Iterable[Any]) -> list[Generator]:
+    """Return the vector fields of a symmetry; see :func:`vector_field` for their forms."""
+    return [Generator(manifold, vector_field(manifold, field)) for field in fields]
 
 
 def translations(forms: SmoothForms) -> list[list[Fraction]]:
-    """Return a basis of the constant vectors along which the functions visibly do not change.
+    """Return a basis of constant vectors along which the functions are constant.
 
-    Visibly: whatever enters a nonlinear operation is a linear form, with rational coefficients,
-    that the vector annihilates.
+    These are the vectors that annihilate every argument of a nonlinear operation, where all of
+    these are linear forms with rational coefficients.
     """
     n = forms.dimension
     zero = (Fraction(0),) * n
@@ -173,41 +128,30 @@ def _factor(graph: Graph, a: int) -> tuple[Fraction, int] | None:
 
 
 def _null_space(rows: list[list[Fraction]], n: int) -> list[list[Fraction]]:
-    """Return a basis of what rational rows annihilate, by elimination."""
-    pivots: list[int] = []
-    reduced: list[list[Fraction]] = []
-    for column in range(n):
-        found = next((row for row in rows if row[column]), None)
-        if found is None:
-            continue
-        rows = [row for row in rows if row is not found]
-        unit = [value / found[column] for value in found]
-        reduced = [_without(row, unit, column) for row in reduced]
-        rows = [_without(row, unit, column) for row in rows]
-        reduced.append(unit)
-        pivots.append(column)
+    """Return a basis of the null space of rational rows."""
+    from sympy import QQ
+    from sympy.polys.matrices import DomainMatrix
+
+    entries = [[QQ(x.numerator, x.denominator) for x in row] for row in rows]
+    reduced, pivots = DomainMatrix(entries, (len(rows), n), QQ).rref()
     basis = []
     for free in (column for column in range(n) if column not in pivots):
         vector = [Fraction(int(k == free)) for k in range(n)]
-        for pivot, row in zip(pivots, reduced, strict=True):
-            vector[pivot] = -row[free]
+        for pivot, row in zip(pivots, reduced.to_list(), strict=False):
+            vector[pivot] = -Fraction(int(row[free].numerator), int(row[free].denominator))
         basis.append(vector)
     return basis
 
 
-def _without(row: list[Fraction], unit: list[Fraction], column: int) -> list[Fraction]:
-    return [u - row[column] * v for u, v in zip(row, unit, strict=True)]
-
-
 def annihilated(forms: SmoothForms, field: Generator) -> list[bool]:
-    """Return for each function whether its slope along the field is shown to be zero."""
+    """Return for each function whether its slope along the field is proved to be zero."""
     components = [write(forms.graph, f) for f in field.components]
     slopes = _Slopes(forms.graph, components)
     return [slopes.vanishes(output) for output in forms.outputs]
 
 
 def slope_bounds(forms: SmoothForms, field: Generator, box: Box) -> "list[Ball]":
-    """Return enclosures of the slopes of the functions along the field; none where it has edges."""
+    """Return enclosures of the slopes of the functions along a field; none if it is not smooth."""
     along = field.at(box.hull)
     if isinstance(along, Undecided):
         return []
@@ -224,14 +168,14 @@ class _Slopes:
         self._slopes: dict[int, Polynomial] = {}
 
     def vanishes(self, output: int) -> bool:
-        """Whether the slope of a node is identically zero; False where that is not seen."""
+        """Whether the slope of a node is identically zero; False if that is not recognised."""
         try:
             return not self.slope(output)
         except _TooLargeError:
             return False
 
     def written(self, a: int) -> Polynomial:
-        """Return a node as a polynomial in nodes that are no sums and no products."""
+        """Return a node as a polynomial in nodes that are neither sums nor products."""
         if a not in self._written:
             self._written[a] = self._write(a)
         return self._written[a]
@@ -300,7 +244,7 @@ _DERIVATIVES = {
 
 
 def _quotient(top: Polynomial, bottom: Polynomial, a: int) -> Polynomial:
-    """Return a quotient: a number where the one is a multiple of the other, else a symbol's."""
+    """Return a quotient: a number if it is constant, otherwise a multiple of a new symbol."""
     if top.keys() == bottom.keys() and top:
         ratios = {top[monomial] / bottom[monomial] for monomial in top}
         if len(ratios) == 1:

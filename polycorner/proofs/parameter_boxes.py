@@ -1,6 +1,6 @@
-"""A claim for a whole box of parameters, proved cell by cell."""
+"""Proofs for boxes of parameters, cell by cell."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
@@ -19,7 +19,14 @@ from polycorner.intervals.balls import (
     precision,
 )
 from polycorner.intervals.enclosures import Undecided
-from polycorner.proofs.findings import Claim, Finding, Status, findings, nowhere, unfounded
+from polycorner.progress import Progress, silent
+from polycorner.proofs.hypotheses import (
+    Claim,
+    ConditionResult,
+    Status,
+    check_hypotheses,
+    without_enclosure,
+)
 from polycorner.proofs.kkt import newton
 from polycorner.proofs.krawczyk import Cell, Enclosure, enclose
 
@@ -27,17 +34,16 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
 CELL_BITS = 64
-MOST_STRIDES = 16  # into which a way through the parameters is cut
-STRIDE_STEPS = 8  # of Newton's method at the end of a stride
-FARTHEST = 0.5  # scale units that a solution may jump beyond its prediction
+MOST_STRIDES = 16  # into which a path through the parameters is divided
+STRIDE_STEPS = 8  # steps of Newton's method at the end of a stride
+FARTHEST = 0.5  # largest distance of a solution from its prediction, in scale units
 
 Interval = tuple[float, float]
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
 class ParameterCell:
-    """A box of parameters, and what is proved for all of them.
+    """A cell of a box of parameters, and the status of the claim on it.
 
     Attributes
     ----------
@@ -46,9 +52,9 @@ class ParameterCell:
     status : Status
         Proved; failed (a condition is violated throughout); or undecided.
     conditions : mapping from str to Status
-        What is said about each condition.
+        Status of each condition.
     reason : str
-        Why the first condition that is not proved is not; empty where all are.
+        The reason why the first condition is not proved; empty if all are.
     bounds : mapping from str to (float, float)
         Bounds of the coordinates, of the energy (``energy``) and of the multipliers
         (``multiplier NAME``) over the cell; empty where there is no enclosure.
@@ -82,7 +88,7 @@ def cover(
     sides: Mapping[str, Interval],
     *,
     max_cells: int,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> tuple[ParameterCell, ...]:
     """Cut a box of parameters into cells until each is decided or ``max_cells`` are reached.
 
@@ -95,7 +101,7 @@ def cover(
     sides : mapping from str to (float, float)
         The box.
     progress : callable, optional
-        Called with the decided fraction of the box.
+        Called with the decided fraction of the box, 1, and the number of cells.
     """
     names, whole = tuple(sides), prod(upper - lower for lower, upper in sides.values())
     order = count()
@@ -114,64 +120,65 @@ def cover(
             continue
         done.append(cell)
         decided += cell.volume / whole
-        if progress is not None:
-            progress(min(1.0, decided))
+        progress(min(1.0, decided), 1.0, f"{len(done)} cells")
     return tuple(done)
 
 
 def _tried(
     claim: Claim, names: tuple[str, ...], item: _Waiting, whole: Mapping[str, Interval]
 ) -> tuple[ParameterCell, list[_Waiting]]:
-    """Return what is decided on a cell, and its halves where that is not everything."""
+    """Return the cell with its status, and its halves if it is undecided."""
     sides = dict(zip(names, item.sides, strict=True))
     middle = tuple(lower + (upper - lower) / 2 for lower, upper in item.sides)
     centre = follow(claim, item.start, item.at, middle)
     if isinstance(centre, Undecided):
-        found = unfounded(claim, centre)
+        found = without_enclosure(centre, symmetric=bool(claim.fields))
         cell = _cell(sides, found, {})
         return cell, [_Waiting(half, item.start, item.at) for half in _halves(item.sides, whole)]
     p0 = [ball(x) for x in middle]
     reach = [between(*side) - p for side, p in zip(item.sides, p0, strict=True)]
     enclosure = enclose(claim.system, centre, Cell(p0, reach), bits=CELL_BITS)
     if isinstance(enclosure, Undecided):
-        cell = _cell(sides, unfounded(claim, enclosure), {})
+        cell = _cell(sides, without_enclosure(enclosure, symmetric=bool(claim.fields)), {})
     else:
-        cell = _cell(sides, findings(claim, enclosure), _bounds(claim, enclosure))
+        cell = _cell(sides, check_hypotheses(claim, enclosure), _bounds(claim, enclosure))
     if cell.status is not Status.UNDECIDED:
         return cell, []
     return cell, [_Waiting(half, centre, middle) for half in _halves(item.sides, whole)]
 
 
 def _cell(
-    sides: Mapping[str, Interval], found: Mapping[str, Finding], where: Mapping[str, Interval]
+    sides: Mapping[str, Interval],
+    found: Mapping[str, ConditionResult],
+    where: Mapping[str, Interval],
 ) -> ParameterCell:
-    conditions = {name: finding.status for name, finding in found.items()}
+    conditions = {name: result.status for name, result in found.items()}
     for status in (Status.FAILED, Status.UNDECIDED):
-        for name, finding in found.items():
-            if finding.status is status:
-                return ParameterCell(sides, status, conditions, f"{name}: {finding.reason}", where)
+        for name, result in found.items():
+            if result.status is status:
+                return ParameterCell(sides, status, conditions, f"{name}: {result.reason}", where)
     return ParameterCell(sides, Status.PROVED, conditions, "", where)
 
 
 def undecided_cell(sides: Mapping[str, Interval], undecided: Undecided) -> ParameterCell:
-    """Return a cell about which nothing is known."""
-    return _cell(sides, nowhere(undecided), {})
+    """Return the undecided cell of the whole box."""
+    return _cell(sides, without_enclosure(undecided), {})
 
 
-def summary(cells: Sequence[ParameterCell]) -> dict[str, Finding]:
-    """Return what is said about each condition for all cells together."""
-    found: dict[str, Finding] = {}
+def summary(cells: Sequence[ParameterCell]) -> dict[str, ConditionResult]:
+    """Return the result of each condition over all cells."""
+    found: dict[str, ConditionResult] = {}
     for name in dict.fromkeys(name for cell in cells for name in cell.conditions):
-        found[name] = Finding(Status.PROVED, f"on all of the {len(cells)} cells")
+        found[name] = ConditionResult(Status.PROVED, f"on all of the {len(cells)} cells")
         for status in (Status.FAILED, Status.UNDECIDED):
             some = [cell for cell in cells if cell.conditions.get(name) is status]
             if some:
                 largest = max(some, key=lambda cell: cell.volume)
-                sides = ", ".join(
-                    f"{p} in [{a:g}, {b:g}]" for p, (a, b) in largest.parameters.items()
+                reason = (
+                    f"on {len(some)} of {len(cells)} cells, the largest with "
+                    f"{shown_box(largest.parameters)}"
                 )
-                reason = f"on {len(some)} of {len(cells)} cells, the largest with {sides}"
-                found[name] = Finding(status, reason)
+                found[name] = ConditionResult(status, reason)
                 break
     return found
 
@@ -194,7 +201,7 @@ def _outwards(value: "Ball") -> Interval:
 def _halves(
     sides: tuple[Interval, ...], whole: Mapping[str, Interval]
 ) -> Iterator[tuple[Interval, ...]]:
-    """Cut a cell across its side that is longest, relative to the whole box; if it can be cut."""
+    """Return the halves across the side that is longest relative to the whole box, if any."""
     lengths = [
         (upper - lower) / (last - first)
         for (lower, upper), (first, last) in zip(sides, whole.values(), strict=True)
@@ -212,8 +219,8 @@ def follow(
 ) -> "list[Ball] | Undecided":
     """Follow a solution from parameters ``at`` to parameters ``to``.
 
-    The way is cut into strides, each predicted along the tangent; a stride is halved where
-    Newton's method goes astray.  Nothing here needs to be rigorous.
+    The path is divided into strides, each predicted along the tangent; a stride is halved if
+    Newton's method fails.  Nothing here needs to be rigorous.
     """
     done, stride = 0.0, 1.0
     undecided = Undecided(
@@ -259,3 +266,8 @@ def _stride(
     steps = zip(found, guess, system.scales, strict=False)
     near = all(abs(a - b) <= FARTHEST * scale for a, b, scale in steps)
     return found if near else None
+
+
+def shown_box(sides: Mapping[str, Interval]) -> str:
+    """Return the sides of a box of parameters in words."""
+    return ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in sides.items())

@@ -8,7 +8,7 @@ from exact_kinds import KINDS, departures, programme
 from exact_oracle import holds
 from hypothesis import settings
 
-from polycorner.proofs.proof import prove
+from polycorner.proofs import prove
 
 DIGITS = 20
 FEW = 16

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from polycorner import Manifold, Polyhedron, certify, minimise, stationary_on
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.formulas import plane_heading_formula
-from polycorner.proofs.findings import CURVED
-from polycorner.proofs.proof import prove
+from polycorner.proofs import prove
+from polycorner.proofs.hypotheses import CURVED
 
 CORNER = ("A2B1", "A2b", "aB1")
 

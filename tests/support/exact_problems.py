@@ -21,6 +21,7 @@ from exact_algebra import ZERO
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, certify, minimise
 from polycorner.formulas.families import Family
+from polycorner.polyhedra.symmetry import Symmetry
 
 UNBOUNDED = ("saddle", "faint curvature", "beyond second order")
 BEYOND = ("third", "fourth", "kink", "edge")
@@ -118,7 +119,8 @@ class Programme:
     def symmetry(self):
         """The constant field in ``q`` that may be declared: none where coordinates are bent."""
         bent = any(x for row in self.bends for x in row)
-        return [] if bent or not self.invariant else [list(map(float, self.invariant))]
+        known = not bent and bool(self.invariant)
+        return Symmetry(fields=[list(map(float, self.invariant))] if known else [])
 
     def certificate(self, q, *, search):
         """Certify ``q``, or what a search from there finds where the energy is bounded below."""

@@ -19,7 +19,7 @@ from polycorner.dumbbells.cli.options import chosen_pair, pair_options, paramete
 
 if TYPE_CHECKING:
     from polycorner.printing import Sheet
-    from polycorner.proofs.proof import Proof
+    from polycorner.proofs import Proof
 
 EPILOG = examples(
     "prove", "prove --drum inf --digits 100 --json", "prove --box t=1.49:1.51 --box l=15.9:16.1"
@@ -67,7 +67,7 @@ def prove(
     prepare(out)
     with working("proving"):
         from polycorner.dumbbells import dyad_minima
-        from polycorner.proofs.proof import prove as proved
+        from polycorner.proofs import prove as proved
 
         (entry,) = [found for found in dyad_minima(pair) if found.name == minimum]
         try:

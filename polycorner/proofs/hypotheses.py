@@ -1,4 +1,4 @@
-"""The hypotheses of the theorem behind a proof, each decided on an enclosure."""
+"""Hypotheses of the theorem behind a proof, each decided on an enclosure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ POSITIVE = "multipliers positive"
 INACTIVE = "inactive gaps positive"
 CURVED = "reduced Hessian positive definite"
 
-MOST_UNKNOWN = 4  # functions of unknown sign for which an and/or tree is tried in every way
-MOST_HALVINGS = 8  # of a cell, for the functions that are not active
+MOST_UNKNOWN = 4  # functions of unknown sign up to which all their signs are tried in a tree
+MOST_HALVINGS = 8  # of a cell, to decide the signs of inactive functions
 
 
 class Status(StrEnum):
-    """What a proof says about one condition."""
+    """Status of a condition in a proof."""
 
     PROVED = "proved"
     FAILED = "failed"
@@ -38,16 +38,28 @@ class Status(StrEnum):
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A condition decided, or not, and why."""
+class ConditionResult:
+    """Status of a condition, and the reason."""
 
     status: Status
     reason: str
 
 
+def _proved(reason: str) -> ConditionResult:
+    return ConditionResult(Status.PROVED, reason)
+
+
+def _failed(reason: str) -> ConditionResult:
+    return ConditionResult(Status.FAILED, reason)
+
+
+def _undecided(reason: str) -> ConditionResult:
+    return ConditionResult(Status.UNDECIDED, reason)
+
+
 @dataclass(frozen=True, eq=False)
 class Claim:
-    """That a face holds a minimum: its KKT system, modulo fields along which nothing changes.
+    """The claim that a face carries a minimum: its KKT system, modulo symmetries.
 
     Attributes
     ----------
@@ -73,26 +85,23 @@ class Claim:
         return (*(d.names[i] for i in self.active), *d.equation_names)
 
 
-def unfounded(claim: Claim, undecided: Undecided) -> dict[str, Finding]:
-    """Return the findings where no enclosure was found: nothing is decided."""
-    return nowhere(undecided, symmetric=bool(claim.fields))
-
-
-def nowhere(undecided: Undecided, *, symmetric: bool = False) -> dict[str, Finding]:
-    """Return the findings where there is nothing to check them on."""
+def without_enclosure(
+    undecided: Undecided, *, symmetric: bool = False
+) -> dict[str, ConditionResult]:
+    """Return the results if there is no enclosure: nothing is decided."""
     others = [INDEPENDENT, *([SYMMETRIC] if symmetric else []), POSITIVE, INACTIVE, CURVED]
-    nothing = Finding(Status.UNDECIDED, "there is no enclosure of a solution to check it on")
-    return {UNIQUE: Finding(Status.UNDECIDED, str(undecided)), **dict.fromkeys(others, nothing)}
+    nothing = _undecided("there is no enclosure of a solution to check it on")
+    return {
+        UNIQUE: _undecided(str(undecided)),
+        **dict.fromkeys(others, nothing),
+    }
 
 
-def findings(claim: Claim, enclosure: Enclosure) -> dict[str, Finding]:
+def check_hypotheses(claim: Claim, enclosure: Enclosure) -> dict[str, ConditionResult]:
     """Decide every condition on an enclosure."""
     found = {
-        UNIQUE: Finding(
-            Status.PROVED, f"Krawczyk's operator maps a box of {claim.system.size} unknowns inside"
-        ),
-        INDEPENDENT: Finding(
-            Status.PROVED,
+        UNIQUE: _proved(f"Krawczyk's operator maps a box of {claim.system.size} unknowns inside"),
+        INDEPENDENT: _proved(
             f"{', '.join(claim.names)}: rows of a regular KKT matrix"
             if claim.names
             else "no function is active",
@@ -118,7 +127,7 @@ def shown(number: "Ball", digits: int = 3) -> str:
 # ---------------------------------------------------------------------------------------- symmetry
 
 
-def _symmetric(claim: Claim, enclosure: Enclosure) -> Finding:
+def _symmetric(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     linear, box = enclosure.linear, enclosure.neighbourhood()
     names = (*claim.names, "the energy")
     for field in claim.fields:
@@ -127,9 +136,8 @@ def _symmetric(claim: Claim, enclosure: Enclosure) -> Finding:
             name = names[constant.index(False)]
             slopes = slope_bounds(linear.forms, field, box)
             if any(slope != 0 for slope in slopes):
-                return Finding(Status.FAILED, f"{name} changes along {field}")
-            return Finding(
-                Status.UNDECIDED,
+                return _failed(f"{name} changes along {field}")
+            return _undecided(
                 f"exact algebra does not show that {name} is constant along {field}",
             )
     sections = []
@@ -139,8 +147,8 @@ def _symmetric(claim: Claim, enclosure: Enclosure) -> Finding:
     listed = "; ".join(map(str, claim.fields))
     if _regular(sections):
         reason = f"energy and active functions are constant along {listed}, across the section"
-        return Finding(Status.PROVED, reason)
-    return Finding(Status.UNDECIDED, f"{listed} may touch the section chosen across it")
+        return _proved(reason)
+    return _undecided(f"{listed} may touch the section chosen across it")
 
 
 def _regular(rows: "list[list[Ball | Undecided]]") -> bool:
@@ -156,38 +164,38 @@ def _regular(rows: "list[list[Ball | Undecided]]") -> bool:
 # ------------------------------------------------------------------------------------- first order
 
 
-def _positive(claim: Claim, enclosure: Enclosure) -> Finding:
+def _positive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     n = claim.system.dimension
     pairs = list(zip(claim.names, enclosure.solution[n:], strict=False))[: len(claim.active)]
     for name, value in pairs:
         if value < 0:
-            return Finding(Status.FAILED, f"the multiplier of {name} lies in {shown(value)}")
+            return _failed(f"the multiplier of {name} lies in {shown(value)}")
     for name, value in pairs:
         if not value > 0:
             reason = f"{name} is weakly active, or the box too wide: its multiplier lies in "
-            return Finding(Status.UNDECIDED, reason + shown(value))
+            return _undecided(reason + shown(value))
     if not pairs:
-        return Finding(Status.PROVED, "no inequality is active")
+        return _proved("no inequality is active")
     name, value = min(pairs, key=lambda pair: float(pair[1].lower()))
-    return Finding(Status.PROVED, f"the smallest is that of {name}, in {shown(value)}")
+    return _proved(f"the smallest is that of {name}, in {shown(value)}")
 
 
-def _inactive(claim: Claim, enclosure: Enclosure) -> Finding:
+def _inactive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     d = claim.problem.polyhedron
     others = [i for i in range(len(d.functions)) if i not in claim.active]
     if not others:
         return _membership(d, claim.active, [], [])
     waiting = [(tuple(enclosure.predictor.cell.reach), 0)]
-    finding = Finding(Status.UNDECIDED, "")
+    result = _undecided("")
     while waiting:
         reach, depth = waiting.pop()
         values = claim.system.formulas.values(enclosure.neighbourhood(reach), others)
-        finding = _membership(d, claim.active, others, values)
-        if finding.status is Status.UNDECIDED and reach and depth < MOST_HALVINGS:
+        result = _membership(d, claim.active, others, values)
+        if result.status is Status.UNDECIDED and reach and depth < MOST_HALVINGS:
             waiting += [(half, depth + 1) for half in _halves(reach)]
-        elif finding.status is not Status.PROVED:
+        elif result.status is not Status.PROVED:
             break
-    return finding
+    return result
 
 
 def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":
@@ -200,7 +208,7 @@ def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":
 
 def _membership(
     d: Polyhedron, active: tuple[int, ...], others: "Sequence[int]", values: "Sequence[Ball]"
-) -> Finding:
+) -> ConditionResult:
     """Decide whether the set near the solution is exactly where the active functions hold."""
     signs: list[int | None] = [0] * len(d.functions)
     for i, value in zip(others, values, strict=True):
@@ -214,7 +222,7 @@ def _membership(
             f"{name} may vanish there without being needed (redundant, or weakly active), or the "
             f"box is too wide: it lies in {shown(listed[name])}"
         )
-        return Finding(Status.UNDECIDED, reason)
+        return _undecided(reason)
     if not agrees:
         below = {name: v for name, v in listed.items() if v < 0 or d.is_union}
         name, value = min(below.items(), key=lambda item: abs(float(item[1].mid())))
@@ -222,11 +230,11 @@ def _membership(
         if d.is_union:
             held = ", ".join(d.names[i] for i in active) or "nothing"
             reason = f"the tree asks there for more, or less, than {held} alone: {reason}"
-        return Finding(Status.FAILED, reason)
+        return _failed(reason)
     if not listed:
-        return Finding(Status.PROVED, "every inequality is active")
+        return _proved("every inequality is active")
     name, least = min(listed.items(), key=lambda item: abs(float(item[1].mid())))
-    return Finding(Status.PROVED, f"the nearest to 0 is {name}, in {shown(least)}")
+    return _proved(f"the nearest to 0 is {name}, in {shown(least)}")
 
 
 def _face_alone(d: Polyhedron, signs: "list[int | None]", active: tuple[int, ...]) -> bool | None:
@@ -249,19 +257,19 @@ def _face_alone(d: Polyhedron, signs: "list[int | None]", active: tuple[int, ...
 # ------------------------------------------------------------------------------------ second order
 
 
-def _curved(claim: Claim, enclosure: Enclosure) -> Finding:
+def _curved(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     linear = enclosure.start
     form = tangent_form(linear.curvature, linear.rows, claim.system.scales)
     if form is None:
-        return Finding(Status.UNDECIDED, "the tangent space of the face could not be enclosed")
+        return _undecided("the tangent space of the face could not be enclosed")
     if not form:
-        return Finding(Status.PROVED, "the face is a point: no tangent direction is left")
+        return _proved("the face is a point: no tangent direction is left")
     found = pivots(form)
     last = found[-1]
     if last < 0:
-        return Finding(Status.FAILED, f"a pivot lies in {shown(last)}, in scaled coordinates")
+        return _failed(f"a pivot lies in {shown(last)}, in scaled coordinates")
     if len(found) < len(form) or not last > 0:
         reason = "flat in a direction that is no declared symmetry, or the box is too wide: "
-        return Finding(Status.UNDECIDED, f"{reason}a pivot lies in {shown(last)}")
+        return _undecided(f"{reason}a pivot lies in {shown(last)}")
     least = min(found, key=lambda pivot: float(pivot.lower()))
-    return Finding(Status.PROVED, f"the smallest of {len(form)} pivots lies in {shown(least)}")
+    return _proved(f"the smallest of {len(form)} pivots lies in {shown(least)}")

@@ -1,0 +1,238 @@
+"""Verification of certificates in interval arithmetic.
+
+Theorem ([NW] thm 12.6; existence by [Krawczyk]).  Let ``q*`` be a point where
+
+1. ``f_i = 0`` for the active inequalities ``A``, ``h_j = 0`` for the equations, and
+   ``dE = sum lam_i df_i + sum mu_j dh_j``;
+2. ``lam_i > 0`` for every ``i`` in ``A``;
+3. the gradients of the active functions and equations are independent;
+4. near ``q*`` the set is ``{f_i >= 0 for i in A, h = 0}``: every other inequality is positive
+   there or, in a tree with unions, does not change the value of the tree;
+5. the Hessian of ``E - sum lam_i f_i - sum mu_j h_j`` is positive definite on the vectors that
+   all these gradients annihilate.
+
+Then ``q*`` is a strict local minimum of ``E`` on the set.
+
+Modulo symmetry.  Let vector fields ``xi_k`` annihilate ``E``, the active functions and the
+equations identically, and let ``n_k`` be normals with the matrix ``n_k xi_l`` regular.  Then 1 is
+solved together with ``n_k (q - q0) = 0``, whose multipliers are zero by invariance, and in 3 and 5
+the ``n_k`` join the gradients.  The conclusion holds on the section ``n_k (q - q0) = 0``; the flows
+of the ``xi_k`` carry every nearby point to the section without changing ``E``, active functions or
+equations.  So ``q*`` is a local minimum on the whole set, and nearby points of the same energy are
+its images under these flows.  Fields are found, or checked, by exact algebra
+(:mod:`~polycorner.proofs.invariance`); nothing is assumed of them.
+
+The statement proved concerns the functions as given: SymPy expressions with exact numbers, pi and
+e, in which parameters and floating-point constants stand for the dyadic fractions they represent.
+It is a statement in one chart: coordinates of circles are taken as real numbers.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+
+from polycorner import checks
+from polycorner.intervals.balls import bounds, decimals, exact, precision
+from polycorner.intervals.enclosures import Formulas, Undecided
+from polycorner.minimisation import Certificate
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.progress import Progress, silent
+from polycorner.proofs.arguments import check_domain, check_parameters, check_unchanged
+from polycorner.proofs.attempt import Attempt, attempt
+from polycorner.proofs.claims import Posed, pose_claim
+from polycorner.proofs.hypotheses import (
+    SYMMETRIC,
+    ConditionResult,
+    Status,
+    check_hypotheses,
+    without_enclosure,
+)
+from polycorner.proofs.invariance import generators
+from polycorner.proofs.krawczyk import Enclosure, widened
+from polycorner.proofs.parameter_boxes import (
+    CELL_BITS,
+    Interval,
+    ParameterCell,
+    cover,
+    summary,
+    undecided_cell,
+)
+from polycorner.proofs.proof import DOUBLE_DIGITS, Bounds, Proof
+
+MOST_DIGITS, MOST_CELLS = 10_000, 10_000_000
+BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
+
+
+def prove(
+    certificate: Certificate,
+    *,
+    digits: int = 30,
+    parameters: Mapping[str, Interval] | None = None,
+    symmetry: Symmetry | None = None,
+    max_cells: int = 5000,
+    progress: Progress = silent,
+) -> Proof:
+    """Prove in interval arithmetic that a certificate's point is a strict local minimum.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        The claim; the exact minimum is sought within ``1e-3`` scale units of its point.
+    digits : int, optional
+        Significant digits of the enclosures, 1 to 10000; default 30.
+    parameters : mapping from str to (float, float), optional
+        A box of parameters of the functions, for all of which the minimum is to be proved.  Only
+        the named parameters vary: one computed from them beforehand stays as it is.
+    symmetry : Symmetry, optional
+        Symmetry modulo which the minimum is strict.  Its ``fields`` are checked by exact algebra;
+        translations are found without being declared.
+    max_cells : int, optional
+        Largest number of cells into which a box of parameters is divided.
+    progress : callable, optional
+        Called with the decided fraction of the box of parameters, 1, and the number of cells in
+        words; see :class:`~polycorner.progress.Progress`.
+
+    Returns
+    -------
+    Proof
+        Its conditions tell what is proved, what is violated and what remains undecided.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of the wrong kind, a problem that was changed after certification, or a
+        function that is not available in ball arithmetic.
+
+    Examples
+    --------
+    >>> from polycorner import Manifold, Polyhedron, minimise
+    >>> M = Manifold.euclidean("x y")
+    >>> x, y = M.symbols
+    >>> D = Polyhedron(M, {"bowl": y - x**2, "lid": 2 - y})
+    >>> p = prove(minimise(D, x + y, [1.0, 1.5]), digits=8)
+    >>> p.proved, p.enclosures["multiplier bowl"]
+    (True, ('1.0000000', '1.0000000'))
+    """
+    checks.instance("certificate", certificate, Certificate)
+    checks.whole("digits", digits, least=1, most=MOST_DIGITS)
+    checks.whole("max_cells", max_cells, least=1, most=MOST_CELLS)
+    if symmetry is not None:
+        checks.instance("symmetry", symmetry, Symmetry)
+    if not callable(progress):
+        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
+    problem = certificate.problem
+    d = problem.polyhedron
+    fields = generators(d.manifold, symmetry.fields if symmetry else ())
+    sides, values = check_parameters(problem, parameters)
+    functions = (*d.functions, *d.equations, problem.energy)
+    formulas = Formulas(functions, d.manifold)
+    check_unchanged(certificate, formulas)
+    tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS if sides else digits)
+    if not sides:
+        return _one(certificate, tried, digits)
+    moving = Formulas(functions, d.manifold, tuple(sides))
+    check_domain(moving, sides)
+    posed = pose_claim(certificate, tried.face, fields, moving, values)
+    if isinstance(posed, Undecided):
+        cells: tuple[ParameterCell, ...] = (undecided_cell(sides, posed),)
+    else:
+        cells = cover(
+            posed.claim, posed.start, values, sides, max_cells=max_cells, progress=progress
+        )
+    return _many(certificate, replace(tried, posed=posed), sides, cells, digits)
+
+
+def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
+    """Return the proof for the parameters of the problem."""
+    d = certificate.problem.polyhedron
+    active = tuple(d.names[i] for i in tried.face)
+    posed, enclosure = tried.posed, tried.enclosure
+    if isinstance(posed, Undecided):
+        return _proof(certificate, digits, active, (), without_enclosure(posed))
+    symmetry = tuple(map(str, posed.claim.fields))
+    if isinstance(enclosure, Undecided):
+        found = without_enclosure(enclosure, symmetric=bool(posed.claim.fields))
+        return _proof(certificate, digits, active, symmetry, _refused(found, posed))
+    with precision(tried.bits):
+        found = _refused(check_hypotheses(posed.claim, enclosure), posed)
+        values = [bounds(x) for x in enclosure.solution]
+        energy = bounds(enclosure.linear.energy)
+    named = _named(posed, values)
+    sides = {name: named[name] for name in d.manifold.names} | {"energy": energy} | named
+    box = _named(posed, _uniqueness_box(enclosure))
+    return replace(
+        _proof(certificate, digits, active, symmetry, found),
+        enclosures={name: decimals(*side, digits) for name, side in sides.items()},
+        box={
+            name: decimals(*side, digits + BOX_DIGITS, inwards=True) for name, side in box.items()
+        },
+        region=tuple(values[: d.dimension]),
+    )
+
+
+def _uniqueness_box(enclosure: Enclosure) -> list[Bounds]:
+    """Return a box of the unknowns in which the solution is the only one."""
+    with precision(CELL_BITS):
+        radii_of = widened(enclosure)
+    middle = [exact(x.mid()) for x in enclosure.predictor.centre]
+    radii = [exact(w.rad()) for w in radii_of]
+    return [(m - r, m + r) for m, r in zip(middle, radii, strict=True)]
+
+
+def _named(posed: Posed, unknowns: list[Bounds]) -> dict[str, Bounds]:
+    """Return the bounds of the coordinates and the multipliers by name."""
+    coordinates = posed.claim.problem.polyhedron.manifold.names
+    names = (*coordinates, *(f"multiplier {name}" for name in posed.claim.names))
+    return dict(zip(names, unknowns, strict=False))
+
+
+def _refused(found: dict[str, ConditionResult], posed: Posed) -> dict[str, ConditionResult]:
+    """Add the result for a declared symmetry that does not hold, if there is one."""
+    return found if posed.refused is None else found | {SYMMETRIC: posed.refused}
+
+
+def _proof(
+    certificate: Certificate,
+    digits: int,
+    active: tuple[str, ...],
+    symmetry: tuple[str, ...],
+    found: Mapping[str, ConditionResult],
+) -> Proof:
+    return Proof(
+        certificate,
+        digits,
+        active,
+        symmetry,
+        conditions={name: finding.status for name, finding in found.items()},
+        reasons={name: finding.reason for name, finding in found.items()},
+        enclosures={},
+        box={},
+    )
+
+
+def _many(
+    certificate: Certificate,
+    tried: Attempt,
+    sides: dict[str, Interval],
+    cells: tuple[ParameterCell, ...],
+    digits: int,
+) -> Proof:
+    """Return the proof for a box of parameters."""
+    found, posed = summary(cells), tried.posed
+    symmetry: tuple[str, ...] = ()
+    if not isinstance(posed, Undecided):
+        found, symmetry = _refused(found, posed), tuple(map(str, posed.claim.fields))
+    active = tuple(certificate.problem.polyhedron.names[i] for i in tried.face)
+    proved = [cell.bounds for cell in cells if cell.status is Status.PROVED]
+    hulls = {
+        name: (Fraction(min(b[name][0] for b in proved)), Fraction(max(b[name][1] for b in proved)))
+        for name in (proved[0] if proved else ())
+    }
+    return replace(
+        _proof(certificate, digits, active, symmetry, found),
+        enclosures={
+            name: decimals(*side, min(digits, DOUBLE_DIGITS)) for name, side in hulls.items()
+        },
+        parameters=sides,
+        cells=cells,
+    )
