@@ -167,6 +167,11 @@ class Printed:
     def _sheet(self) -> Sheet:
         raise NotImplementedError
 
+    @property
+    def sheet(self) -> Sheet:
+        """The result as a title, tables and sentences."""
+        return self._sheet()
+
     def __str__(self) -> str:
         """Return aligned plain text."""
         return self._sheet().text()

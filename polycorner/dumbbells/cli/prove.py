@@ -89,7 +89,6 @@ def prove(
 
 def _sheet(answer: dict[str, Any], proof: "Proof") -> "Sheet":
     from polycorner.printing import Sheet, Table
-    from polycorner.proofs.report import proof_sheet
 
     degrees = Table(
         ("angle in degrees", "lower bound", "upper bound"),
@@ -100,7 +99,7 @@ def _sheet(answer: dict[str, Any], proof: "Proof") -> "Sheet":
         ),
         (1, 2),
     )
-    return Sheet(answer["minimum"], (*proof_sheet(proof).parts, degrees))
+    return Sheet(answer["minimum"], (*proof.sheet.parts, degrees))
 
 
 def _region(boxes: tuple[str, ...]) -> dict[str, tuple[float, float]]:
