@@ -1,4 +1,5 @@
-from .disks.critical import CriticalConfiguration
+from .disks.configurations import CriticalConfiguration
+from .disks.critical import CriticalSearch
 from .disks.disks import TorusDisks
 from .pinball import Pinball
 from .spheres import SphereCluster
@@ -6,6 +7,7 @@ from .tutorial import Tutorial
 
 __all__ = [
     "CriticalConfiguration",
+    "CriticalSearch",
     "Pinball",
     "SphereCluster",
     "TorusDisks",

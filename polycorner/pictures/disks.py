@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from polycorner.checks import refuse
-from polycorner.models.disks.critical import CriticalConfiguration
+from polycorner.models.disks.configurations import CriticalConfiguration
 from polycorner.models.disks.disks import TorusDisks
 from polycorner.spaces.manifold import Array
 

@@ -4,7 +4,7 @@ Lengths are in units of the shortest lattice vector: the square torus has area 1
 one (a regular hexagon with opposite sides identified) has area ``sqrt(3)/2`` ([EM] sec. 2).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, product
 from typing import Any, Literal
@@ -12,18 +12,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.models.disks.critical import (
-    SAME,
-    CriticalConfiguration,
-    coincide,
-    critical_configurations,
-)
+from polycorner.models.disks.configurations import SAME, CriticalConfiguration, coincide
+from polycorner.models.disks.critical import CriticalSearch
 from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrapped
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array, Manifold, scalar
+from polycorner.values import Value
 
 Lattice = Literal["square", "hexagonal"]
 
@@ -31,7 +29,7 @@ COSINES = {"square": 0.0, "hexagonal": 0.5}
 
 
 @dataclass(frozen=True)
-class TorusDisks:
+class TorusDisks(Value):
     """``n`` equal disks on the torus ``R^2/L``.
 
     ::
@@ -68,10 +66,8 @@ class TorusDisks:
     lattice: Lattice = "square"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "count", _whole("count", self.count))
-        if self.lattice not in tuple(COSINES):
-            msg = f"lattice: expected 'square' or 'hexagonal'; got {self.lattice!r}"
-            raise ValueError(msg)
+        object.__setattr__(self, "count", checks.whole("count", self.count, least=1))
+        checks.choice("lattice", self.lattice, COSINES)
 
     @cached_property
     def basis(self) -> Array:
@@ -140,13 +136,22 @@ class TorusDisks:
         ends = {f"{i}-{j}({p},{q})": (i, j, (p, q)) for i, j in pairs for p, q in IMAGES}
         return {**ends, OWN: (1, 1, (1, 0))}
 
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the gaps, one for each pair and image."""
+        return tuple(gap.name for gap in self.gaps)
+
+    def fewer(self, count: int) -> "TorusDisks":
+        """Return ``count`` disks on the same torus."""
+        return replace(self, count=count)
+
     @cached_property
     def _bundle(self) -> Bundle:
         return Bundle(self.manifold, self.gaps)
 
     def starts(self, rng: np.random.Generator, count: int) -> Array:
         """Return ``count`` random placements in the polyhedron, at half their largest radius."""
-        points = rng.random((_whole("count", count), 2 * self.count + 1))
+        points = rng.random((checks.whole("count", count, least=1), 2 * self.count + 1))
         points[:, -1] = self.radius(points) / 2
         return self.manifold.wrap(points)
 
@@ -199,7 +204,7 @@ class TorusDisks:
 
     def critical(
         self,
-        rng: np.random.Generator,
+        rng: np.random.Generator | int | None = None,
         *,
         starts: int | None = None,
         progress: Progress | None = None,
@@ -232,8 +237,8 @@ class TorusDisks:
 
         Parameters
         ----------
-        rng : numpy.random.Generator
-            Draws the starts.
+        rng : Generator or int, optional
+            Draws the starts; default a generator with seed 0.
         starts : int, optional
             Random starts of each round; default 80 for each disk.
         progress : callable, optional
@@ -244,8 +249,36 @@ class TorusDisks:
         tuple of CriticalConfiguration
             The largest radius first; equal radii by index and nullity.
         """
-        starts = None if starts is None else _whole("starts", starts)
-        return critical_configurations(self, rng, starts, progress)
+        search = self.critical_search(rng, starts=starts)
+        while not search.complete:
+            search = search.advanced()
+            if progress is not None:
+                count = len(search.configurations)
+                progress(search.rounds, None, f"{count} critical configurations")
+        return search.configurations
+
+    def critical_search(
+        self, rng: np.random.Generator | int | None = None, *, starts: int | None = None
+    ) -> CriticalSearch:
+        """Return the search of :meth:`critical` before its first round, to be saved and resumed.
+
+        Parameters
+        ----------
+        rng, starts
+            As for :meth:`critical`.
+
+        Examples
+        --------
+        >>> search = TorusDisks(2).critical_search(0)
+        >>> while not search.complete:
+        ...     search = CriticalSearch.restored(TorusDisks(2), search.advanced().record)
+        >>> [round(c.radius, 6) for c in search.configurations]
+        [0.353553, 0.25]
+        """
+        if starts is not None:
+            checks.whole("starts", starts, least=1)
+        first = 2 if self.count > 1 else 3
+        return CriticalSearch(self, starts, checks.generator("rng", rng), disks=first)
 
     def same(
         self,
@@ -256,13 +289,3 @@ class TorusDisks:
     ) -> bool:
         """Whether two critical configurations are equal; see :meth:`critical`."""
         return coincide(self, first, second, tolerance)
-
-
-def _whole(name: str, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        msg = f"{name}: expected a whole number; got {value!r}"
-        raise TypeError(msg)
-    if value < 1:
-        msg = f"{name}: expected at least 1; got {value}"
-        raise ValueError(msg)
-    return int(value)

@@ -105,11 +105,12 @@ def uncut(along: Array) -> Array:
 
 def components(count: int, joined: list[tuple[int, int]]) -> tuple[tuple[int, ...], ...]:
     """Return the connected components of a graph on ``1..count``, the largest first."""
-    label = list(range(count + 1))
+    from networkx.utils import UnionFind
+
+    sets = UnionFind(range(1, count + 1))
     for i, j in joined:
-        old, new = label[i], label[j]
-        label = [new if value == old else value for value in label]
-    parts = [tuple(i for i in range(1, count + 1) if label[i] == value) for value in set(label[1:])]
+        sets.union(i, j)
+    parts = [tuple(sorted(part)) for part in sets.to_sets()]
     return tuple(sorted(parts, key=lambda part: (-len(part), part)))
 
 

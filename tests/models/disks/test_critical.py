@@ -1,6 +1,9 @@
 """Every claim about a critical configuration is checked from the definition."""
 
+import copy
+import json
 import math
+import pickle
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -19,7 +22,8 @@ from disk_oracles import (
 from scipy.optimize import linprog
 
 from polycorner import Verdict, certify, stratum_at
-from polycorner.models.disks.critical import described
+from polycorner.models.disks.configurations import described
+from polycorner.models.disks.critical import CriticalSearch
 from polycorner.models.disks.disks import TorusDisks
 
 EACH = [
@@ -265,5 +269,60 @@ def test_one_disk_touches_its_own_image():
 def test_progress_is_told():
     told = []
     TorusDisks(2).critical(np.random.default_rng(0), starts=20, progress=lambda *a: told.append(a))
-    assert told[0] == (1, None, "2 disks, round 1: 2 critical configurations")
-    assert told[-1][2].endswith(": 2 critical configurations")
+    assert told[0] == (1, None, "2 critical configurations")
+    assert [done for done, *_ in told] == list(range(1, len(told) + 1))
+
+
+class TestResuming:
+    """A search that is saved after every round, read back and copied ends as the one in one go."""
+
+    @staticmethod
+    def rounds(model, keep, starts=None):
+        search = model.critical_search(0, starts=starts)
+        while not search.complete:
+            search = keep(search.advanced())
+        return search.configurations
+
+    @pytest.mark.parametrize(
+        "keep",
+        [
+            lambda search: CriticalSearch.restored(
+                search.model, json.loads(json.dumps(search.record))
+            ),
+            lambda search: pickle.loads(pickle.dumps(search)),
+            copy.deepcopy,
+        ],
+        ids=["record", "pickle", "copy"],
+    )
+    def test_the_same_configurations_are_found(self, keep):
+        whole = TorusDisks(3).critical(0, starts=40)
+        again = self.rounds(TorusDisks(3), keep, starts=40)
+        assert [(c.index, c.nullity, c.contacts, c.hits) for c in again] == [
+            (c.index, c.nullity, c.contacts, c.hits) for c in whole
+        ]
+        for one, other in zip(again, whole, strict=True):
+            np.testing.assert_allclose(one.point, other.point, atol=1e-12)
+
+    def test_a_round_leaves_the_search_it_started_from_as_it_was(self):
+        search = TorusDisks(2).critical_search(0, starts=20)
+        before = search.record
+        first, second = search.advanced(), search.advanced()
+        assert search.record == before
+        assert first.record == second.record
+
+    def test_a_record_whose_numbers_were_changed_is_refused(self):
+        record = TorusDisks(2).critical_search(0, starts=20).advanced().record
+        record["stage"][0]["centres"][0] += 0.01
+        with pytest.raises(ValueError, match="not critical"):
+            CriticalSearch.restored(TorusDisks(2), record)
+
+    def test_one_disk_needs_no_round(self):
+        search = TorusDisks(1).critical_search()
+        assert search.complete
+        assert search.advanced() is search
+        assert len(search.configurations) == 1
+
+    def test_configurations_are_read_only(self):
+        (c,) = TorusDisks(1).critical()
+        with pytest.raises(ValueError, match="read-only"):
+            c.point[0] = 0.0
