@@ -1,4 +1,4 @@
-"""Figures of parameter studies: one parameter across, a curve for each value of another."""
+"""Figures of parameter studies: results over one parameter, a curve for each value of another."""
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -15,11 +15,11 @@ from polycorner.spaces.manifold import Array
 if TYPE_CHECKING:
     import xarray as xr
 
-MOST_CURVES = 12  # of many values of the second parameter, so many are drawn
+MOST_CURVES = 12  # drawn for a second parameter of many values
 
 
 def draw_study(study: str, found: "xr.Dataset") -> Figure | None:
-    """Draw a study that ships; None if it has no figure or more than two axes of several values."""
+    """Draw an installed study; None for others, and for more than two axes of several values."""
     draw = DRAWN.get(study)
     if study in REPEATED:
         found = _averaged(found, REPEATED[study])
@@ -82,9 +82,9 @@ def _axis_label(found: "xr.Dataset", name: str) -> str:
     return _words(name) + (f" ({shown})" if shown else "")
 
 
-def _panels(title: str, ratio: tuple[float, float] = (1, 1)) -> tuple[Figure, Axes, Axes]:
+def _panels(title: str) -> tuple[Figure, Axes, Axes]:
     figure = Figure(figsize=(12, 5), layout="constrained")
-    first, second = figure.subplots(1, 2, width_ratios=ratio)
+    first, second = figure.subplots(1, 2)
     figure.suptitle(title)
     return figure, first, second
 
@@ -92,18 +92,18 @@ def _panels(title: str, ratio: tuple[float, float] = (1, 1)) -> tuple[Figure, Ax
 def draw_heading_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
     """Draw the heading of the corner and the smallest of its multipliers.
 
-    Full where the corner is a certified minimum, dotted where it is not; the paper's
+    Lines are solid where the corner is a certified minimum and dotted elsewhere; the paper's
     ``arctan(r/l)`` is dashed.
     """
     figure, first, second = _panels("Heading of a dyad at its corner, certified")
     x = found[across].values
     papers: list[Array] = []
     for colour, label, curve in _curves(found, others):
-        rests = curve["minimum"].values == 1
+        minimal = curve["minimum"].values == 1
         multipliers = [curve[n].values for n in curve.data_vars if "multiplier" in str(n)]
         for axes, y in ((first, curve["heading"].values), (second, np.min(multipliers, axis=0))):
-            axes.plot(x, np.where(rests, y, np.nan), ".-", ms=4, color=colour, label=label)
-            axes.plot(x, np.where(_beside(rests), y, np.nan), ":", color=colour)
+            axes.plot(x, np.where(minimal, y, np.nan), ".-", ms=4, color=colour, label=label)
+            axes.plot(x, np.where(_other_stretches(minimal), y, np.nan), ":", color=colour)
         paper = curve["paper_heading"].values
         if not any(np.allclose(paper, p, equal_nan=True) for p in papers):
             papers.append(paper)
@@ -113,14 +113,16 @@ def draw_heading_sweep(found: "xr.Dataset", across: str, others: str | None) -> 
         first.plot([], [], ":", color="0.4", label="corner is no minimum")
     first.set(ylabel="heading (degrees)", xlabel=_axis_label(found, across))
     second.axhline(0, color="0.8", lw=0.8, zorder=0)
-    second.set(ylabel="smallest multiplier, dE/dgap", xlabel=_axis_label(found, across))
+    unit = _after(found["multiplier_A2B1"].attrs.get("units", ""))
+    label = f"smallest multiplier, dE/dgap{f' ({unit.strip()})' if unit else ''}"
+    second.set(ylabel=label, xlabel=_axis_label(found, across))
     first.legend(fontsize=9, frameon=False)
     return figure
 
 
-def _beside(rests: Any) -> Any:
-    """Return where a curve is no minimum, with a neighbour each so that the parts meet."""
-    away = ~rests
+def _other_stretches(minimal: Any) -> Any:
+    """Return where a corner is no minimum, with the neighbours, so that parts of a line meet."""
+    away = ~minimal
     near = away.copy()
     near[1:] |= away[:-1]
     near[:-1] |= away[1:]
@@ -130,10 +132,10 @@ def _beside(rests: Any) -> Any:
 def draw_climbing_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
     """Draw climb rates and headings with twice their standard errors; the law is dotted."""
     figure, first, second = _panels("Nested pairs driven by a turning drum")
-    for beside, colour, label, curve in _side_by_side(found, across, others):
+    for x, colour, label, curve in _side_by_side(found, across, others):
         for axes, name in ((first, "climb_rate"), (second, "heading")):
-            _with_bars(axes, beside, curve, name, color=colour, label=label)
-        first.plot(beside, curve["law"].values, ":", color=colour)
+            _with_bars(axes, x, curve, name, color=colour, label=label)
+        first.plot(x, curve["law"].values, ":", color=colour)
     first.plot([], [], ":", color="0.4", label="ω ρ tan(heading)")
     first.axhline(0, color="0.8", lw=0.8, zorder=0)
     first.set(ylabel="climb rate (mm/s)", xlabel=_axis_label(found, across))
@@ -145,7 +147,7 @@ def draw_climbing_sweep(found: "xr.Dataset", across: str, others: str | None) ->
 def _side_by_side(
     found: "xr.Dataset", across: str, others: str | None
 ) -> "Iterator[tuple[Array, str, str | None, xr.Dataset]]":
-    """Yield places, colour, label and results of curves; places so that bars do not hide bars."""
+    """Yield abscissae, colour, label and results of curves, shifted so that all bars are seen."""
     x = found[across].values
     width = float(np.ptp(x)) / max(1, len(x) - 1)
     curves = list(_curves(found, others))
@@ -177,7 +179,7 @@ def draw_bunch_sweep(found: "xr.Dataset", across: str, others: str | None) -> Fi
     return figure
 
 
-REPEATED: Mapping[str, str] = {"bunch": "start"}  # axes of members of ensembles
+REPEATED: Mapping[str, str] = {"bunch": "start"}  # the axis over which to average
 DRAWN: Mapping[str, Callable[["xr.Dataset", str, str | None], Figure]] = {
     "heading": draw_heading_sweep,
     "climbing": draw_climbing_sweep,

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from polycorner.checks import whole
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
 
-FIRST, LAST = 2.0, 14.0  # degrees between which pairs start, as far as they are several
+FIRST, LAST = 2.0, 14.0  # degrees: headings of the first and the last pair at the start
 
 
 def heading(
@@ -78,10 +79,10 @@ def climbing(
     pairs: int = 4,
     duration: float = 60.0,
 ) -> dict[str, Any]:
-    """Return how fast right-handed nested pairs climb in a turning drum, and at which heading.
+    """Return climb rate and heading of right-handed nested pairs in a turning drum.
 
-    Pairs start at headings from 2 to 14 degrees and are followed under noise; the first half of the
-    time is left out.  Other parameters are those of the paper's drum, the defaults of
+    Pairs start at headings from 2 to 14 degrees and move under noise; the first half of the time is
+    left out.  Other parameters are those of the paper's drum, the defaults of
     :class:`~polycorner.dumbbells.drum.DumbbellDrum`.
 
     Parameters
@@ -89,9 +90,9 @@ def climbing(
     noise : float
         Amplitude of the chatter, see :class:`~polycorner.motion.noise.Noise`.
     tilt : float
-        Of the drum, in degrees.
+        Tilt of the drum, in degrees.
     rng : Generator
-        The noise's seed is drawn from it.
+        Source of the seed of the noise.
     length, rod_radius : float
         In mm.
     spin : float
@@ -111,9 +112,7 @@ def climbing(
     from polycorner.dumbbells.dynamics.dyads import Start, follow_dyads, steady
     from polycorner.motion.noise import Noise
 
-    if isinstance(pairs, bool) or not isinstance(pairs, int) or pairs < 1:
-        msg = f"pairs: expected a positive whole number; got {pairs!r}"
-        raise ValueError(msg)
+    whole("pairs", pairs, least=1)
     drum = DumbbellDrum(length, rod_radius=rod_radius, tilt=math.radians(tilt), spin=spin)
     headings = np.radians(np.linspace(FIRST, LAST, pairs)).tolist()
     starts: list[Start] = [("R", angle) for angle in headings]
@@ -147,7 +146,7 @@ def bunch(
     duration: float = 1200.0,
     dt: float = 0.004,
 ) -> dict[str, Any]:
-    """Follow a bunch of dumbbells at the bottom of the drum; return who left, and who is a dyad.
+    """Follow a bunch of dumbbells in the drum; return how many left, and how many are in dyads.
 
     See :func:`~polycorner.dumbbells.dynamics.bunch.follow_bunch`.  Defaults are the paper's drum,
     with what the paper does not give as in :class:`~polycorner.dumbbells.drum.DumbbellDrum`.
@@ -159,7 +158,7 @@ def bunch(
     noise : float
         Amplitude of the chatter, see :class:`~polycorner.motion.noise.Noise`.
     top : float
-        Where the drum ends, in mm.
+        Height at which the drum ends, in mm.
     sliding, rolling, rubbing : float
         Static coefficients; the dynamic ones change in proportion to the drum's defaults.
     tilt, spin : float
@@ -174,18 +173,16 @@ def bunch(
     Returns
     -------
     dict
-        Numbers of dumbbells: ``left``, and of them ``left_right``, ``left_left`` and
-        ``left_single`` as members of right- and left-handed dyads and of none; at the end
-        ``in_right``, ``in_left``, in as many of ``both``, ``single``, and ``rollers``.  ``reach``,
-        the mean height of those in the drum, and ``max_penetration`` in mm; ``missed``, the share
-        of the groups in contact that were not solved to the tolerance.
+        Numbers of dumbbells that ``left`` the drum, among them ``left_right`` and ``left_left`` in
+        right- and left-handed dyads and ``left_single``; numbers of those in the drum at the end:
+        ``in_right``, ``in_left``, in dyads of ``both`` hands, ``single``, and ``rollers``.
+        ``reach``, the mean height of those in the drum, and ``max_penetration`` in mm; ``missed``,
+        the share of groups in contact that were not solved to the tolerance.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch
 
-    if isinstance(start, bool) or not isinstance(start, int) or start < 0:
-        msg = f"start: expected a whole number not below 0; got {start!r}"
-        raise ValueError(msg)
+    whole("start", start, least=0)
     drum = DumbbellDrum(
         length,
         ball_radius,
@@ -214,5 +211,5 @@ def bunch(
 
 
 def in_proportion(static: float, usual: tuple[float, float]) -> tuple[float, float]:
-    """Return a static coefficient and the dynamic one, by the usual two."""
+    """Return a static coefficient, and a dynamic one in the ratio of the usual two."""
     return static, static * usual[1] / usual[0]
