@@ -227,10 +227,10 @@ def _multipliers(c: Certificate, unit: str) -> str:
         return "none: the dumbbells overlap"
     if not c.stratum.active:
         return "none: no contact is closed"
-    listed = ", ".join(f"{name} {value:.6f} {unit}" for name, value in c.multipliers.items())
+    listed = ", ".join(f"{name} {value:.6f}" for name, value in c.multipliers.items())
     if c.verdict is Verdict.NOT_STATIONARY:
-        return f"{listed} (least squares: the contacts do not balance the weight)"
-    return listed
+        return f"{listed} {unit} (least squares: the contacts do not balance the weight)"
+    return f"{listed} {unit}"
 
 
 def _way(found: Descent, pair: DumbbellPair) -> str:

@@ -1,0 +1,123 @@
+"""Images of the documentation that no example draws.
+
+``PYTHONPATH=tests/support python docs/draw_images.py [NAME ...]`` draws all, or the ones named.
+"""
+
+import asyncio
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from polycorner import minimise, skeleton
+from polycorner.dumbbells import DumbbellPair, dyad_minima, pair_atlas, pair_map
+from polycorner.dumbbells.pictures import (
+    draw_atlas,
+    draw_heading,
+    draw_pair,
+    draw_pair_map,
+    pair_film,
+    write_solid,
+)
+from polycorner.dumbbells.viewer import descent, film_page, live_application, serve, write_page
+from polycorner.dumbbells.viewer.server import bound
+from polycorner.models import Tutorial
+from polycorner.pictures import draw_region, save
+from polycorner.skeletons.refinement import traced
+
+IMAGES = Path(__file__).parent / "images"
+DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
+READY = "document.documentElement.dataset.ready === 'yes'"
+
+
+def heading() -> None:
+    """Draw headings against length."""
+    save(draw_heading(DRUM, np.linspace(6, 30, 49).tolist(), [0.75, 1.5, 2.4]), _png("heading"))
+
+
+def delta() -> None:
+    """Draw the right-handed pair at its minimum."""
+    save(draw_pair(dyad_minima(DRUM)[0]), _png("delta_R"))
+
+
+def atlas() -> None:
+    """Draw the skeleton of a pair as a graph, and the forbidden solid."""
+    found = pair_atlas(PLANE)
+    save(draw_atlas(found), _png("pair_atlas"))
+    with tempfile.TemporaryDirectory() as folder:
+        write_solid(found, Path(folder))
+        (Path(folder) / "solid.png").replace(_png("solid"))
+
+
+def proportions() -> None:
+    """Draw the map over length and rod radius."""
+    found = pair_map(np.linspace(2, 6, 12), np.linspace(0.05, 0.95, 8), tolerance=1e-3)
+    save(draw_pair_map(found), _png("pair_map"))
+
+
+def tutorial() -> None:
+    """Draw the planar region with its corners."""
+    region = Tutorial()
+    found = skeleton(region.polyhedron, region.starts(np.random.default_rng(0), 60))
+    corners = [(f"C{k}", corner.point) for k, corner in enumerate(found.corners)]
+    edges = [traced(found, edge) for edge in found.edges]
+    drawn = draw_region(region.polyhedron, (-3.6, 3.8, -3, 3.3), corners=corners, edges=edges)
+    save(drawn, _png("tutorial"))
+
+
+def viewer() -> None:
+    """Photograph the live page after a fall."""
+    import chromium
+
+    application, addresses = live_application(DRUM, "127.0.0.1"), list[str]()
+    listener, opened = bound("127.0.0.1", 0), threading.Event()
+
+    def ready(address: str) -> None:
+        addresses.append(address)
+        opened.set()
+
+    asyncio.set_event_loop(asyncio.new_event_loop())
+    threading.Thread(target=serve, args=(application, listener, ready), daemon=True).start()
+    opened.wait()
+    with (
+        tempfile.TemporaryDirectory() as profile,
+        chromium.page(chromium.needed(), Path(profile), graphics=True) as tab,
+    ):
+        tab.open(addresses[0], width=1200)
+        tab.wait(f"{READY} && document.documentElement.dataset.solid === 'yes'")
+        tab.click("#fall")
+        tab.wait("document.getElementById('verdict').textContent !== ''")
+        tab.wait("!board.falling")
+        tab.picture(_png("viewer"), whole=True)
+
+
+def viewer_film() -> None:
+    """Photograph the last instant of a film, in dark colours."""
+    import chromium
+
+    corner = minimise(DRUM.polyhedron, DRUM.energy, DRUM.nested("R"))
+    start = DRUM.nested("R", heading=0.5, clearance=1.5) + np.array([0.08, 0, 0, 0.06, 0, -0.1])
+    points = descent(DRUM.polyhedron, DRUM.energy, start).points
+    note = f"The steepest descent to delta_R, heading {np.degrees(corner.point[2]):.3f}°"
+    film = pair_film(DRUM, points, title="A pair reaches its minimum", note=note)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        chromium.page(chromium.needed(), Path(folder) / "profile", graphics=True) as tab,
+    ):
+        tab.open(write_page(film_page(film), Path(folder) / "film.html"), width=1200, dark=True)
+        tab.wait(READY)
+        tab.press("End")
+        tab.picture(_png("viewer_film"))
+
+
+def _png(name: str) -> Path:
+    return IMAGES / f"{name}.png"
+
+
+DRAWN = {f.__name__: f for f in (heading, delta, atlas, proportions, tutorial, viewer, viewer_film)}
+
+if __name__ == "__main__":
+    for chosen in sys.argv[1:] or DRAWN:
+        DRAWN[chosen]()
