@@ -120,7 +120,7 @@ def _is_minimum(locus: Locus) -> bool:
 def _outcome(
     loci: list[Locus], failures: Counter[Verdict], starts: int, *, interrupted: bool
 ) -> Minima:
-    ordered = sorted(loci, key=lambda locus: locus.energy)
+    ordered = _by_level(loci)
     kept = [locus for locus in ordered if _is_minimum(locus)]
     others = [locus for locus in ordered if not _is_minimum(locus)]
     for locus in others:
@@ -135,3 +135,16 @@ def _outcome(
         starts=starts,
         interrupted=interrupted,
     )
+
+
+def _by_level(loci: list[Locus]) -> list[Locus]:
+    """Return loci by energy, those of equal energy in the order in which they were found.
+
+    Rounding errors of equal energies, as of mirror images, thus do not decide the order.
+    """
+    levels: dict[int, int] = {}
+    level, last = 0, -np.inf
+    for k in sorted(range(len(loci)), key=lambda k: loci[k].energy):
+        level += loci[k].energy - last > loci[k].slack
+        levels[k], last = level, loci[k].energy
+    return [loci[k] for k in sorted(levels, key=lambda k: (levels[k], k))]

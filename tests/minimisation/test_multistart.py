@@ -12,6 +12,8 @@ from oracles_search import flooded, minima_on_interval, orbit_count
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry, Verdict
 from polycorner.minimisation import minima
+from polycorner.minimisation.loci import Locus
+from polycorner.minimisation.multistart import _by_level
 from polycorner.models import Pinball
 from polycorner.polyhedra import Element
 
@@ -310,3 +312,12 @@ def test_points_are_drawn_where_the_inequalities_hold():
     exact = [-math.pi / 2, math.pi / 2]
     assert sorted(c.point[0] for c in found) == pytest.approx(exact, abs=1e-8)
     assert all(c.point[1] == pytest.approx(10) for c in found)
+
+
+@given(st.permutations(range(6)), st.lists(st.floats(-1, 1), min_size=6, max_size=6))
+def test_rounding_does_not_order_minima_of_equal_energy(order, noise):
+    loci = [
+        Locus(None, k // 2 + 1e-12 * noise[k], 1e-9, False, [], [], np.zeros((0, 1))) for k in order
+    ]
+    expected = sorted(range(6), key=lambda position: order[position] // 2)
+    assert _by_level(loci) == [loci[position] for position in expected]
