@@ -1,4 +1,4 @@
-"""What it costs to start: importing polycorner, its command line, and a dyad from the cache.
+"""Start-up time of the package, its command line and a dyad from the cache.
 
 Every figure is that of fresh interpreters, the different ones in turn.  The import is given as what
 it adds to `import numpy`, and that to a bare interpreter.

@@ -1,4 +1,4 @@
-"""Dumbbells in the turning drum: polycorner beside MuJoCo, speed, memory, and what they do.
+"""Dumbbells in the rotating drum: speed, memory and physics of polycorner and MuJoCo.
 
 The same drum, sizes, friction and starts, at steps of a millisecond, one thread.  MuJoCo's cost is
 given for the model as `mjcf` writes it, for a drum of half as many boxes (faster, coarser), and

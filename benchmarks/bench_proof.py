@@ -1,4 +1,4 @@
-"""Proofs in ball arithmetic: how long they take, and a campaign that looks for a false one.
+"""Proofs in ball arithmetic: time per proof, and a campaign that searches for a false one.
 
 The pair of dumbbells is proved at growing precision and for a whole box of sizes at once.  Then
 random problems with exactly known answers, many of them on the edge of being minima, are put to

@@ -1,4 +1,4 @@
-"""Meshes of the forbidden solid, rounded and sharp: seconds, faces, and what they miss.
+"""Meshes of the forbidden solid, rounded and sharp: time, faces and deviations.
 
 The rounded one is marching cubes on the least gap; the sharp one has mesh edges along the curves
 of two contacts.  ``cut`` is the largest gap in the middle of a face, ``volume`` and ``curved`` the

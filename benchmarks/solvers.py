@@ -1,4 +1,4 @@
-"""The dyad's minimisation handed to other solvers, each as well as we know how.
+"""The dyad's minimisation problem for other solvers, each formulated as well as possible.
 
 All of them get what polycorner's own search uses: variables in the manifold's scales, gaps in ball
 radii, the energy divided by its size at rest, and functions compiled to machine code.

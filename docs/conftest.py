@@ -1,3 +1,3 @@
-"""Pages are tested for their doctests; what the site is built with, and what it makes, is not."""
+"""Doctests of the pages; the configuration of the site and its output are not tested."""
 
 collect_ignore = ["conf.py", "generated"]

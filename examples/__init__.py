@@ -1,1 +1,1 @@
-"""Examples, each a module with a ``main`` that returns what it shows."""
+"""Examples: modules with a ``main`` that returns the result."""

@@ -1,4 +1,4 @@
-"""Atomic writing: a file appears under its name whole, or what was there before is untouched."""
+"""Atomic writing: a file is replaced as a whole or left untouched."""
 
 import os
 import secrets

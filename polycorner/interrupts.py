@@ -1,4 +1,4 @@
-"""Ctrl-C as a wish to stop: what is under way is finished and kept."""
+"""Ctrl-C as a request to stop: work in progress is finished and kept."""
 
 import signal
 import threading

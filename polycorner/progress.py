@@ -1,4 +1,4 @@
-"""The one signature by which long work reports progress."""
+"""The signature by which long work reports progress."""
 
 from typing import Protocol
 

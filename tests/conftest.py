@@ -1,4 +1,4 @@
-"""What tests share: a silent plotting back end, the amount of generated input, a browser.
+"""Shared configuration: a silent plotting back end, the amount of generated input, a browser.
 
 ``HYPOTHESIS_PROFILE=thorough`` asks for more examples than the default profile ``fast``.
 """

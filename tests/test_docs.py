@@ -1,4 +1,4 @@
-"""The documentation says what is so: names exist, links lead somewhere, numbers hold."""
+"""The documentation agrees with the code: names exist, links resolve, numbers hold."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""Immutable values: what they drop when pickled, and arrays that cannot be written."""
+"""Immutable values: content of their pickles, and arrays that cannot be written."""
 
 import copy
 import pickle

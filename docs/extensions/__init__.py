@@ -1,1 +1,1 @@
-"""What the site needs beside Sphinx: formulas, the gallery's pictures, a look at every link."""
+"""Sphinx extensions of the site: formulas, API page, pictures of the gallery, link checks."""

@@ -1,4 +1,4 @@
-"""Appendix A: where zigzags turn, and how a dumbbell rolls in between."""
+"""Appendix A: turning points of zigzags, and rolling between them."""
 
 import math
 from collections.abc import Callable

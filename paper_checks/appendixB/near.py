@@ -1,4 +1,4 @@
-"""Polyhedra to try statements of appendix B on, and what is around their points.
+"""Test polyhedra for the statements of appendix B, and neighbourhoods of their points.
 
 Near a point a polyhedron is a chart away from its local model, the cone that the gradients of its
 active functions cut out as the pieces say. The hyperplanes of these functions divide the space

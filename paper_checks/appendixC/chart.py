@@ -1,4 +1,4 @@
-"""Appendix C: its coordinates around a dyad at rest, and what the lemma says in them.
+"""Appendix C: coordinates around a dyad in equilibrium, and the lemma in these coordinates.
 
 ``x1`` is a ball-ball gap, ``x2`` and ``x3`` are ball-rod gaps, ``x4, x5, x6`` the mean azimuth,
 heading and axial position of the pair.

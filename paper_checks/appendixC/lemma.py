@@ -1,4 +1,4 @@
-"""The minimisation lemma of appendix C: its proof, carried out, and what each hypothesis is for.
+"""The minimisation lemma of appendix C: its proof, and the role of each hypothesis.
 
 Lemma.  Let ``C`` contain 0 and let ``x_i >= 0`` on ``C`` for ``i <= p``; let ``f`` be smooth near 0
 with (1) ``df/dx_i > 0`` at 0 for ``i <= p``, (2) ``df/dx_j = 0`` at 0 for ``p < j <= p + q``,

@@ -1,4 +1,4 @@
-"""Appendix C: the minimisation lemma, and what it says about a pair of dumbbells."""
+"""Appendix C: the minimisation lemma and its application to a pair of dumbbells."""
 
 from functools import cache, partial
 

@@ -1,4 +1,4 @@
-"""Appendix C: what the weight of the rods does to the heading."""
+"""Appendix C: the effect of the rods' weight on the heading."""
 
 import math
 from functools import partial

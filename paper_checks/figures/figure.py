@@ -1,4 +1,4 @@
-"""What a figure is: a name, the words that go with it, and how it is drawn."""
+"""Figures: a name, the texts that belong to it, and the function that draws it."""
 
 import io
 from collections.abc import Callable

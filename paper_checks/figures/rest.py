@@ -1,4 +1,4 @@
-"""Where a dumbbell rests on the tilted drum, where it turns round, and which way it is turned."""
+"""Regions of rest of a dumbbell on the tilted drum, turning points and directions."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""The solid of overlapping pairs with the corners and edges of what is left, and the motions there.
+"""The solid of overlapping pairs with corners, edges and motions of its complement.
 
 Each kind of motion has one colour in the strips of pairs and on the solid.
 """

@@ -1,4 +1,4 @@
-"""What all figures share: dumbbells and drums, colours by meaning, fonts, and bodies drawn flat."""
+"""Style shared by all figures: dumbbells, drums, colours, fonts, projected bodies."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""What a check is: a claim restated, and a finding whose numbers were computed when it ran."""
+"""Claims of the paper, and findings with numbers computed when the check runs."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

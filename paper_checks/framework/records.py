@@ -1,4 +1,4 @@
-"""What became of the claims, as JSON has it and as a table in Markdown."""
+"""Results of the claims as JSON and as a table in Markdown."""
 
 from collections import Counter
 from typing import Any

@@ -1,4 +1,4 @@
-"""Running checks in processes of their own, and what became of each."""
+"""Checks run in separate processes, and their results."""
 
 import os
 import signal

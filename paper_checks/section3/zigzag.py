@@ -1,4 +1,4 @@
-"""Section 3.2: how a dyad zigzags, and what its heading is.
+"""Section 3.2: the zigzag of a dyad and its heading.
 
 The model is that of :mod:`paper_checks.section3.singles`; the coefficient of friction between
 dumbbells that touch is 0.3.

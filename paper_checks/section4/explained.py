@@ -1,4 +1,4 @@
-"""Section 4: why a single dumbbell does what it does."""
+"""Section 4: explanations of the motion of a single dumbbell."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Section 5: how many components the strata have, which kinds there are, and what joins them.
+"""Section 5: numbers of components of the strata, their kinds, and the motions between them.
 
 A point of ``M x M`` is an ordered pair of dumbbells whose balls are alike.  Counts for labelled
 balls, and for dumbbells that are not told apart either, are given beside.

@@ -1,4 +1,4 @@
-"""The nested corner of section 6: balance, heading, and how the energy holds the pair there."""
+"""The nested corner of section 6: balance of forces, heading, entrapment."""
 
 import math
 from dataclasses import replace

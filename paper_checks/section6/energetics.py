@@ -1,4 +1,4 @@
-"""Section 6: the loci where a pair of dumbbells rests, and what is claimed of its corner."""
+"""Section 6: minima of the energy of a pair, and claims about its corner."""
 
 from dataclasses import replace
 from functools import cache, partial

@@ -1,4 +1,4 @@
-"""The paper's dumbbells from their definition, and what is proved about where they rest.
+"""The paper's dumbbells from their definition, and proofs of their minima.
 
 What is written here is written from [GMBN] sec. 2 and 5, apart from the library's own formulas, so
 that a check may hold one against the other.  Every proof is found once and kept.

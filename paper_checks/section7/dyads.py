@@ -1,4 +1,4 @@
-"""Section 7: what is said of dyads as a set of placements, and of a tilt without motion."""
+"""Section 7: dyads as a set of placements, and the effect of a tilt without motion."""
 
 import math
 from collections import Counter

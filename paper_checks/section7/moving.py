@@ -1,4 +1,4 @@
-"""Section 7: how pairs move in the turning drum.
+"""Section 7: motion of pairs in the rotating drum.
 
 The model is that of :mod:`paper_checks.section3.singles`; the coefficient of friction between
 dumbbells that touch is 0.3.

@@ -1,4 +1,4 @@
-"""Section 7.3: what a tilt of the drum does to the heading of a dyad at rest."""
+"""Section 7.3: the effect of the drum's tilt on the heading of a dyad in equilibrium."""
 
 import math
 from functools import cache, partial

@@ -1,4 +1,4 @@
-"""What may be done to a pair of dumbbells without changing how its members touch.
+"""Symmetries of a pair of dumbbells: motions of the whole, and relabellings.
 
 In the developed plane both may be translated and turned together; in the drum they may be
 rolled and shifted together, and a half-turn about a vertical axis brings them back into the

@@ -1,4 +1,4 @@
-"""What moves of the bodies leave alone, and how the plane is the limit of the drum."""
+"""Invariance under motions of the bodies, and the plane as the limit of the drum."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What may be done to a pair without changing how its members touch, and what it leaves alone."""
+"""Symmetries of a pair: invariant contacts, and the group of relabellings."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Functions and families as pickles: the same bits elsewhere, without SymPy where it can be."""
+"""Pickles of functions and families: the same bits elsewhere, without SymPy if possible."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""What the tests of the paper's figures share."""
+"""Fixtures for the tests of the paper's figures."""
 
 import pytest
 

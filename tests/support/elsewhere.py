@@ -1,4 +1,4 @@
-"""Values in a spawned process: what a pickle brings there and back."""
+"""Function calls in a spawned process."""
 
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor

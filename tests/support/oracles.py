@@ -1,4 +1,4 @@
-"""Slow, independent truths: definitions written out, in exact or long arithmetic where it helps."""
+"""Slow, independent oracles: definitions written out, in exact or long arithmetic where useful."""
 
 import itertools
 import math

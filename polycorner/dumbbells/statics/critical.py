@@ -1,4 +1,4 @@
-"""Where the dyad's corner stops being a minimum, and what becomes of the pair then.
+"""Critical sizes at which the dyad's corner ceases to be a minimum, and the branches beyond.
 
 At the corner three contacts are closed: the inner balls touch each other, and each of them the
 other's rod.  The thicker the rods, the less the inner balls overlap along the axis; at a critical

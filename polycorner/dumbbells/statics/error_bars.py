@@ -1,4 +1,4 @@
-"""How a dyad's corner moves with the sizes of its dumbbells, and how well a heading is known."""
+"""Sensitivity of a dyad's corner to the sizes of its dumbbells, and error bars of headings."""
 
 import math
 from collections.abc import Mapping

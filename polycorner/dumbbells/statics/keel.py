@@ -1,4 +1,4 @@
-"""The keel effect: where on a tilted drum a dumbbell stays at rest, and where it turns.
+"""The keel effect: regions of rest of a dumbbell on a tilted drum, and its turning points.
 
 A dumbbell rolls more easily than it slides.  It stays at rest while the ratio of the force along
 the wall to the force onto the wall lies in one convex set: the disc of radius ``mu_s``, cut by the

@@ -1,4 +1,4 @@
-"""Where two dumbbells can rest: all minima of a pair, and how they depend on its proportions.
+"""All minima of a pair of dumbbells, and their dependence on its proportions.
 
 A kind of rest is named by the contacts that hold it, those with positive multipliers:
 

@@ -1,4 +1,4 @@
-"""The atlas of the pair: which corners there are, and which motions join them."""
+"""The skeleton of a pair of dumbbells: its corners and the motions that join them."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Where the atlas of the pair in the plane changes, over length and rod radius in ball radii."""
+"""Changes of the pair's skeleton in the plane with length and rod radius."""
 
 import math
 from collections import Counter

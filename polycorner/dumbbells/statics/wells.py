@@ -1,4 +1,4 @@
-"""Which wells a dyad's corner is made of, and how far each of them reaches.
+"""One-dimensional wells that make up a dyad's corner, and their extents.
 
 A certificate labels the directions at the corner; here each of them becomes a well on a line with
 the slope and the stiffness that the heights of the balls give it.

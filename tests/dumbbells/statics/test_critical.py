@@ -1,4 +1,4 @@
-"""Where the corner ends: bisection, Newton's method and the closed form; and what follows."""
+"""Critical sizes: bisection, Newton's method and the closed form."""
 
 import math
 from dataclasses import replace

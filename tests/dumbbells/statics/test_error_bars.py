@@ -1,4 +1,4 @@
-"""How well a heading is known: derivatives, error bars, and the same by sampling."""
+"""Error bars of headings: derivatives, and the same by sampling."""
 
 import math
 from dataclasses import replace

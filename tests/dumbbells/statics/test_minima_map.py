@@ -1,4 +1,4 @@
-"""Where two dumbbells can rest: against closed forms, scans, and the corners found another way."""
+"""Minima of two dumbbells against closed forms, scans, and corners found another way."""
 
 import math
 from dataclasses import replace

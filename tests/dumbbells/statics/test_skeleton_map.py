@@ -1,4 +1,4 @@
-"""Where the atlas of the pair changes: the closed form from its definition, and the bisection."""
+"""Changes of the pair's skeleton: the closed form from its definition, and bisection."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""Curves and pairs in the paper's figures are what independent formulas say."""
+"""Curves and pairs in the paper's figures against independent formulas."""
 
 import math
 

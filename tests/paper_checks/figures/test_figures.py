@@ -1,4 +1,4 @@
-"""The paper's figures draw, say what they show in one font, and are written."""
+"""The paper's figures: drawn in one font, described and written."""
 
 import re
 import xml.etree.ElementTree as ET

@@ -1,4 +1,4 @@
-"""Running checks: whatever one of them does, the others are heard; Ctrl-C keeps what was found."""
+"""Running checks: failures stay isolated, and Ctrl-C keeps finished results."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""Sections 3 and 4: verdicts that are stood by, and what the checks count, by hand."""
+"""Sections 3 and 4: expected verdicts, and counts made by hand."""
 
 import math
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Section 7, moving dyads: verdicts that are stood by, and symmetries of what is compared."""
+"""Section 7, moving dyads: expected verdicts, and symmetries of the comparisons."""
 
 import numpy as np
 import pytest
