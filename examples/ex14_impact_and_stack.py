@@ -21,7 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models.textbook import GRAVITY, box_on_plane, row_of_balls, stack, table
+from polycorner.models.supports import stack, table
+from polycorner.models.textbook import GRAVITY, box_on_plane, row_of_balls
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.simulation import simulate
 from polycorner.motion.system import System

@@ -18,6 +18,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
 from polycorner.spaces.manifold import Array, Manifold, finite, reals
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
@@ -44,7 +45,7 @@ CUPS = ((4.3, 3.1, 0.5, 0.65), (6.0, 4.7, 0.6, 0.75))
 
 
 @dataclass(frozen=True)
-class Pinball:
+class Pinball(Value):
     """A point ball on a tilted board between walls, with pins, wedges and cups in its way.
 
     Coordinates are ``x`` across the board and ``y`` up the board, from its lower left corner.
@@ -134,7 +135,7 @@ class Pinball:
         """Return every corner of the region, locally convex or concave, ``(k, 2)``."""
         return meeting_corners(self.polyhedron, self.walls)
 
-    def starts(self, rng: np.random.Generator, count: int) -> Array:
+    def starts(self, rng: np.random.Generator | int | None, count: int) -> Array:
         """Return ``count`` points of the region, uniformly distributed, ``(count, 2)``."""
         return uniform_points(self.polyhedron, (0, 0), (self.width, self.height), rng, count)
 

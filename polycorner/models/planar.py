@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
@@ -25,7 +27,7 @@ MAX_TRIES = 100_000  # random points without one inside, after which a set count
 
 
 @dataclass(frozen=True)
-class Wall:
+class Wall(Value):
     """A straight or circular wall in the plane: ``f = n (p - m) + k |p - m|^2 / 2 >= 0``.
 
     The gradient of ``f`` has length one wherever ``f = 0``, so that ``f`` is the distance from
@@ -154,22 +156,21 @@ def meeting_corners(polyhedron: Polyhedron, walls: Sequence[Wall]) -> Array:
 
 
 def uniform_points(
-    polyhedron: Polyhedron, low: ArrayLike, high: ArrayLike, rng: np.random.Generator, count: int
+    polyhedron: Polyhedron,
+    low: ArrayLike,
+    high: ArrayLike,
+    rng: np.random.Generator | int | None,
+    count: int,
 ) -> Array:
     """Return ``count`` points uniform in the part of ``D`` inside a box, ``(count, n)``.
 
     Raises
     ------
     TypeError, ValueError
-        If ``rng`` is no generator, ``count`` no number of points, or no random point of the box
-        lies in ``D``.
+        For an ``rng`` or ``count`` of a wrong kind, or where no random point of the box lies in
+        ``D``.
     """
-    if not isinstance(rng, np.random.Generator):
-        msg = f"rng: expected a numpy.random.Generator; got {rng!r}"
-        raise TypeError(msg)
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
-        msg = f"count: expected a whole number not below 0; got {count!r}"
-        raise ValueError(msg)
+    rng, count = checks.generator("rng", rng), checks.whole("count", count, least=0)
     low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     kept, tries = np.empty((0, len(low))), 0
     while len(kept) < count:
@@ -184,13 +185,7 @@ def uniform_points(
 
 def positive(argument: str, value: object) -> float:
     """Return a positive finite number as a float, refusing anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        msg = f"{argument}: expected a real number; got {value!r}"
-        raise TypeError(msg)
-    if not 0 < value < math.inf:
-        msg = f"{argument}: expected a positive finite number; got {value}"
-        raise ValueError(msg)
-    return float(value)
+    return checks.real(argument, value, above=0)
 
 
 def _wall_formula() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":

@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner import checks
 from polycorner.formulas import cache
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.polyhedra.symmetry import Relabelling, Symmetry
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
@@ -42,7 +44,7 @@ def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
 
 
 @dataclass(frozen=True)
-class SphereCluster:
+class SphereCluster(Value):
     """``n`` hard spheres of unit diameter in space.
 
     Coordinates are ``x1 y1 z1 ... xn yn zn``, in diameters.  The contact of spheres ``i < j`` is
@@ -62,9 +64,7 @@ class SphereCluster:
     count: int
 
     def __post_init__(self) -> None:
-        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 2:
-            msg = f"count: expected a whole number of spheres, at least 2; got {self.count!r}"
-            raise ValueError(msg)
+        checks.whole("count", self.count, least=2)
 
     @cached_property
     def manifold(self) -> Manifold:

@@ -12,6 +12,7 @@ from polycorner.models.planar import Wall, meeting_corners, positive, uniform_po
 from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
 
 SIDES = (
     Wall("AB", (0.2, -1.6), (1, 12), 0.4),
@@ -25,7 +26,7 @@ SIDES = (
 
 
 @dataclass(frozen=True)
-class Tutorial:
+class Tutorial(Value):
     """A region in the plane with corners A to G, locally a quadrant at each ([GMBN] app. B).
 
     Counterclockwise from A its sides ``AB``, ``BC``, ..., ``GA`` are two segments, two arcs that
@@ -96,7 +97,7 @@ class Tutorial:
             for wall in self.walls
         }
 
-    def starts(self, rng: np.random.Generator, count: int) -> Array:
+    def starts(self, rng: np.random.Generator | int | None, count: int) -> Array:
         """Return ``count`` points of the region, uniformly distributed, ``(count, 2)``."""
         outline = np.vstack([*self.sides().values()])
         return uniform_points(self.polyhedron, outline.min(axis=0), outline.max(axis=0), rng, count)

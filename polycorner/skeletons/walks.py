@@ -7,13 +7,13 @@ points, or just touches, is not missed.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from polycorner.skeletons.points import HeldPoint, projected
+from polycorner.skeletons.sign_changes import dips, sign_change
 from polycorner.spaces.manifold import Array
 
 FIRST_STEP = 0.2
@@ -233,15 +233,15 @@ class _Follower:
         f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
         slope0 = self.signs * (here.gradients[rows] @ self.t)
         slope1 = self.signs * (there.gradients[rows] @ t)
-        dips = (slope0 < 0) & (slope1 >= 0)
+        turns = (slope0 < 0) & (slope1 >= 0)
         crosses = f1 < 0
         chord = self._chord(point)
         reach = np.maximum(self._sizes(here), self._sizes(there)) * chord
         near = f0 + f1 < reach
         return [
             (int(rows[k]), float(self.signs[k]))
-            for k in np.flatnonzero(crosses | dips)
-            if crosses[k] or near[k] or _dip(f0[k], f1[k], slope0[k], slope1[k], chord)
+            for k in np.flatnonzero(crosses | turns)
+            if crosses[k] or near[k] or dips(f0[k], f1[k], slope0[k], slope1[k], chord)
         ]
 
     def _chord(self, point: HeldPoint) -> float:
@@ -267,7 +267,7 @@ class _Follower:
                 at = self._between(point, s)
                 return sign * float(at.gradients[j] @ at.tangent(self.t)), at
 
-            far, end = _root(slope)
+            far, end = sign_change(slope)
             distance = sign * end.distances[j]
             if distance > self.quotient.tolerance:
                 return None
@@ -282,7 +282,7 @@ class _Follower:
             quick = self._crossing(point, j)
             if quick is not None:
                 return (*quick, True)
-        s, where = _root(value, far)
+        s, where = sign_change(value, far)
         return s, where, end is point
 
     def _crossing(self, point: HeldPoint, j: int) -> tuple[float, HeldPoint] | None:
@@ -310,7 +310,7 @@ class _Follower:
 
         if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
             return None
-        _, nearest = _root(passed)
+        _, nearest = sign_change(passed)
         same = abs(self._from_home(nearest.q)).max() < 100 * self.quotient.tolerance
         return (nearest, nearest.tangent(self.t)) if same else None
 
@@ -320,40 +320,3 @@ class _Follower:
         if invariants is None:
             return manifold.difference(q, self.start.q) / self.scales
         return invariants(q) - invariants(self.start.q)
-
-
-def _dip(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
-    """Whether the cubic through values and slopes at both ends comes near zero in between."""
-    m0, m1 = h * slope0, h * slope1
-    curve = [f0, m0, 3 * (f1 - f0) - 2 * m0 - m1, 2 * (f0 - f1) + m0 + m1]
-    flat = np.roots([3 * curve[3], 2 * curve[2], curve[1]])
-    lowest = flat.real[(abs(flat.imag) < 1e-6) & (flat.real > 0) & (flat.real < 1.01)]
-    values = np.polyval(curve[::-1], lowest)
-    return bool((values < 0.25 * min(f0, f1) + 1e-9).any())
-
-
-def _root(
-    value: Callable[[float], tuple[float, HeldPoint]], far: float = 1.0
-) -> tuple[float, HeldPoint]:
-    """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
-    a, b = 0.0, far
-    (fa, _), (fb, at) = value(a), value(b)
-    if abs(fb) < 1e-15:
-        return b, at
-    s, side = far, 0
-    for _ in range(80):
-        if b - a < 1e-15 or fb == fa:
-            break
-        s = (a * fb - b * fa) / (fb - fa)
-        f, at = value(s)
-        if f == 0.0 or abs(f) < 1e-15:
-            break
-        if (f > 0) == (fb > 0):
-            b, fb = s, f
-            fa, side = (fa / 2 if side == 1 else fa), 1
-        else:
-            a, fa = s, f
-            fb, side = (fb / 2 if side == -1 else fb), -1
-        if b - a < 1e-14:
-            break
-    return s, at

@@ -27,6 +27,7 @@ from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.errors import SolverError
+from polycorner.models import supports
 from polycorner.models import textbook as scenes
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
@@ -195,7 +196,7 @@ def test_both_steps_agree_on_many_systems():
 WORKED = {
     "box": (scenes.box_on_plane(1.0, 0.5, Interval(0.5), angle=0.3, restitution=0.5), [0, 0.5, 0]),
     "belt": (scenes.box_on_plane(0.5, 1.0, Interval(0.3), belt=0.5), [0, 1, 0]),
-    "groove": (scenes.groove(Interval(0.4)), [0, math.sqrt(2), 0]),
+    "groove": (supports.groove(Interval(0.4)), [0, math.sqrt(2), 0]),
     "row": (scenes.row_of_balls((1, 2, 3, 4), 0.7), [0, 1, 2, 3]),
     "ball": (scenes.ball_on_plane(Ellipse(0.3, 0.2), CutDisc(0.1, 0.05), angle=0.1), [0] * 4),
     "thrown": (scenes.thrown_ball(Interval(0.2), 0.6), [0, 1, 0]),

@@ -8,6 +8,7 @@ from step_inclusion import assemble
 
 from polycorner import minimise
 from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.models import supports
 from polycorner.models import textbook as scenes
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc, Interval
@@ -29,10 +30,10 @@ SCENES = {
     "block": (scenes.sliding_block(Disc(0.5), angle=STEEP), [0, 0]),
     "ball": (scenes.ball_on_plane(Disc(0.5), Disc(0.5), angle=STEEP), [0] * 4),
     "box": (scenes.box_on_plane(1.0, 0.5, Interval(0.5), angle=STEEP), [0, 0.5, 0]),
-    "table": (scenes.table(Disc(0.5), angle=STEEP), [0] * 6),
-    "stack": (scenes.stack(3, Interval(0.5), angle=0.2), floors(3)),
-    "groove": (scenes.groove(Interval(0.5)), [0, math.sqrt(2), 0]),
-    "pile": (scenes.pile_of_discs(), [1, 1, 3, 1, 2, 1 + math.sqrt(3)]),
+    "table": (supports.table(Disc(0.5), angle=STEEP), [0] * 6),
+    "stack": (supports.stack(3, Interval(0.5), angle=0.2), floors(3)),
+    "groove": (supports.groove(Interval(0.5)), [0, math.sqrt(2), 0]),
+    "pile": (supports.pile_of_discs(), [1, 1, 3, 1, 2, 1 + math.sqrt(3)]),
 }
 
 
@@ -170,7 +171,7 @@ def test_a_sliding_box_stays_down_on_both_feet(angle, speed, belt):
 
 def test_a_sliding_table_stays_down_on_all_legs():
     mu, angle = 0.3, 0.5
-    table = scenes.table(Disc(mu), angle=angle)
+    table = supports.table(Disc(mu), angle=angle)
     path = simulate(table, table.state([0] * 6), 0.5, 1e-3)
     np.testing.assert_allclose(path.q[:, 0, 1:], 0, atol=1e-10)
     expected = 0.5 * G * (math.sin(angle) - mu * math.cos(angle))

@@ -28,6 +28,7 @@ from polycorner.models.wells.escape import mean_escape_time
 from polycorner.models.wells.wells import KINDS, Well
 from polycorner.motion.noise import Noise
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     from polycorner.motion.engine.driver import Engine
@@ -77,7 +78,7 @@ def herd_engine(
 
 
 @dataclass(frozen=True, eq=False)
-class Escapes:
+class Escapes(Value):
     """When copies of a mass reached the rim of its well.
 
     Attributes
@@ -207,7 +208,7 @@ def rests(
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Value):
     """U, half-U and half-V wells of the same depth under the same noise.
 
     Attributes

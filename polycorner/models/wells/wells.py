@@ -24,9 +24,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.minimisation import Entrapment
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold, reals, scalar
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
@@ -37,7 +39,7 @@ KINDS = (Entrapment.U, Entrapment.HALF_U, Entrapment.HALF_V)
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Value):
     """A motion from 0 up and back, without drag.
 
     Attributes
@@ -59,7 +61,7 @@ class Flight:
 
 
 @dataclass(frozen=True)
-class Well:
+class Well(Value):
     """A point mass on a line with the energy ``V(x) = slope |x| + stiffness x^2 / 2``.
 
     With a wall at ``x = 0`` the mass lives in ``0 <= x``, otherwise on the whole line; the well
@@ -312,10 +314,4 @@ def _fall(height: float, force: float, stiffness: float, mass: float) -> tuple[f
 
 
 def _number(name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        msg = f"{name}: expected a real number; got {value!r}"
-        raise TypeError(msg)
-    if not 0 <= float(value) < math.inf:
-        msg = f"{name}: expected a number not below 0; got {value:g}"
-        raise ValueError(msg)
-    return float(value)
+    return checks.real(name, value, least=0)

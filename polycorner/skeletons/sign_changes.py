@@ -1,0 +1,45 @@
+"""Sign changes and dips of a function along a step."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+Point = TypeVar("Point")
+
+
+def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
+    """Whether the cubic through values and slopes at both ends comes near zero in between."""
+    m0, m1 = h * slope0, h * slope1
+    curve = [f0, m0, 3 * (f1 - f0) - 2 * m0 - m1, 2 * (f0 - f1) + m0 + m1]
+    flat = np.roots([3 * curve[3], 2 * curve[2], curve[1]])
+    lowest = flat.real[(abs(flat.imag) < 1e-6) & (flat.real > 0) & (flat.real < 1.01)]
+    values = np.polyval(curve[::-1], lowest)
+    return bool((values < 0.25 * min(f0, f1) + 1e-9).any())
+
+
+def sign_change(
+    value: Callable[[float], tuple[float, Point]], far: float = 1.0
+) -> tuple[float, Point]:
+    """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
+    a, b = 0.0, far
+    (fa, _), (fb, at) = value(a), value(b)
+    if abs(fb) < 1e-15:
+        return b, at
+    s, side = far, 0
+    for _ in range(80):
+        if b - a < 1e-15 or fb == fa:
+            break
+        s = (a * fb - b * fa) / (fb - fa)
+        f, at = value(s)
+        if f == 0.0 or abs(f) < 1e-15:
+            break
+        if (f > 0) == (fb > 0):
+            b, fb = s, f
+            fa, side = (fa / 2 if side == 1 else fa), 1
+        else:
+            a, fa = s, f
+            fb, side = (fb / 2 if side == -1 else fb), -1
+        if b - a < 1e-14:
+            break
+    return s, at
