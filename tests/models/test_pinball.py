@@ -333,39 +333,29 @@ def test_a_board_without_room_says_so():
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("argument", "value", "kind"),
     [
-        ({"width": 0}, "width: expected a positive finite number; got 0"),
-        ({"height": math.inf}, "height: expected a positive finite number; got inf"),
-        ({"tilt": -0.1}, "tilt: expected a positive finite number; got -0.1"),
-        ({"tilt": 1.6}, "tilt: expected an angle of at most pi/2; got 1.6"),
-        ({"pins": [(1, 2)]}, r"pins: expected rows \(x, y, radius\); got an array of shape"),
-        ({"pins": [(1, 2, 0.0)]}, "pins: expected positive radii; got "),
-        ({"pins": [(1, 2, math.nan)]}, "pins: expected finite numbers; got nan"),
-        ({"pins": [(1, 2), (1, 2, 3)]}, "pins: expected a rectangular array"),
-        ({"pins": 3}, r"pins: expected rows \(x, y, radius\); got an array of shape"),
-        ({"wedges": [(1, 2, 3)]}, "wedges: expected triangles of three corners"),
-        ({"wedges": [((1, 1), (2, 2), (3, 3))]}, "wedges: expected three corners that are not"),
-        ({"wedges": [((1, 1), (1, 1), (1, 1))]}, "wedges: expected three corners that are not"),
-        ({"cups": [(1, 2, 1, 1)]}, "cups: expected radii with 0 < inner < outer; got "),
-        ({"cups": [(1, 2, -1, 1)]}, "cups: expected radii with 0 < inner < outer; got "),
+        ("width", 0, ValueError),
+        ("height", math.inf, ValueError),
+        ("tilt", -0.1, ValueError),
+        ("tilt", 1.6, ValueError),
+        ("pins", [(1, 2)], ValueError),
+        ("pins", [(1, 2, 0.0)], ValueError),
+        ("pins", [(1, 2, math.nan)], ValueError),
+        ("pins", [(1, 2), (1, 2, 3)], ValueError),
+        ("pins", 3, ValueError),
+        ("wedges", [(1, 2, 3)], ValueError),
+        ("wedges", [((1, 1), (2, 2), (3, 3))], ValueError),
+        ("wedges", [((1, 1), (1, 1), (1, 1))], ValueError),
+        ("cups", [(1, 2, 1, 1)], ValueError),
+        ("cups", [(1, 2, -1, 1)], ValueError),
+        ("width", "6", TypeError),
+        ("tilt", True, TypeError),
+        ("pins", "pins", TypeError),
+        ("cups", None, TypeError),
+        ("wedges", [[[True] * 2] * 3], TypeError),
     ],
 )
-def test_arguments_are_refused_in_a_sentence(changes, says):
-    with pytest.raises(ValueError, match=f"^{says}"):
-        Pinball(**changes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"width": "6"}, "width: expected a real number; got '6'"),
-        ({"tilt": True}, "tilt: expected a real number; got True"),
-        ({"pins": "pins"}, "pins: expected real numbers; got dtype"),
-        ({"cups": None}, "cups: expected real numbers; got dtype object"),
-        ({"wedges": [[[True] * 2] * 3]}, "wedges: expected real numbers; got dtype bool"),
-    ],
-)
-def test_arguments_of_a_wrong_kind_are_refused_in_a_sentence(changes, says):
-    with pytest.raises(TypeError, match=f"^{says}"):
-        Pinball(**changes)
+def test_the_error_names_the_argument(argument, value, kind):
+    with pytest.raises(kind, match=rf"^{argument}: expected [^\n]+; got "):
+        Pinball(**{argument: value})
