@@ -178,22 +178,24 @@ def _rows(c: Certificate) -> list[Entries]:
 def _differences(written: Entries, c: Certificate, tolerance: float) -> Iterator[str]:
     """Yield the results that are not those written, in words."""
     found, scales, size = _results(c), c.problem.scales, SOLVED * c.analysis.reference
-    measured: list[tuple[str, Any, Any, Any]] = []  # and the size of an allowed difference
+    # Names, written and found numbers, and the size to which a difference is relative.
+    evaluated: list[tuple[str, Any, Any, Any]] = []
+    solved: list[tuple[str, Any, Any, Any]] = []
     for one, other in zip(_every_row(written), _every_row(found), strict=True):
-        name, gradient = other["name"], _numbers(other["gradient"])
-        slope = float(abs(gradient * scales).max())
-        around = max(abs(read_number(other["value"])), slope)
-        measured.append((f"value of {name!r}", one["value"], other["value"], around))
-        measured.append(
+        name, slopes = other["name"], _numbers(other["gradient"]) * scales
+        slope = float(np.nan_to_num(abs(slopes)).max())
+        value = np.nan_to_num(abs(read_number(other["value"])))
+        evaluated.append((f"value of {name!r}", one["value"], other["value"], max(value, slope)))
+        evaluated.append(
             (f"gradient of {name!r}", one["gradient"], other["gradient"], slope / scales)
         )
         key = "multiplier" if found["multipliers unique"] else "multiplier range"
-        pull = np.linalg.norm(gradient * scales) or 1.0
-        measured.append((f"{key} of {name!r}", one.get(key, []), other.get(key, []), size / pull))
-    measured.append(("curvatures", written["curvatures"], found["curvatures"], size))
-    ours, theirs = (list(entry["residuals"].values()) for entry in (written, found))
-    measured.append(("residuals", ours, theirs, float(SOLVED)))
-    for what, one, other, allowed in measured:
+        pull = np.linalg.norm(slopes) or 1.0
+        solved.append((f"{key} of {name!r}", one.get(key, []), other.get(key, []), size / pull))
+    solved.append(("curvatures", written["curvatures"], found["curvatures"], size))
+    residuals = [list(entry["residuals"].values()) for entry in (written, found)]
+    solved.append(("residuals", residuals[0], residuals[1], float(SOLVED)))
+    for what, one, other, allowed in (*evaluated, *solved):
         a, b = _numbers(one), _numbers(other)
         limit = tolerance * allowed
         if a.shape != b.shape or not np.allclose(a, b, rtol=0.0, atol=limit, equal_nan=True):

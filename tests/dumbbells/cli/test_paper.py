@@ -1,6 +1,8 @@
 """The claims on the command line: what is printed and written, and one line for a mistake."""
 
+import errno
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -79,6 +81,24 @@ def test_interrupted_runs_keep_what_was_found(capsys, pretended, tmp_path):
     assert err == "polycorner: interrupted; not run: A2, A3a\n"
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Interrupted before these were checked: A2, A3a." in page
+
+
+def test_a_full_disk_costs_neither_the_answer_nor_the_old_report(
+    capsys, pretended, monkeypatch, tmp_path
+):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    pretended(GOOD)
+    _, answer, _ = run(capsys)
+    old = tmp_path / "report.html"
+    old.write_text("the report of yesterday")
+    monkeypatch.setattr("os.fsync", full)
+    code, out, err = run(capsys, "--out", str(tmp_path))
+    assert (code, out) == (2, answer)
+    assert os.strerror(errno.ENOSPC) in err
+    assert old.read_text() == "the report of yesterday"
+    assert list(tmp_path.iterdir()) == [old]
 
 
 def test_slow_claims_are_left_out_and_said_to_be(capsys, monkeypatch):
