@@ -122,6 +122,24 @@ def test_sentences_and_titles_are_escaped(title, words):
     assert read.tags == {"div", "p", "strong"}
 
 
+@given(tables(), st.integers(4, 60))
+def test_no_width_cuts_a_word(table, width):
+    """At any width the cells are whole, and lines are longer only where one word is."""
+    shown = table.text(width)
+    told = [table.caption, *table.head, *(cell for row in table.rows for cell in row)]
+    every = [word for cell in told for word in cell.split()]
+    assert set(shown.split()) == set(every)
+    longest = max(map(len, every), default=0)
+    assert max(map(len, shown.splitlines()), default=0) <= max(width, longest + 2)
+
+
+def test_wide_tables_are_wrapped_and_wider_ones_become_lines():
+    table = Table(("name", "contacts"), (("delta", "A2B1 A2b aB1"),))
+    assert table.text(80) == "name   contacts\ndelta  A2B1 A2b aB1"
+    assert table.text(15) == "name   contacts\ndelta  A2B1 A2b\n       aB1"
+    assert table.text(12) == "name\n  delta\ncontacts\n  A2B1 A2b\n  aB1"
+
+
 def test_zero_has_no_sign():
     assert number(-0.0) == "0"
 

@@ -89,13 +89,14 @@ def timed(words: str) -> Iterator[None]:
 def notices(chosen: Verbosity) -> Iterator[None]:
     """Show warnings and the library's log as remarks: one line each, none with ``--quiet``.
 
-    What the library logs (that it compiles, say) is shown on a terminal or with ``--verbose``.
+    What the library logs is shown on a terminal (that it compiles, say), details of it with
+    ``--verbose`` only.
     """
     handler = _Remarks(chosen)
     log = logging.getLogger("polycorner")
     level, show = log.level, warnings.showwarning
     log.addHandler(handler)
-    log.setLevel(logging.INFO)
+    log.setLevel(logging.DEBUG)
     warnings.showwarning = handler.warn
     try:
         yield
@@ -114,8 +115,8 @@ class _Remarks(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record where it is wanted."""
-        wanted = self.chosen.verbose or sys.stderr.isatty() or record.levelno > logging.INFO
-        if wanted and not self.chosen.quiet:
+        least = logging.INFO if sys.stderr.isatty() else logging.WARNING
+        if self.chosen.verbose or (record.levelno >= least and not self.chosen.quiet):
             self.write(record.getMessage())
 
     def warn(self, message: Warning | str, *_: object, **__: object) -> None:

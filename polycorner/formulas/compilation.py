@@ -19,18 +19,41 @@ Only entry points are cached; what they call is compiled into them.
 """
 
 import hashlib
+import logging
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from numba import config, types
-from numba.core import cgutils
+from numba.core import cgutils, event
 from numba.extending import intrinsic
 
 from polycorner.formulas.cache import cache_folder
 
+LOG = logging.getLogger("polycorner.compilation")
+
 if not config.CACHE_DIR:  # what is cached after this import goes to the one cache folder
     config.CACHE_DIR = str(cache_folder() / "numba")
+
+
+class Announcement(event.Listener):  # type: ignore[misc]
+    """Logs once for each package that its code is compiled, the cache not holding it."""
+
+    def __init__(self) -> None:
+        self.announced: set[str] = set()
+
+    def on_start(self, event: Any) -> None:
+        """Log the package of the function that is compiled, unless that was done before."""
+        package = event.data["dispatcher"].py_func.__module__.rpartition(".")[0]
+        if package.startswith("polycorner.") and package not in self.announced:
+            self.announced.add(package)
+            LOG.info("compiling %s, once on this machine; this can take minutes", package)
+
+    def on_end(self, event: Any) -> None:
+        """Do nothing."""
+
+
+event.register("numba:compile", Announcement())
 
 
 def sources_digest(package: str) -> str:

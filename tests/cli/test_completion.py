@@ -54,6 +54,8 @@ def completed(*words):
         (("prove", "--minimum", "delta"), {"delta_R", "delta_L"}),
         (("atlas", "disks", "--t"), {"--torus"}),
         (("completion", "z"), {"zsh"}),
+        (("paper", "P3"), {"P3", "P3a", "P3b"}),
+        (("paper", "figures", "flow"), {"flow_lines"}),
     ],
 )
 def test_what_is_typed_is_completed(words, offered):

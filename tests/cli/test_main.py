@@ -75,6 +75,22 @@ def test_every_subcommand_is_looked_at():
     assert told == set(LEAVES)
 
 
+# ------------------------------------------------------------------------------- tables
+
+
+@pytest.mark.parametrize("name", sorted(set(QUICK) - {"drum"}))  # which tells its speed
+def test_no_table_cuts_a_word_in_a_narrow_terminal(capsys, monkeypatch, name):
+    words = {}
+    for columns in (1000, 80, 60):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        code, out, _ = run(capsys, name, *QUICK[name])
+        assert code == 0
+        words[columns] = set(out.split())
+        wide = [line for line in out.splitlines() if len(line) > columns]
+        assert all(max(map(len, line.split())) > columns / 2 for line in wide)
+    assert words[80] == words[60] == words[1000]
+
+
 # -------------------------------------------------------------------------------- help
 
 
@@ -95,6 +111,39 @@ def test_help_has_examples_and_they_are_right(capsys, monkeypatch, names):
             command.make_context("polycorner", below).close()
         except click.exceptions.Exit:
             assert "--help" in words
+
+
+EXECUTED = (
+    "atlas dyad --plane",
+    "atlas spheres --count 6",
+    "atlas tutorial --out out",
+    "atlas disks --count 2",
+    "cache",
+    "dyad",
+    "dyad --drum inf --json",
+    "minima pinball --starts 200 --seed 1",
+    "paper --list",
+    "prove",
+)
+
+
+@pytest.mark.parametrize("line", EXECUTED)
+def test_quick_examples_run(capsys, monkeypatch, tmp_path, line):
+    monkeypatch.chdir(tmp_path)
+    helps = [commands.run(capsys, *names, "--help")[1] for names in EVERY]
+    assert any(re.search(rf"^ *polycorner {re.escape(line)}$", text, re.M) for text in helps)
+    code, out, err = commands.run(capsys, *line.split())
+    assert (code, err) == (0, "")
+    assert out
+
+
+@every_leaf
+def test_options_stand_in_groups_with_their_defaults(capsys, name):
+    text = commands.run(capsys, *name.split(), "--help")[1]
+    assert "General options:" in text
+    for option in options(LEAVES[name]).values():
+        if not option.is_flag and option.default not in (None, (), "") and option.name != "movie":
+            assert "[default: " in text
 
 
 @every_leaf

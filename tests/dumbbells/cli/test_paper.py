@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,8 @@ import paper_checks
 from paper_checks.figures import FIGURES
 from paper_checks.framework import running
 from paper_checks.framework.running import Result, Run
+from polycorner.dumbbells.cli import paper_names
+from polycorner.dumbbells.cli.paper import EPILOG
 
 ROOT = Path(paper_checks.__file__).parents[1]
 A, B, C = small_catalogue.CLAIMS[:3]
@@ -57,6 +60,44 @@ def test_files_and_table(capsys, tmp_path):
     (record,) = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert record["verdict"] == "corrected"
     assert "| P2b |" in (out / "report.md").read_text(encoding="utf-8")
+
+
+def test_names_are_read_from_the_sources():
+    """Without importing the checks, and all of them."""
+    claims = {claim.id for claim in paper_checks.CLAIMS}
+    assert claims <= set(paper_names.claim_ids())
+    assert {name.rstrip("abcdefghij") for name in paper_names.claim_ids()} == {
+        name.rstrip("abcdefghij") for name in claims
+    }
+    assert set(paper_names.figure_names()) == set(FIGURES)
+    assert paper_names.sections() == sorted({claim.section for claim in paper_checks.CLAIMS})
+
+
+def test_examples_name_claims_and_figures():
+    for line in re.findall(r"polycorner paper (.*)", EPILOG):
+        words = [word for word in line.partition("--")[0].split() if word != "figures"]
+        assert set(words) <= {*paper_names.claim_ids(), *paper_names.figure_names()}
+
+
+def test_claims_are_listed(capsys):
+    code, out, err = run(capsys, "--list", "--section", "B", "--json")
+    assert (code, err) == (0, "")
+    known = [claim.id for claim in paper_checks.CLAIMS if claim.section == "B"]
+    assert [record["id"] for record in json.loads(out)] == known
+    assert known[0] in run(capsys, "--list", known[0])[1]
+
+
+def test_a_wrong_id_is_refused_before_anything_is_imported():
+    program = (
+        "import sys; from polycorner.cli.main import main\n"
+        "try:\n    main(['paper', 'E44'])\nexcept SystemExit as stopped:\n    code = stopped.code\n"
+        "print(code, sorted({'numpy', 'sympy', 'paper_checks'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "2 []\n"
+    assert "did you mean E4" in done.stderr
 
 
 def test_quiet(capsys):

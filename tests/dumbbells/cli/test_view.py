@@ -259,3 +259,4 @@ def test_without_tornado_the_extra_is_named(capsys, monkeypatch):
     code, _, err = commands.run(capsys, "view", "--no-browser")
     assert code == 2
     assert "pip install 'polycorner[view]'" in err
+    assert "pip install '.[view]'" in err  # in a checkout
