@@ -25,6 +25,8 @@ class Option(click.Option):
     """An option that is listed under the title of its group."""
 
     def __init__(self, *args: Any, group: str = "Options", **settings: Any) -> None:
+        if isinstance(settings.get("type"), click.IntRange):
+            settings.setdefault("metavar", "N")  # the range stands behind the help
         super().__init__(*args, **settings)
         self.group = group
 
@@ -37,7 +39,7 @@ class GroupedCommand(click.Command):
         groups: dict[str, list[tuple[str, str]]] = {}
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx)
-            if record is not None:
+            if record is not None and isinstance(parameter, click.Option):
                 groups.setdefault(getattr(parameter, "group", GENERAL), []).append(record)
         for title in sorted(groups, key=lambda title: (title == GENERAL, title == OUTPUT)):
             with formatter.section(title):
