@@ -13,9 +13,8 @@ from polycorner.cli.options import (
     output_options,
     seed_option,
 )
-from polycorner.cli.output import fail, working
 from polycorner.cli.report import critical_sheet, label
-from polycorner.cli.search import Search
+from polycorner.cli.search import DiskSearch, Search
 
 if TYPE_CHECKING:
     from polycorner.models.pinball import Pinball
@@ -44,14 +43,19 @@ def atlas() -> None:
     """
 
 
+resume_option = option(
+    "--resume",
+    is_flag=True,
+    group="Search",
+    help="Continue a search that was stopped, killed or out of budget.",
+)
+
+
 def search_options(function: Command) -> Command:
     """Add ``--seed``, ``--budget``, ``--resume`` and the options of every answer."""
     for add in (
         output_options,
-        option(
-            "--resume", is_flag=True, group="Search",
-            help="Continue a search that was stopped, killed or out of budget.",
-        ),
+        resume_option,
         option(
             "--budget", type=click.IntRange(min=1), default=100_000, group="Search",
             help="Most edges to trace.",
@@ -121,7 +125,7 @@ def pinball(as_json: bool, out: Path | None, seed: int, budget: int, resume: boo
 
 
 @atlas.command(
-    epilog=examples("atlas disks --count 2", "atlas disks --count 2 --torus hexagonal --json"),
+    epilog=_epilog("disks --count 2", "disks --count 2 --torus hexagonal --json"),
 )
 @option("--count", type=click.IntRange(min=1), default=3, group="Model", help="Number of disks.")
 @option(
@@ -129,23 +133,18 @@ def pinball(as_json: bool, out: Path | None, seed: int, budget: int, resume: boo
     help="Lattice of the torus.",
 )  # fmt: skip
 @seed_option("the random starts")
+@resume_option
 @output_options
-def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) -> None:
+def disks(count: int, torus: str, seed: int, resume: bool, as_json: bool, out: Path | None) -> None:
     """List the critical radii of hard disks on a flat torus.
 
     At a critical radius the contacts of the disks carry a stress in equilibrium.
     """
-    import numpy as np
+    from polycorner.models import TorusDisks
 
-    from polycorner.models.disks.disks import TorusDisks
-
-    try:
-        model = TorusDisks(count, "hexagonal" if torus == "hexagonal" else "square")
-    except (TypeError, ValueError) as error:
-        fail(f"--{error}")
-    search = Search("disks", {"count": count, "torus": torus}, out, seed)
-    with working("searching disks", "rounds") as progress:
-        found = model.critical(np.random.default_rng(seed), progress=progress)
+    model = TorusDisks(count, "hexagonal" if torus == "hexagonal" else "square")
+    search = DiskSearch("disks", {"count": count, "torus": torus}, out, seed)
+    found = search.run(model, resume=resume)
     rows = [
         {
             "radius": c.radius,
@@ -156,7 +155,12 @@ def disks(count: int, torus: str, seed: int, as_json: bool, out: Path | None) ->
         }
         for c in found
     ]
-    answer = {"model": "disks", "parameters": search.parameters, "critical": rows}
+    answer = {
+        "model": "disks",
+        "parameters": search.parameters,
+        "critical": rows,
+        "complete": "exhausted" if search.finished else "interrupted",
+    }
 
     def draw(folder: Path) -> list[Path]:
         from polycorner.pictures import disks, style

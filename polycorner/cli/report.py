@@ -54,7 +54,8 @@ def critical_sheet(answer: dict[str, Any]) -> Sheet:
         (f"{row['radius']:.9f}", *(str(row[key]) for key in head[1:])) for row in answer["critical"]
     )
     caption = "Critical radii, in units of the torus's side"
-    return Sheet("", (Table(head, tuple(rows), tuple(range(len(head))), caption),))
+    table = Table(head, tuple(rows), tuple(range(len(head))), caption)
+    return Sheet("", (table, f"complete: {answer['complete']}"))
 
 
 def _told(answer: dict[str, Any]) -> list[tuple[str, str]]:

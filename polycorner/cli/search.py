@@ -1,4 +1,4 @@
-"""A search for an atlas that is saved as it goes, resumed, and reported."""
+"""Searches that are saved as they go, resumed, and reported."""
 
 import hashlib
 from collections.abc import Callable, Iterator
@@ -21,6 +21,8 @@ from polycorner.cli.output import (
 from polycorner.cli.report import atlas_sheet, keys, label
 
 if TYPE_CHECKING:
+    from polycorner.container import Kind
+    from polycorner.models import CriticalConfiguration, CriticalSearch, TorusDisks
     from polycorner.polyhedra.polyhedron import Polyhedron
     from polycorner.polyhedra.symmetry import Symmetry
     from polycorner.printing import Sheet
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 SAVED_EVERY = 10.0  # seconds between two savings of a long search
 
 
-class Search:
-    """A search with its progress bar, its saved state and its report.
+class Kept:
+    """A search with the file of its state and its report.
 
     Parameters
     ----------
@@ -40,15 +42,18 @@ class Search:
         Its parameters.
     out : path, optional
         Folder of the answer, where an unfinished search is kept too; else it is kept in the cache.
-    seed, budget : int
-        Seed of the random directions; how many edges may be traced.
+    seed : int
+        Seed of whatever is random.
+
+    Attributes
+    ----------
+    finished, interrupted, drawn : bool
+        Whether nothing is left to do, whether Ctrl-C ended the search, and whether its result is
+        fit for pictures.
     """
 
-    def __init__(
-        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int = 1
-    ) -> None:
-        self.model, self.parameters, self.out = model, chosen, out
-        self.seed, self.budget = seed, budget
+    def __init__(self, model: str, chosen: dict[str, Any], out: Path | None, seed: int) -> None:
+        self.model, self.parameters, self.out, self.seed = model, chosen, out, seed
         prepare(out)
         self.finished, self.interrupted, self.drawn = True, False, True
 
@@ -65,6 +70,57 @@ class Search:
         from polycorner.formulas.cache import cache_folder
 
         return cache_folder() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
+
+    def check_kept(self) -> None:
+        """End the command where there is nothing to resume."""
+        if not self.state.exists():
+            fail("--resume: expected an unfinished search with the same options; got none")
+
+    def end(self, *, finished: bool, interrupted: bool) -> None:
+        """Note how the search ended; the state of a finished one is removed."""
+        self.finished = self.drawn = finished
+        self.interrupted = interrupted
+        if finished:
+            self.state.unlink(missing_ok=True)
+
+    def finish(
+        self,
+        answer: dict[str, Any],
+        *,
+        as_json: bool,
+        draw: Callable[[Path], list[Path]],
+        sheet: "Callable[[dict[str, Any]], Sheet]" = atlas_sheet,
+    ) -> None:
+        """Print the answer, write the files, and end the process if it was interrupted."""
+
+        def write() -> Iterator[Path]:
+            if self.out is not None:
+                yield write_answer(answer, self.out, "atlas.json")
+                if self.drawn:
+                    with writing(self.out), timed("drawing"):
+                        yield from draw(self.out)
+
+        deliver(answer, lambda: shown(sheet(answer)), write, as_json=as_json)
+        if not self.finished:
+            unfinished(self.state)
+        if self.interrupted:
+            raise click.exceptions.Exit(130)
+
+
+class Search(Kept):
+    """A search for corners, edges and faces.
+
+    Parameters
+    ----------
+    budget : int
+        The most edges to trace.
+    """
+
+    def __init__(
+        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int
+    ) -> None:
+        super().__init__(model, chosen, out, seed)
+        self.budget = budget
 
     def run(
         self,
@@ -103,13 +159,11 @@ class Search:
                 if left < 1:
                     break
                 found = resumed(found, budget=Budget(left, SAVED_EVERY), progress=progress)
-        self.finished = found.complete not in (Completeness.BUDGET, Completeness.INTERRUPTED)
-        if self.finished:
-            self.state.unlink(missing_ok=True)
-        else:
+        interrupted = found.complete is Completeness.INTERRUPTED
+        unfinished = interrupted or found.complete is Completeness.BUDGET
+        if unfinished:
             self._save(found)
-        self.drawn = self.finished
-        self.interrupted = found.complete is Completeness.INTERRUPTED
+        self.end(finished=not unfinished, interrupted=interrupted)
         return found
 
     def _save(self, found: "Skeleton") -> None:
@@ -121,8 +175,7 @@ class Search:
     def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
         from polycorner.files import load_skeleton
 
-        if not self.state.exists():
-            fail("--resume: expected an unfinished search with the same options; got none")
+        self.check_kept()
         try:
             return load_skeleton(self.state, polyhedron, symmetry=symmetry, label=self.label)
         except ValueError as error:
@@ -176,25 +229,37 @@ class Search:
             "notes": list(found.notes),
         }
 
-    def finish(
-        self,
-        answer: dict[str, Any],
-        *,
-        as_json: bool,
-        draw: Callable[[Path], list[Path]],
-        sheet: "Callable[[dict[str, Any]], Sheet]" = atlas_sheet,
-    ) -> None:
-        """Print the answer, write the files, and end the process if it was interrupted."""
 
-        def write() -> Iterator[Path]:
-            if self.out is not None:
-                yield write_answer(answer, self.out, "atlas.json")
-                if self.drawn:
-                    with writing(self.out), timed("drawing"):
-                        yield from draw(self.out)
+class DiskSearch(Kept):
+    """A search for the critical radii of disks, saved after every round."""
 
-        deliver(answer, lambda: shown(sheet(answer)), write, as_json=as_json)
-        if not self.finished:
-            unfinished(self.state)
-        if self.interrupted:
-            raise click.exceptions.Exit(130)
+    def run(self, model: "TorusDisks", *, resume: bool) -> "tuple[CriticalConfiguration, ...]":
+        """Search, or resume; an interruption loses the round under way only."""
+        from polycorner.container import JSON, Kind
+
+        kind = Kind("search of disks", "polycorner atlas disks", JSON)
+        with working(f"searching {self.model}", "rounds") as progress:
+            search = self._load(model, kind) if resume else model.critical_search(self.seed)
+            try:
+                while not search.complete:
+                    search = search.advanced()
+                    with writing(self.state):
+                        kind.save_json(self.state, {"label": self.label, "search": search.record})
+                    progress(search.rounds, None, f"{len(search.configurations)} found")
+            except KeyboardInterrupt:
+                if not search.rounds:
+                    raise
+        self.end(finished=search.complete, interrupted=not search.complete)
+        return search.configurations
+
+    def _load(self, model: "TorusDisks", kind: "Kind") -> "CriticalSearch":
+        from polycorner.models import CriticalSearch
+
+        self.check_kept()
+        try:
+            content = kind.load_json(self.state)
+            if content["label"] != self.label:
+                fail(f"--resume: expected a search with the same options in {self.state}")
+            return CriticalSearch.restored(model, content["search"])
+        except (ValueError, LookupError, TypeError) as error:
+            fail(f"--resume: {error}")

@@ -93,7 +93,9 @@ class CompiledKernel:
         code = read_code(name)
         self.origin = "compiled" if code is None else "loaded"
         if code is None:
-            LOG.debug("compiling %d formulas with derivatives up to order %d", kernel.outputs, order)
+            LOG.debug(
+                "compiling %d formulas with derivatives up to order %d", kernel.outputs, order
+            )
             code = _machine_code(kernel.program, order, name)
             write_code(name, code)
         self._engine, addresses = _load(code, name)

@@ -161,7 +161,7 @@ MISTAKES = {
     ("--seed", "x"): ("--seed", MODELS),
     ("--budget", "0"): ("--budget", SEARCHES),
     ("--budget", "1.5"): ("--budget", SEARCHES),
-    ("--resume", "--seed", "99"): ("--resume", SEARCHES),
+    ("--resume", "--seed", "99"): ("--resume", MODELS),
     ("--no-such-option",): ("--no-such-option", MODELS),
     ("extra",): ("extra", MODELS),
     ("--out", "README.md"): ("--out", MODELS),

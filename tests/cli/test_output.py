@@ -1,6 +1,5 @@
 """Output of commands: remarks, warnings and the log, and answers before their files."""
 
-import json
 import logging
 import math
 import sys

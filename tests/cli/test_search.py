@@ -3,9 +3,14 @@
 import json
 import re
 import subprocess
+import sys
+import time
+from contextlib import contextmanager
 
 import pytest
 from atlas_commands import answer, on_terminal, run, started
+
+from polycorner.models import CriticalSearch
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -114,3 +119,73 @@ def test_a_terminal_shows_progress_and_a_pipe_does_not():
     process = started("spheres", "--count", "6", "--json", stderr=subprocess.PIPE)
     piped, err = process.communicate(timeout=300)
     assert (process.returncode, piped, err) == (0, out, "")
+
+
+# ------------------------------------------------------------------------------------- disks
+
+
+@pytest.fixture
+def stopped(monkeypatch):
+    """Let Ctrl-C come in the second round of a search of disks."""
+
+    @contextmanager
+    def at_round(number):
+        usual = CriticalSearch.advanced
+
+        def advanced(search):
+            if search.rounds == number - 1:
+                raise KeyboardInterrupt
+            return usual(search)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(CriticalSearch, "advanced", advanced)
+            yield
+
+    return at_round
+
+
+def test_disks_that_were_interrupted_are_resumed(stopped, tmp_path):
+    disks = ("disks", "--count", "3", "--out", str(tmp_path))
+    whole = answer("disks", "--count", "3")
+    with stopped(3):
+        code, out, err = run(*disks, "--json")
+    assert code == 130
+    assert json.loads(out)["complete"] == "interrupted"
+    assert "--resume continues it" in err
+    code, out, err = run(*disks, "--resume", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == whole
+    assert {path.name for path in tmp_path.iterdir()} == {"atlas.json", "critical.png"}
+
+
+@pytest.mark.parametrize("change", [lambda text: text[:-40], lambda text: text.replace("1", "2")])
+def test_a_changed_search_of_disks_is_refused(stopped, tmp_path, change):
+    disks = ("disks", "--count", "2", "--out", str(tmp_path))
+    with stopped(2):
+        run(*disks)
+    (state,) = tmp_path.glob("*state*")
+    state.write_text(change(state.read_text()))
+    code, out, err = run(*disks, "--resume")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("polycorner: --resume: ")
+
+
+def test_what_a_killed_process_found_is_kept(tmp_path):
+    """The search is saved by the clock, long before its first thousand edges."""
+    search = ("spheres", "--count", "10", "--out", str(tmp_path), "--json")
+    program = (
+        "import sys, polycorner.cli.search as s; s.SAVED_EVERY = 0.5\n"
+        "from polycorner.cli.main import main; main(sys.argv[1:])"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "atlas", *search], stdout=subprocess.DEVNULL
+    )
+    state = tmp_path / "atlas-state.json"
+    while process.poll() is None and not state.exists():
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    assert state.exists()
+    code, out, _ = run(*search, "--resume", "--budget", "1")
+    assert code == 0
+    assert json.loads(out)["complete"] == "budget"
