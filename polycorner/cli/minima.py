@@ -85,23 +85,25 @@ def report(
         The options.
     """
     richness = found.richness
+    rows = [
+        {
+            **described(certificate),
+            "energy": certificate.energy,
+            "count": count,
+            "active": list(certificate.active),
+            "signature": list(certificate.signature),
+            "verdict": certificate.verdict.value,
+            "point": certificate.point.tolist(),
+        }
+        for certificate, count in zip(found, found.counts, strict=True)
+    ]
     answer = {
         "model": model,
         "parameters": chosen,
         "starts": found.starts,
         "energy_unit": unit,
-        "minima": [
-            {
-                **described(certificate),
-                "energy": certificate.energy,
-                "count": count,
-                "active": list(certificate.active),
-                "signature": list(certificate.signature),
-                "verdict": certificate.verdict.value,
-                "point": certificate.point.tolist(),
-            }
-            for certificate, count in zip(found, found.counts, strict=True)
-        ],
+        # Minima of equal energy differ in their last digits, which is no order.
+        "minima": sorted(rows, key=lambda row: (float(f"{row['energy']:.9g}"), row["name"])),
         "elsewhere": {verdict.value: count for verdict, count in found.elsewhere.items()},
         "estimate": richness.estimate,
         "interval": list(richness.interval),
