@@ -1,4 +1,4 @@
-"""Figures of where the dyad's corner stops being a minimum, and of what happens there."""
+"""Figures of the bifurcation at which the dyad's corner ceases to be a minimum."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ from polycorner.spaces.manifold import Array
 
 CORNER_COLOUR, PASS_COLOUR, ENDS_COLOUR = (*BODIES, SHADES[-1])
 SAMPLES = 60
-BESIDE = 1e-7  # how far from the critical radius, in ball radii, the branches are cut
+BESIDE = 1e-7  # distance from the critical radius, in ball radii, at which branches are cut
 
 
 def draw_bifurcation(pair: DumbbellPair, rods: tuple[float, float] | None = None) -> Figure:
@@ -122,7 +122,7 @@ def _finish_energy(axes: Axes, pair: DumbbellPair, thin: tuple[Branch, Branch]) 
 def _note(
     axes: Axes, share: float, height: float, text: str, colour: str, *, below: bool = False
 ) -> None:
-    """Write beside a horizontal line, at a share of the panel's width."""
+    """Write a text above or below a horizontal line, at a fraction of the panel's width."""
     axes.annotate(
         text,
         (share, height),
@@ -157,7 +157,7 @@ def draw_critical(
     axes.fill_between(lengths, least, exact, color=CORNER_COLOUR, alpha=0.13, linewidth=0)
     axes.plot(lengths, exact, color="black", linewidth=1.5, label="2 √(1 − r²/l²) − 1")
     axes.plot(lengths, np.where(least > 0, least, np.nan), "--", color="0.4", linewidth=1.2)
-    # Markers of different drums are staggered, or all would lie on top of each other.
+    # Markers of different drums are staggered, since their critical radii nearly coincide.
     places = np.linspace(2.15, longest - 1, 8)
     styles = zip(drums, cycle(SHADES), cycle("o^sDv"), strict=False)
     for k, (drum, colour, marker) in enumerate(styles):

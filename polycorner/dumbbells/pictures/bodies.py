@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.spaces.manifold import Array
 
-MARGIN = 1.5  # ball radii of wall shown beyond the outermost centres, at least
+MARGIN = 1.5  # least extent of the wall beyond the outermost centres, in ball radii
 SIDES = 12  # of a tube
 AXIS = 10.0  # mm, the length at which axes are drawn
 
@@ -24,7 +24,7 @@ class Wall:
     radius : float
         ``R`` in mm, ``inf`` for the plane ``z = -r``.
     depth : float
-        ``r``: how far below a centre the wall is.
+        ``r``: distance of the wall below a centre.
     across : (float, float)
         Least and greatest azimuth in rad, ``x`` in mm in the plane.
     along : (float, float)
@@ -50,7 +50,7 @@ class Wall:
 
     @property
     def description(self) -> dict[str, Any]:
-        """The wall as what JSON can hold; the radius of a plane is None."""
+        """The wall for JSON; the radius of a plane is None."""
         radius = None if self.is_plane else self.radius
         return {
             "radius": radius,
@@ -107,12 +107,12 @@ def wall_around(pair: DumbbellPair, centres: Array) -> Wall:
 
 
 def relative_stretch(pair: DumbbellPair) -> Array:
-    """Return what relative placements are multiplied with: 1, 1 and ``l/2`` mm for a radian."""
+    """Return the factors of relative placements in drawings: 1, 1 and ``l/2`` mm for a radian."""
     return np.array([1.0, 1.0, pair.length / 2])
 
 
 def contact_point(pair: DumbbellPair, centres: Array, name: str) -> Array:
-    """Return where a contact is, ``(3,)``: the middle of what is left between the surfaces.
+    """Return the point of a contact, ``(3,)``, midway between the surfaces.
 
     Parameters
     ----------
@@ -125,8 +125,8 @@ def contact_point(pair: DumbbellPair, centres: Array, name: str) -> Array:
 
     Notes
     -----
-    Between points of the two axes that are nearest to each other the line is cut where it leaves
-    the one body and enters the other; where they overlap, in the middle of the overlap.
+    On the segment between the nearest points of the two axes, the point is midway between the
+    surfaces, also where the bodies overlap.
     """
     one, other = _member(centres[:2], name[: -1 if name.endswith("b") else -2]), centres[2:]
     other = _member(other, name[len(name) - (1 if name.endswith("b") else 2) :])

@@ -23,7 +23,7 @@ SINGLE = "#8C9BA8"
 ARROW = "0.35"
 LOWEST: dict[str, Any] = {"color": "0.6", "linewidth": 0.8, "linestyle": "--"}
 AVERAGE = "black"
-FEW = 6  # bodies that get colours of their own
+FEW = 6  # largest number of bodies with colours of their own
 LINES = (*BODIES, "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 CORNERS = 36  # of a ball's outline
 LEAST = 4.0  # degrees or mm that a panel shows at least
@@ -34,8 +34,8 @@ PANELS = ("azimuth φ (degrees)", "axial position η (mm)", "heading θ (degrees
 def draw_history(run: DrumRun) -> Figure:
     """Draw azimuth, axial position and heading against time, as in [GMBN] fig. 4 and 6.
 
-    Two dumbbells also get their average in black.  Of more than a few, all are drawn alike, and
-    the times they spend in dyads are coloured by chirality.
+    For two dumbbells their average is drawn in black.  More than ``FEW`` dumbbells share one
+    colour, and the times they spend in dyads are coloured by chirality.
     """
     figure = Figure(figsize=(9, 8), layout="constrained")
     panels = figure.subplots(3, 1, sharex=True)
@@ -66,7 +66,7 @@ def draw_history(run: DrumRun) -> Figure:
 
 
 def _frame(axes: Axes) -> None:
-    """Let the panel show no less than a few units, and zero if it is in it."""
+    """Extend narrow panels to ``LEAST`` units, and draw the zero line if it is in view."""
     low, high = axes.get_ylim()
     lack = max(0.0, LEAST - (high - low)) / 2
     axes.set_ylim(low - lack, high + lack)
@@ -75,7 +75,7 @@ def _frame(axes: Axes) -> None:
 
 
 def title(run: DrumRun) -> str:
-    """Return what a figure says about the parameters."""
+    """Return the parameters of a run as the title of its figures."""
     drum = run.drum
     place = f"R = {drum.drum_radius:g} mm, α = {math.degrees(drum.tilt):g}°"
     noise = f", noise {run.noise.chatter:g}" if run.noise.chatter else ""
@@ -141,12 +141,12 @@ def draw_drum(run: DrumRun, index: int = -1) -> Figure:
 
 
 class DrumView:
-    """The drum unrolled, its axis upwards; shows one instant after the other in one figure.
+    """A figure of the drum unrolled, its axis upwards, that shows any recorded instant.
 
     Parameters
     ----------
     run : DrumRun
-        Its extent is what all its instants need.
+        The extent of the figure covers all its instants.
     width : float, optional
         Of the figure, in inches.
     """
@@ -158,7 +158,7 @@ class DrumView:
         height = (width - 1.6) * (high - low) / (right - left) + 1.6
         if height > TALL:
             width, height = 1.6 + (TALL - 1.6) * (right - left) / (high - low), TALL
-        # Room for the words above a narrow drum.
+        # Space for the title above a narrow drum.
         size = (max(width, 4.6), max(height, 3.2))
         self.figure = Figure(figsize=size, layout="constrained")
         self.axes = self.figure.add_subplot()
@@ -185,7 +185,7 @@ class DrumView:
     def _extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
         path, drum = self.run.trajectory, self.run.drum
         reach = drum.length / 2 + 1.6 * drum.ball_radius
-        # Who has left stays where it left; coordinates of all instants may therefore be taken.
+        # Dumbbells that left keep their last coordinates, so all instants can be used.
         across, along = self.sizes.centre_radius * path.q[..., 0], path.q[..., 1]
         left, right = min(across.min() - reach, -reach), max(across.max() + reach, reach)
         low, high = along.min() - reach, along.max() + reach
@@ -235,7 +235,7 @@ class DrumView:
 
 
 def _key(drum: DumbbellDrum) -> list[Line2D]:
-    """Return what the colours of the dumbbells, the arrow and the lines of a drum mean."""
+    """Return legend entries for the colours of dumbbells, the arrow and the lowest line."""
     entries = []
     if drum.count > 1:
         kinds = [(HANDS[hand], f"{WORDS[hand]} dyad") for hand in ("R", "L")]

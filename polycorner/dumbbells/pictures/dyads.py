@@ -1,4 +1,4 @@
-"""Figures of a dyad: at rest in the drum, and its heading against length."""
+"""Figures of a dyad: the pair at its minimum, and its heading against length."""
 
 import math
 from collections.abc import Sequence
@@ -75,7 +75,7 @@ def _draw_drum(axes: Any, entry: DyadMinimum) -> None:
     pair, centres = entry.pair, entry.pair.ball_centres(entry.point)
     middle = centres.mean(axis=0)
     reach = float(abs(centres - middle).max()) + 2 * pair.ball_radius
-    # Bodies always lie on the wall, so the wall is drawn first whatever the view.
+    # Bodies always lie above the wall, so the wall is drawn first in every view.
     axes.computed_zorder = False
     _draw_wall(axes, pair, middle, reach)
     for body, colour in zip((centres[:2], centres[2:]), BODIES, strict=True):

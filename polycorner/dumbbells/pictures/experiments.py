@@ -1,4 +1,4 @@
-"""Figures of motion in the drum: steady headings of dyads, climbing, and who leaves."""
+"""Figures of experiments in the drum: steady headings of dyads, climb rates, and exits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,11 +19,12 @@ TILTED, LEVEL = "#0072B2", "#E69F00"
 
 
 def draw_steady_headings(found: Sequence[Steady]) -> Figure:
-    """Draw headings that right-handed pairs take, against length, and where shifts end.
+    """Draw steady headings and shifts of right-handed pairs against length.
 
     First panel: means with twice their standard errors, filled for a tilted and open for a level
     drum; the energy's minimiser, ``arctan(r/l)``, and the heading of least energy at the other end
-    of the way along the rods.  Second panel: the shift along the axis, between the ends of the way.
+    of the edge along the rods.  Second panel: the shift along the axis, between the ends of that
+    edge.
     """
     figure, drum = Figure(figsize=(12.5, 5.6), layout="constrained"), found[0].drum
     first, second = figure.subplots(1, 2)
@@ -83,9 +84,9 @@ def _points(axes: Axes, found: Sequence[Steady], what: str) -> None:
 def draw_climbing(
     zigzags: Sequence[Zigzag], drum: DumbbellDrum, found: Sequence[Steady] = ()
 ) -> Figure:
-    """Draw climb rates against headings: of single dumbbells, of driven pairs, and the law.
+    """Draw climb rates of single dumbbells and driven pairs against headings, with the law.
 
-    The law, of a perfect keel, is ``omega rho tan(theta)``.
+    The law of a perfect keel is ``omega rho tan(theta)``.
     """
     figure = Figure(figsize=(7.5, 5.4), layout="constrained")
     axes = figure.subplots()
@@ -116,9 +117,9 @@ def draw_climbing(
 
 
 def draw_exits(runs: Mapping[str, BunchRun]) -> Figure:
-    """Draw, for each bunch by its name, who has left, and as what, against time.
+    """Draw the cumulative exits of each named bunch by kind, against time.
 
-    Below: how many of those in the drum are in right and left dyads or single.
+    Below: the numbers in right and left dyads and of single dumbbells in the drum.
     """
     figure = Figure(figsize=(6.2 * len(runs), 7.2), layout="constrained")
     grid = figure.subplots(2, len(runs), squeeze=False)

@@ -1,4 +1,4 @@
-"""Dumbbells at many instants, with all that is said of them: what a page in the browser plays."""
+"""Films: dumbbells at many instants, with contacts, strata and energies, for pages to play."""
 
 import math
 from collections.abc import Mapping
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 TOUCHING = 1e-6  # scaled distance within which a contact of a configuration counts as closed
 FRAMES = 1000  # of a long run, at most
 HANDS: Mapping[str | None, str] = {"R": "right-handed", "L": "left-handed", None: "none"}
-FIRST, SECOND, SINGLE, RIGHT, LEFT = range(5)  # what a dumbbell is coloured as
+FIRST, SECOND, SINGLE, RIGHT, LEFT = range(5)  # roles of dumbbells, by which they are coloured
 
 
 @dataclass(frozen=True)
 class Words:
-    """What is written beside a frame.
+    """Texts beside a frame.
 
     Attributes
     ----------
@@ -51,20 +51,20 @@ class Film:
     Attributes
     ----------
     title, note : str
-        What is shown, in a line and in a sentence.
+        A title, and a sentence of description.
     pair : DumbbellPair
         The lengths.
     times : (T,) array
-        What the timeline counts, and ``unit`` what in: ``s``, or ball radii along a path.
+        Times in ``unit``: seconds, or ball radii along a path.
     centres : (T, N, 2, 3) array
         Ball centres in mm; NaN for dumbbells that have left.
     roles : (T, N) array of int
-        How dumbbells are coloured: 0 and 1 the members of a pair; 2 single, 3 in a right-handed
+        Roles of dumbbells: 0 and 1 the members of a pair; 2 single, 3 in a right-handed
         and 4 in a left-handed dyad.
     energies : mapping from str to (T,) array
         By name with unit.
     contacts : tuple of T mappings from str to (3,) array
-        Closed contacts, and where they are, in mm.
+        Closed contacts and their points, in mm.
     words : tuple of T Words
     wall : Wall
     spin : float
@@ -90,7 +90,7 @@ class Film:
 
 
 def stratum_words(stratum: Stratum) -> str:
-    """Return a face in words, such as ``dimension 3, rank 3, quadrant``."""
+    """Return the description of a stratum, such as ``dimension 3, rank 3, quadrant``."""
     return f"dimension {stratum.dimension}, rank {stratum.rank}, {stratum.local_type.name.lower()}"
 
 
@@ -121,11 +121,11 @@ def pair_film(
     pair : DumbbellPair
     q : (T, 6) or (6,) array
     times : (T,) array, optional
-        Increasing; default the length of the way in ball radii.
+        Increasing; default the arc length of the path in ball radii.
     unit : str, optional
         Of the times.
     title, note : str, optional
-        What is written above the film.
+        Heading of the film.
     tolerance : float, optional
         Scaled distance within which a contact counts as closed.
 
@@ -179,10 +179,10 @@ def _increasing(times: ArrayLike, count: int) -> Array:
 def run_film(run: DrumRun, *, frames: int = FRAMES, title: str = "Dumbbells in the drum") -> Film:
     """Return a motion in the drum as a film of at most ``frames`` of its instants.
 
-    Contacts are those that the motion recorded as touching, called ``A1b`` for one or two
-    dumbbells and ``3-7 A1b`` for more.  Of a pair the film gives the face of the polyhedron, from
-    the gradients of the touching contacts, and the chirality; of more dumbbells how many dyads of
-    each hand there are (:func:`~polycorner.dumbbells.dynamics.pairs.dyads_among`).
+    Contacts are those recorded with the motion, named ``A1b`` for one or two dumbbells and
+    ``3-7 A1b`` for more.  For a pair the film gives the face of the polyhedron, from the gradients
+    of the closed contacts, and the chirality; for more dumbbells, the number of dyads of each
+    chirality (:func:`~polycorner.dumbbells.dynamics.pairs.dyads_among`).
     """
     path, drum = run.trajectory, run.drum
     chosen = chosen_frames(len(path), frames)
@@ -220,7 +220,7 @@ def _described(drum: DumbbellDrum) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Shot:
-    """One recorded instant of a run: what touches, and which dumbbells are dyads."""
+    """One recorded instant of a run: its contacts and its dyads."""
 
     pair: DumbbellPair
     q: Array
@@ -238,7 +238,7 @@ class _Shot:
 
     @property
     def between(self) -> "list[Touch]":
-        """What touches between dumbbells, not the bottom."""
+        """Contacts between dumbbells, without those with the bottom."""
         return [touch for touch in self.touching if touch[1] in CONTACTS]
 
     @property
@@ -252,7 +252,7 @@ class _Shot:
 
     @property
     def roles(self) -> list[int]:
-        """How dumbbells are coloured; one in dyads of both hands counts with the last."""
+        """Roles of dumbbells; one in dyads of both chiralities has that of the last."""
         count = len(self.q)
         if count <= 2:
             return [FIRST, SECOND][:count]
@@ -263,7 +263,7 @@ class _Shot:
 
     @property
     def face(self) -> str:
-        """The face of the polyhedron of one or two dumbbells, if nothing else is touched."""
+        """The face of the polyhedron of one or two dumbbells; empty if they touch the bottom."""
         names = [contact for _, contact, _ in self.between]
         if len(self.q) > 2 or not self.present.all() or len(names) < len(self.touching):
             return ""

@@ -1,4 +1,4 @@
-"""Figures of the keel effect: where a dumbbell rests in a tilted drum, and how it is turned."""
+"""Figures of the keel effect: regions of rest in a tilted drum, and the torque while sliding."""
 
 import math
 
@@ -18,13 +18,13 @@ RESOLUTION = 721  # of the torque, in both directions
 
 
 def draw_keel(keel: Keel, *, friction: float | None = None) -> Figure:
-    """Draw the plane of azimuth and heading: regions of rest, and where headings grow.
+    """Draw the plane of azimuth and heading: regions of rest, and regions of growing headings.
 
     The first panel has ``A`` and ``B``, the curve ``S`` and the eastern boundary of ``A``, in blue
-    for positive and in green for negative headings as in [GMBN] app. A.  Arrows lead from where a
-    carried dumbbell starts to roll to where its rolling is used up.  The second panel hatches where
-    the torque on a dumbbell that slides down the slope increases ``|theta|``; ``friction`` is its
-    coefficient, by default the dynamic one of sliding.
+    for positive and in green for negative headings as in [GMBN] app. A.  Arrows lead from the
+    azimuth at which a carried dumbbell starts to roll to the one at which it stops.  In the hatched
+    region of the second panel the torque on a dumbbell that slides down the slope increases
+    ``|theta|``; ``friction`` is its coefficient, by default the dynamic one of sliding.
     """
     friction = keel.sliding_dynamic if friction is None else friction
     figure = Figure(figsize=(12.5, 6.2), layout="constrained")
@@ -91,7 +91,7 @@ def _draw_curve(axes: Axes, tilt: float, limit: float) -> None:
 
 
 def _draw_zigzags(axes: Axes, keel: Keel) -> None:
-    """Mark where dumbbells of some headings start to roll and where they stop."""
+    """Mark the azimuths at which dumbbells of some headings start to roll and stop."""
     turning = keel.turning(np.radians(HEADINGS))
     found = np.degrees([turning.upper, turning.coasting])
     for heading, start, stop in zip(HEADINGS, *found, strict=True):
@@ -104,7 +104,7 @@ def _draw_zigzags(axes: Axes, keel: Keel) -> None:
 
 def place_torque(axes: Axes, keel: Keel, friction: float) -> None:
     """Draw ``S``, and hatch where the torque on a dumbbell that slides increases ``|theta|``."""
-    edge = 89.999  # at 90 degrees nothing presses on the wall
+    edge = 89.999  # at 90 degrees the normal force vanishes
     phi = np.radians(np.linspace(-edge, edge, RESOLUTION))
     theta = np.radians(np.linspace(-90, 90, RESOLUTION))
     torque = net_torque(phi, theta[:, None], keel.tilt, friction)

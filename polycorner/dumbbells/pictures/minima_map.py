@@ -1,4 +1,4 @@
-"""Pictures of where a pair can rest: the map over its proportions, and an example of each kind."""
+"""Figures of the minima of pairs: a map over the proportions, and an example of each kind."""
 
 import math
 from typing import Any
@@ -21,17 +21,17 @@ from polycorner.spaces.manifold import Array
 UNSEEN, NONE = "0.75", "white"
 NESTED = {"staggered": "#E69F00", "delta": "#56B4E9"}
 MARKS = ("x", "+", "1", "2", "3", "4", "|", "_", "*", "P", "^", "v", "<", ">", "s", "D")
-ASIDE = 0.14  # between the marks of one cell, in logarithms of the length
+ASIDE = 0.14  # distance of marks within a cell, in logarithms of the length
 FINE = 90  # points of a closed-form curve along either axis
 COLUMNS = 4
 
 
 def draw_minima_map(found: MinimaMap) -> Figure:
-    """Draw, for every ``l/R``, which kinds of rest were found over ``l/r`` and ``t/r``.
+    """Draw, for every ``l/R``, the kinds of minima found over ``l/r`` and ``t/r``.
 
-    The colour of a cell says which nested kind was found, marks what else there is beside ``G``.
+    The colour of a cell is the nested kind found there; marks are further kinds beside ``G``.
     Lines are closed forms: full, the length above which a ball reaches the other's rod; dashed,
-    where a level crossing fits.
+    the boundary of the region in which a level crossing fits.
     """
     panels = len(found.curvatures)
     columns = min(2, panels)
@@ -40,7 +40,7 @@ def draw_minima_map(found: MinimaMap) -> Figure:
     for i in range(panels):
         axes = figure.add_subplot(rows, columns, i + 1)
         _draw_panel(axes, found, i)
-    figure.suptitle(f"Kinds of rest of a pair beside G, {found.starts} starts for each pair")
+    figure.suptitle(f"Kinds of minima of a pair beside G, {found.starts} starts for each pair")
     figure.legend(handles=_handles(found), loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -48,7 +48,7 @@ def draw_minima_map(found: MinimaMap) -> Figure:
 def draw_kinds(found: MinimaMap) -> Figure:
     """Draw an example of each kind, seen from above and along the drum.
 
-    What is drawn later lies nearer to the eye; the dashed line is the lowest of the drum.
+    Nearer bodies are drawn over farther ones; the dashed line is the lowest of the drum.
     """
     rows = math.ceil(len(found.kinds) / COLUMNS) or 1
     figure = Figure(figsize=(3.4 * COLUMNS, 4.6 * rows), layout="constrained")
@@ -182,6 +182,6 @@ def _draw_bodies(axes: Axes, pair: DumbbellPair, flat: Array, height: Array) -> 
 
 
 def _rank(level: float, height: Array) -> float:
-    """Return a place between 0 and 1 in the order of drawing."""
+    """Return a drawing order between 0 and 1."""
     low, high = float(height.min()), float(height.max())
     return (level - low) / (high - low) if high - low > 1e-6 * abs(high) else 0.5

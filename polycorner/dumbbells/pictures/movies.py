@@ -37,12 +37,12 @@ def movie_suffix() -> str:
 
 
 def check_movie(path: str | os.PathLike[str]) -> None:
-    """Refuse a file name whose kind of movie cannot be written here.
+    """Raise for a file name whose format cannot be written.
 
     Raises
     ------
     ValueError
-        Naming what is possible, or what to install.
+        For another suffix, or for MP4 without imageio-ffmpeg.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
@@ -57,7 +57,7 @@ def check_movie(path: str | os.PathLike[str]) -> None:
 
 
 def chosen_frames(count: int, most: int = FRAMES) -> list[int]:
-    """Return the numbers of the recorded instants that are shown, the first and last among them."""
+    """Return the numbers of the instants shown, the first and the last included."""
     shown = min(count, most)
     return sorted({round(k) for k in np.linspace(0, count - 1, shown).tolist()})
 
@@ -107,7 +107,7 @@ def write_movie(
 
 
 def _pictures(view: DrumView, numbers: list[int]) -> Iterator[Picture]:
-    """Yield pictures; what does not move is laid out and drawn once."""
+    """Yield frames; the static background is drawn once."""
     view.figure.set_dpi(DOTS)
     canvas: Any = FigureCanvasAgg(view.figure)
     view.show(numbers[0])
@@ -125,7 +125,7 @@ def _pictures(view: DrumView, numbers: list[int]) -> Iterator[Picture]:
 
 
 def _write_mp4(pictures: Iterator[Picture], path: Path, rate: int) -> None:
-    """Write an MP4 file through ffmpeg, which is asked whether all went well."""
+    """Write an MP4 file through ffmpeg and check its exit status."""
     import imageio_ffmpeg
 
     first = next(pictures)
@@ -141,7 +141,7 @@ def _write_mp4(pictures: Iterator[Picture], path: Path, rate: int) -> None:
             pipe.close()
             encoder.wait()
         except BrokenPipeError:
-            encoder.wait()  # it gave up: what it said tells why
+            encoder.wait()  # it failed, and its messages say why
         except BaseException:
             encoder.kill()
             raise
@@ -151,8 +151,8 @@ def _write_mp4(pictures: Iterator[Picture], path: Path, rate: int) -> None:
 
 
 def _reason(said: str) -> str:
-    """Return the last line of what ffmpeg said, without the part that said it."""
-    lines = said.strip().splitlines() or ["ffmpeg stopped without a word"]
+    """Return the last message of ffmpeg, without the name of the component."""
+    lines = said.strip().splitlines() or ["ffmpeg stopped without a message"]
     return lines[-1].rpartition("] ")[2]
 
 

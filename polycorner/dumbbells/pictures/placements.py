@@ -20,7 +20,7 @@ from polycorner.spaces.manifold import Array
 def relative_placements(
     pair: DumbbellPair, points: ArrayLike, *, mean_heading: float | None = None
 ) -> Array:
-    """Return the placements of two dumbbells with given relative ones, ``(..., 6)``.
+    """Return placements ``(..., 6)`` of two dumbbells with given relative placements.
 
     Relative placements ``(x, y, delta)`` are: lateral and axial position of B less that of A
     (mm; in the drum azimuths times ``rho``) and heading of B less that of A (radians).
@@ -57,7 +57,7 @@ def relative_placements(
 def relative_coordinates(
     pair: DumbbellPair, q: ArrayLike, *, mean_heading: float | None = None
 ) -> Array:
-    """Return the relative placements ``(x, y, delta)`` of given ones ``(..., 6)``.
+    """Return the relative placements ``(x, y, delta)`` of placements ``(..., 6)``.
 
     The inverse of :func:`relative_placements` up to congruence and, at fixed mean heading, up to
     the names of balls: a placement with the opposite mean heading is turned by half a turn.
@@ -130,7 +130,7 @@ def forbidden_solid(
 
     In the plane it is all that is forbidden up to congruence; in a drum it is a section at fixed
     mean heading, where moving both dumbbells along or around the drum changes nothing.  If the
-    dumbbells can reach around the drum, the azimuth is a periodic axis.
+    dumbbells can touch all around the drum, the azimuth is a periodic axis.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def forbidden_solid(
 
 
 def _lateral_reach(pair: DumbbellPair) -> tuple[float, bool]:
-    """Return how far apart dumbbells that touch can be (mm), and whether that is all around."""
+    """Return the lateral reach of contact (mm), and whether it goes around the drum."""
     reach = pair.length + 2 * pair.ball_radius
     if pair.is_plane:
         return 1.02 * reach, False

@@ -1,4 +1,4 @@
-"""Dumbbells in the drum, and the atlas of a pair, as scenes in three dimensions for GLB files.
+"""Scenes for GLB files: dumbbells in the drum, and the forbidden solid of a pair.
 
 Coordinates are the library's, in mm: ``y`` is the drum's axis, ``z`` points up, the axis of the
 drum is ``x = z = 0``; in the plane centres have ``z = 0``.  Axes of 10 mm are part of a scene.
@@ -42,7 +42,7 @@ ROUND = 3  # subdivisions of a ball: 1280 triangles
 
 
 def library() -> Any:
-    """Return trimesh, which is imported only where a scene is made."""
+    """Return trimesh, imported on demand."""
     import trimesh
 
     return trimesh
@@ -51,7 +51,7 @@ def library() -> Any:
 def pair_scene(pair: DumbbellPair, q: ArrayLike, *, tolerance: float = TOUCHING) -> "trimesh.Scene":
     """Return two dumbbells in the drum or on the plane, with their contacts, as a scene in mm.
 
-    Nodes are called after what they show: balls ``A1, A2, B1, B2``, rods ``a, b``, contacts
+    Names of nodes: balls ``A1, A2, B1, B2``, rods ``a, b``, contacts
     ``contact A2B1`` and so on, ``wall``, and the axes ``x, y, z``.
 
     Parameters
@@ -185,7 +185,7 @@ def write_scene(scene: "trimesh.Scene", path: Path) -> Path:
 def _painted(
     mesh: Any, colour: str, *, opacity: float = 1.0, rough: float = 0.55
 ) -> "trimesh.Trimesh":
-    """Give a mesh a material of one colour; without metal, which would mirror nothing: black."""
+    """Give a mesh a material of one colour, not metallic, since there is nothing to reflect."""
     made = library().visual
     material = made.material.PBRMaterial(
         baseColorFactor=[*map(_linear, to_rgba(colour)[:3]), round(255 * opacity)],
@@ -200,7 +200,7 @@ def _painted(
 
 
 def _linear(part: float) -> int:
-    """Return a part of an sRGB colour as linear light in 0 to 255, as GLB files want it."""
+    """Return a component of an sRGB colour as linear light from 0 to 255, as in GLB files."""
     return round(255 * (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4))
 
 
@@ -215,7 +215,7 @@ def solid_mesh(mesh: "trimesh.Trimesh", stretch: Array) -> "trimesh.Trimesh":
     keys = np.stack([faces, np.broadcast_to(parts[:, None], faces.shape)], axis=-1).reshape(-1, 2)
     kept, corners = np.unique(keys.astype(np.int64), axis=0, return_inverse=True)
     made = library().Trimesh(vertices[kept[:, 0]], corners.reshape(faces.shape), process=False)
-    _ = made.vertex_normals  # written with the file, so that it looks smooth
+    _ = made.vertex_normals  # cached, so that they are exported
     return _painted(made, SOLID, opacity=0.8, rough=0.9)
 
 
@@ -265,7 +265,7 @@ def _moved(centre: Array) -> Array:
 
 
 def _along(ends: Array) -> Array:
-    """Return the motion that brings the ``z`` axis to the segment between two points."""
+    """Return the rigid motion that takes the ``z`` axis to the segment between two points."""
     place = _moved(ends.mean(axis=0))
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     side = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])

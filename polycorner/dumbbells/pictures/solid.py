@@ -1,4 +1,4 @@
-"""The solid of forbidden placements of a pair, with the corners and edges of its atlas over it."""
+"""The solid of forbidden placements of a pair with the corners and edges of its skeleton."""
 
 import json
 import math
@@ -41,7 +41,7 @@ def relative_curves(
 ) -> list[tuple[str, Array]]:
     """Return the edges as ``(name, (k, 3))`` in relative placements, each once.
 
-    The relative heading is brought into one period about zero; an edge that leaves it is cut there.
+    The relative heading is reduced to one period about zero; edges are cut where they leave it.
     Balls of a dumbbell are alike here, so in the drum a half-turn about the vertical gives a
     second image, and edges that differ by a relabelling of balls may coincide.
 
@@ -68,7 +68,7 @@ def relative_curves(
 
 
 def _cut(atlas: PairAtlas, points: Array, period: float) -> list[Array]:
-    """Return the pieces of an edge in one period about zero, each up to where it leaves it."""
+    """Return the pieces of an edge in one period about zero."""
     turns = np.round(points[:, 2] / period)
     cuts = np.flatnonzero(np.diff(turns)) + 1
     pieces = np.split(points, cuts)
@@ -86,7 +86,7 @@ def _cut(atlas: PairAtlas, points: Array, period: float) -> list[Array]:
 
 
 def _on_seam(atlas: PairAtlas, one: Array, other: Array, turns: Array, period: float) -> Array:
-    """Return where the edge through two points crosses the end of a period, ``(1, 3)``."""
+    """Return the point ``(1, 3)`` at which an edge crosses the end of a period."""
     place = period * turns.mean()
     share = (place - one[2]) / (other[2] - one[2])
     guess = (one + share * (other - one))[None]
@@ -98,7 +98,7 @@ def _on_seam(atlas: PairAtlas, one: Array, other: Array, turns: Array, period: f
 
 
 def _coincide(one: Array, other: Array) -> bool:
-    """Return whether two polylines are one curve: its ends and its middle, either way along it."""
+    """Return whether two polylines are one curve, compared at the ends and in the middle."""
     places = one[[0, len(one) // 2, -1]]
     steps = np.linalg.norm(np.diff(other, axis=0), axis=1).max()
     apart = np.linalg.norm(places[:, None] - other, axis=-1).min(axis=1)
@@ -132,7 +132,7 @@ def relative_corners(
 
 @dataclass(frozen=True)
 class SolidFacts:
-    """How large the solid is, and how well its mesh agrees with the atlas.
+    """Size of a solid, and agreement of its mesh with the skeleton.
 
     Attributes
     ----------

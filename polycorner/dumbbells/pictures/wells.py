@@ -1,4 +1,4 @@
-"""Figures of U, half-U and half-V wells: how they capture, how they hold, and those of a dyad."""
+"""Figures of U, half-U and half-V wells: capture, escape, and the wells of a dyad."""
 
 import math
 from collections.abc import Sequence
@@ -18,18 +18,18 @@ from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import simulate
 
 COLOURS = dict(zip(KINDS, ("#0072B2", "#E69F00", "#D55E00"), strict=True))
-SHAKEN = 120.0  # how long sample paths are, in a sqrt(m / D)
+SHAKEN = 120.0  # duration of sample paths, in a sqrt(m / D)
 RIMS = tuple(np.geomspace(0.1, 1.0, 8).tolist())  # mm
 SHAKING = Shaking(energy=2e-3, drag_rate=5.0)  # of the dyad, in weights of a ball times mm; 1/s
 MEASURED = 0.25  # mm, simulated
-LONGEST = 30.0  # s, of a mean time that is simulated
+LONGEST = 30.0  # s, longest mean time that is simulated
 TITLE = 11
 PATH = 2  # seed of the sample paths
-FRICTION = 0.04  # of the depth per rim, where it takes part
+FRICTION = 0.04  # of the depth per rim, in the panels with friction
 
 
 def draw_wells(comparison: Comparison, pair: DumbbellPair) -> Figure:
-    """Draw the three wells, how noise and walls decide between them, and the wells of a dyad.
+    """Draw the three wells, their escape times by drag and restitution, and the wells of a dyad.
 
     The first row is about noise: the wells, paths under the same kicks, and mean times to escape
     by drag and by restitution; points with error bars (95 per cent) are simulations, curves solve
@@ -44,7 +44,7 @@ def draw_wells(comparison: Comparison, pair: DumbbellPair) -> Figure:
     _draw_restitutions(axes[0, 3], comparison)
     lossy = ladder(1.0, friction=FRICTION, restitution=0.6)
     _draw_capture(axes[1, 0], lossy)
-    _draw_rests(axes[1, 1], lossy)
+    _draw_final_positions(axes[1, 1], lossy)
     holds = [hold for hold in dyad_holds(pair) if hold.kind is not Entrapment.FREE]
     _draw_holds(axes[1, 2], _distinct(holds))
     _draw_hold_times(axes[1, 3], _distinct(holds))
@@ -94,7 +94,7 @@ def _draw_paths(axes: Axes, comparison: Comparison) -> None:
 
 
 def _draw_drags(axes: Axes, comparison: Comparison) -> None:
-    """Draw how many times longer a well holds than the U well with the same drag."""
+    """Draw the mean escape times relative to those of the U well with the same drag."""
     reference = {run.well.drag: run for run in comparison.runs if not run.well.wall}
     for kind, times in zip(KINDS, comparison.over_drag, strict=True):
         ratio = times / comparison.over_drag[0]
@@ -139,7 +139,7 @@ def _error_bar(
     reference: Escapes | None = None,
     colour: str | None = None,
 ) -> None:
-    """Draw a mean, or a ratio of two as if they were independent, with 95 per cent."""
+    """Draw a mean, or a ratio of two independent ones, with its 95 per cent interval."""
     mean, spread = run.mean, run.error / run.mean
     if reference is not None:
         mean = mean / reference.mean
@@ -151,7 +151,7 @@ def _error_bar(
 
 
 def _draw_capture(axes: Axes, wells: Sequence[Well]) -> None:
-    """Draw the energy with which the mass passes 0, from the rim's on."""
+    """Draw the energy of the mass at each passage of 0, from the rim on."""
     for well in wells:
         speed = _speed_to(well, 0.9 * well.rim)
         energies, times, total = [well.mass * speed**2 / 2], [0.0], 0.0
@@ -165,7 +165,7 @@ def _draw_capture(axes: Axes, wells: Sequence[Well]) -> None:
         colour = COLOURS[well.kind]
         shown = np.array(energies) / well.depth
         end, place = well.capture(speed)
-        label = f"{well.kind.value}: rests at {f'{place:.2g} a' if place else 0}"
+        label = f"{well.kind.value}: stops at {f'{place:.2g} a' if place else 0}"
         axes.semilogy(times, np.where(shown > 0, shown, math.nan), "o-", color=colour, markersize=4)
         axes.axvline(end, color=colour, linestyle="--", linewidth=1, label=label)
     axes.set(xlabel="time / a √(m/D)", ylabel="energy on leaving 0 / D", ylim=(1e-5, 2))
@@ -175,13 +175,13 @@ def _draw_capture(axes: Axes, wells: Sequence[Well]) -> None:
 
 
 def _speed_to(well: Well, height: float) -> float:
-    """Return the speed at 0 that lifts the mass to a height."""
+    """Return the speed at 0 with which the mass reaches a height."""
     work = well.potential(height) + well.friction * height
     return math.sqrt(2 * float(work) / well.mass)
 
 
-def _draw_rests(axes: Axes, wells: Sequence[Well]) -> None:
-    """Draw where masses come to rest that start at rest anywhere in the well."""
+def _draw_final_positions(axes: Axes, wells: Sequence[Well]) -> None:
+    """Draw the final positions of masses that start at rest anywhere in the well."""
     rng = np.random.default_rng(1)
     for well in wells:
         starts = well.starts(rng, 200)[:, 0]
@@ -190,14 +190,14 @@ def _draw_rests(axes: Axes, wells: Sequence[Well]) -> None:
         share = np.concatenate([[0.0], np.arange(1, len(places) + 1) / len(places), [1.0]])
         axes.step(ends, share, where="post", color=COLOURS[well.kind], label=well.kind.value)
     reach = 1.3 * wells[0].friction / wells[0].stiffness
-    axes.set(xlabel="place x / a at which it rests", xlim=(-reach, reach), ylim=(0, 1.02))
+    axes.set(xlabel="final position x / a", xlim=(-reach, reach), ylim=(0, 1.02))
     axes.set_ylabel("share of masses up to there")
-    axes.set_title("(f) where friction leaves what starts anywhere", fontsize=TITLE)
+    axes.set_title("(f) final positions under friction", fontsize=TITLE)
     axes.legend(frameon=False, loc="upper left")
 
 
 def _distinct(holds: Sequence[Hold]) -> list[tuple[str, Hold]]:
-    """Return holds that differ, with the names of all that are alike."""
+    """Return distinct holds, with the names of all directions that share them."""
     found: list[tuple[str, Hold]] = []
     for hold in holds:
         for k, (name, other) in enumerate(found):

@@ -1,8 +1,7 @@
-"""Pages served on this machine: the live page of a pair, and pages that were made before.
+"""Applications of the local server: the live page of a pair, and pages complete in themselves.
 
-The server answers those who call it by its name and come from its own pages: a request for another
-``Host`` (a name that was pointed here) and a connection from another ``Origin`` are refused.  It
-reads no file on anybody's behalf; what it may be sent is in
+Requests with a foreign ``Host`` (DNS rebinding) and connections from a foreign ``Origin`` are
+refused.  No request reads a file; the accepted messages are those of
 :mod:`polycorner.dumbbells.viewer.sliders`.
 """
 
@@ -23,11 +22,11 @@ from polycorner.dumbbells.viewer.page import page_file, three_script
 from polycorner.dumbbells.viewer.server import allowed, names_of
 from polycorner.dumbbells.viewer.sliders import MESSAGE, RefusedError, hello, parsed
 
-RATE = 300  # messages of a page in a second, at most
-PAGES = 16  # live pages at a time, at most
-QUIET = 0.15  # s without a message before the solid is drawn anew
+RATE = 300  # most messages of a page in a second
+PAGES = 16  # most live pages at a time
+QUIET = 0.15  # s without a message before the solid is computed again
 CELLS = 18  # of the solid along each axis; its edges and corners are exact at any number
-REFUSED = 1008  # the code of RFC 6455 for what breaks a rule
+REFUSED = 1008  # policy violation in RFC 6455
 HEADERS = {
     "X-Frame-Options": "DENY",
     "X-Content-Type-Options": "nosniff",
@@ -41,14 +40,14 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
     "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-UNFRAMED = "frame-ancestors 'none'"  # the rest is in the page, which works without a server, too
+UNFRAMED = "frame-ancestors 'none'"  # the page itself holds the rest of its policy
 TYPES = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
 
 Files = Mapping[str, str]
 
 
 class _Guarded(RequestHandler):
-    """Headers that keep a page to itself, and a refusal of other names."""
+    """Security headers, and the refusal of foreign host names."""
 
     def initialize(self, names: tuple[str, ...], **_: Any) -> None:
         self.names = names
@@ -59,7 +58,7 @@ class _Guarded(RequestHandler):
 
     def prepare(self) -> None:
         if not allowed(self.request.host, self.names):
-            raise HTTPError(403, reason="This server is not called that.")
+            raise HTTPError(403, reason="This is not a name of this server.")
 
     def write_error(self, status_code: int, **_: Any) -> None:
         self.set_header("Content-Type", "text/plain; charset=utf-8")
@@ -67,15 +66,15 @@ class _Guarded(RequestHandler):
 
 
 class _Missing(_Guarded):
-    """Everything that is not here."""
+    """All other paths."""
 
     def prepare(self) -> None:
         super().prepare()
-        raise HTTPError(404, reason="There is nothing of that name.")
+        raise HTTPError(404, reason="There is no page of that name.")
 
 
 class _Fixed(_Guarded):
-    """A text that was ready when the server started."""
+    """A fixed text."""
 
     def initialize(self, names: tuple[str, ...], **given: Any) -> None:
         super().initialize(names)
@@ -88,7 +87,7 @@ class _Fixed(_Guarded):
 
 
 class _Live(WebSocketHandler):
-    """One page of a pair: its board, and the values that have come and are not yet answered."""
+    """One live page: its board, and slider values received but not yet answered."""
 
     def initialize(self, names: tuple[str, ...], pair: DumbbellPair) -> None:
         self.names, self.board = names, Board.of(pair)
@@ -101,7 +100,7 @@ class _Live(WebSocketHandler):
     def prepare(self) -> None:
         origin = self.request.headers.get("Origin")
         if not allowed(self.request.host, self.names):
-            raise HTTPError(403, reason="This server is not called that.")
+            raise HTTPError(403, reason="This is not a name of this server.")
         if origin is None or not self.check_origin(origin):
             raise HTTPError(403, reason="Only this server's own page may connect.")
 
@@ -111,7 +110,7 @@ class _Live(WebSocketHandler):
     def open(self, *_: str, **__: str) -> None:
         pages: set[_Live] = self.settings["pages"]
         if len(pages) >= PAGES:
-            self._refuse(f"as many pages are open as there may be, {PAGES}: close one of them")
+            self._refuse(f"the limit of {PAGES} open pages is reached: close one of them")
             return
         pages.add(self)
         self._tell("hello", hello(self.board.sliders))
@@ -134,7 +133,7 @@ class _Live(WebSocketHandler):
         if isinstance(asked, str):
             self._press(asked)
             return
-        if not self.waiting:  # what comes before the answer is answered with it
+        if not self.waiting:  # values that arrive before the answer share it
             IOLoop.current().add_callback(self._answer)
         self.waiting |= asked
 
@@ -152,7 +151,7 @@ class _Live(WebSocketHandler):
 
     def _refuse(self, words: str) -> None:
         self.refused = True
-        self.close(REFUSED, words[:120])  # a closing frame has no room for more
+        self.close(REFUSED, words[:120])  # the limit of a closing frame
 
     def _answer(self) -> None:
         values, self.waiting = self.waiting, {}
@@ -174,11 +173,11 @@ class _Live(WebSocketHandler):
         self._draw_soon()
 
     def _tell(self, kind: str, content: dict[str, Any]) -> None:
-        with suppress(WebSocketClosedError):  # the page may have gone away meanwhile
+        with suppress(WebSocketClosedError):  # the page may have been closed meanwhile
             self.write_message(json.dumps({"kind": kind} | content, allow_nan=False))
 
     def _draw_soon(self) -> None:
-        """Draw the solid once the page has been quiet for a moment, if it is another one."""
+        """Compute the solid after ``QUIET`` seconds without messages, if it has changed."""
         loop = IOLoop.current()
         if self.solid is not None:
             loop.remove_timeout(self.solid)
@@ -199,7 +198,7 @@ class _Live(WebSocketHandler):
 
 
 def live_application(pair: DumbbellPair, host: str) -> Application:
-    """Return the server of the live page of a pair; the first answers are compiled here."""
+    """Return the application of the live page of a pair, with its kernels compiled."""
     Board.of(pair).fall()
     texts = {name: page_file(name) for name in ("stage.js", "board.js", "page.css")}
     texts |= {"": page_file("board.html"), "three.js": three_script()}
@@ -207,7 +206,7 @@ def live_application(pair: DumbbellPair, host: str) -> Application:
 
 
 def page_application(page: str, host: str) -> Application:
-    """Return the server of one page that is complete in itself."""
+    """Return the application that serves one page complete in itself."""
     return _application({"": page}, UNFRAMED, host, [])
 
 

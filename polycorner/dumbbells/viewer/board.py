@@ -1,4 +1,4 @@
-"""What the live page shows of a pair: all that the library says of it, as JSON can hold it."""
+"""State of the live page: a pair, its placement, and its analysis for JSON."""
 
 import math
 from collections.abc import Mapping
@@ -26,20 +26,20 @@ from polycorner.minimisation import Certificate, Verdict, certify
 from polycorner.polyhedra.strata import LocalType
 from polycorner.spaces.manifold import Array
 
-DRUM = 125.0 / 16.0  # drum radius over length, of a pair that starts in the plane
-FRAMES = 150  # of a fall, at most
-START = 30.0  # degrees, the heading that buttons put a pair at: it has some way to fall
+DRUM = 125.0 / 16.0  # ratio of drum radius to length for a pair that starts in the plane
+FRAMES = 150  # most frames of a descent
+START = 30.0  # degrees, the initial heading set by the buttons
 
 
 @dataclass(frozen=True)
 class Board:
-    """A pair, where it is, and how far its sliders reach.
+    """A pair with its placement and its sliders.
 
     Attributes
     ----------
     pair : DumbbellPair
     q : tuple of six float
-        The configuration, at full precision: a slider that is not moved does not round it.
+        The configuration at full precision; sliders that are not moved do not round it.
     sliders : mapping from str to Slider
     drum_radius : float
         ``R`` in mm, kept while the pair is in the plane.
@@ -103,7 +103,7 @@ class Board:
         return replace(board, q=tuple((np.array(self.q) * self.units / board.units).tolist()))
 
     def pressed(self, button: str) -> "Board":
-        """Return the board after one of the buttons but ``fall``."""
+        """Return the board after one of the buttons other than ``fall``."""
         if button == "plane":
             return self._as(replace(self.pair, drum_radius=math.inf))
         if button == "drum":
@@ -111,7 +111,7 @@ class Board:
         return self.started("R" if button == "right" else "L")
 
     def started(self, chirality: Chirality) -> "Board":
-        """Return the board with a nested pair off the lowest line, open and turned too far."""
+        """Return the board with an open nested pair at ``START`` degrees off the lowest line."""
         sign = 1 if chirality == "R" else -1
         heading, room = math.radians(sign * START), self.pair.ball_radius / 2
         q = self.pair.nested(chirality, heading=heading, clearance=room)
@@ -122,7 +122,7 @@ class Board:
 
     @cached_property
     def certificate(self) -> Certificate:
-        """What the library says of the point, contacts closed within ``1e-6`` ball radii."""
+        """The certificate of the point, contacts closed within ``1e-6`` ball radii."""
         return certify(self.pair.polyhedron, self.pair.energy, self.q, tolerance=TOUCHING)
 
     @property
@@ -131,7 +131,7 @@ class Board:
         return (self.q[2] + self.q[5]) / 2
 
     def reading(self) -> dict[str, Any]:
-        """Return all numbers and words of the page."""
+        """Return all numbers and texts of the page."""
         pair, c = self.pair, self.certificate
         centres = pair.ball_centres(self.q)
         names = pair.polyhedron.names
@@ -152,7 +152,7 @@ class Board:
 
     @property
     def words(self) -> dict[str, str]:
-        """What is written beside the pictures."""
+        """Texts beside the pictures."""
         pair, c = self.pair, self.certificate
         outside = c.stratum.local_type is LocalType.OUTSIDE
         headings = [math.degrees(angle) for angle in pair.heading(self.q).tolist()]
@@ -170,7 +170,7 @@ class Board:
 
     @property
     def _wall(self) -> Wall:
-        """All of the wall that sliders lead to."""
+        """The part of the wall that the sliders can reach."""
         pair, room = self.pair, self.pair.length / 2 + self.pair.ball_radius
         along, across = (self.sliders[f"{name}_A"].high + room for name in ("axial", "lateral"))
         if pair.is_plane:
@@ -179,9 +179,9 @@ class Board:
         return Wall(pair.drum_radius, pair.ball_radius, (-turn, turn), (-along, along))
 
     def fall(self) -> "tuple[Board, dict[str, Any]]":
-        """Return the board after a fall, and the fall as the page shows it."""
+        """Return the board after a descent, and the descent for the page."""
         pair = self.pair
-        # A step shorter than rods are thick: one does not pass through the other.
+        # Steps shorter than rods are thick: one cannot pass through another.
         stride = min(STRIDE, pair.rod_radius / (2 * pair.ball_radius))
         found = descent(pair.polyhedron, pair.energy, self.q, stride=stride)
         reached = found.certificate.verdict is not Verdict.INFEASIBLE
@@ -194,7 +194,7 @@ class Board:
             "frames": [board.reading() for board in shown],
             "trail": [piece.tolist() for piece in trail(pair, points)],
             "verdict": found.certificate.verdict.value,
-            "way": _way(found, pair) if reached else "",
+            "way": _summary(found, pair) if reached else "",
             "last": last.reading(),
         }
 
@@ -203,7 +203,7 @@ class Board:
 
 
 def atlas_place(pair: DumbbellPair, q: Array) -> Array:
-    """Return relative placements ``(..., 3)`` as the atlas is drawn: ``delta`` in one period."""
+    """Return relative placements ``(..., 3)`` for drawings, ``delta`` in one period."""
     heading = None if pair.is_plane else np.asarray((q[..., 2] + q[..., 5]) / 2)
     given: Any = heading  # each placement in the section at its own mean heading
     points = relative_coordinates(pair, q, mean_heading=given)
@@ -213,7 +213,7 @@ def atlas_place(pair: DumbbellPair, q: Array) -> Array:
 
 
 def trail(pair: DumbbellPair, points: Array) -> list[Array]:
-    """Return a path ``(T, 6)`` in the atlas, in pieces where it leaves at the top or the bottom."""
+    """Return a path ``(T, 6)`` in relative placements, cut at the ends of the period."""
     line = atlas_place(pair, points)
     jumps = np.abs(np.diff(line[:, 2])) > pair.length / 2
     return np.split(line, np.flatnonzero(jumps) + 1)
@@ -233,9 +233,9 @@ def _multipliers(c: Certificate, unit: str) -> str:
     return f"{listed} {unit}"
 
 
-def _way(found: Descent, pair: DumbbellPair) -> str:
+def _summary(found: Descent, pair: DumbbellPair) -> str:
     energies = np.asarray(pair.energy.value(found.points[[0, -1]]))
     return (
-        f"The steepest way down, {found.lengths[-1]:.2f} ball radii long: the energy falls from "
+        f"Steepest descent of {found.lengths[-1]:.2f} ball radii: the energy decreases from "
         f"{energies[0]:.6f} to {energies[1]:.6f}."
     )

@@ -1,8 +1,7 @@
-"""A film or an atlas as one HTML page that needs nothing beside it and asks for nothing.
+"""Self-contained HTML pages for films and atlases.
 
-The page carries three.js, which trimesh ships inside its own viewer, the module that
-draws, the one that plays, and the numbers; a content security policy allows these very scripts by
-their hashes and forbids every request.
+A page contains three.js (from trimesh's viewer), our scripts and the data.  Its content security
+policy allows these scripts by their hashes and forbids every request.
 """
 
 import base64
@@ -31,19 +30,19 @@ from polycorner.dumbbells.pictures.symbols import HANDS, KIND_WORDS, KINDS, WORD
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.errors import PolycornerError
 
-END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # what follows is trimesh's own page
+END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # trimesh's own page follows
 KEYS = " Space plays, ← and → step, Home and End go to the ends."
 CELLS = 48  # of an atlas's solid along each axis
 
 
 def film_page(film: Film) -> str:
-    """Return the HTML page that plays a film: turn, zoom, move, play, step, with all labels."""
+    """Return the HTML page that plays a film."""
     keys = KEYS if len(film) > 1 else ""
     return _page(film.title, film.note, film_data(film), keys)
 
 
 def atlas_page(atlas: PairAtlas, *, resolution: int = CELLS) -> str:
-    """Return the HTML page of the forbidden solid of a pair with the edges and corners over it."""
+    """Return the HTML page of the forbidden solid of a pair with its edges and corners."""
     pair = atlas.pair
     where = "in the plane" if atlas.heading is None else f"in a drum, R = {pair.drum_radius:g} mm"
     data = {
@@ -83,7 +82,7 @@ def write_page(page: str, path: Path) -> Path:
 
 
 def page_file(name: str) -> str:
-    """Return a script, a style sheet or a template that is part of this package."""
+    """Return a script, a style sheet or a template of this package."""
     return files("polycorner.dumbbells.viewer").joinpath("assets", name).read_text("utf-8")
 
 
@@ -94,7 +93,7 @@ def three_script() -> str:
     Raises
     ------
     PolycornerError
-        If the installed trimesh carries it no more, or not in this form.
+        If the installed trimesh does not contain it in this form.
     """
     try:
         packed_viewer = library().resources.get_bytes("templates/viewer.zip")
@@ -124,7 +123,7 @@ def _page(title: str, note: str, data: dict[str, Any], keys: str) -> str:
         f"default-src 'none'; script-src {_hashes(scripts.values())}; style-src {_hashes([style])};"
         " img-src data:; base-uri 'none'; form-action 'none'"
     )
-    # In a block of data only the sign that could end the block needs care.
+    # In a block of data only "<" needs escaping: it could end the block.
     block = json.dumps(data, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     return Template(page_file("film.html")).substitute(
         scripts, policy=policy, style=style, title=escape(title), note=escape(note), data=block,
@@ -141,7 +140,7 @@ def _hashes(texts: Iterable[str]) -> str:
 
 
 def film_data(film: Film) -> dict[str, Any]:
-    """Return a film as what JSON can hold, numbers packed; ``film.js`` unpacks it."""
+    """Return a film for JSON, its numbers packed; ``film.js`` unpacks them."""
     names = sorted({name for closed in film.contacts for name in closed})
     words = sorted(set(film.words), key=lambda w: (w.stratum, w.chirality))
     places = [place for closed in film.contacts for place in closed.values()]
@@ -172,6 +171,6 @@ def _whole(values: Iterable[int]) -> ArrayLike:
 
 
 def packed(values: ArrayLike | bytes) -> str:
-    """Return the bytes of an array, or bytes, compressed with gzip and written in base64."""
+    """Return the bytes of an array, or bytes, compressed with gzip, in base64."""
     content = values if isinstance(values, bytes) else np.asarray(values).tobytes()
     return base64.b64encode(gzip.compress(content, mtime=0)).decode()

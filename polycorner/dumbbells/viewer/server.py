@@ -1,4 +1,4 @@
-"""A server on this machine: where it listens, and by which names it may be called."""
+"""The local server: listening sockets, and the host names it answers to."""
 
 import asyncio
 import errno
@@ -13,21 +13,20 @@ from tornado.web import Application
 
 LOCAL = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = frozenset({"0.0.0.0", "[::]"})
-LARGEST = 16_384  # bytes of a request's header, and of its body
+LARGEST = 16_384  # most bytes of a request's header, and of its body
 HOST = re.compile(r"(\[[0-9a-fA-F:.]+\]|[0-9a-zA-Z.-]+)(?::[0-9]{1,5})?")
-TRIES = 50  # ports after the one that is taken
+TRIES = 50  # ports tried after one that is in use
 
 
 class PortTakenError(OSError):
-    """The port is in use; says which one is free."""
+    """The port is in use; the message names one that is free."""
 
 
 def allowed(host: str, names: tuple[str, ...]) -> bool:
     """Return whether a ``Host`` header names this server: one of its names, whatever the port.
 
-    The port is not looked at, since it may be forwarded.  When the server listens everywhere
-    (``0.0.0.0``) any literal address is its name: another site can have its own name pointed
-    here, but not an address.
+    The port is ignored, since it may be forwarded.  A server that listens on all interfaces
+    (``0.0.0.0``) answers to every literal address: DNS rebinding works with names only.
     """
     found = HOST.fullmatch(host)
     if found is None:
@@ -47,7 +46,7 @@ def _literal(name: str) -> bool:
 
 
 def names_of(host: str) -> tuple[str, ...]:
-    """Return the names by which a server on an address may be called."""
+    """Return the host names of a server on an address."""
     called = f"[{host}]" if ":" in host else host.lower()
     return (called, *LOCAL)
 
@@ -59,7 +58,7 @@ def serve(application: Application, listener: socket.socket, ready: Callable[[st
     ----------
     application : Application
     listener : socket
-        As of :func:`bound`; it is closed at the end.
+        From :func:`bound`; it is closed at the end.
     ready : callable
         Called with the address of the page once it can be opened.
     """
@@ -82,14 +81,14 @@ async def _serve(
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """Return a listening socket on an address and a port; port 0 takes any that is free.
+    """Return a listening socket on an address and a port; port 0 is any free one.
 
     Raises
     ------
     PortTakenError
         If the port is in use, naming one that is free.
     OSError
-        If the address is none of this machine's.
+        If the address does not belong to this machine.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
@@ -110,7 +109,7 @@ def bound(host: str, port: int) -> socket.socket:
 
 
 def _free_after(host: str, port: int) -> int | None:
-    """Return the next port that is free, if one of the nearest is."""
+    """Return the next free port within ``TRIES``, or None."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in range(port + 1, min(port + TRIES, 65536)):
         with socket.socket(family, socket.SOCK_STREAM) as probe:

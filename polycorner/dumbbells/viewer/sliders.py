@@ -1,4 +1,4 @@
-"""What the live page may send: slider names with numbers in their ranges, or a button's name."""
+"""Messages of the live page: slider names with numbers in their ranges, or a button's name."""
 
 import json
 import math
@@ -26,16 +26,16 @@ BUTTONS = (
     ("plane", "In the plane"),
     ("drum", "In the drum"),
 )
-MESSAGE = 512  # bytes, at most; all sliders together need fewer
+MESSAGE = 512  # most bytes of a message; all sliders together need fewer
 
 
 class RefusedError(ValueError):
-    """A message that is none of those the page sends; says what was expected."""
+    """A message that the page never sends."""
 
 
 @dataclass(frozen=True)
 class Slider:
-    """A number that the page may set: its name and range, and what is written beside it."""
+    """A number that the page may set: name, label, range and step."""
 
     name: str
     label: str
@@ -88,7 +88,7 @@ def coordinates() -> list[str]:
 
 
 def hello(sliders: Mapping[str, Slider]) -> dict[str, Any]:
-    """Return what the page is built from: groups of sliders, and buttons."""
+    """Return the groups of sliders and the buttons of the page, for JSON."""
     groups = [
         [f"Dumbbell {body}", [vars(sliders[f"{kind}_{body}"]) for kind, _ in PLACES]]
         for body in "AB"
@@ -103,7 +103,7 @@ def parsed(message: str, sliders: Mapping[str, Slider]) -> dict[str, float] | st
     Raises
     ------
     RefusedError
-        For anything else: another text, another name, a number out of range or not finite.
+        For all other messages, names and numbers.
     """
     try:
         content = json.loads(message)
@@ -123,7 +123,7 @@ def _checked(name: str, value: object, sliders: Mapping[str, Slider]) -> float:
     if slider is None:
         msg = "expected the name of a slider; got another one"
         raise RefusedError(msg)
-    # A whole number of any size can be compared, but not converted; nan is in no range.
+    # Integers of any size compare, but may not convert to float; nan is in no range.
     real = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
     if slider.low <= real <= slider.high:
         return float(real)

@@ -1,4 +1,4 @@
-"""How a pair comes to rest: the steepest way down inside a polyhedron, contact by contact."""
+"""Steepest descent inside a polyhedron, contact by contact."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
-STRIDE = 0.15  # scale units between two points of a path, at most
-LEAST = 1e-4  # the same, at least: the rest is the minimiser's
+STRIDE = 0.15  # longest step of a path, in scale units
+LEAST = 1e-4  # shortest step, below which the minimiser takes over
 TOUCHING = 1e-4  # scaled distance within which a contact closes if the energy presses on it
-MOST = 600  # points
+MOST = 600  # points of a path
 GROWTH = 1.5
 CORRECTIONS = 3
 
@@ -27,16 +27,16 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """A way down, and why it ends where it does.
+    """A path of steepest descent, and the certificate of its end.
 
     Attributes
     ----------
     points : (k, n) array
-        From the start, or the nearest point of the polyhedron, to the place of rest; coordinates
-        on circles are not wrapped.  The energy falls from each to the next.
+        From the start, or the nearest point of the polyhedron, to the minimum; coordinates on
+        circles are not wrapped.  The energy decreases from each to the next.
     certificate : Certificate
-        What :func:`~polycorner.minimise` says of the end; ``certificate.point`` is the last point
-        if it found one.
+        Of :func:`~polycorner.minimise` at the end; ``certificate.point`` is the last point, unless
+        the polyhedron was not reached.
     """
 
     points: Array
@@ -44,7 +44,7 @@ class Descent:
 
     @property
     def lengths(self) -> Array:
-        """Length of the way up to each point, ``(k,)``, in scale units."""
+        """Arc length of the path up to each point, ``(k,)``, in scale units."""
         scales = self.certificate.problem.scales
         steps = np.linalg.norm(np.diff(self.points, axis=0) / scales, axis=1)
         return np.concatenate([[0.0], np.cumsum(steps)])
@@ -58,25 +58,25 @@ def descent(
     stride: float = STRIDE,
     most: int = MOST,
 ) -> Descent:
-    """Return the steepest way down from ``start`` to rest.
+    """Return the path of steepest descent from ``start`` to a minimum.
 
     At every point the step is the negative gradient in scaled coordinates, projected on the cone
     of the contacts that are closed (``min |d + dE|`` over ``df_i d >= 0``, by non-negative least
-    squares), and then brought back to the polyhedron.  It is the motion of a body without inertia
-    in a thick fluid: contacts close one by one, and stay closed while the energy presses.  Close
-    to rest :func:`~polycorner.minimise` takes over; its certificate is that of the end.
+    squares), followed by a projection on the polyhedron.  It is the overdamped motion of a body:
+    contacts close one by one, and stay closed while the energy presses on them.  Close to the
+    minimum :func:`~polycorner.minimise` takes over.
 
     Parameters
     ----------
     polyhedron : Polyhedron
-        An intersection; unions are not followed.
+        An intersection.
     energy : SmoothFunction or sympy.Expr
     start : (n,) array
-        Where to start; outside, the nearest point that repeated linearisation finds.
+        The start; outside the polyhedron, the nearest point found by repeated linearisation.
     stride : float, optional
-        Longest step in scale units; bodies thinner than that could be stepped over.
+        Longest step in scale units; a longer one may pass through thin bodies.
     most : int, optional
-        Points at most.
+        Largest number of points.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def descent(
 
 
 def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Array]:
-    """Return the points of the way down; none if the polyhedron is not reached."""
+    """Return the points of the path; none if the polyhedron is not reached."""
     everything = frozenset(range(problem.inequalities))
     reached, q = problem.restore(everything, q)
     if not reached:
@@ -113,7 +113,7 @@ def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Arra
         ahead = _held(problem, q + step / size * way * problem.scales, pressed)
         reached, trial = problem.restore(everything, ahead)
         lower, onward, held = _downhill(problem, trial)
-        # A way back means that the step led beyond the lowest point; contacts only deflect.
+        # A reversed direction means that the step overshot; contacts only deflect.
         if reached and lower < height and onward @ way >= 0:
             q, height, way, pressed = trial, lower, onward, held
             points.append(q)
@@ -124,7 +124,7 @@ def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Arra
 
 
 def _downhill(problem: Problem, q: Array) -> tuple[float, Array, Indices]:
-    """Return the energy, the steepest way down that is open, and the contacts it presses on.
+    """Return the energy, the direction of steepest descent, and the contacts that press.
 
     In scaled coordinates and fractions of the slope.  With ``dE = sum w_i df_i - d`` over closed
     contacts the weights are those of a least-squares fit with ``w_i >= 0``; then ``d`` is ``-dE``
@@ -144,9 +144,9 @@ def _downhill(problem: Problem, q: Array) -> tuple[float, Array, Indices]:
 
 
 def _held(problem: Problem, q: Array, pressed: Indices) -> Array:
-    """Return the point near ``q`` where some contacts are closed: a tangent leaves what is curved.
+    """Return the point near ``q`` where some contacts are closed.
 
-    Newton's method with the shortest corrections.
+    Newton's method with the shortest corrections: a tangent leaves a curved face.
     """
     for _ in range(CORRECTIONS if len(pressed) else 0):
         values, gradients = problem.evaluate(q, 1)

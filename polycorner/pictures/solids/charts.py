@@ -1,4 +1,4 @@
-"""Points of a surface ``min f_i = 0``: which functions vanish there, and how to get to them."""
+"""Newton's method for points of a surface ``min f_i = 0`` and the functions that vanish there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Gaps = Callable[[Array, int], tuple[Array, ...]]
 # A function is active where it vanishes to within this many cells.
 ACTIVE = 1e-7
 NEWTON_STEPS = 12
-# Newton's method goes no further than this many cells.
+# Largest distance, in cells, that Newton's method may move a point.
 REACH = 2.0
 TURNS = 3
 DEPENDENT = 1e-5
@@ -24,7 +24,7 @@ SLAB = 50_000
 
 @dataclass(frozen=True)
 class Chart:
-    """Functions whose least one bounds a region, with the cell of a grid as the unit of length.
+    """Functions whose minimum bounds a region, in units of the cells of a grid.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Chart:
         return np.asarray(self.low + places * self.spacing)
 
     def evaluate(self, places: Array) -> tuple[Array, Array]:
-        """Return values ``(N, m)`` and gradients ``(N, m, 3)`` by cell; those not finite are 0."""
+        """Return values ``(N, m)`` and gradients per cell ``(N, m, 3)``, 0 if not finite."""
         parts = [places[k : k + SLAB] for k in range(0, max(1, len(places)), SLAB)]
         found = [self.gaps(self.points(part), 1) for part in parts]
         values = np.concatenate([np.asarray(v, dtype=np.float64) for v, _ in found])
@@ -56,19 +56,19 @@ class Chart:
         return values, np.where(np.isfinite(slopes).all(axis=-1, keepdims=True), slopes, 0.0)
 
     def distances(self, places: Array) -> Array:
-        """Return ``f_i / |grad f_i|``, about how many cells away ``f_i = 0`` is, ``(N, m)``."""
+        """Return ``f_i / |grad f_i|``, distances in cells to first order, ``(N, m)``."""
         return _distances(*self.evaluate(places))
 
     def settle(self, places: Array, wanted: Mask, fixed: Mask) -> tuple[Array, Mask]:
-        """Return where the wanted functions vanish, near given places, and whether they do.
+        """Return points near given places where wanted functions vanish, and a mask of success.
 
-        Newton's method with the shortest corrections; coordinates marked as fixed stay.
+        Newton's method with the shortest corrections; coordinates marked as fixed are kept.
 
         Parameters
         ----------
         places : (N, 3) array
         wanted : (N, m) bool
-            Which functions shall vanish; their gradients may be dependent.
+            Functions that shall vanish; their gradients may be dependent.
         fixed : (N, 3) bool
         """
         here, left = places.copy(), np.arange(len(places))
@@ -85,14 +85,14 @@ class Chart:
         return here, near & (missed < ACTIVE)
 
     def active(self, places: Array) -> Mask:
-        """Return which functions vanish at given places, ``(N, m)``."""
+        """Return a mask of the functions that vanish at given places, ``(N, m)``."""
         return np.asarray(abs(self.distances(places)) < ACTIVE)
 
     def descend(self, places: Array, fixed: Mask) -> tuple[Array, Mask]:
-        """Return points of the surface near given places, and what is active there.
+        """Return points of the surface near given places, and the functions active there.
 
-        The least function is followed to zero; where another one is below zero there, that one.
-        What cannot be settled stays where it is, with the least function alone.
+        Newton's method on the least function; where another one is negative at the solution, on
+        that one.  Places where this fails are returned with the least function alone.
         """
         here, active = places.copy(), np.zeros((len(places), 0), dtype=bool)
         left = np.arange(len(places))
@@ -111,10 +111,11 @@ class Chart:
         return here, active
 
     def meet(self, places: Array, wanted: Mask, fixed: Mask) -> tuple[Array, Mask]:
-        """Return points of the surface where wanted functions vanish together, and what is active.
+        """Return points of the surface where wanted functions vanish, and all that are active.
 
-        Where another function is below zero there, it has to vanish as well: an edge has run
-        into a corner.  Where such a point is out of reach, :meth:`descend` takes its place.
+        Where another function is negative at the solution, the edge has passed a corner, and that
+        function has to vanish as well.  Where there is no such point near by, see
+        :meth:`descend`.
         """
         here, active = places.copy(), wanted.copy()
         left = np.arange(len(places))
@@ -140,10 +141,10 @@ class Chart:
         return here, active
 
     def _corner(self, place: Array, wanted: Mask, fixed: Mask) -> tuple[Array, Mask]:
-        """Return the nearest point of the surface where three of four and more functions vanish.
+        """Return the nearest point of the surface where three of four or more functions vanish.
 
-        Two corners nearer to each other than a cell make functions meet that do not all vanish
-        at one point.  Where there is none, :meth:`descend`.
+        With two corners in one cell, the wanted functions need not all vanish at one point.
+        Where there is no point for any three, see :meth:`descend`.
         """
         triples = list(combinations(np.flatnonzero(wanted), 3))
         tried = np.zeros((len(triples), len(wanted)), dtype=bool)

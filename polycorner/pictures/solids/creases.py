@@ -1,4 +1,4 @@
-"""A triangulated surface ``min f_i = 0`` cut along the curves where the least function changes."""
+"""Subdivision of a triangulated surface ``min f_i = 0`` along its creases."""
 
 from dataclasses import dataclass, replace
 
@@ -9,26 +9,26 @@ from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
 
 ROUNDS = 6
-# A new vertex stays this fraction of an edge away from its ends, before it is settled.
+# Least initial distance of a new vertex from the ends of its edge, as a fraction.
 MARGIN = 0.02
 HALVINGS = 6
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A closed triangulation, and which functions vanish at its vertices.
+    """A closed triangulation, and the functions that vanish at its vertices.
 
     Attributes
     ----------
     places : (V, 3) array
         Vertices, in cells.
     active : (V, m) bool
-        Which functions vanish there; none at a vertex inside a cap.
+        Functions that vanish there; none at a vertex inside a cap.
     fixed : (V, 3) bool
-        Coordinates that may not change: those of the seams.
+        Coordinates that must not change: those of the seams.
     faces : (F, 3) int
     caps : (F,) bool
-        Which faces close the chart at a seam.
+        Faces that close the chart at a seam.
     """
 
     places: Array
@@ -44,7 +44,7 @@ class Cut:
 
 
 def cut_along_creases(cut: Cut, chart: Chart) -> Cut:
-    """Return the surface with a vertex wherever an edge goes from one function to another.
+    """Return the surface with vertices where edges cross from one function to another.
 
     Edges whose ends have no function in common are split where two functions vanish; faces
     whose corners have none in common, but in pairs, get a vertex where three vanish.  Every face
@@ -59,7 +59,7 @@ def cut_along_creases(cut: Cut, chart: Chart) -> Cut:
 
 
 def edges_of(faces: Indices) -> tuple[Indices, Indices]:
-    """Return the edges ``(E, 2)``, lower vertex first, and which each side of a face is ``(F, 3)``.
+    """Return the edges ``(E, 2)``, lower vertex first, and the edge of each side ``(F, 3)``.
 
     Side ``k`` of a face goes from its vertex ``k`` to the next.
     """
@@ -91,9 +91,9 @@ def _split_edges(cut: Cut, chart: Chart) -> tuple[Cut, int]:
 
 
 def _crossings(cut: Cut, ends: Indices, chart: Chart) -> tuple[Array, Mask]:
-    """Return where on edges one function takes over from another, and which two.
+    """Return points on edges where two functions exchange the minimum, and the two functions.
 
-    Between two creases without a common function there is a corner: all of theirs.
+    Between two creases without a common function there is a corner of all their functions.
     """
     start, stop = cut.places[ends[:, 0]], cut.places[ends[:, 1]]
     middle = chart.distances((start + stop) / 2)
@@ -146,7 +146,7 @@ def _with_vertices(cut: Cut, places: Array, active: Mask, fixed: Mask) -> Cut:
 
 
 def subdivided(faces: Indices, middles: Indices, places: Array) -> tuple[Indices, Indices]:
-    """Return faces with vertices put on some of their sides, and the face each is part of.
+    """Return faces subdivided at vertices on some of their sides, and the parent of each.
 
     Parameters
     ----------
@@ -154,13 +154,13 @@ def subdivided(faces: Indices, middles: Indices, places: Array) -> tuple[Indices
     middles : (F, 3) int
         The vertex on side ``k``, or -1.
     places : (V, 3) array
-        Vertices: of the two ways to cut a quadrilateral, the one with the shorter cut is taken.
+        Vertices; quadrilaterals are cut along the shorter diagonal.
     """
     count = (middles >= 0).sum(axis=1)
     parts, parents = [faces[count == 0]], [np.flatnonzero(count == 0)]
     for number in (1, 2, 3):
         chosen = np.flatnonzero(count == number)
-        # Turned so that the split side is the first one, or the whole side is.
+        # Rotated so that the side that is split, or the one that is not, comes first.
         first = (middles[chosen] >= 0) if number == 1 else (middles[chosen] < 0)
         turn = (first.argmax(axis=1)[:, None] + np.arange(3)) % 3
         a, b, c = np.take_along_axis(faces[chosen], turn, axis=1).T

@@ -1,4 +1,4 @@
-"""Slivers of a cut surface taken out by drawing short edges together, creases and corners kept."""
+"""Edge collapses that remove slivers of a cut surface and keep its creases and corners."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,19 +10,19 @@ from polycorner.pictures.solids.creases import Cut, edges_of
 from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
 
-# Edges shorter than this many cells are drawn together; none becomes longer than the other.
+# Edges shorter than the first number of cells are collapsed; none gets longer than the second.
 SHORT, LONG = 0.45, 1.8
 COINCIDENT = 1e-6
-# Faces below this shape are bad: 1 is equilateral, 0 flat, negative turned inside out.
+# Faces of a lower shape are poor: 1 is equilateral, 0 degenerate, negative inverted.
 POOR = 0.2
 ROUNDS = 40
-# Rounds end when fewer than this share of the faces is concerned.
+# Rounds end when fewer collapses than this share of the faces remain.
 FEW = 2e-3
 
 
 @dataclass(frozen=True)
 class Labelled:
-    """A cut surface with what each face lies on.
+    """A cut surface with the function of each face.
 
     Attributes
     ----------
@@ -39,11 +39,11 @@ class Labelled:
 
     @property
     def unresolved(self) -> int:
-        """How many faces have corners without a common function."""
+        """Number of faces whose corners have no common function."""
         return int((~self.cut.common.any(axis=1) & ~self.cut.caps).sum())
 
     def shapes(self, faces: Indices, labels: Indices) -> Array:
-        """Return how well shaped faces are, from 1 for equilateral to -1; see ``POOR``."""
+        """Return the shapes of faces, from 1 for equilateral ones to -1; see ``POOR``."""
         a, b, c = (self.cut.places[corner] for corner in faces.T)
         out = sum(self.slopes[corner, labels] for corner in faces.T)
         size = lengths_of(out)
@@ -53,14 +53,14 @@ class Labelled:
 
 
 def lengths_of(vectors: Array) -> Array:
-    """Return the lengths of vectors ``(N, 3)``, faster than a norm along so short an axis."""
+    """Return the lengths of vectors ``(N, 3)``; faster than ``norm`` along a short axis."""
     return np.asarray(np.sqrt(np.einsum("nk,nk->n", vectors, vectors)))
 
 
 def labelled(cut: Cut, chart: Chart) -> Labelled:
-    """Return the surface with the function that each face lies on.
+    """Return the surface with the function of each face.
 
-    Where several vanish at all corners, or none, the least one in the middle of the face.
+    Where several vanish at all corners, or none, it is the least one in the middle of the face.
     """
     middles = chart.distances(cut.places[cut.faces].mean(axis=1))
     common = cut.common
@@ -77,27 +77,26 @@ def labelled(cut: Cut, chart: Chart) -> Labelled:
     return Labelled(cut, labels, units)
 
 
-def thinned(surface: Labelled) -> Labelled:
-    """Return the surface with short edges drawn together, as far as that keeps what it is.
+def collapsed(surface: Labelled) -> Labelled:
+    """Return the surface with short edges collapsed, its creases and topology preserved.
 
-    A vertex is drawn along an edge into the other end: one inside a face to any neighbour, one on
-    a crease along the crease, one on a seam along the seam at both of its sides at once, and
-    corners not at all, unless both are the same point.  The surface stays closed and keeps its
-    topology (both ends have exactly two common neighbours, the link condition [DEGN]); no face
-    turns over, and none gets worse than ``POOR`` that was not.
+    A vertex inside a face may collapse into any neighbour, one on a crease along the crease, one
+    on a seam along the seam and on both of its sides at once; corners do not, unless both ends
+    are the same point.  The surface stays closed and keeps its topology: both ends have exactly two
+    common neighbours, the link condition [DEGN].  No face is inverted, and none becomes poor.
     """
     twins, shapes = _twins(surface.cut), surface.shapes(surface.cut.faces, surface.labels)
     for on_seams in (True, False):
         for _ in range(ROUNDS):
             moves = _moves(surface, shapes, twins if on_seams else None)
-            surface, shapes = _drawn(surface, shapes, moves)
+            surface, shapes = _after(surface, shapes, moves)
             if len(moves) <= (0 if on_seams else FEW * len(surface.labels)):
                 break
     return surface
 
 
 def _twins(cut: Cut) -> Indices:
-    """Return the vertex across the seam of every vertex on one ``(V,)``, -1 for others."""
+    """Return the vertex across the seam for vertices on a seam, ``(V,)``; -1 for others."""
     from scipy.spatial import cKDTree
 
     twins = np.full(len(cut.places), -1)
@@ -113,8 +112,8 @@ def _twins(cut: Cut) -> Indices:
     return twins
 
 
-def _drawn(surface: Labelled, shapes: Array, moves: Indices) -> tuple[Labelled, Array]:
-    """Return the surface after the moves, and the shapes of its faces."""
+def _after(surface: Labelled, shapes: Array, moves: Indices) -> tuple[Labelled, Array]:
+    """Return the surface after the collapses, and the shapes of its faces."""
     cut = surface.cut
     target = np.arange(len(cut.places))
     target[moves[:, 0]] = moves[:, 1]
@@ -130,7 +129,7 @@ def _drawn(surface: Labelled, shapes: Array, moves: Indices) -> tuple[Labelled, 
 
 
 def _moves(surface: Labelled, shapes: Array, twins: Indices | None) -> Indices:
-    """Return which vertices are drawn into which now ``(k, 2)``, far enough from each other.
+    """Return independent collapses ``(k, 2)``: a vertex, and the neighbour it collapses into.
 
     With twins, vertices on seams; without them, all others.
     """
@@ -151,7 +150,7 @@ def _moves(surface: Labelled, shapes: Array, twins: Indices | None) -> Indices:
 
 
 def _twice(ways: Indices, twins: Indices) -> Mask:
-    """Return which moves are there on both sides of a seam."""
+    """Return a mask of the collapses that occur on both sides of a seam."""
     count = len(twins)
     across = twins[ways]
     there = np.isin(across @ [count, 1], ways @ [count, 1])
@@ -161,7 +160,7 @@ def _twice(ways: Indices, twins: Indices) -> Mask:
 def _allowed(
     surface: Labelled, edges: Indices, sides: Indices, lengths: Array, wanted: Mask
 ) -> Indices:
-    """Return the wanted moves that keep creases and corners, ``(k, 2)``."""
+    """Return the wanted collapses that keep creases and corners, ``(k, 2)``."""
     cut = surface.cut
     beside = np.argsort(sides.ravel(), kind="stable").reshape(-1, 2) // 3
     crease = surface.labels[beside[:, 0]] != surface.labels[beside[:, 1]]
@@ -175,7 +174,7 @@ def _allowed(
 
 
 def _two_in_common(faces: Indices, edges: Indices, ways: Indices) -> Mask:
-    """Return whether the ends of an edge have exactly two neighbours in common."""
+    """Return a mask of the collapses that satisfy the link condition."""
     from scipy.sparse import coo_array
 
     count = int(faces.max()) + 1
@@ -186,7 +185,7 @@ def _two_in_common(faces: Indices, edges: Indices, ways: Indices) -> Mask:
 
 
 def _no_worse(surface: Labelled, ways: Indices, shapes: Array) -> Mask:
-    """Return which moves leave no face poor that was not, and none too long."""
+    """Return a mask of the collapses that make no face poor and no edge too long."""
     cut = surface.cut
     corners = cut.faces.ravel()
     order = np.argsort(corners, kind="stable")
@@ -213,7 +212,7 @@ def _no_worse(surface: Labelled, ways: Indices, shapes: Array) -> Mask:
 
 
 def _apart(edges: Indices, ways: Indices, costs: Array) -> Mask:
-    """Return which moves are cheaper than all others of neighbours."""
+    """Return a mask of the collapses that cost less than all others near by."""
     order = np.lexsort((ways[:, 1], ways[:, 0], costs))
     rank = np.empty(len(ways), dtype=np.int64)
     rank[order] = np.arange(len(ways))

@@ -1,4 +1,4 @@
-"""Pairs of badly shaped neighbours in a triangulation exchanged for better ones."""
+"""Edge flips that improve the shapes of triangles."""
 
 from dataclasses import replace
 
@@ -9,16 +9,16 @@ from polycorner.pictures.solids.edge_collapse import LONG, Labelled
 from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
 
-# Pairs with a face of a shape below this are tried; the worse shape has to grow by the gain.
+# Pairs with a shape below the first number are tried; the worse shape has to improve by the second.
 TRIED, GAIN = 0.5, 0.05
 ROUNDS = 12
 
 
 def flipped(surface: Labelled) -> Labelled:
-    """Return the surface with edges between faces of one label turned, where that shapes better.
+    """Return the surface with edges between faces of one label flipped where shapes improve.
 
-    Of the two ways to cut a quadrilateral into triangles, the one whose worse triangle is better.
-    Edges that are there already are not made again, so that the surface stays closed.
+    Of the two diagonals of a quadrilateral we take the one whose worse triangle is better.  A flip
+    never duplicates an existing edge, so the surface stays closed.
     """
     for _ in range(ROUNDS):
         turned = _turned(surface)
@@ -37,7 +37,7 @@ def _turned(surface: Labelled) -> Labelled | None:
     worse = shapes[beside].min(axis=1)
     tried = np.flatnonzero((worse < TRIED) & (labels[beside[:, 0]] == labels[beside[:, 1]]))
     beside, place = beside[tried], place[tried]
-    # Along the edge from u to v in the first face; w and x are across from it.
+    # The edge leads from u to v in the first face; w and x are opposite to it.
     u, v, w = (cut.faces[beside[:, 0], (place[:, 0] + k) % 3] for k in range(3))
     x = cut.faces[beside[:, 1], (place[:, 1] + 2) % 3]
     ones, others = np.stack([u, x, w], axis=1), np.stack([x, v, w], axis=1)
@@ -65,7 +65,7 @@ def _joined(edges: Indices, one: Indices, other: Indices) -> Mask:
 
 
 def _best(beside: Indices, gain: Array, count: int) -> Mask:
-    """Return which pairs of faces gain more than any other pair with one of them."""
+    """Return a mask of the pairs that gain more than all others with a face in common."""
     rank = np.empty(len(gain), dtype=np.int64)
     rank[np.argsort(-gain, kind="stable")] = np.arange(len(gain))
     least = np.full(count, len(gain))

@@ -25,7 +25,7 @@ FEWEST_CELLS = 4
 def grid(
     bounds: Bounds, resolution: int | Sequence[int], periodic: Sequence[bool]
 ) -> tuple[Array, Indices, Mask]:
-    """Return the box ``(3, 2)``, the cells along each axis, and which axes are periodic.
+    """Return the box ``(3, 2)``, the cells along each axis, and a mask of the periodic axes.
 
     Raises
     ------

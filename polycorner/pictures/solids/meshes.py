@@ -1,4 +1,4 @@
-"""Regions ``{f < 0}`` of space as watertight meshes, their topology, and files of them."""
+"""Watertight meshes of regions ``{f < 0}`` of space, their topology, and mesh files."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -54,7 +54,7 @@ class Isosurface:
     mesh : trimesh.Trimesh
         Watertight, with outward normals; ``mesh.euler_number`` is that of the capped surface.
     caps : (F,) bool
-        Which faces of the mesh are caps.
+        Mask of the faces that are caps.
     euler_characteristic : int
         ``V - E + F`` of the surface, opposite sides of periodic axes identified.
     inside : (n1 + 1, n2 + 1, n3 + 1) bool
@@ -62,7 +62,7 @@ class Isosurface:
     bounds : (3, 2) float
         The box.
     periodic : tuple of three bool
-        Which axes are periodic.
+        Mask of the periodic axes.
     """
 
     mesh: "trimesh.Trimesh"
@@ -79,7 +79,7 @@ class Isosurface:
 
     @cached_property
     def area(self) -> float:
-        """The area of the surface without caps, the axes taken as they are (mm beside radians)."""
+        """The area of the surface without caps; units of the axes (mm, radians) are mixed."""
         return float(np.asarray(self.mesh.area_faces)[~self.caps].sum())
 
     @property
@@ -111,7 +111,7 @@ def isosurface(
     resolution : int or three of them
         Number of cells along each axis, at least 4.
     periodic : three bool, optional
-        Axes along which ``f`` repeats itself with the length of the box as its period.
+        Axes along which ``f`` is periodic with the length of the box.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the vertices of a mesh on a grid stand for, and surfaces sewn together by it."""
+"""Grid keys of mesh vertices, and surfaces sewn together by them."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from polycorner.errors import SolverError
 from polycorner.pictures.solids.grids import AXES, Indices, Mask
 from polycorner.spaces.manifold import Array
 
-# Kinds of vertices in a key after those on an edge along axis 0, 1 or 2.
+# Kinds of vertices beside 0, 1 and 2, which lie on an edge along that axis.
 ON_NODE, IN_CELL = 3, 4
 
 
 def keys_of(places: Array, cells: Indices) -> Indices:
-    """Return what each vertex stands for, ``(V, 4)``: a lower node or cell, and a kind.
+    """Return the grid key of each vertex, ``(V, 4)``: a lower node or cell, and a kind.
 
     The kind is the axis of the edge the vertex lies on; a vertex between the last layer and the
     one beyond it belongs to the node in the last layer; a few lie within a cell.
@@ -33,7 +33,7 @@ def merged(keys: Indices, faces: Indices) -> tuple[Indices, Indices]:
 
 
 def shared(keys: Indices, faces: Indices, open_keys: Indices, open_faces: Indices) -> Mask:
-    """Return which faces are also faces of the surface without caps."""
+    """Return a mask of the faces that belong to the surface without caps."""
     both = np.concatenate([faces, open_faces + len(keys)])
     vertices, numbered = merged(np.concatenate([keys, open_keys]), both)
     codes = np.sort(numbered, axis=1) @ (len(vertices) ** np.arange(AXES))
@@ -48,6 +48,6 @@ def sewn_euler_characteristic(keys: Indices, faces: Indices, cells: Indices, wra
     edges = np.sort(np.concatenate([sewn[:, [0, 1]], sewn[:, [1, 2]], sewn[:, [2, 0]]]), axis=1)
     _, counts = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_counts=True)
     if (counts != 2).any():
-        msg = f"marching cubes left {int((counts != 2).sum())} edges without two faces at a seam"
+        msg = f"marching cubes left {int((counts != 2).sum())} edges at a seam without two faces"
         raise SolverError(msg)
     return int(len(vertices) - len(counts) + len(sewn))

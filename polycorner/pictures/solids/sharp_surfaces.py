@@ -1,4 +1,4 @@
-"""Regions ``{min f_i < 0}`` as watertight meshes with sharp edges and corners."""
+"""Watertight meshes of regions ``{min f_i < 0}`` with sharp edges and corners."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from polycorner.errors import SolverError
 from polycorner.pictures.solids.charts import Chart, Gaps
 from polycorner.pictures.solids.creases import Cut, cut_along_creases, edges_of
-from polycorner.pictures.solids.edge_collapse import Labelled, labelled, thinned
+from polycorner.pictures.solids.edge_collapse import Labelled, collapsed, labelled
 from polycorner.pictures.solids.edge_flips import flipped
 from polycorner.pictures.solids.grids import Bounds, Indices, Mask
 from polycorner.pictures.solids.meshes import Isosurface, closed_mesh, isosurface
@@ -26,21 +26,21 @@ class SharpSurface(Isosurface):
     Attributes
     ----------
     labels : (F,) int
-        Which function vanishes on a face; -1 on caps.  Kept with the mesh as
+        The function that vanishes on a face; -1 on caps.  Kept with the mesh as
         ``mesh.face_attributes["part"]``.
     active : (V, m) bool
-        Which functions vanish at a vertex: one inside a face, two on a crease, more at a corner,
+        Functions that vanish at a vertex: one inside a face, two on a crease, more at a corner,
         none inside a cap.
     surface_error : float
         Largest ``|min f_i|`` at vertices, in the middles of faces and of their sides.
     edge_error : float
         Largest ``|f_i|`` of either function at the ends and in the middles of creases.
     unresolved : int
-        Number of faces whose corners have no function in common: 0 unless the grid is so coarse
-        that creases cannot be told apart.
+        Number of faces whose corners have no function in common: 0 unless the grid is too coarse
+        to separate creases.
     curved_volume : float
-        The volume with what lies between the flat faces and the curved ones, to a higher order
-        than :attr:`volume`.
+        The volume with a correction for the curvature of the faces, of higher order than
+        :attr:`volume`.
     """
 
     labels: Indices
@@ -63,9 +63,9 @@ class SharpSurface(Isosurface):
 
     @cached_property
     def corners(self) -> Array:
-        """Vertices that end creases or at which more than two of them meet, ``(k, 3)``.
+        """Vertices where a crease ends or more than two meet, ``(k, 3)``.
 
-        A crease cut at a seam is not ended.
+        A crease that is cut at a seam does not end there.
         """
         ends, counts = np.unique(self.creases, return_counts=True)
         faces = np.asarray(self.mesh.faces)
@@ -98,18 +98,18 @@ def sharp_surface(
 
     1. Marching cubes ([LLVT]) and false position give a closed triangulation of
        ``min f_i = 0`` (:func:`~polycorner.pictures.isosurface`).
-    2. Each vertex is settled by Newton's method on the function that is least there.
+    2. Newton's method moves each vertex to the zeros of the least function there.
     3. Edges from one function to another get a vertex where both vanish, faces between three a
        vertex where three vanish: vertices on features as in [KBSS], by Newton's method on the
-       functions themselves in place of a fit to normals.  Where a third function is below zero,
-       it has to vanish too, so that corners are found, also those of four faces and rank three.
-    4. Short edges are drawn together along faces and creases, and edges inside faces turned,
-       until faces are well shaped.
+       functions themselves in place of a fit to normals.  Where a third function is negative it
+       has to vanish, too, which finds corners, those of four faces and rank three included.
+    4. Short edges collapse along faces and creases, and edges inside faces are flipped, until
+       faces are well shaped.
 
-    Steps 3 and 4 subdivide, contract under the link condition ([DEGN]) and turn edges of a
-    closed surface: it stays closed, whatever the functions are.  Where two surfaces of one
-    function join, such as distances to the inside and the end of a segment, gradients agree and
-    there is no crease; curvature jumps, which costs no order.
+    Steps 3 and 4 subdivide, collapse under the link condition ([DEGN]) and flip edges of a closed
+    surface, which stays closed for all functions.  Where one function is only piecewise smooth,
+    such as the distance from a segment, its gradient is continuous and there is no crease; the jump
+    of the curvature costs no order.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def sharp_surface(
         Of points ``(N, 3)`` and an order: the values ``(N, m)`` alone for order 0, with the
         gradients ``(N, m, 3)`` for order 1.
     bounds, resolution, periodic
-        As for :func:`~polycorner.pictures.isosurface`.  The least function alone has to
-        repeat itself along a periodic axis; the others may change their roles.
+        As for :func:`~polycorner.pictures.isosurface`.  Only the least function
+        has to be periodic; the others may exchange their roles.
 
     Raises
     ------
@@ -134,11 +134,11 @@ def sharp_surface(
     rough = isosurface(least, bounds, resolution, periodic)
     chart = Chart(gaps, rough.bounds[:, 0], rough.spacing)
     whole = labelled(cut_along_creases(_settled(rough, chart), chart), chart)
-    return _surface(rough, flipped(thinned(whole)), chart)
+    return _surface(rough, flipped(collapsed(whole)), chart)
 
 
 def _settled(rough: Isosurface, chart: Chart) -> Cut:
-    """Return the vertices of an isosurface on their functions, those on seams within these."""
+    """Return an isosurface with its vertices moved to their functions, within seams on seams."""
     places = chart.places(np.asarray(rough.mesh.vertices))
     faces, cells = np.asarray(rough.mesh.faces), np.array(rough.inside.shape) - 1
     fixed = np.isclose(places, 0.0, atol=1e-6) | np.isclose(places, cells, rtol=0.0, atol=1e-6)
@@ -209,8 +209,8 @@ def _edge_error(places: Array, faces: Indices, labels: Indices, chart: Chart) ->
 def _between(places: Array, faces: Indices, labels: Indices, chart: Chart) -> float:
     """Return the volume between flat faces and curved ones.
 
-    The surface is ``-f / (grad f . n)`` above a face, whose integral takes the middles of the
-    sides; they are exact for quadratic heights.
+    The surface has height ``-f / (grad f . n)`` above a face; the midpoints of the sides integrate
+    quadratic heights exactly.
     """
     on_surface = labels >= 0
     faces, labels = faces[on_surface], labels[on_surface]

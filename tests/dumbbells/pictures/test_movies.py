@@ -60,7 +60,7 @@ def test_a_full_disk_is_told_in_one_line(tmp_path, monkeypatch, read):
 def test_an_encoder_that_stops_silently_is_told_too(tmp_path, monkeypatch):
     program = encoder(tmp_path, ["sys.exit(3)"])
     monkeypatch.setattr(ffmpeg, "get_ffmpeg_exe", lambda: program)
-    with pytest.raises(OSError, match=r"^ffmpeg stopped without a word$"):
+    with pytest.raises(OSError, match=r"^ffmpeg stopped without a message$"):
         movies._write_mp4(pictures(9, (640, 960)), tmp_path / "bar.mp4", 10)
 
 

@@ -158,9 +158,7 @@ def test_only_so_many_pages_at_a_time(application, monkeypatch):
                 await read(first, "reading")
                 async with connected(port) as second:
                     assert await asyncio.wait_for(second.read_message(), 20) is None
-                    assert second.close_reason.startswith(
-                        "as many pages are open as there may be, 1"
-                    )
+                    assert second.close_reason.startswith("the limit of 1 open pages is reached")
             while application.settings["pages"]:
                 await asyncio.sleep(0.01)
 

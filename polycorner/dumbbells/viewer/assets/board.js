@@ -1,14 +1,14 @@
 "use strict";
 
 // The live page: sends slider values and names of buttons, shows what the library answers.
-// Nothing is computed here; every number on the page came from the server.
+// Every number on the page is computed by the server.
 
 const $ = (id) => document.getElementById(id);
 const FALL = 3000; // ms that a fall takes on the page
 
 class Board {
   constructor() {
-    this.pending = {}; // values that were moved and not yet sent
+    this.pending = {}; // values moved and not yet sent
     this.fields = {};
     this.stage = new Stage($("stage"));
     this.atlas = new Stage($("atlas"));
@@ -83,7 +83,7 @@ class Board {
     if (!this.closed) this.socket.send(JSON.stringify(name));
   }
 
-  // One message is under way at a time; what is moved meanwhile goes with the next one.
+  // One message is under way at a time; values moved meanwhile go with the next one.
   send() {
     if (this.waiting || this.closed || !Object.keys(this.pending).length) return;
     this.waiting = performance.now();
@@ -106,7 +106,7 @@ class Board {
     document.documentElement.dataset.ready = "yes";
   }
 
-  // Put the sliders where the server has them, but for those that have been moved since.
+  // Set the sliders to the server's values, except those moved since.
   settle(sliders) {
     for (const [name, value] of Object.entries(sliders)) {
       const { range, field } = this.fields[name];

@@ -27,7 +27,7 @@ async function decoded(data) {
   return film;
 }
 
-// Rows of the table beside the picture; returns what sets their contents.
+// Rows of the table beside the picture; returns their value cells.
 function rows(names) {
   return names.map((name) => {
     const term = document.createElement("dt"), value = document.createElement("dd");
@@ -93,14 +93,14 @@ class Player {
     act();
   }
 
-  // All of the film's wall in view; of a long one what is at this instant.
+  // Frame the box of the film.
   look() {
     const { low, high } = this.film.box;
     const middle = low.map((value, k) => (value + high[k]) / 2);
     this.stage.frame(middle, Math.max(0.58 * Math.hypot(...low.map((value, k) => high[k] - value)), 1));
   }
 
-  // Keep the dumbbells where they are in the picture while they move on.
+  // Keep the dumbbells in the middle of the picture.
   follow() {
     if (!$("follow").checked) { this.middle = null; return; }
     const { film } = this, wide = 6 * film.count, sum = [0, 0, 0];
@@ -168,7 +168,7 @@ class Player {
   }
 }
 
-// An atlas has no time: the picture, and what its colours mean.
+// A page without time: the model of an atlas with its legend.
 async function showModel(data) {
   const stage = (window.stage = new Stage($("stage")));
   $("timeline").hidden = $("following").hidden = true;

@@ -1,12 +1,11 @@
 "use strict";
 
-// Dumbbells, the wall they lie on and their contacts, drawn with three.js (the global THREE).
-// One Stage is one picture; the page that plays a film and the live page use it alike.
+// Dumbbells, the wall and contacts, drawn with three.js (the global THREE).  One Stage is one
+// picture, on pages of films and on the live page.
 // Lengths are mm, coordinates those of the library: y along the drum, z up.
 
 class Stage {
-  // host: the element to fill.  Where the browser has no WebGL it says so and everything else on
-  // the page goes on working: all methods may be called then.
+  // host: the element to fill.  Without WebGL it shows a message, and all methods do nothing.
   constructor(host) {
     this.host = host;
     this.scene = new THREE.Scene();
@@ -24,14 +23,14 @@ class Stage {
   }
 
   start() {
-    // Asking three.js itself would leave an error on the console where there is no WebGL.
+    // Without WebGL three.js would log an error.
     const probe = document.createElement("canvas");
     const context = probe.getContext("webgl2") || probe.getContext("webgl");
     if (!context) {
-      this.host.textContent = "This browser shows no pictures in three dimensions (no WebGL).";
+      this.host.textContent = "This browser cannot show three dimensions (no WebGL).";
       return false;
     }
-    context.getExtension("WEBGL_lose_context")?.loseContext(); // browsers allow but a few
+    context.getExtension("WEBGL_lose_context")?.loseContext(); // browsers limit their number
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
     this.renderer.outputEncoding = THREE.sRGBEncoding;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
@@ -39,7 +38,7 @@ class Stage {
     this.controls = new THREE.TrackballControls(this.camera, this.renderer.domElement);
     this.controls.staticMoving = true;
     this.controls.rotateSpeed = 2.5;
-    this.controls.keys = ["", "", ""]; // letters are not for the picture
+    this.controls.keys = ["", "", ""]; // no letters as shortcuts
     this.controls.addEventListener("change", () => this.ask());
     this.host.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.resize()).observe(this.host);
@@ -47,7 +46,7 @@ class Stage {
     this.view();
     const frame = () => {
       requestAnimationFrame(frame);
-      this.controls.update(); // asks for a picture if the view has changed
+      this.controls.update(); // requests a frame if the view has changed
       if (this.asked) this.renderer.render(this.scene, this.camera);
       this.asked = false;
     };
@@ -93,14 +92,14 @@ class Stage {
     this.ask();
   }
 
-  // Move the observer, and what is looked at, by a vector in mm.
+  // Move the camera and its target by a vector in mm.
   shift(by) {
     if (!this.renderer) return;
     for (const place of [this.camera.position, this.controls.target]) place.add(new THREE.Vector3(...by));
     this.ask();
   }
 
-  // With the picture in focus: arrows turn it, + and - come nearer and go away, 0 resets.
+  // Keys of the picture in focus: arrows turn it, + and - zoom, 0 resets the view.
   key(event) {
     const turn = { ArrowLeft: [0, 1], ArrowRight: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1] }[event.key];
     const zoom = { "+": 0.9, "-": 1 / 0.9 }[event.key];
@@ -126,17 +125,17 @@ class Stage {
     return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
   }
 
-  // A colour of the style sheet; three.js adds up light, which is linear.
+  // A colour of the style sheet; three.js computes with linear light.
   colour(name) {
     return new THREE.Color(this.style(name)).convertSRGBToLinear();
   }
 
-  // After a change of the colour scheme: build everything again as it was.
+  // Build everything again after a change of the colour scheme.
   repaint() {
     for (const [method, given] of Object.entries(this.last)) this[method](...given);
   }
 
-  // Put something in the place of what was called the same before.
+  // Add an object under a name, in place of the former one.
   put(name, object) {
     const old = this.scene.getObjectByName(name);
     if (old) {
@@ -309,7 +308,7 @@ class Stage {
 
   // --------------------------------------------------------------------------------------- atlases
 
-  // Show a GLB file (an ArrayBuffer) in the place of the last one; resolves to its bounding box.
+  // Show a GLB file (an ArrayBuffer) instead of the last one; resolves to its bounding box.
   model(buffer) {
     if (!this.works) return Promise.resolve(null);
     return new Promise((resolve, reject) => {
@@ -330,12 +329,12 @@ class Stage {
     this.frame(middle, 0.5 * Math.hypot(...low.map((value, k) => high[k] - value)), from, [0, 0, 1]);
   }
 
-  // A way through the atlas, and where it has come to; pieces: arrays of [x, y, z].
+  // A path through the atlas and its current point; pieces: arrays of [x, y, z].
   way(pieces, point, radius) {
     this.last.way = [pieces, point, radius];
     if (!this.works) return;
     const group = new THREE.Group();
-    // Transparent by name only: what is transparent is drawn last, and over the solid.
+    // Declared transparent, so that it is drawn last, over the solid.
     const seen = (name) => new THREE.MeshBasicMaterial({ color: this.colour(name), depthTest: false, transparent: true });
     for (const piece of pieces) {
       if (piece.length < 2) continue;
