@@ -16,6 +16,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 
+from polycorner.atomic import write_atomically
+
 VARIABLE = "POLYCORNER_CACHE_DIR"
 
 
@@ -104,10 +106,7 @@ def write_code(name: str, code: bytes) -> None:
     """Keep machine code under a name; other processes see all of it or nothing."""
     path = _code_file(name)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(hashlib.sha256(code).digest() + code)
-        Path(file.name).replace(path)
+        write_atomically(path, hashlib.sha256(code).digest() + code)
     except OSError as error:
         warnings.warn(
             f"compiled kernels cannot be kept in {path.parent} ({error.strerror or error}); set "
