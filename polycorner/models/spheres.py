@@ -126,7 +126,7 @@ class SphereCluster(Value):
         return np.concatenate(centres[: self.count])
 
     def starts(self) -> Array:
-        """Return points to fall from, ``(1, 3 n)``."""
+        """Return the start of a search, ``(1, 3 n)``: the stacked cluster."""
         return self.stacked()[None]
 
     def _sorted_distances(self, q: Array) -> Array:

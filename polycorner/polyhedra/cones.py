@@ -1,4 +1,4 @@
-"""Cones cut out by the gradients of active functions.
+"""Linearised cones of active functions: ranks, null spaces, extreme rays.
 
 Rows are gradients in scaled coordinates; the linearised cone is ``{d : A d >= 0, E d = 0}``.
 """
@@ -25,7 +25,7 @@ class Rows:
     units : (k, n) array
         The rows divided by their lengths.
     rank : int
-        How many singular values count.
+        Number of singular values above the tolerance.
     """
 
     def __init__(self, matrix: Array, tolerance: float) -> None:
@@ -41,12 +41,12 @@ class Rows:
 
     @property
     def null_space(self) -> Array:
-        """Orthonormal basis, as columns ``(n, n - rank)``, of what the rows annihilate."""
+        """Orthonormal basis, as columns ``(n, n - rank)``, of the null space."""
         return np.asarray(self._right[self.rank :].T)
 
     @property
     def relations(self) -> Array:
-        """Orthonormal basis, as columns ``(k, k - rank)``, of the weights that sum to nothing."""
+        """Orthonormal basis, as columns ``(k, k - rank)``, of the rows' linear relations."""
         return np.asarray(self._left[:, self.rank :])
 
     def weights(self, vector: Array) -> Array:
@@ -62,7 +62,7 @@ def rank(matrix: Array, tolerance: float) -> int:
 
 
 def null_space(matrix: Array, tolerance: float) -> Array:
-    """Return an orthonormal basis of what the rows annihilate; see :class:`Rows`."""
+    """Return an orthonormal basis of the vectors that the rows annihilate; see :class:`Rows`."""
     return Rows(matrix, tolerance).null_space if matrix.size else np.eye(matrix.shape[1])
 
 
@@ -118,7 +118,7 @@ def linear_programme(
 def independent_rows(matrix: Array, tolerance: float) -> list[int]:
     """Return positions of independent rows that span all rows, the best conditioned first.
 
-    Gram-Schmidt with pivoting: what is left of a row must be longer than ``tolerance``.
+    Gram-Schmidt with pivoting: the remainder of a row must be longer than ``tolerance``.
     """
     left = matrix
     chosen: list[int] = []
@@ -134,7 +134,7 @@ def independent_rows(matrix: Array, tolerance: float) -> list[int]:
 
 
 def extreme_rays(rows: Array, tolerance: float) -> list[tuple[Array, frozenset[int]]]:
-    """Return the extreme rays of the pointed cone ``{d : a_i d >= 0}`` and what is tight on each.
+    """Return the extreme rays of the pointed cone ``{d : a_i d >= 0}`` and the rows tight on each.
 
     The double description method: the rays of a simplicial cone made of independent rows are the
     columns of an inverse; every further half-space keeps the rays inside it and adds one ray for

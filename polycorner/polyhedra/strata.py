@@ -36,7 +36,7 @@ class Stratum(Printed, Value):
     Attributes
     ----------
     active : tuple of str
-        Functions that vanish at the point and matter for membership near it.
+        Functions that vanish at the point and decide membership near it.
     pieces : tuple of tuple of str
         The polyhedron near the point as a union: each piece is where its functions are >= 0.
     rank : int
@@ -46,7 +46,7 @@ class Stratum(Printed, Value):
     local_type : LocalType
         Interior, quadrant, cone, union, degenerate, or outside.
     annotations : mapping from str to str or None
-        What the model says about the point, such as ``{"chirality": "R"}``.
+        The model's remarks on the point, such as ``{"chirality": "R"}``.
     """
 
     active: tuple[str, ...]

@@ -99,7 +99,7 @@ class SearchState(Value):
 
 
 class Explorer(EdgeTracer):
-    """A search under way."""
+    """A search in progress."""
 
     def __init__(
         self, quotient: Quotient, starts: Iterable[Array], rng: np.random.Generator
@@ -172,7 +172,8 @@ class Explorer(EdgeTracer):
         edges, crossings, descents = len(self.curves) + budget, len(self.tried) + budget, budget
         while True:
             if self.pending:
-                yield len(self.curves) < edges, partial(self._trace, self.pending[0])
+                if not self._is_traced(self.pending[0]):
+                    yield len(self.curves) < edges, partial(self._trace, self.pending[0])
                 self.pending.popleft()
             elif self.starts:
                 allowed = len(self.curves) < edges and descents > 0
@@ -266,7 +267,7 @@ class Explorer(EdgeTracer):
         return self.quotient.at(curve.middle)
 
     def _cross(self, k: int, face: frozenset[int]) -> None:
-        """Go straight across a face from the middle of an edge and record where it ends."""
+        """Walk straight across a face from the middle of an edge and record the edge at the end."""
         ray = self.faces_beside(k)[face]
         walk = follow(ray.sample, ray.direction, passive=face)
         active = walk.last.active() if walk.end is End.CORNER else None

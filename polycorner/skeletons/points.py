@@ -17,10 +17,11 @@ from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, lo
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
 
+# Sizes of Newton steps in scale units: one that is rounding, and one whose square is.
 EXACT = 1e-13
+LAST = 1e-8
 # Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
 SINGULAR = 1e-14
-LAST = 1e-8
 NEWTON = 8
 # Tolerances within which a gradient must keep its direction.
 VICINITY = 10.0
@@ -30,18 +31,18 @@ DEPENDENT = 1e-7
 
 @dataclass(frozen=True)
 class Quotient:
-    """A polyhedron with its symmetry: what walking needs.
+    """A polyhedron modulo its symmetry, with the tolerances of a search.
 
     Attributes
     ----------
     polyhedron : Polyhedron
         The set.
     symmetry : Symmetry
-        What is quotiented out.
+        The symmetry to divide by.
     tolerance : float
         Distance, in scale units, up to which a function counts as zero.
     extent : float
-        Length, in scale units, after which a walk counts as going to infinity.
+        Length, in scale units, after which a walk counts as unbounded.
     """
 
     polyhedron: Polyhedron
@@ -55,7 +56,7 @@ class Quotient:
         return len(self.polyhedron.functions)
 
     def at(self, q: Array) -> "EvaluatedPoint":
-        """Return everything that is known at a point."""
+        """Return values, gradients and orbit at a point."""
         return EvaluatedPoint(self, q, *evaluated(self.polyhedron, q))
 
 
@@ -118,7 +119,7 @@ class HeldPoint(EvaluatedPoint):
     kept : list of int
         Inequalities that are held at zero, with independent gradients.
     finite : bool
-        Whether values and gradients are; nothing else may be asked of the frame otherwise.
+        Whether values and gradients are finite; otherwise nothing else is defined.
     condition : float
         Smallest diagonal entry of the triangular factor of the unit gradients: zero where they
         are dependent.
@@ -171,9 +172,9 @@ class HeldPoint(EvaluatedPoint):
 
 
 def projected(quotient: Quotient, q: Array, kept: Sequence[int], reach: float) -> HeldPoint | None:
-    """Return the frame of the nearest point where the held functions vanish.
+    """Return the nearest point where the held functions vanish.
 
-    None if Newton's method does not get there within ``reach`` scale units of ``q``, or meets
+    None if Newton's method does not converge within ``reach`` scale units of ``q``, or meets
     values that are not finite.  A step shorter than the square root of the rounding error is
     the last: convergence is quadratic.
     """

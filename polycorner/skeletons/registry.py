@@ -1,4 +1,4 @@
-"""The corners found so far, and which of them a point is.
+"""Registry of the corners found so far.
 
 With relabellings only one corner of each orbit is kept, and of its rays one of each orbit under
 the relabellings that leave the corner in record stands for all of them.
@@ -14,6 +14,8 @@ from polycorner.skeletons.points import EvaluatedPoint, Quotient, projected
 from polycorner.skeletons.vertex_figures import Ray, VertexFigure, vertex_figure
 from polycorner.spaces.manifold import Array
 
+# Distances in scale units: of points that are one corner, of points compared, and of functions from
+# zero at an exact corner.
 SAME = 1e-5
 NEAR = 1e-4
 SLACK = 1e-10
@@ -23,7 +25,7 @@ Names = frozenset[str]
 
 @dataclass
 class CornerRecord:
-    """A corner while the atlas grows.
+    """A corner while the skeleton grows.
 
     ``orbit[k]`` is the ray that stands for ray ``k``; ``edges`` the edges by such rays.
     """
@@ -38,7 +40,7 @@ class CornerRecord:
 
 
 class CornerRegistry:
-    """Corners, and what there is to say about them and about the walks between them."""
+    """The corners found so far, and notes for the user."""
 
     def __init__(self, quotient: Quotient) -> None:
         self.quotient, self.symmetry = quotient, quotient.symmetry
@@ -60,12 +62,12 @@ class CornerRegistry:
         return ", ".join(self.polyhedron.names[i] for i in sorted(rows))
 
     def note(self, sentence: str, *, lost: bool = False) -> None:
-        """Keep a sentence for the user, once; say whether something could not be followed."""
+        """Keep a sentence for the user once; ``lost`` if something could not be traced."""
         self.notes.setdefault(sentence)
         self.lost |= lost
 
     def find(self, point: EvaluatedPoint) -> tuple[int, list[Relabelling]] | None:
-        """Return the position of the corner at a point, new or known, and how to get there.
+        """Return the position of the corner at a point, new or known, and the relabellings to it.
 
         The relabellings carry the names at the point to the names at the corner.
         """
@@ -117,7 +119,7 @@ class CornerRegistry:
         return np.zeros(1) if key is None else np.asarray(key(q))
 
     def restore(self, q: Array) -> None:
-        """Add a corner at a point that was one before."""
+        """Add a corner at the point of a saved one."""
         point = self.quotient.at(q)
         self._add(point, point.active() or frozenset(), self._key(q))
 
@@ -128,7 +130,7 @@ class CornerRegistry:
         for sentence in figure.notes:
             self.note(sentence, lost=True)
         if figure.singular and figure.full > 2:
-            self.note(f"faces at the singular corner {self.written(active)} are not put together")
+            self.note(f"faces at the singular corner {self.written(active)} are not assembled")
         stabiliser = self.symmetry.relabellings(self.manifold, point.q, point.q, SAME)
         record = CornerRecord(point, active, figure, key, stabiliser, [])
         for i, ray in enumerate(figure.rays):
@@ -145,7 +147,7 @@ class CornerRegistry:
         relabellings: Iterable[Relabelling],
         among: Iterable[int],
     ) -> tuple[int, Relabelling] | None:
-        """Return which ray of a corner a ray is, after one of the relabellings."""
+        """Return the ray of a corner that a relabelling carries a ray to, and the relabelling."""
         alike: dict[Names, list[int]] = {}
         for i in among:
             alike.setdefault(self.names(record.figure.rays[i].active), []).append(i)

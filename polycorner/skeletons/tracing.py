@@ -18,6 +18,7 @@ from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
+# Steps of the ternary search on an arc.
 ARC_SEARCH = 40
 
 EdgeEnd = tuple[int, int]
@@ -82,14 +83,16 @@ class EdgeTracer:
 
     @property
     def notes(self) -> list[str]:
-        """Everything a user should know."""
+        """What a user should know."""
         return list(self.registry.notes)
+
+    def _is_traced(self, end: EdgeEnd) -> bool:
+        """Whether an edge already arrived from its other end."""
+        return end[1] in self.records[end[0]].edges
 
     def _trace(self, end: EdgeEnd) -> None:
         k, i = end
         record = self.records[k]
-        if i in record.edges:
-            return
         ray = record.figure.rays[i]
         walk = follow(ray.sample, ray.direction, passive=ray.active)
         points = np.vstack([record.point.q, walk.points])
@@ -119,7 +122,7 @@ class EdgeTracer:
             )
 
     def _arrive(self, walk: Walk, ray: Ray) -> tuple[EdgeEnd | None, Relabelling]:
-        """Return the end of the edge at the corner a walk came to."""
+        """Return the end of the edge at the corner where a walk ended."""
         found = self.corner(walk.last)
         if found is None:
             return None, {}
@@ -241,7 +244,7 @@ class EdgeTracer:
         return int(fixed.shape[1]) - len(point.basis(active))
 
     def _on_curve(self, point: EvaluatedPoint, active: frozenset[int]) -> bool:
-        """Whether functions that depend on each other vanish together on a curve."""
+        """Whether dependent functions vanish together on a curve, not at a point."""
         kept = point.basis(active)
         if len(kept) == len(active):
             return True

@@ -1,12 +1,12 @@
-"""The edges that leave a corner, and the two-dimensional sectors between them.
+"""Vertex figures: the edges at a corner and the two-dimensional sectors between them.
 
 At a regular corner, where the active gradients have full rank in the quotient by the symmetry,
 edges leave along lines on which all but one dimension of the gradients vanishes: the extreme rays
 of the tangent cone where the polyhedron is locally an intersection, lines of the arrangement
 that stay in the set where it is a union.  At a singular corner, where the rank falls short and
 second-order terms alone make the point isolated, breaking one contact leaves the null directions
-of the others.  Every candidate is put to the test: a point a little way along it must lie in the
-polyhedron, and what vanishes there is the edge's active set.
+of the others.  Every candidate is tested: a point a little way along it must lie in the polyhedron,
+and the functions that vanish there are the edge's active set.
 """
 
 import math
@@ -57,7 +57,7 @@ class Sector:
 
 @dataclass(frozen=True)
 class VertexFigure:
-    """What leaves a corner.
+    """The rays and sectors at a corner.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def _regular(point: EvaluatedPoint, rows: list[int], slopes: Array) -> Iterator[
 
 
 def _active_along(point: EvaluatedPoint, rows: list[int], rates: Array) -> frozenset[int] | None:
-    """Return what stays active along a direction; None where it leaves the polyhedron."""
+    """Return the functions active along a direction; None where it leaves the polyhedron."""
     away = point.distances[: point.quotient.count].copy()
     away[rows] = np.where(abs(rates) > FLAT, rates, 0.0)
     pieces = point.quotient.polyhedron.signs_to_pieces(np.sign(away).astype(int).tolist())
@@ -166,7 +166,7 @@ def _rank_of(rows: list[int], slopes: Array, some: frozenset[int]) -> int:
 def _singular(
     point: EvaluatedPoint, rows: list[int], slopes: Array, notes: list[str]
 ) -> Iterator[Candidate]:
-    """Break one contact and yield the null directions of the others, by second order if need be.
+    """Yield the null directions that breaking one contact leaves, to second order if need be.
 
     Where the others still have a null plane and one relation ``sum w_i a_i = 0``, their common
     zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
@@ -205,7 +205,7 @@ def _curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Ar
     frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
     hessians = polyhedron.hessians(point.q)[rows] * np.outer(scales, scales)
     sizes = np.linalg.norm(point.gradients[rows], axis=1)
-    sizes[sizes == 0] = 1.0  # a gradient that vanishes is a relation by itself
+    sizes[sizes == 0] = 1.0  # a vanishing gradient is a relation by itself
     return np.asarray(frame.T @ np.einsum("i,ijk->jk", weights / sizes, hessians) @ frame)
 
 
@@ -275,7 +275,7 @@ def _sectors(
 ) -> tuple[Sector, ...]:
     """Return the sectors between rays that lie in a common two-dimensional flat."""
     n = slopes.shape[1]
-    # Some of independent rows are independent: no rank is computed for the many pairs of rays.
+    # Subsets of independent rows are independent: no rank is needed for the many pairs of rays.
     independent = rank(slopes, RANK_TOLERANCE) == len(slopes)
     flats: dict[frozenset[int], set[int]] = {}
     zero = [frozenset(np.flatnonzero(abs(slopes @ y) <= FLAT).tolist()) for y in rays]

@@ -1,9 +1,9 @@
-"""Motion on the set where some functions of a polyhedron stay zero.
+"""Walks on the set where some functions of a polyhedron stay zero.
 
-A step goes along the tangent and returns to the set; the tangent is carried along, so a walk on
-an edge follows it and a walk on a larger face goes straight ahead.  Functions that are not held
-are watched by their values *and* their slopes: a contact that closes and opens again between two
-points, or just touches, is not missed.
+A step goes along the tangent and is projected back to the set; the tangent is transported along,
+so a walk on an edge follows it and a walk on a larger face goes straight ahead.  Functions that are
+not held are monitored by their values *and* their slopes, so that a contact that closes and opens
+again between two points, or just touches, is not missed.
 """
 
 import math
@@ -16,19 +16,22 @@ from polycorner.skeletons.points import HeldPoint, projected
 from polycorner.skeletons.sign_changes import dips, sign_change
 from polycorner.spaces.manifold import Array
 
+# Steps in scale units.
 FIRST_STEP = 0.2
 LONGEST_STEP = 0.5
 SHORTEST_STEP = 1e-7
+# Largest turn of the tangent in a step, in radians, and the deviation allowed besides that turn,
+# relative to the step.
 TURN = 0.25
 STRAY = 0.01
-# Step below which a change of orientation is taken for a crossing of curves, not for a jump.
+# Step below which a change of orientation means that curves cross, not that the walk jumped.
 FLIP = 1e-3
-# Passive functions may drift this far, in scale units, before a walk has lost its curve.
+# Distance in scale units from zero at which a passive function shows that the curve is lost.
 DRIFT = 1e-6
 
 
 class End(Enum):
-    """How a walk ends; the value says it in a sentence."""
+    """End of a walk; the value is the predicate of a sentence."""
 
     CORNER = "a corner"
     CLOSED = "closes upon itself without a corner"
@@ -44,17 +47,17 @@ class Walk:
     Attributes
     ----------
     points : (k, n) array
-        Where it went, in coordinates that are not wrapped.
+        Its points, in coordinates that are not wrapped.
     last : HeldPoint
-        At its end.
+        Its end.
     tangent : (n,) array
         Scaled unit direction of arrival.
     end : End
-        Why it stopped.
+        Reason for the end.
     length : float
         In scale units.
     branches : int
-        How often other curves on the same functions were crossed.
+        Number of crossings with other curves of the same functions.
     """
 
     points: Array
@@ -78,15 +81,15 @@ def follow(
     Parameters
     ----------
     start : HeldPoint
-        Where the held functions vanish.
+        A point where the held functions vanish.
     direction : (n,) array
-        Where to go; projected to the tangent space.
+        Initial direction; projected to the tangent space.
     passive : set of int
-        Functions besides ``start.kept`` that vanish all along (dependent on them).
+        Functions besides ``start.kept`` that vanish all along, being dependent on them.
     home : bool
         Whether to stop when the walk comes back to where it started.
     extent : float, optional
-        Length after which to give up; default that of the quotient.
+        Length after which the walk ends; default that of the quotient.
     """
     return _Follower(start, direction, passive, home=home, extent=extent).run()
 
@@ -119,7 +122,7 @@ class _Follower:
         self.side = start.orientation(self.t)
 
     def run(self) -> Walk:
-        """Step until something happens."""
+        """Step to the first event."""
         h = FIRST_STEP
         while True:
             taken = self._step(h)
@@ -142,9 +145,9 @@ class _Follower:
             h = min(1.6 * h, self._longest())
 
     def _longest(self) -> float:
-        """Return how long a step may be: longer far out, where nothing is near.
+        """Return the longest step: longer far out, where no other function is near.
 
-        On circles a step stays a small part of the way around.
+        On circles a step is a small part of the circumference.
         """
         away = abs(self.point.distances[self.watched])
         room = float(away.min(initial=self.extent))
@@ -166,7 +169,7 @@ class _Follower:
         self.points.append(point.q)
 
     def _step(self, h: float) -> tuple[HeldPoint, Array, float] | End:
-        """Return the next point, the tangent there and the step that worked."""
+        """Return the next point, the tangent there and the step that was accepted."""
         blocked = False
         while h > SHORTEST_STEP:
             ahead = self.point.q + h * self.scales * self.t
@@ -177,7 +180,7 @@ class _Follower:
                 t = point.tangent(self.t)
                 turn = math.acos(min(1.0, float(t @ self.t)))
                 off = (point.q - self.point.q) / self.scales - h * self.t
-                # Farther off than the turn explains: another curve of the same functions.
+                # A larger deviation than the turn explains: another curve of the same functions.
                 strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + STRAY)
                 flipped = point.orientation(t) * self.side < 0 and h > FLIP
                 if turn < TURN and not strayed and not flipped:
@@ -214,7 +217,7 @@ class _Follower:
         return None
 
     def _matters(self, where: HeldPoint) -> bool:
-        """Whether the face changes here, and not only functions that are beside the point."""
+        """Whether the face changes here: in a union a zero may be irrelevant."""
         if not self.union:
             return True
         active = where.active()
@@ -315,7 +318,7 @@ class _Follower:
         return (nearest, nearest.tangent(self.t)) if same else None
 
     def _from_home(self, q: Array) -> Array:
-        """Return the way from the start's orbit, by the invariants."""
+        """Return the displacement from the start's orbit, by the invariants."""
         manifold, invariants = self.quotient.polyhedron.manifold, self.quotient.symmetry.invariants
         if invariants is None:
             return manifold.difference(q, self.start.q) / self.scales

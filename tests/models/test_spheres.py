@@ -8,7 +8,6 @@ from functools import lru_cache
 import networkx as nx
 import numpy as np
 import pytest
-from atlas_shapes import counts
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles_spheres import (
@@ -23,6 +22,7 @@ from oracles_spheres import (
     stress_and_flex,
     without_one_contact,
 )
+from skeleton_shapes import counts
 
 from polycorner import Symmetry, skeleton
 from polycorner.models.spheres import SphereCluster

@@ -1,4 +1,4 @@
-"""Which face a point lies on: rank, dimension, type, and what they do not depend on."""
+"""Strata: rank, dimension, type, and what they do not depend on."""
 
 import itertools
 import math

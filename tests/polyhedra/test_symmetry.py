@@ -1,4 +1,4 @@
-"""Quotients: atlases modulo motions and relabellings against atlases of the whole."""
+"""Quotients: skeletons modulo motions and relabellings against skeletons of the whole."""
 
 import itertools
 import math
@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from atlas_shapes import counts, half_spaces, isomorphic, polytope, space
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles_atlas import orbit_counts
+from oracles_skeletons import orbit_counts
+from skeleton_shapes import counts, half_spaces, isomorphic, polytope, space
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, Symmetry, skeleton
 from polycorner.polyhedra import Element

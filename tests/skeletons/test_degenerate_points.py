@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import counts, polytope
 from linear_algebra import Disturbed
+from skeleton_shapes import counts, polytope
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, skeleton
 from polycorner.formulas.functions import Family

@@ -1,4 +1,4 @@
-"""Atlases of polytopes against exhaustion in the fractions; what every atlas keeps to."""
+"""Skeletons of polytopes against exhaustion in the fractions; what every skeleton keeps to."""
 
 import itertools
 import math
@@ -7,7 +7,11 @@ from collections import Counter
 import networkx as nx
 import numpy as np
 import pytest
-from atlas_shapes import (
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles_skeletons import exact_polytope
+from scipy.spatial import HalfspaceIntersection
+from skeleton_shapes import (
     ball,
     check_incidence,
     counts,
@@ -17,10 +21,6 @@ from atlas_shapes import (
     polytope,
     space,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from oracles_atlas import exact_polytope
-from scipy.spatial import HalfspaceIntersection
 
 from polycorner import AllOf, Manifold, Polyhedron, skeleton
 from polycorner.polyhedra import LocalType
@@ -64,7 +64,7 @@ def integer_polytopes(draw, n, rows):
 
 
 def agrees(atlas, rows, limits):
-    """Assert that an atlas is that of ``{q : rows q <= limits}``, from the exact one."""
+    """Assert that a skeleton is that of ``{q : rows q <= limits}``, from the exact one."""
     exact = exact_polytope(rows, limits)
     n = len(rows[0])
     D = atlas.polyhedron
@@ -288,7 +288,7 @@ class TestAnswer:
 class TestDeterminism:
     @given(integer_polytopes(3, 4), st.integers(0, 10**6))
     @fewest
-    def test_the_same_seed_gives_the_same_atlas_to_the_last_bit(self, shape, seed):
+    def test_the_same_seed_gives_the_same_skeleton_to_the_last_bit(self, shape, seed):
         D, starts = polytope(*shape), [[0.01, 0.02, 0.0]]
         one, other = (skeleton(D, starts, rng=seed) for _ in range(2))
         assert identical(one, other)
@@ -300,7 +300,7 @@ class TestDeterminism:
 
     @given(integer_polytopes(3, 4), st.lists(st.integers(0, 10**6), min_size=2, max_size=2))
     @fewest
-    def test_different_seeds_and_starts_give_isomorphic_atlases(self, shape, seeds):
+    def test_different_seeds_and_starts_give_isomorphic_skeletons(self, shape, seeds):
         D = polytope(*shape)
         one = skeleton(D, [[0.01, 0.02, 0.0]], rng=seeds[0])
         other = skeleton(D, [[-0.1, 0.02, 0.1], [0.2, 0.1, 0.0]], rng=seeds[1])

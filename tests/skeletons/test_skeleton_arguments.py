@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from atlas_shapes import counts, half_spaces, isomorphic, polytope, space
+from skeleton_shapes import counts, half_spaces, isomorphic, polytope, space
 
 from polycorner import AllOf, Polyhedron, Symmetry, skeleton
 from polycorner.skeletons import Budget, resume, traced

@@ -1,14 +1,14 @@
-"""Atlases of curved regions against closed forms: arcs, closed edges, tangential contacts."""
+"""Skeletons of curved regions against closed forms: arcs, closed edges, tangential contacts."""
 
 import math
 
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import ball, check_incidence, closed, counts, half_space, space
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles_atlas import arc_length, circle_meetings, inscribed, turned
+from oracles_skeletons import arc_length, circle_meetings, inscribed, turned
+from skeleton_shapes import ball, check_incidence, closed, counts, half_space, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
 from polycorner.polyhedra import LocalType

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import counts, polytope
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from skeleton_shapes import counts, polytope
 
 from polycorner import Manifold, Polyhedron, skeleton
 from polycorner.polyhedra import LocalType
@@ -189,7 +189,7 @@ class TestNearMisses:
 
     @given(st.sampled_from([1e-9, 3e-9]), st.integers(0, 99))
     @few
-    def test_corners_within_the_tolerance_are_one_and_the_atlas_says_so(self, distance, seed):
+    def test_corners_within_the_tolerance_are_one_and_the_skeleton_says_so(self, distance, seed):
         D = polytope([[-1, 0], [0, -1], [-1, -1], [1, 1]], [0, 0, -distance, 2])
         atlas = skeleton(D, [[0.5, 0.4]], rng=seed)
         assert counts(atlas) == (3, 3, 1)

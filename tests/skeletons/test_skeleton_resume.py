@@ -1,12 +1,11 @@
-"""An atlas that ran out of budget or was interrupted goes on to the same end."""
+"""A skeleton that ran out of budget or was interrupted goes on to the same end."""
 
 import numpy as np
 import pytest
-from atlas_shapes import ball, counts, identical, isomorphic, polytope, space
+from skeleton_shapes import ball, counts, identical, isomorphic, polytope, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
-from polycorner.skeletons import Completeness, points
-from polycorner.skeletons.search import resume
+from polycorner.skeletons import Budget, Completeness, points, resume
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols
@@ -28,7 +27,7 @@ class Interrupter:
 
 
 def interrupted_evaluation(monkeypatch, when, *arguments, **options):
-    """Return an atlas that was interrupted in the middle of a given evaluation, and the count."""
+    """Return a skeleton that was interrupted in the middle of a given evaluation, and the count."""
     alarm, evaluated = Interrupter(when), points.evaluated
 
     def wrapped(polyhedron, q):
@@ -50,7 +49,7 @@ def whole():
 
 class TestResume:
     @pytest.mark.parametrize("budget", [1, 2, 5, 8, 11])
-    def test_an_atlas_that_ran_out_of_budget_goes_on_to_the_same_end(self, whole, budget):
+    def test_a_skeleton_that_ran_out_of_budget_goes_on_to_the_same_end(self, whole, budget):
         part = skeleton(CUBE, START, budget=budget)
         assert part.complete is Completeness.BUDGET
         assert len(part.edges) == budget
@@ -67,13 +66,13 @@ class TestResume:
             assert len(atlas.edges) == count
         assert identical(resume(atlas), whole)
 
-    def test_an_atlas_may_be_taken_up_twice(self, whole):
+    def test_a_skeleton_may_be_taken_up_twice(self, whole):
         part = skeleton(CUBE, START, budget=4)
         first, second = resume(part), resume(part)
         assert identical(first, whole)
         assert identical(second, whole)
 
-    def test_a_finished_atlas_stays_as_it_is(self, whole):
+    def test_a_finished_skeleton_stays_as_it_is(self, whole):
         assert identical(resume(whole), whole)
 
     @pytest.mark.parametrize("when", [1, 2, 5, 9, 14, 20, 28])
@@ -128,3 +127,37 @@ class TestResume:
 
         with pytest.raises(ZeroDivisionError):
             skeleton(CUBE, START, progress=fail)
+
+
+class TestBudget:
+    """Every phase is bounded; pieces, however small, end as the whole."""
+
+    @staticmethod
+    def finished(part, budget):
+        for _ in range(100):
+            before = part.state
+            part = resume(part, budget=budget)
+            assert len(part.state.tried) <= len(before.tried) + 1
+            assert len(before.starts) - len(part.state.starts) <= 1
+            if part.complete is not Completeness.BUDGET:
+                return part
+        return pytest.fail("a search in pieces comes to no end")
+
+    def test_a_moment_is_enough_for_one_piece_of_work(self, whole):
+        moment = Budget(seconds=1e-9)
+        part = skeleton(CUBE, START, budget=moment)
+        assert part.complete is Completeness.BUDGET
+        assert identical(self.finished(part, moment), whole)
+
+    def test_crossings_are_counted_as_edges_are(self, whole):
+        part = skeleton(CUBE, START, budget=12)
+        assert (len(part.edges), len(part.state.tried)) == (12, 12)
+        assert part.complete is Completeness.BUDGET
+        assert part.euler_note == "the search is not finished"
+        assert identical(self.finished(part, 1), whole)
+
+    def test_starts_that_lead_nowhere_are_counted(self):
+        part = skeleton(TRIANGLE, [[-1, -1]] * 50 + [[0.2, 0.2]], budget=20)
+        assert len(part.state.starts) == 31
+        assert len(part.notes) == 20
+        assert counts(resume(part)) == (3, 3, 1)

@@ -1,12 +1,12 @@
-"""Atlases of curved bodies, on cylinders and tori, and on sections, against closed forms."""
+"""Skeletons of curved bodies, on cylinders and tori, and on sections, against closed forms."""
 
 import math
 
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import ball, check_incidence, closed, counts, space
-from oracles_atlas import arc_length, inscribed
+from oracles_skeletons import arc_length, inscribed
+from skeleton_shapes import ball, check_incidence, closed, counts, space
 
 from polycorner import AllOf, Manifold, Polyhedron, skeleton
 

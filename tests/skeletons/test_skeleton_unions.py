@@ -1,14 +1,14 @@
-"""Atlases of unions against counted cells: concave corners, stairs, holes, boxes that overlap."""
+"""Skeletons of unions against counted cells: concave corners, stairs, holes, boxes that overlap."""
 
 import itertools
 
 import networkx as nx
 import numpy as np
 import pytest
-from atlas_shapes import ball, boxes_union, check_incidence, counts, half_spaces, space
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles_atlas import Cells
+from oracles_skeletons import Cells
+from skeleton_shapes import ball, boxes_union, check_incidence, counts, half_spaces, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
 from polycorner.polyhedra import LocalType

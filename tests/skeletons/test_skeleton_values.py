@@ -6,14 +6,15 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from atlas_shapes import identical
 from elsewhere import called
+from skeleton_shapes import identical
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
 from polycorner.models.spheres import SphereCluster
 from polycorner.skeletons import Completeness, resume, traced
 from polycorner.skeletons.orbits import orbits
 
+PLANE = Manifold.euclidean("x y")
 x, y, z = Manifold.euclidean("x y z").symbols
 BALL = Polyhedron(
     Manifold.euclidean("x y z"),
@@ -82,3 +83,19 @@ def test_fields_are_frozen(found):
     ):
         with pytest.raises(FrozenInstanceError):
             setattr(thing, name, None)
+
+
+def test_every_skeleton_says_its_euler_characteristic_or_why_not(found):
+    x, y = PLANE.symbols
+    wedge = skeleton(Polyhedron(PLANE, {"floor": y, "wall": x}), [[1, 2]], extent=40)
+    crossed = skeleton(Polyhedron(PLANE, {"saddle": x * y, "disc": 1 - x**2 - y**2}), [[0.5, 0.2]])
+    nothing = skeleton(Polyhedron(PLANE, {"floor": y}), [[0, -1]])
+    for one in (found, wedge, crossed, nothing, skeleton(BALL, START, budget=1)):
+        assert "None" not in str(one)
+        assert (one.euler_characteristic is None) == bool(one.euler_note)
+        told = one.euler_note and f"not determined: {one.euler_note}"
+        assert f"Euler characteristic  {told or one.euler_characteristic}" in str(one)
+
+
+def test_a_corner_has_one_name(found):
+    assert all(f"C{k} " in str(found) for k in range(len(found.corners)))

@@ -1,4 +1,4 @@
-"""Quotients by motions: atlases of orbits against atlases of shapes and distances."""
+"""Quotients by motions: skeletons of orbits against skeletons of shapes and distances."""
 
 import itertools
 import math
@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import counts, polytope, space
+from skeleton_shapes import counts, polytope, space
 
 from polycorner import Manifold, Polyhedron, Symmetry, skeleton
 from polycorner.polyhedra import Element

@@ -1,4 +1,4 @@
-"""What leaves a corner: rays and sectors at regular, degenerate, singular and concave corners."""
+"""Vertex figures: rays and sectors at regular, degenerate, singular and concave corners."""
 
 import itertools
 import math
@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import ball, boxes_union, half_spaces, polytope, space
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles_atlas import Cells
+from oracles_skeletons import Cells
+from skeleton_shapes import ball, boxes_union, half_spaces, polytope, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry
 from polycorner.skeletons.points import Quotient

@@ -1,14 +1,14 @@
-"""Walks: they stay on their curve, end at the first event, and say how they end."""
+"""Walks: they stay on their curve and end at the first event."""
 
 import math
 
 import numpy as np
 import pytest
 import sympy as sp
-from atlas_shapes import ball, half_space, space
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from oracles_atlas import arc_length, turned
+from oracles_skeletons import arc_length, turned
+from skeleton_shapes import ball, half_space, space
 from strategies import directions
 
 from polycorner import AllOf, Manifold, Polyhedron, SmoothFunction, Symmetry

@@ -1,4 +1,4 @@
-"""Shapes with many atlases, compiled once per kind, and what any two atlases are compared by."""
+"""Shapes with many skeletons, compiled once per kind, and invariants that compare skeletons."""
 
 import itertools
 from collections import Counter
@@ -81,11 +81,11 @@ def boxes_union(boxes):
     return Polyhedron(space(n), AnyOf(*parts))
 
 
-# --------------------------------------------------------------------------------- atlases as such
+# --------------------------------------------------------------------------------- skeletons
 
 
 def isomorphic(one, other):
-    """Whether two atlases agree up to the order of what is in them."""
+    """Whether two skeletons agree up to the order of what is in them."""
     same = (
         [len(one.corners), len(one.edges), len(one.faces)],
         Counter((e.active, frozenset(e.kinds)) for e in one.edges),
@@ -110,7 +110,7 @@ def _sizes(face):
 
 
 def identical(one, other):
-    """Whether two atlases agree in everything, polylines to the last bit."""
+    """Whether two skeletons agree in everything, polylines to the last bit."""
     return (
         [(c.point.tobytes(), c.active, c.singular, c.edges) for c in one.corners]
         == [(c.point.tobytes(), c.active, c.singular, c.edges) for c in other.corners]
@@ -133,7 +133,7 @@ def closed(atlas):
 
 
 def check_incidence(atlas):
-    """Assert what holds in every atlas, whatever the polyhedron is."""
+    """Assert what holds in every skeleton, whatever the polyhedron is."""
     D, M = atlas.polyhedron, atlas.polyhedron.manifold
     ends = Counter()
     for k, edge in enumerate(atlas.edges):
