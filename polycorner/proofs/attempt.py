@@ -1,4 +1,4 @@
-"""One attempt at a proof: the right face of a certificate's point, enclosed precisely enough."""
+"""Attempts at a proof: enclosures of the KKT points of the faces of a certificate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 BITS_PER_DIGIT = 3.3220
 GUARD_BITS = 64
-NEARBY = 1e-3  # scale units that the exact solution may lie away from a certificate's point
-LEAST_SIZE = 1e-10  # units below which digits are counted from the unit, not from the number
+NEARBY = 1e-3  # distance of the exact solution from a certificate's point, in scale units
+LEAST_SIZE = 1e-10  # size in units below which digits are relative to the unit
 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """How far the proof of one face came.
+    """Claim and enclosure for one face.
 
     Attributes
     ----------
     face : tuple of int
         The active functions.
     posed : Posed or Undecided
-        The claim that they hold a minimum, or why it could not be posed.
+        The claim that the face carries a minimum, or why it could not be posed.
     enclosure : Enclosure or Undecided
         Its KKT point enclosed, or why not.
     bits : int
-        Binary digits that were computed with.
+        Working precision in binary digits.
     """
 
     face: tuple[int, ...]
@@ -49,8 +49,8 @@ def attempt(
 ) -> Attempt:
     """Enclose the KKT point of a face that carries the energy.
 
-    Where gradients are dependent there may be several such faces: the first is taken at whose
-    point every other function has a sign, if there is one.
+    With dependent gradients there may be several such faces; preferred is the first at whose point
+    the signs of all other functions are decided.
     """
     first: Attempt | None = None
     for face in faces(certificate):
@@ -70,10 +70,10 @@ def _on_face(
     formulas: Formulas,
     digits: int,
 ) -> tuple[Attempt, bool]:
-    """Enclose the KKT point of a face; return also whether all other signs are decided there.
+    """Enclose the KKT point of a face; return also whether all other signs are decided.
 
-    Functions that are active within the certificate's tolerance but turn out to be violated there
-    join the face, and it is tried again.
+    Functions that are active within the certificate's tolerance but violated at the KKT point join
+    the face for another attempt.
     """
     active = certificate.analysis.active
     while True:
@@ -94,14 +94,14 @@ def _on_face(
 
 
 def bits_for(digits: int) -> int:
-    """Return how many binary digits are computed with for so many decimal ones."""
+    """Return the working precision in binary digits for a number of decimal digits."""
     return ceil(digits * BITS_PER_DIGIT) + GUARD_BITS
 
 
 def _enclosed(
     certificate: Certificate, posed: Posed, digits: int
 ) -> tuple[Enclosure | Undecided, int]:
-    """Enclose the solution, with more precision where the first does not suffice."""
+    """Enclose the solution, with a higher precision if the first is not sufficient."""
     system = posed.claim.system
     bits = bits_for(digits)
     for last in (False, True):
@@ -129,7 +129,7 @@ def _distance(certificate: Certificate, z: "list[Ball]") -> float:
 
 
 def _sharp(enclosure: Enclosure, digits: int) -> bool:
-    """Whether every unknown is known to so many digits, relative to itself or to its unit."""
+    """Whether every unknown is enclosed to ``digits`` digits, relative to itself or its unit."""
     units = enclosure.predictor.system.units
     small = ball(10) ** -digits
     return all(
@@ -139,7 +139,7 @@ def _sharp(enclosure: Enclosure, digits: int) -> bool:
 
 
 def _explained(certificate: Certificate, undecided: Undecided) -> Undecided:
-    """Add what the certificate knows about why the equations may be singular."""
+    """Add hints from the certificate at why the equations may be singular."""
     hints = []
     if not certificate.licq:
         hints.append("the gradients of the active functions are nearly dependent")

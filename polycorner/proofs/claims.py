@@ -32,7 +32,7 @@ DEPENDENT = 1e-6  # sine of the angle up to which a field depends on the others
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A claim, unknowns to start from, and declared fields that are no symmetries.
+    """A claim, approximate unknowns, and the result for declared fields that are no symmetries.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Posed:
 
 
 def faces(certificate: Certificate) -> Iterator[tuple[int, ...]]:
-    """Return sets of active functions that may carry the energy, the likeliest first.
+    """Return sets of active functions that may carry the energy's gradient, likeliest first.
 
     Where gradients are independent there is one: the functions whose multipliers are not zero.
     Where they are dependent, every independent set with positive multipliers is one, and the

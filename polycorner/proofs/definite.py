@@ -1,4 +1,4 @@
-"""Whether a form is positive definite on a tangent space, for all matrices in an enclosure."""
+"""Positive definiteness of a form on a tangent space, for all matrices in an enclosure."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
@@ -15,7 +15,7 @@ Rows: TypeAlias = "Sequence[Sequence[Ball]]"
 
 
 def tangent_form(curvature: Rows, rows: Rows, scales: Sequence[float]) -> "list[list[Ball]] | None":
-    """Return a symmetric form restricted to what ``rows`` annihilate, nearly diagonal.
+    """Return a symmetric form restricted to the null space of ``rows``, nearly diagonal.
 
     In scaled coordinates, with ``C`` the rows and ``Z``, ``R`` floating-point approximations of an
     orthonormal basis of their null space and of their pseudoinverse, the columns of

@@ -148,7 +148,7 @@ def _symmetric(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     if _regular(sections):
         reason = f"energy and active functions are constant along {listed}, across the section"
         return _proved(reason)
-    return _undecided(f"{listed} may touch the section chosen across it")
+    return _undecided(f"{listed} may be tangent to the section chosen across it")
 
 
 def _regular(rows: "list[list[Ball | Undecided]]") -> bool:
@@ -199,7 +199,7 @@ def _inactive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
 
 
 def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":
-    """Return the two halves of a box, cut across its widest side."""
+    """Return the two halves of a box, divided across its widest side."""
     widest = max(range(len(reach)), key=lambda a: float(reach[a].rad()))
     side = reach[widest]
     for end in (side.lower(), side.upper()):
@@ -209,7 +209,7 @@ def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":
 def _membership(
     d: Polyhedron, active: tuple[int, ...], others: "Sequence[int]", values: "Sequence[Ball]"
 ) -> ConditionResult:
-    """Decide whether the set near the solution is exactly where the active functions hold."""
+    """Decide whether the active functions alone describe the set near the solution."""
     signs: list[int | None] = [0] * len(d.functions)
     for i, value in zip(others, values, strict=True):
         signs[i] = 1 if value > 0 else -1 if value < 0 else None
@@ -229,7 +229,7 @@ def _membership(
         reason = f"{name} lies in {shown(value)}"
         if d.is_union:
             held = ", ".join(d.names[i] for i in active) or "nothing"
-            reason = f"the tree asks there for more, or less, than {held} alone: {reason}"
+            reason = f"the tree requires more, or less, than {held} alone there: {reason}"
         return _failed(reason)
     if not listed:
         return _proved("every inequality is active")

@@ -1,4 +1,4 @@
-"""The KKT equations of a face as a square system of equations, and Newton's method for them.
+"""KKT equations of a face as a square system in balls, and Newton's method for them.
 
 Unknowns are ``z = (q, lam, nu)``: the point, the multipliers of the active functions and
 equations, and one multiplier for every gauge.  The equations are
@@ -29,14 +29,14 @@ from polycorner.intervals.tapes import Box
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
-FIRST_BITS = 128  # where Newton's method starts; the precision then doubles
+FIRST_BITS = 128  # precision at which Newton's method starts; it then doubles
 MOST_STEPS = 25
 SUBJECT = "the KKT equations"
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The equations and their derivatives on a box; everything encloses.
+    """Enclosures of the equations and their derivatives on a box.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Linear:
     curvature : list of list of Ball
         The Lagrangian's Hessian, ``[n][n]``.
     forms : SmoothForms
-        Active functions, equations and energy as they are on the box.
+        Active functions, equations and energy, smooth on the box.
     """
 
     residual: "list[Ball]"
@@ -78,8 +78,8 @@ class System:
     anchor : tuple of float
         The point ``q0``.
     units : tuple of float
-        What counts as a unit of each unknown: the scales of the coordinates, then multipliers
-        with which a function pulls as strongly as the energy does.
+        Unit of each unknown: the scales of the coordinates, then the multipliers with which the
+        gradient of a function is as large as that of the energy.
     """
 
     formulas: Formulas
@@ -108,7 +108,7 @@ class System:
         return self.linear(z, Box([*z[: self.dimension], *p]))
 
     def linear(self, z: "Sequence[Ball]", box: Box) -> Linear | Undecided:
-        """Return the same for a point and parameters that lie in ``box`` together."""
+        """Return the same for a point and parameters that are enclosed jointly by ``box``."""
         n, k = self.dimension, len(self.held)
         forms = self._smooth(box)
         if isinstance(forms, Undecided):
@@ -143,10 +143,10 @@ class System:
     def bend(
         self, z: "Sequence[Ball]", tangents: "Sequence[Sequence[Ball]]", box: Box
     ) -> "list[Ball] | Undecided":
-        """Return how far the equations bend away from their tangents along a predictor.
+        """Return the second-order remainder of the equations along a predictor.
 
-        On the predictor, which ``z`` and ``box`` enclose, unknowns have the constant slopes
-        ``tangents`` along ``delta``.  The result encloses ``1/2 sum_ab d_a d_b F delta_a delta_b``.
+        On the predictor, enclosed by ``z`` and ``box``, the unknowns have constant derivatives
+        ``tangents`` by ``delta``.  The result encloses ``1/2 sum_ab d_a d_b F delta_a delta_b``.
         """
         n, k, count = self.dimension, len(self.held), len(box.reach)
         forms = self._smooth(box)
@@ -176,7 +176,7 @@ def _combined(weights: "Sequence[Ball]", rows: "Sequence[Sequence[Ball]]") -> "l
 
 
 def _pairs(reach: "Sequence[Ball]") -> "Iterator[tuple[int, int, Ball]]":
-    """Return pairs ``a <= b`` and what ``d_a d_b`` is multiplied by in half a quadratic form."""
+    """Return pairs ``a <= b`` with the factor of ``d_a d_b`` in half a quadratic form."""
     for a, b in combinations_with_replacement(range(len(reach)), 2):
         yield a, b, square(reach[a]) / 2 if a == b else reach[a] * reach[b]
 
@@ -202,7 +202,7 @@ def newton(
 def _settled(
     system: System, z: "Sequence[Ball]", p: "Sequence[Ball]", small: "Ball", steps: int
 ) -> "list[Ball] | Undecided":
-    """Take Newton steps until one is relatively small, and one more."""
+    """Take Newton steps until one is relatively small, then one more."""
     last = False
     for _ in range(steps):
         linear = system.at(z, p)

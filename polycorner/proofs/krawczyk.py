@@ -1,4 +1,4 @@
-"""Krawczyk's test: boxes in which the KKT equations have exactly one solution.
+"""Krawczyk's test for boxes in which the KKT equations have exactly one solution.
 
 Without parameters, ``Y`` being near the inverse of the Jacobian at ``z0`` and ``J`` enclosing the
 Jacobian over ``z0 + W``,
@@ -8,7 +8,7 @@ Jacobian over ``z0 + W``,
 inside the interior of ``W`` proves that there is exactly one solution in ``z0 + W``, that it lies
 in ``z0 + K``, and that every matrix in ``J`` is regular ([Krawczyk], [Neumaier] sec. 5.1, [Rump]).
 
-With parameters ``p = p0 + delta`` the same is said of the remainder ``w`` beside a predictor
+With parameters ``p = p0 + delta`` the same holds for the remainder ``w`` added to a predictor
 ``z0 + Z1 delta``.  There ``F(z0)`` becomes ``F`` along the predictor: its Taylor polynomial of
 first order at ``delta = 0`` and its second derivatives over the cell.
 
@@ -40,9 +40,9 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball, Matrix
 
 MOST_INFLATIONS = 6
-SLACK_BITS = 16  # a room is never smaller than its unit's last digits but so many
-GROWTH = 1.3  # of a room, over the image it has to contain
-WIDEST = 10  # units at which a room is given up
+SLACK_BITS = 16  # last binary digits of a unit that a candidate box covers at least
+GROWTH = 1.3  # ratio of a candidate box to the image it has to contain
+WIDEST = 10  # size in units from which on a candidate box is given up
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +75,19 @@ class Predictor:
     tangents: "list[list[Ball]]"
 
     def unknowns(self, remainder: "Sequence[Ball]") -> "list[Ball]":
-        """Return enclosures of all unknowns over the cell, given the remainder beside them."""
+        """Return enclosures of all unknowns over the cell, for a remainder."""
         around = [a + b for a, b in zip(self.centre, remainder, strict=True)]
         if not self.tangents:
             return around
         return [a + dot(t, self.cell.reach) for a, t in zip(around, self.tangents, strict=True)]
 
     def box(self, remainder: "Sequence[Ball]") -> Box:
-        """Return where the point and the parameters lie together."""
+        """Return a joint enclosure of the point and the parameters."""
         n, cell = self.system.dimension, self.cell
         around = [a + b for a, b in zip(self.centre[:n], remainder[:n], strict=True)]
         if not self.tangents:
             return Box(around)
-        own = entries_of_identity(len(cell.reach))
+        own = unit_rows(len(cell.reach))
         return Box.moving([*around, *cell.middle], [*self.tangents[:n], *own], cell.reach)
 
     def part(self, reach: "Sequence[Ball]") -> "Predictor":
@@ -99,7 +99,7 @@ class Predictor:
         return Predictor(self.system, cell, centre, self.tangents)
 
 
-def entries_of_identity(size: int) -> "list[list[Ball]]":
+def unit_rows(size: int) -> "list[list[Ball]]":
     """Return the rows of the unit matrix."""
     rows: list[list[Ball]] = identity(size).tolist()
     return rows
@@ -112,21 +112,21 @@ class Enclosure:
     Attributes
     ----------
     predictor : Predictor
-        What the box is taken around.
-    room : list of Ball
-        ``W``: within which the solution's remainder is the only one.
+        The centre of the box, as a function of the parameters.
+    candidate : list of Ball
+        ``W``, in which the remainder of the solution is unique.
     remainder : list of Ball
-        ``K``: where it lies, in the interior of ``W``.
-    inner : Matrix
+        ``K``, which contains it, in the interior of ``W``.
+    preconditioner : Matrix
         ``Y``.
     start, linear : Linear
         The equations and their derivatives at the centre, and over the whole box.
     """
 
     predictor: Predictor
-    room: "list[Ball]"
+    candidate: "list[Ball]"
     remainder: "list[Ball]"
-    inner: "Matrix"
+    preconditioner: "Matrix"
     start: Linear
     linear: Linear
 
@@ -137,7 +137,7 @@ class Enclosure:
 
     def neighbourhood(self, part: "Sequence[Ball]" = ()) -> Box:
         """Return a neighbourhood of the solution, for ``delta`` in a part of the cell."""
-        return (self.predictor.part(part) if part else self.predictor).box(self.room)
+        return (self.predictor.part(part) if part else self.predictor).box(self.candidate)
 
 
 def enclose(
@@ -145,45 +145,47 @@ def enclose(
 ) -> Enclosure | Undecided:
     """Prove that the equations have exactly one solution in a box about ``centre``.
 
-    The room starts a little larger than ``Y F`` and grows until the image lies inside; the caller
-    computes with ``bits`` binary digits.
+    The candidate box starts slightly larger than ``Y F`` and grows until it contains the image.
+    The working precision is ``bits`` binary digits, set by the caller.
     """
     cell = cell or Cell()
     start = system.at(centre, cell.middle)
     if isinstance(start, Undecided):
         return start
-    inner = middle_inverse(start.jacobian)
-    if inner is None:
+    preconditioner = middle_inverse(start.jacobian)
+    if preconditioner is None:
         return Undecided(SUBJECT, "their Jacobian is singular")
-    tangents = (-(inner * matrix(start.drift))).mid().tolist() if cell.reach else []
+    tangents = (-(preconditioner * matrix(start.drift))).mid().tolist() if cell.reach else []
     predictor = Predictor(system, cell, centre, tangents)
-    base = _base(predictor, start, inner)
+    base = _base(predictor, start, preconditioner)
     if isinstance(base, Undecided):
         return base
     least = [unit * ball(2) ** (SLACK_BITS - bits) for unit in system.units]
     image = entries(base)
     for _ in range(MOST_INFLATIONS):
         grown = zip(image, least, strict=True)
-        room = [ball(0, (GROWTH * x.abs_upper() + small).upper()) for x, small in grown]
-        if not all(w.rad() < WIDEST * unit for w, unit in zip(room, system.units, strict=True)):
+        candidate = [ball(0, (GROWTH * x.abs_upper() + small).upper()) for x, small in grown]
+        if not all(
+            w.rad() < WIDEST * unit for w, unit in zip(candidate, system.units, strict=True)
+        ):
             break
-        linear = system.linear(predictor.unknowns(room), predictor.box(room))
+        linear = system.linear(predictor.unknowns(candidate), predictor.box(candidate))
         if isinstance(linear, Undecided):
             return linear
-        image = entries(base + _defect(linear, inner) * column(room))
-        if all(w.contains_interior(x) for w, x in zip(room, image, strict=True)):
-            return Enclosure(predictor, room, image, inner, start, linear)
+        image = entries(base + _defect(linear, preconditioner) * column(candidate))
+        if all(w.contains_interior(x) for w, x in zip(candidate, image, strict=True)):
+            return Enclosure(predictor, candidate, image, preconditioner, start, linear)
     return Undecided(
         SUBJECT, "Krawczyk's operator does not map the box into itself: it is too wide"
     )
 
 
-def _defect(linear: Linear, inner: "Matrix") -> "Matrix":
+def _defect(linear: Linear, preconditioner: "Matrix") -> "Matrix":
     """Return ``I - Y J``."""
-    return identity(inner.nrows()) - inner * matrix(linear.jacobian)
+    return identity(preconditioner.nrows()) - preconditioner * matrix(linear.jacobian)
 
 
-def _base(predictor: Predictor, start: Linear, inner: "Matrix") -> "Matrix | Undecided":
+def _base(predictor: Predictor, start: Linear, preconditioner: "Matrix") -> "Matrix | Undecided":
     """Return ``-Y F`` along the predictor."""
     system, tangents = predictor.system, predictor.tangents
     value = column(start.residual)
@@ -194,24 +196,24 @@ def _base(predictor: Predictor, start: Linear, inner: "Matrix") -> "Matrix | Und
             return bend
         drift = matrix(start.jacobian) * matrix(tangents) + matrix(start.drift)
         value = value + drift * column(predictor.cell.reach) + column(bend)
-    return -(inner * value)
+    return -(preconditioner * value)
 
 
 def widened(enclosure: Enclosure, attempts: int = 12) -> "list[Ball]":
-    """Return the widest room tried, without parameters, in which the solution is the only one.
+    """Return the widest box tried, without parameters, in which the solution is unique.
 
     If ``|I - Y J| w < w`` over the box of radii ``w``, no matrix in ``J`` is singular, and two
     solutions in the box would contradict the mean value theorem ([Neumaier] sec. 5.1).
     """
     predictor = enclosure.predictor
     for power in range(1, attempts + 1):
-        room = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
-        linear = predictor.system.linear(predictor.unknowns(room), predictor.box(room))
+        candidate = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
+        linear = predictor.system.linear(predictor.unknowns(candidate), predictor.box(candidate))
         if isinstance(linear, Undecided):
             continue
-        image = entries(_defect(linear, enclosure.inner) * column(room))
-        alone = all(x.abs_upper() < w.abs_upper() for w, x in zip(room, image, strict=True))
-        inside = zip(room, enclosure.remainder, strict=True)
+        image = entries(_defect(linear, enclosure.preconditioner) * column(candidate))
+        alone = all(x.abs_upper() < w.abs_upper() for w, x in zip(candidate, image, strict=True))
+        inside = zip(candidate, enclosure.remainder, strict=True)
         if alone and all(w.contains(x) for w, x in inside):
-            return room
-    return enclosure.room
+            return candidate
+    return enclosure.candidate

@@ -74,7 +74,7 @@ class ParameterCell:
 
 @dataclass(frozen=True, eq=False)
 class _Waiting:
-    """A cell to be tried, and a solution to start from at given parameters."""
+    """A cell in the queue, with a solution for given parameters to start from."""
 
     sides: tuple[Interval, ...]
     start: "list[Ball]"
@@ -90,7 +90,7 @@ def cover(
     max_cells: int,
     progress: Progress = silent,
 ) -> tuple[ParameterCell, ...]:
-    """Cut a box of parameters into cells until each is decided or ``max_cells`` are reached.
+    """Divide a box of parameters into cells until all are decided or ``max_cells`` are reached.
 
     Parameters
     ----------

@@ -119,8 +119,8 @@ def test_the_widest_box_holds_one_of_two_solutions(a, side):
     assert lower <= side * root <= upper
     assert upper - lower < Fraction(1, 10**25)
     with precision(64):
-        (room,) = widened(found)
-    centre, reach = exact(found.predictor.centre[0].mid()), exact(room.rad())
+        (candidate,) = widened(found)
+    centre, reach = exact(found.predictor.centre[0].mid()), exact(candidate.rad())
     assert centre - reach <= side * root <= centre + reach
     assert not centre - reach <= -side * root <= centre + reach
     assert reach >= root / 100

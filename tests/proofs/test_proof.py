@@ -196,7 +196,7 @@ def test_an_open_branch_refutes_a_minimum_that_rounding_suggests():
     assert c.is_minimum
     p = prove(c)
     assert p.conditions[INACTIVE] == "failed"
-    assert "more, or less, than f1 alone: f2 lies in" in p.reasons[INACTIVE]
+    assert "more, or less, than f1 alone there: f2 lies in" in p.reasons[INACTIVE]
 
 
 # ------------------------------------------------------------------------------------- symmetries
