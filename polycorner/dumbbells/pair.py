@@ -117,16 +117,17 @@ class DumbbellPair(Value):
         All of them in the plane; in the drum rolling, shifting and the half-turn about a vertical
         axis.
         """
+        if self.is_plane:
+            return Symmetry(motions.plane_tangents, self._invariants)
+        return Symmetry(
+            motions.drum_tangents, self._invariants, elements=(motions.half_turn_in_place(),)
+        )
+
+    def _invariants(self, q: Array) -> Array:
         half, unit = self.length / 2, self.ball_radius
         if self.is_plane:
-            return Symmetry(
-                motions.plane_tangents, lambda q: motions.plane_invariants(q, half, unit)
-            )
-        return Symmetry(
-            motions.drum_tangents,
-            lambda q: motions.drum_invariants(q, half, unit, self.centre_radius),
-            elements=(motions.half_turn_in_place(),),
-        )
+            return motions.plane_invariants(q, half, unit)
+        return motions.drum_invariants(q, half, unit, self.centre_radius)
 
     def section(self, heading: float = 0.0) -> Polyhedron:
         """Return ``D`` cut down to pairs with a given mean heading, in radians.

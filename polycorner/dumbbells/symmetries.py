@@ -7,6 +7,7 @@ drum.  Bodies and balls may be relabelled: the two dumbbells, and the two balls 
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -70,7 +71,11 @@ def half_turn_in_place() -> Element:
 
     It carries the drum into itself, labels and all.
     """
-    return Element(lambda q: q * np.array([-1, -1, 1] * 2) + np.array([0, 0, math.pi] * 2), {})
+    return Element(_half_turn, {})
+
+
+def _half_turn(q: Array) -> Array:
+    return q * np.array([-1, -1, 1] * 2) + np.array([0, 0, math.pi] * 2)
 
 
 def _swap(q: Array) -> Array:
@@ -81,11 +86,12 @@ def _turn_first(q: Array) -> Array:
     return np.asarray(q + np.array([0, 0, math.pi, 0, 0, 0]))
 
 
-def _product(g: Element, h: Element) -> Element:
-    def both(q: Array) -> Array:
-        return h.apply(g.apply(q))
+def _both(g: Element, h: Element, q: Array) -> Array:
+    return h.apply(g.apply(q))
 
-    return Element(both, {name: h.names[image] for name, image in g.names.items()})
+
+def _product(g: Element, h: Element) -> Element:
+    return Element(partial(_both, g, h), {name: h.names[image] for name, image in g.names.items()})
 
 
 def _element(apply: Callable[[Array], Array], balls: dict[str, str]) -> Element:

@@ -2,6 +2,8 @@
 
 import itertools
 import math
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import oracles
@@ -307,3 +309,15 @@ class TestSection:
         assert section.names == pair.polyhedron.names
         np.testing.assert_array_equal(section.values(q), pair.polyhedron.values(q))
         assert section.annotations == pair.polyhedron.annotations
+
+
+@pytest.mark.parametrize("pair", [PLANE, DumbbellPair(16, 3, 1.5, 125)], ids=["plane", "drum"])
+def test_symmetries_survive_pickling(pair):
+    symmetry = replace(pair.symmetry, elements=(*pair.symmetry.elements, *ELEMENTS))
+    other = pickle.loads(pickle.dumps(symmetry))
+    q = np.array([0.1, 2.0, 0.3, -0.2, -3.0, 1.0])
+    np.testing.assert_array_equal(other.tangents(q), symmetry.tangents(q))
+    np.testing.assert_array_equal(other.invariants(q), symmetry.invariants(q))
+    for g, h in zip(other.elements, symmetry.elements, strict=True):
+        np.testing.assert_array_equal(g.apply(q), h.apply(q))
+        assert g.names == h.names
