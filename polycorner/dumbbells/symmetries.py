@@ -75,7 +75,7 @@ def half_turn_in_place() -> Element:
 
 
 def _half_turn(q: Array) -> Array:
-    return q * np.array([-1, -1, 1] * 2) + np.array([0, 0, math.pi] * 2)
+    return np.asarray(q * np.array([-1, -1, 1] * 2) + np.array([0, 0, math.pi] * 2))
 
 
 def _swap(q: Array) -> Array:
