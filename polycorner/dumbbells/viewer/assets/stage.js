@@ -54,9 +54,7 @@ class Stage {
     return true;
   }
 
-  ask() {
-    this.asked = true;
-  }
+  ask() { this.asked = true; }
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.host;
