@@ -258,11 +258,16 @@ class Work(NamedTuple):
     island_vector: Annotated[Any, real("N*k")]
     envelope: Annotated[Any, whole("N*k")]  # end of each row of the band matrix
     band: Annotated[Any, real("M")]  # the band matrix, row by row
-    events: Annotated[Any, whole("E 4")]  # kind, bodies (-1: none), contact (-1: none)
-    event_numbers: Annotated[Any, real("E 2")]  # time, impulse
 
 
-Record = TypeVar("Record", Model, State, Work)
+class Log(NamedTuple):
+    """Events of the steps that one call does."""
+
+    entries: Annotated[Any, whole("E 4")]  # kind, bodies (-1: none), contact (-1: none)
+    numbers: Annotated[Any, real("E 2")]  # time, impulse
+
+
+Record = TypeVar("Record", Model, State, Work, Log)
 
 
 def declarations(record: Any) -> Mapping[str, Declaration]:

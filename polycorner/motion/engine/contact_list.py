@@ -50,11 +50,11 @@ def sticks(model, work, b, u):
 
 
 @inlined
-def record(work, count, kind, i, j, which, time, value):
+def record(log, count, kind, i, j, which, time, value):
     """Record an event; return the number of events."""
-    work.events[count, 0], work.events[count, 1] = kind, i
-    work.events[count, 2], work.events[count, 3] = j, which
-    work.event_numbers[count, 0], work.event_numbers[count, 1] = time, value
+    log.entries[count, 0], log.entries[count, 1] = kind, i
+    log.entries[count, 2], log.entries[count, 3] = j, which
+    log.numbers[count, 0], log.numbers[count, 1] = time, value
     return count + 1
 
 
@@ -75,7 +75,7 @@ def classify(work, b, was, gap, h, time, scale, u, out):
 
 
 @inlined
-def record_contacts(model, state, work, blocks, h, time, count):
+def record_contacts(model, state, work, log, blocks, h, time, count):
     """Record contacts made, lost and bounced; update the list of contacts between bodies."""
     u, out, C = work.slip, work.image, 0
     for b in range(blocks):
@@ -102,20 +102,20 @@ def record_contacts(model, state, work, blocks, h, time, count):
             when = out[2]
             if out[1] != LOST and before < 0.0 and gap > 0.0:
                 when = min(time + 0.5 * h + gap / -before, time + 1.5 * h)
-            count = record(work, count, int(out[1]), i, j, g, when, work.impulse[b, 0])
+            count = record(log, count, int(out[1]), i, j, g, when, work.impulse[b, 0])
         if kind == OWN_GAP:
             state.touches[i, g] = 1 if out[0] > 0.0 else 0
         else:
             work.origin[b, 3] = 1 if out[0] > 0.0 else 0
     if model.pair_kernel != 0:
-        size, count = keep_contacts(model, state, work, C, h, time, count)
+        size, count = keep_contacts(model, state, work, log, C, h, time, count)
         add_contacts(model, state, work, C, size)
         sort_contacts(state, state.counts[CONTACTS])
     return count
 
 
 @inlined
-def keep_contacts(model, state, work, C, h, time, count):
+def keep_contacts(model, state, work, log, C, h, time, count):
     """Keep the contacts between two sleepers, record those lost; return list size and events."""
     k, size = model.dimension, 0
     for s in range(state.counts[CONTACTS]):
@@ -124,7 +124,7 @@ def keep_contacts(model, state, work, C, h, time, count):
         if work.awake[i] or work.awake[j] or not (state.alive[i] and state.alive[j]):
             if state.pair_flags[s, 1] and not listed(model, work, C, state.keys[s]):
                 g = state.keys[s] % model.pair_gaps
-                count = record(work, count, LOST, i, j, g, time + h, 0.0)
+                count = record(log, count, LOST, i, j, g, time + h, 0.0)
             continue
         state.keys[size] = state.keys[s]
         for a in range(3):

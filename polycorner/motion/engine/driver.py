@@ -17,6 +17,8 @@ from polycorner.motion.engine.arrays import (
     STEPS,
     SWEEPS,
     UNSOLVED,
+    Log,
+    Model,
     Sizes,
     State,
     Work,
@@ -87,11 +89,15 @@ class Engine:
         self.model = model_of(bodies, self._sizes, noise, solver or Solver())
         self.motion = allocate(State, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
-        self.work = allocate(Work, self._sizes)
+        self.work, self.log = allocate(Work, self._sizes), allocate(Log, self._sizes)
 
     @property
     def _sizes(self) -> Sizes:
         return Sizes.of(self.bodies, self.capacity)
+
+    @property
+    def _records(self) -> tuple[Model, State, Work, Log]:
+        return self.model, self.motion, self.work, self.log
 
     @property
     def time(self) -> float:
@@ -121,7 +127,7 @@ class Engine:
         compiled = self._compiled()
         events: list[Event] = []
         while steps > 0:
-            why, done, count = compiled.advance(self.model, self.motion, self.work, self.dt, steps)
+            why, done, count = compiled.advance(*self._records, self.dt, steps)
             events += self._read(count)
             steps -= done
             if why == compiled.CONTACTS_FULL:
@@ -135,14 +141,14 @@ class Engine:
 
         if not entry_point.advance.overloads:
             with one_at_a_time("motion"):
-                entry_point.advance(self.model, self.motion, self.work, self.dt, 0)
+                entry_point.advance(*self._records, self.dt, 0)
         return entry_point
 
     def _read(self, count: int) -> list[Event]:
         contacts, names = self.bodies.body.contacts, self.bodies.pair_contacts
         events = []
         for (kind, i, j, which), (time, value) in zip(
-            self.work.events[:count].tolist(), self.work.event_numbers[:count].tolist(), strict=True
+            self.log.entries[:count].tolist(), self.log.numbers[:count].tolist(), strict=True
         ):
             contact = "" if which < 0 else (contacts[which] if j < 0 else names[which])
             bodies = (i,) if j < 0 else (i, j)
@@ -158,7 +164,7 @@ class Engine:
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.motion = restored(State, self._sizes, arrays)
-        self.work = allocate(Work, self._sizes)
+        self.work, self.log = allocate(Work, self._sizes), allocate(Log, self._sizes)
 
     def energies(self) -> tuple[float, float]:
         """Return kinetic and potential energy of the bodies that have not left."""

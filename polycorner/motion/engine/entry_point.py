@@ -17,15 +17,15 @@ def _entry_point(sources: str) -> Any:
     """Return the compiled function; it reads ``sources``, which puts it into its cache key."""
 
     @njit(cache=True, error_model="numpy")
-    def advance(model, state, work, h, steps):
+    def advance(model, state, work, log, h, steps):
         """Advance by several steps; return why it stopped, and how many steps and events."""
         _ = sources
         count = ZERO
         most = 2 * work.contact.shape[0] + model.bodies * (2 + model.restitution.size)
         for done in range(steps):
-            if count + most > work.events.shape[0]:
+            if count + most > log.entries.shape[0]:
                 return EVENTS_FULL, done, count
-            fits, count = step(model, state, work, h, count)
+            fits, count = step(model, state, work, log, h, count)
             if not fits:
                 work.list_status[1] = 0
                 return CONTACTS_FULL, done, count

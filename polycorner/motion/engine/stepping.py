@@ -137,7 +137,7 @@ def solve(model, state, work, h, time, index):
 
 
 @inlined
-def step(model, state, work, h, count):
+def step(model, state, work, log, h, count):
     """Advance by one step; return whether there was room for all contacts, and the event count."""
     k, N = model.dimension, model.bodies
     index = state.counts[STEPS]
@@ -150,7 +150,7 @@ def step(model, state, work, h, count):
             return False, count
     book_work(model, state, work, blocks, h)
     if any_awake:
-        count = record_contacts(model, state, work, blocks, h, time, count)
+        count = record_contacts(model, state, work, log, blocks, h, time, count)
     store_sticking(model, state, work, blocks)
     for i in range(N):
         work.rested[i] = state.rests[i]
@@ -161,14 +161,14 @@ def step(model, state, work, h, count):
         if work.awake[i] and state.rests[i] != work.rested[i]:
             kind = REST if state.rests[i] else MOTION
             when = time + h if state.rests[i] else time
-            count = record(work, count, kind, i, NONE, NONE, when, 0.0)
+            count = record(log, count, kind, i, NONE, NONE, when, 0.0)
         for c in range(k):
             if work.awake[i]:
                 state.v[i, c] = work.v_new[i, c]
             state.q[i, c] = work.q_mid[i, c] + 0.5 * h * state.v[i, c]
         if model.exit_coordinate >= 0 and state.q[i, model.exit_coordinate] > model.exit_limit:
             state.alive[i] = 0
-            count = record(work, count, EXIT, i, NONE, NONE, time + h, 0.0)
+            count = record(log, count, EXIT, i, NONE, NONE, time + h, 0.0)
             for s in range(state.counts[CONTACTS]):
                 pair = state.keys[s] // model.pair_gaps
                 if i in (pair // N, pair % N):

@@ -6,6 +6,7 @@ import pytest
 from polycorner import Manifold, Polyhedron
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.motion.engine.arrays import (
+    Log,
     Model,
     Sizes,
     State,
@@ -36,7 +37,7 @@ def test_sizes_count_what_bodies_have():
     assert (SIZES.P, SIZES.B) == (3, 3 * 5 + 2 * 16)
 
 
-@pytest.mark.parametrize("record", [State, Work])
+@pytest.mark.parametrize("record", [State, Work, Log])
 def test_arrays_are_allocated_as_declared(record):
     arrays = allocate(record, SIZES)
     for name, declared in declarations(record).items():
@@ -47,7 +48,7 @@ def test_arrays_are_allocated_as_declared(record):
 
 
 def test_every_array_is_declared_once():
-    for record in (Model, State, Work):
+    for record in (Model, State, Work, Log):
         assert tuple(declarations(record)) == record._fields
 
 
