@@ -10,6 +10,7 @@ from numbers import Integral, Real
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.errors import nearest
 
@@ -121,6 +122,42 @@ def real(
     if not inside or math.isnan(number):
         refuse(argument, expected, value)
     return number
+
+
+def increasing(
+    argument: str,
+    values: object,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+) -> "NDArray[np.float64]":
+    """Return increasing numbers of a range as an array ``(k,)``, ``k >= 1``, or raise.
+
+    Examples
+    --------
+    >>> increasing("rods", [0.5, 0.2], above=0, below=1)
+    Traceback (most recent call last):
+    ValueError: rods: expected increasing numbers > 0 and < 1; got [0.5, 0.2]
+    """
+    bounds = _bounds((">", above), (">=", least), ("<", below))
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        msg = f"{argument}: expected increasing numbers{bounds}; got {values!r}"
+        raise TypeError(msg) from error
+    inside = (
+        array.ndim == 1
+        and array.size > 0
+        and np.isfinite(array).all()
+        and (np.diff(array) > 0).all()
+        and (above is None or array[0] > above)
+        and (least is None or array[0] >= least)
+        and (below is None or array[-1] < below)
+    )
+    if not inside:
+        refuse(argument, f"increasing numbers{bounds}", values)
+    return array
 
 
 def choice(argument: str, value: object, known: Iterable[str]) -> str:

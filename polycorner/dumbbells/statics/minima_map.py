@@ -1,11 +1,11 @@
 """All minima of a pair of dumbbells, and their dependence on its proportions.
 
-A kind of rest is named by the contacts that hold it, those with positive multipliers:
+A kind of minimum is named by its contacts with positive multipliers:
 
 =============  ====================================================================
 ``G``          none: end to end on the lowest line, any distance apart
 ``delta``      a ball-ball contact and two ball-rod contacts: nested
-``staggered``  three ball-ball contacts: nested without reaching a waist
+``staggered``  three ball-ball contacts: nested without touching a rod
 ``crossed``    rod on rod: one lies across the other, free to shift along it
 others         the numbers of ball-ball, ball-rod and rod-rod contacts, ``crossed 201``
                where there is one between the rods
@@ -14,20 +14,21 @@ others         the numbers of ball-ball, ball-rod and rod-rod contacts, ``crosse
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
 from polycorner.minimisation import Certificate, Minima, certify, minima
 from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.progress import Progress as SearchProgress
-from polycorner.progress import silent
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.progress import Progress, silent
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 CURVATURES = (0.128, 0.5, 1.0, 1.5)
 RODS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
@@ -36,17 +37,14 @@ FITTING = 0.995  # largest chord of the cylinder of ball centres that a dumbbell
 
 NAMES = {(0, 0, 0): "G", (1, 2, 0): "delta", (3, 0, 0): "staggered", (0, 0, 1): "crossed"}
 
-# What is told after every pair: how many are done, and how many there are.
-Progress = Callable[[int, int], None]
-
 
 def energy_symmetry(pair: DumbbellPair, *, mirror: bool = False) -> Symmetry:
-    """Return what leaves both the polyhedron and the energy of a pair unchanged.
+    """Return the symmetries of both the polyhedron and the energy of a pair.
 
     Shifting the pair along the drum, relabelling the dumbbells and the balls of either, and the
     half-turn about the vertical axis; rolling the pair is no symmetry of its energy.  With
     ``mirror`` also the reflection in the vertical plane through the drum's axis, so that right-
-    and left-handed rests count as one.
+    and left-handed minima count as one.
     """
     unit, half = pair.ball_radius, pair.length / 2
 
@@ -114,9 +112,9 @@ def pair_minima(
     starts: int = 1000,
     rng: np.random.Generator | int | None = None,
     mirror: bool = False,
-    progress: SearchProgress = silent,
+    progress: Progress = silent,
 ) -> Minima:
-    """Find where a pair can rest, up to shifts and relabelling, from scattered placements.
+    """Find the minima of a pair, up to shifts and relabelling, from scattered placements.
 
     Parameters
     ----------
@@ -125,16 +123,14 @@ def pair_minima(
     starts : int, optional
         How many placements :func:`scattered` draws.
     rng : Generator or int, optional
-        Source of them; default a generator with seed 0.
+        Source of the placements; default a generator with seed 0.
     mirror : bool, optional
         Whether mirror images count as one.
     progress : callable, optional
         As for :func:`~polycorner.minima`.
     """
-    if isinstance(starts, bool) or not isinstance(starts, int) or starts < 1:
-        msg = f"starts: expected a positive whole number; got {starts!r}"
-        raise ValueError(msg)
-    generator = np.random.default_rng(0 if rng is None else rng)
+    checks.whole("starts", starts, least=1)
+    generator = checks.generator("rng", rng)
     return minima(
         pair.polyhedron,
         pair.energy,
@@ -145,7 +141,7 @@ def pair_minima(
 
 
 def kind_of(certificate: Certificate) -> str:
-    """Return the name of a rest by the contacts that hold it; see the table above."""
+    """Return the name of a minimum by the contacts that hold it; see the table above."""
     analysis = certificate.analysis
     lengths = Counter(len(certificate.active[k]) for k in analysis.strong_positions)
     numbers = (lengths[4], lengths[3], lengths[2])
@@ -154,7 +150,7 @@ def kind_of(certificate: Certificate) -> str:
 
 
 def crossing_room(pair: DumbbellPair) -> float:
-    """Return by how much a level crossing fits, in mm; negative where there is none.
+    """Return the clearance of a level crossing, in mm; negative where there is none.
 
     One dumbbell lies on the lowest line; the rod of the other, ``2 t`` higher, is a level chord
     across it, ``2 w`` wide with ``w^2 = 4 t (rho - t)``, and not above the drum's axis,
@@ -179,26 +175,26 @@ def crossing_room(pair: DumbbellPair) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class MinimaMap:
-    """Which kinds of rest random starts find, over the proportions of a pair.
+class MinimaMap(Value):
+    """Kinds of minima found from random starts, over the proportions of a pair.
 
     Attributes
     ----------
     curvatures, rods, lengths : (k,), (n,) and (m,) arrays
         ``l/R`` (0 is the plane), ``t/r`` and ``l/r``.
     kinds : tuple of str
-        Every kind that was found.
+        All kinds found.
     counts : (k, n, m, kinds) array of int
-        How many starts ended in each kind; -1 for a pair that does not fit in its drum, or was
-        not looked at.
+        How many starts ended in each kind; -1 for a pair that does not fit in its drum or
+        was not reached.
     distinct : (k, n, m, kinds) array of int
-        How many rests of that kind there are, mirror images and relabelled ones counted once.
+        Number of minima of that kind, mirror images and relabelled ones counted once.
     lost : (k, n, m) array of int
         How many starts ended in no minimum.
     starts : int
-        How many were let fall for each pair.
+        Number of starts for each pair.
     examples : mapping from str to (DumbbellPair, Certificate)
-        For each kind the pair where most starts ended in it, the dumbbells close together.
+        For each kind the pair in which most starts ended in it, with the dumbbells close together.
     """
 
     curvatures: Array
@@ -234,12 +230,12 @@ def minima_map(
     lengths: ArrayLike = LENGTHS,
     starts: int = 600,
     rng: np.random.Generator | int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> MinimaMap:
-    """Map which kinds of rest there are over ``l/R``, ``t/r`` and ``l/r``.
+    """Map the kinds of minima over ``l/R``, ``t/r`` and ``l/r``.
 
-    Mirror images count as one.  What a kind's share of the starts is depends on how
-    :func:`scattered` draws them; a kind that is not found may be rare instead of absent.
+    Mirror images count as one.  The share of starts that end in a kind depends on the
+    distribution of :func:`scattered`; a kind that is not found may be rare instead of absent.
 
     Parameters
     ----------
@@ -250,16 +246,16 @@ def minima_map(
     lengths : (m,) array, optional
         ``l/r``, increasing and at least 2.
     starts : int, optional
-        How many are let fall for each pair.
+        Number of starts for each pair.
     rng : Generator or int, optional
         Source of the starts; default a generator with seed 0.
     progress : callable, optional
-        Called as ``progress(done, pairs)`` after every pair.
+        Called as ``progress(done, pairs, note)`` after every pair.
 
     Returns
     -------
     MinimaMap
-        Also after an interruption (Ctrl-C): pairs that were not reached count as not looked at.
+        Also after an interruption (Ctrl-C), without the pairs that were not reached.
 
     Raises
     ------
@@ -267,11 +263,11 @@ def minima_map(
         For arguments of a wrong kind, shape or range.
     """
     axes = (
-        _axis("curvatures", curvatures, 0.0, 2.0, "at least 0 and below 2"),
-        _axis("rods", rods, 1e-9, 1.0, "above 0 and below 1"),
-        _axis("lengths", lengths, 2.0, math.inf, "at least 2"),
+        checks.increasing("curvatures", curvatures, least=0, below=2),
+        checks.increasing("rods", rods, above=0, below=1),
+        checks.increasing("lengths", lengths, least=2),
     )
-    generator = np.random.default_rng(0 if rng is None else rng)
+    generator = checks.generator("rng", rng)
     survey = _Survey(tuple(len(axis) for axis in axes), starts)
     cells = list(product(*(range(len(axis)) for axis in axes)))
     try:
@@ -279,15 +275,14 @@ def minima_map(
             pair = _pair(*(float(axis[k]) for axis, k in zip(axes, cell, strict=True)))
             if pair is not None:
                 survey.put(cell, pair, pair_minima(pair, starts=starts, rng=generator, mirror=True))
-            if progress is not None:
-                progress(done, len(cells))
+            progress(done, len(cells), "pairs")
     except KeyboardInterrupt:
         pass  # the pairs that were reached are the answer
     return survey.result(*axes)
 
 
 class _Survey:
-    """What was found so far."""
+    """Results found so far."""
 
     def __init__(self, shape: tuple[int, ...], starts: int) -> None:
         self.starts = starts
@@ -297,7 +292,7 @@ class _Survey:
         self.examples: dict[str, tuple[int, DumbbellPair, Certificate]] = {}
 
     def put(self, cell: tuple[int, ...], pair: DumbbellPair, found: Minima) -> None:
-        """Put down what was found for one pair; an unfinished search does not count."""
+        """Record the minima of one pair; an unfinished search does not count."""
         if found.interrupted:
             raise KeyboardInterrupt
         self.lost[cell] = sum(found.elsewhere.values())
@@ -331,12 +326,3 @@ def _pair(curvature: float, rod: float, length: float) -> DumbbellPair | None:
     if drum <= 1 or length > FITTING * 2 * (drum - 1):
         return None
     return DumbbellPair(length, 1.0, rod, drum)
-
-
-def _axis(name: str, given: ArrayLike, low: float, high: float, expected: str) -> Array:
-    axis = finite(np.atleast_1d(reals(given, name)), name)
-    inside = ((axis >= low) & (axis < high)).all()
-    if axis.ndim != 1 or not len(axis) or not (np.diff(axis) > 0).all() or not inside:
-        msg = f"{name}: expected increasing numbers {expected}; got {given!r}"
-        raise ValueError(msg)
-    return axis

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import ball_relabellings, relabellings
 from polycorner.polyhedra.symmetry import Element
@@ -115,7 +116,7 @@ def pair_atlas(
     budget, progress, rng
         As for :func:`~polycorner.skeletons.search.skeleton`.
     """
-    generator = np.random.default_rng(0 if rng is None else rng)
+    generator = checks.generator("rng", rng)
     found = skeleton(
         pair.polyhedron if pair.is_plane else pair.section(heading),
         pair_starts(pair, generator, heading),
@@ -128,7 +129,7 @@ def pair_atlas(
 
 
 def pair_starts(pair: DumbbellPair, rng: np.random.Generator, heading: float = 0.0) -> Array:
-    """Return where the atlas starts: nested pairs of both chiralities, random placements."""
+    """Return the starts of the search: nested pairs of both chiralities, random placements."""
     nested = [pair.nested(chirality, heading=heading) for chirality in ("R", "L")]
     fitting = [q for q in nested if pair.polyhedron.contains(q)]
     return np.array([*fitting, *pair.placements(rng, PLACEMENTS, heading=heading)])

@@ -2,22 +2,24 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from polycorner.dumbbells.symmetries import relabellings
+from polycorner.progress import Progress, silent
 from polycorner.skeletons.elements import Completeness, Edge, Skeleton
 from polycorner.skeletons.orbits import Orbits
 from polycorner.skeletons.search import skeleton
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.spaces.manifold import Array
 
-# Corners nearer to each other than about this, in ball radii, are not told apart reliably; so much
-# may a change that was found be away from where it is.
+# Distance, in ball radii, below which corners are not distinguished reliably, and so the possible
+# error of the position of a change.
 BLUR = 2e-5
 STARTS = 3
 
@@ -28,23 +30,20 @@ Positions = NDArray[np.int64]
 # A rod radius, a bracket of the length, and the signatures below and above.
 Change = tuple[float, tuple[float, float], tuple[int, int]]
 
-# What is told after every atlas: how many were computed, and how many are expected in all.
-Progress = Callable[[int, int], None]
-
 
 @dataclass(frozen=True)
 class Pattern:
-    """What corners and motions there are up to relabelling, whatever their geometry.
+    """Corners and motions up to relabelling, without their geometry.
 
     Attributes
     ----------
     counts : (int, int, int)
         Corners, edges and faces.
     corners : tuple of (str, int)
-        Kinds of corners, as :meth:`PairAtlas.kind` names them, and how many there are of each.
+        Kinds of corners, as named by :meth:`PairAtlas.kind`, and their numbers.
     motions : tuple of (str, int)
         Kinds of edges: the numbers of ball-ball, ball-rod and rod-rod contacts, then the kinds of
-        the corners at both ends, as in ``020 Delta_R E_R``; and how many there are of each.
+        the corners at both ends, as in ``020 Delta_R E_R``; and their numbers.
     """
 
     counts: Counts
@@ -54,19 +53,19 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Signature:
-    """An atlas of the pair without its geometry.
+    """The skeleton of a pair without its geometry.
 
     Attributes
     ----------
     labelled : (int, int, int)
         Corners, edges and faces for labelled dumbbells and balls.
     ordered : (int, int, int)
-        The same where the two dumbbells are told apart and the two balls of each are not.
+        The same with the balls of each dumbbell identified.
     pattern : Pattern
         The same up to every relabelling, with the kinds.
     sound : bool
-        Whether the atlas is whole: every edge ends in corners, the placements hang together, and
-        their boundary, a torus, has Euler characteristic zero.
+        Whether the skeleton is complete: every edge ends in corners, the placements are connected,
+        and their boundary, a torus, has Euler characteristic zero.
     """
 
     labelled: Counts
@@ -137,7 +136,7 @@ def pair_map(
     rods: ArrayLike,
     *,
     tolerance: float = 1e-4,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> PairMap:
     """Map where the atlas of the pair in the plane changes; lengths in ball radii.
 
@@ -155,18 +154,16 @@ def pair_map(
         Width, in ball radii, to which every change is bracketed.  Below ``BLUR`` corners are not
         told apart reliably.
     progress : callable, optional
-        Called as ``progress(done, expected)`` after every atlas.
+        Called as ``progress(done, expected, note)`` after every skeleton.
 
     Raises
     ------
     TypeError, ValueError
         For arguments of a wrong kind, shape or range.
     """
-    across = _axis("lengths", lengths, lambda x: x >= 2, "at least 2 ball radii")
-    up = _axis("rods", rods, lambda x: (x > 0) & (x < 1), "between 0 and 1 ball radius")
-    if isinstance(tolerance, bool) or not isinstance(tolerance, int | float) or not tolerance > 0:
-        msg = f"tolerance: expected a positive width in ball radii; got {tolerance!r}"
-        raise ValueError(msg)
+    across = checks.increasing("lengths", lengths, least=2)
+    up = checks.increasing("rods", rods, above=0, below=1)
+    checks.real("tolerance", tolerance, above=0)
     survey = _Survey(float(tolerance), progress, len(across) * len(up) + len(up))
     table = np.array([[survey.at(x, t) for x in across.tolist()] for t in up.tolist()])
     exact = [(long_rod_length(1.0, t), t) for t in up.tolist()]
@@ -185,10 +182,10 @@ def pair_map(
 
 
 def signature_of(atlas: PairAtlas) -> Signature:
-    """Return what is left of an atlas in the plane without its geometry.
+    """Return the signature of a skeleton in the plane.
 
-    Where relabellings do not carry the atlas to itself, something is missing: it is not sound,
-    and every corner, edge and face counts by itself.
+    If relabellings do not map the skeleton to itself, it is incomplete: it is not sound, and every
+    corner, edge and face counts by itself.
     """
     found, single = atlas.skeleton, _single(atlas.skeleton)
     try:
@@ -227,9 +224,9 @@ def pattern_at(length: float, rod_radius: float, *, seed: int = 0) -> Pattern:
 
 
 class _Survey:
-    """The signatures met so far, and how much of the work is done."""
+    """Signatures found so far, and the progress of the work."""
 
-    def __init__(self, tolerance: float, progress: Progress | None, expected: int) -> None:
+    def __init__(self, tolerance: float, progress: Progress, expected: int) -> None:
         self.tolerance, self.progress = tolerance, progress
         self.done, self.expected = 0, expected
         self.signatures: list[Signature] = []
@@ -281,8 +278,7 @@ class _Survey:
     def _tell(self) -> None:
         self.done += 1
         self.expected = max(self.expected, self.done)
-        if self.progress is not None:
-            self.progress(self.done, self.expected)
+        self.progress(self.done, self.expected, "skeletons")
 
 
 def _pattern(atlas: PairAtlas, groups: Groups) -> Pattern:
@@ -307,13 +303,3 @@ def _motion(atlas: PairAtlas, edge: Edge) -> str:
     ends = sorted("none" if k is None else atlas.kind(corners[k]) for k in edge.ends)
     lengths = Counter(len(name) for name in edge.active)
     return f"{lengths[4]}{lengths[3]}{lengths[2]} {' '.join(ends)}"
-
-
-def _axis(
-    name: str, given: ArrayLike, allowed: Callable[[Array], NDArray[np.bool_]], expected: str
-) -> Array:
-    axis = finite(np.atleast_1d(reals(given, name)), name)
-    if axis.ndim != 1 or not len(axis) or not (np.diff(axis) > 0).all() or not allowed(axis).all():
-        msg = f"{name}: expected increasing numbers {expected}; got {given!r}"
-        raise ValueError(msg)
-    return axis

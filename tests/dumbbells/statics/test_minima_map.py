@@ -218,7 +218,7 @@ SMALL = {"curvatures": [0.5, 1.5], "rods": [0.05, 0.5], "lengths": [3, 16], "sta
 
 def test_the_map_counts_every_start_of_every_pair():
     told = []
-    found = minima_map(**SMALL, progress=lambda done, pairs: told.append((done, pairs)))
+    found = minima_map(**SMALL, progress=lambda done, pairs, _: told.append((done, pairs)))
     assert told == [(k, 8) for k in range(1, 9)]
     assert found.kinds[0] in ("G", "delta")
     assert set(found.kinds) >= {"G", "delta", "staggered", "crossed"}
@@ -240,7 +240,7 @@ def test_the_map_counts_every_start_of_every_pair():
 
 
 def test_a_map_can_be_repeated_and_interrupted():
-    def stop(done, pairs):
+    def stop(done, pairs, _note):
         if done == 3 < pairs:
             raise KeyboardInterrupt
 
@@ -252,22 +252,22 @@ def test_a_map_can_be_repeated_and_interrupted():
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "blamed"),
     [
-        ({"curvatures": [-0.1]}, "curvatures: expected increasing numbers at least 0 and below 2"),
-        ({"rods": [0.5, 0.2]}, "rods: expected increasing numbers above 0 and below 1; got"),
-        ({"lengths": [1.5]}, "lengths: expected increasing numbers at least 2; got"),
-        ({"lengths": []}, "lengths: expected increasing numbers"),
-        ({"rods": [np.nan]}, "rods: expected finite numbers; got nan"),
-        ({"starts": 0}, "starts: expected a positive whole number; got 0"),
+        ({"curvatures": [-0.1]}, "curvatures"),
+        ({"rods": [0.5, 0.2]}, "rods"),
+        ({"lengths": [1.5]}, "lengths"),
+        ({"lengths": []}, "lengths"),
+        ({"rods": [np.nan]}, "rods"),
+        ({"starts": 0}, "starts"),
     ],
 )
-def test_arguments_are_refused_in_a_sentence(changes, says):
-    with pytest.raises(ValueError, match=f"^{says}"):
+def test_arguments_are_refused_in_a_sentence(changes, blamed):
+    with pytest.raises(ValueError, match=f"^{blamed}: expected "):
         minima_map(**(SMALL | changes))
 
 
 @pytest.mark.parametrize("starts", [0, True, 2.5, "many"])
 def test_starts_are_counted_in_whole_numbers(starts):
-    with pytest.raises(ValueError, match=r"^starts: expected a positive whole number; got "):
+    with pytest.raises((TypeError, ValueError), match=r"^starts: expected a whole number"):
         pair_minima(PAIR, starts=starts)

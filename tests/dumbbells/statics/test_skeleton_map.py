@@ -36,7 +36,12 @@ def told():
 
 @pytest.fixture(scope="module")
 def found(told):
-    return pair_map([2.6, 3.4], [ROD], tolerance=1e-2, progress=lambda *state: told.append(state))
+    return pair_map(
+        [2.6, 3.4],
+        [ROD],
+        tolerance=1e-2,
+        progress=lambda done, total, _: told.append((done, total)),
+    )
 
 
 # ------------------------------------------------------------------------------------ closed form
@@ -276,19 +281,19 @@ class TestComparison:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "options", "message"),
+    ("arguments", "options", "blamed"),
     [
-        (([3, 2], [0.5]), {}, "lengths: expected increasing numbers at least 2 ball radii"),
-        (([1.9, 3], [0.5]), {}, "lengths: expected increasing numbers at least 2 ball radii"),
-        (([], [0.5]), {}, "lengths: expected"),
-        (([[2, 3]], [0.5]), {}, "lengths: expected"),
-        (([2, 3], [0.0, 0.5]), {}, "rods: expected increasing numbers between 0 and 1 ball"),
-        (([2, 3], [0.5, 1.0]), {}, "rods: expected"),
+        (([3, 2], [0.5]), {}, "lengths"),
+        (([1.9, 3], [0.5]), {}, "lengths"),
+        (([], [0.5]), {}, "lengths"),
+        (([[2, 3]], [0.5]), {}, "lengths"),
+        (([2, 3], [0.0, 0.5]), {}, "rods"),
+        (([2, 3], [0.5, 1.0]), {}, "rods"),
         (([2, math.nan], [0.5]), {}, "lengths"),
-        (([2, 3], [0.5]), {"tolerance": 0.0}, "tolerance: expected a positive width"),
-        (([2, 3], [0.5]), {"tolerance": True}, "tolerance: expected a positive width"),
+        (([2, 3], [0.5]), {"tolerance": 0.0}, "tolerance"),
+        (([2, 3], [0.5]), {"tolerance": True}, "tolerance"),
     ],
 )
-def test_wrong_arguments_are_named(arguments, options, message):
-    with pytest.raises(ValueError, match=message):
+def test_wrong_arguments_are_named(arguments, options, blamed):
+    with pytest.raises((TypeError, ValueError), match=f"^{blamed}: expected "):
         pair_map(*arguments, **options)
