@@ -2,6 +2,8 @@
 
 import logging
 import math
+import os
+import subprocess
 import sys
 import warnings
 
@@ -80,3 +82,18 @@ def test_a_bar_shows_what_is_done_and_how_long_it_takes(capsys, monkeypatch):
     assert "3 of 12 edges" in shown
     assert "s left" in shown
     assert "2 corners" in shown
+
+
+@pytest.mark.slow
+def test_compiling_is_announced_when_something_is_compiled(tmp_path):
+    """Once, with an empty cache; the next process finds the code and says nothing."""
+    command = [sys.executable, "-m", "polycorner", "minima", "pinball", "--starts", "1", "-v"]
+    for announced in (True, False):
+        done = subprocess.run(
+            command,
+            env=os.environ | {"POLYCORNER_CACHE_DIR": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert ("compiling polycorner.minimisation" in done.stderr) is announced

@@ -180,36 +180,6 @@ def test_files_are_written(capsys, tmp_path):
     assert json.loads((tmp_path / "new" / "folder" / "dyad.json").read_text()) == answer(capsys)
 
 
-MISTAKES = {
-    ("--ball", "x"): "--ball",
-    ("--ball", "-3"): "--ball",
-    ("--ball", "0"): "--ball",
-    ("--rod", "3"): "--rod",
-    ("--rod", "nan"): "--rod",
-    ("--rod", "inf"): "--rod",
-    ("--length", "5"): "--length",
-    ("--length", "inf"): "--length",
-    ("--drum", "10"): "--length",
-    ("--drum", "-1"): "--drum",
-    ("--drum", "nan"): "--drum",
-    ("--rod-weight", "-1"): "--rod-weight",
-    ("--config", "no-such-file.toml"): "--config",
-    ("--config", "README.md"): "--config",
-    ("--no-such-option",): "--no-such-option",
-    ("extra",): "extra",
-}
-
-
-@pytest.mark.parametrize("arguments", MISTAKES, ids=" ".join)
-def test_every_mistake_gets_one_line(capsys, arguments):
-    code, out, err = run(capsys, "dyad", *arguments)
-    assert code == 2
-    assert out == ""
-    assert err.count("\n") == 1
-    assert err.startswith("polycorner: ")
-    assert MISTAKES[arguments] in err
-
-
 @pytest.mark.parametrize(
     "text",
     ["lenght = 16", "length = 'long'", "length = true", "[length]\nmm = 3", "rod = nan"],

@@ -45,20 +45,3 @@ def test_table_says_how_complete_it_is(capsys):
     code, out, _ = run(capsys, "pinball", "--starts", "40")
     assert code == 0
     assert "coverage" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "option"),
-    [
-        (("dyad", "--starts", "0"), "--starts"),
-        (("pinball", "--starts", "many"), "--starts"),
-        (("dyad", "--seed", "-1"), "--seed"),
-        (("dyad", "--ball", "0"), "--ball"),
-        (("marble",), "marble"),
-    ],
-)
-def test_mistakes_get_one_line(capsys, arguments, option):
-    code, out, err = run(capsys, *arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert option in err

@@ -157,20 +157,6 @@ def test_figures(capsys, tmp_path):
     assert out.count("wrote ") == len(list(tmp_path.iterdir())) == 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (("--section", "9"), "--section: expected one of 2, 3, 4, 5, 6, 7, 8, A, B, C; got 9"),
-        (("X1",), "ID: expected a claim that --list shows; got X1"),
-        (("e4",), "ID: expected a claim that --list shows; got e4 (did you mean E4?)"),
-        (("figures",), "figures: expected --out DIR, the folder they go to; got none"),
-        (("--workers", "0"), "Invalid value for '--workers': 0 is not in the range 1<=x<=64."),
-    ],
-)
-def test_mistakes_get_one_line(capsys, arguments, sentence):
-    assert run(capsys, *arguments) == (2, "", f"polycorner: {sentence}\n")
-
-
 def test_mistakes_with_figures_and_folders(capsys, tmp_path):
     out = ("--out", str(tmp_path))
     code, _, err = run(capsys, "figures", "nosuch", *out)

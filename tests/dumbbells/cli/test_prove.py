@@ -48,26 +48,6 @@ def test_files(capsys, tmp_path):
     assert (tmp_path / "cells.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "option"),
-    [
-        (("--digits", "0"), "--digits"),
-        (("--digits", "1e9"), "--digits"),
-        (("--box", "t"), "--box"),
-        (("--box", "t=1.4"), "--box"),
-        (("--box", "t=2:1"), "--box"),
-        (("--box", "r=1:2"), "--box"),
-        (("--minimum", "H"), "--minimum"),
-        (("--rod", "5"), "--rod"),
-    ],
-)
-def test_mistakes_get_one_line(capsys, arguments, option):
-    code, out, err = run(capsys, *arguments)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
-    assert option in err
-
-
 def test_help(capsys):
     code, out, _ = run(capsys, "--help")
     assert code == 0

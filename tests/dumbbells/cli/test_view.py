@@ -234,26 +234,6 @@ def test_a_port_in_use_is_one_sentence(capsys):
     )
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("--port", "70000"), "--port"),
-        (("--length", "2"), "--length: expected at least two ball radii"),
-        (("--host", "203.0.113.9", "--no-browser"), "--host: 203.0.113.9 cannot be listened on"),
-        (("atlas", "--heading", "nan"), "--heading: expected an angle in degrees; got nan"),
-        (("trajectory", "nowhere.nc"), "FILE: expected a trajectory as of polycorner drum --out"),
-        (("atlas", "--length", "7", "--drum", "inf", "--out", "a.obj"), "--out: expected a file"),
-        (("dyda",), "dyda"),
-    ],
-)
-def test_mistakes_are_one_sentence(capsys, arguments, words):
-    code, out, err = commands.run(capsys, "view", *arguments)
-    assert (code, out) == (2, "")
-    assert words in err
-    assert err.startswith("polycorner: ")
-    assert err.count("\n") == 1
-
-
 def test_without_tornado_the_extra_is_named(capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     code, _, err = commands.run(capsys, "view", "--no-browser")
