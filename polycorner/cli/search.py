@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +57,7 @@ class Kept:
         self.model, self.parameters, self.out, self.seed = model, chosen, out, seed
         prepare(out)
         self.finished, self.interrupted, self.drawn = True, False, True
+        self._unsaved: OSError | None = None
 
     @property
     def label(self) -> str:
@@ -75,6 +77,15 @@ class Kept:
         """End the command where there is nothing to resume."""
         if not self.state.exists():
             fail("--resume: expected an unfinished search with the same options; got none")
+
+    def keep(self, save: Callable[[], object]) -> None:
+        """Save the state; a failure is reported after the answer, which it must not cost."""
+        try:
+            save()
+        except OSError as error:
+            self._unsaved = error
+        else:
+            self._unsaved = None
 
     def end(self, *, finished: bool, interrupted: bool) -> None:
         """Note how the search ended; the state of a finished one is removed."""
@@ -102,6 +113,9 @@ class Kept:
 
         deliver(answer, lambda: shown(sheet(answer)), write, as_json=as_json)
         if not self.finished:
+            with writing(self.state):
+                if self._unsaved is not None:
+                    raise self._unsaved
             unfinished(self.state)
         if self.interrupted:
             raise click.exceptions.Exit(130)
@@ -169,8 +183,7 @@ class Search(Kept):
     def _save(self, found: "Skeleton") -> None:
         from polycorner.files import save_skeleton
 
-        with writing(self.state):
-            save_skeleton(found, self.state, label=self.label)
+        self.keep(lambda: save_skeleton(found, self.state, label=self.label))
 
     def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
         from polycorner.files import load_skeleton
@@ -243,8 +256,8 @@ class DiskSearch(Kept):
             try:
                 while not search.complete:
                     search = search.advanced()
-                    with writing(self.state):
-                        kind.save_json(self.state, {"label": self.label, "search": search.record})
+                    entries = {"label": self.label, "search": search.record}
+                    self.keep(partial(kind.save_json, self.state, entries))
                     progress(search.rounds, None, f"{len(search.configurations)} found")
             except KeyboardInterrupt:
                 if not search.rounds:

@@ -340,7 +340,9 @@ def test_an_unexpected_error_is_one_sentence_and_verbose_shows_where(capsys, mon
     assert "in broken" in err
 
 
-@pytest.mark.parametrize("name", ["atlas tutorial", "minima pinball", "dyad"])
+@pytest.mark.parametrize(
+    "name", ["atlas tutorial", "atlas pinball", "atlas disks", "minima pinball", "dyad"]
+)
 def test_a_full_disk_costs_neither_the_answer_nor_the_old_file(capsys, monkeypatch, tmp_path, name):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
