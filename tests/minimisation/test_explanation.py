@@ -6,43 +6,17 @@ import re
 import numpy as np
 import pytest
 import sympy as sp
+from explanations import NUMBER, direction, figures, opening_rates, sentence
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from oracles import CONTACTS, balls, gaps
 from oracles_minima import least_on_cone
 from polynomials import linear, quadratic
 
 from polycorner import AnyOf, Manifold, Polyhedron, Verdict, certify, minimise
-from polycorner.dumbbells import DumbbellPair
-from polycorner.models import Pinball, Tutorial
 
-NUMBER = r"(-?[\d.]+(?:e[-+]\d+)?)"
 M1, M2, M3 = (Manifold.euclidean(names) for names in ("x", "x y", "x y z"))
 x, y, z = M3.symbols
 numbers = st.floats(-2, 2).filter(lambda v: abs(v) > 0.05)
-
-
-def sentence(text, words):
-    """Return the one line that contains the words."""
-    (found,) = [line for line in text.splitlines() if words in line]
-    return found
-
-
-def figures(text, words):
-    """Return the numbers after each occurrence of the words."""
-    return [float(found) for found in re.findall(re.escape(words) + " " + NUMBER, text)]
-
-
-def direction(line, manifold):
-    """Return a direction as it is told, in the manifold's own coordinates."""
-    told = dict(re.findall(rf"d(\w+) = {NUMBER}", line))
-    return np.array([float(told.get(name, 0)) for name in manifold.names])
-
-
-def told_rates(text):
-    """Return the contacts that the energy pulls open, and how fast."""
-    found = re.findall(rf"^Opening (\w+).* at the rate {NUMBER} per", text, re.MULTILINE)
-    return {name: float(rate) for name, rate in found}
 
 
 # ------------------------------------------------------------- programmes with known answers
@@ -86,7 +60,7 @@ def test_contacts_that_the_energy_pulls_open_are_named_with_their_rates(programm
     rows, held, _, scales = programme
     text = posed(*programme).explain(unit="mm")
     negative = {f"c{i}": -value for i, value in enumerate(held) if value < 0}
-    assert told_rates(text) == pytest.approx(negative, rel=1e-5)
+    assert opening_rates(text) == pytest.approx(negative, rel=1e-5)
     assert ("per mm" in text) == bool(negative)
     falls = [line for line in text.splitlines() if line.startswith("The energy decreases fastest")]
     assert len(falls) == bool(negative)
@@ -203,7 +177,7 @@ def test_an_interior_point_that_is_not_stationary():
 def test_a_slope_along_the_face_is_told_apart_from_the_contacts():
     """At (1, 1) on the parabola dE = (1, 1) = 0.2 d(bowl) - ..., with d(bowl) = (-2, 1)."""
     text = certify(Polyhedron(M2, {"bowl": y - x**2}), x + y, [1.0, 1.0]).explain()
-    assert told_rates(text) == {"bowl": 0.2}
+    assert opening_rates(text) == {"bowl": 0.2}
     along = sentence(text, "Along the face")
     assert direction(along, M2) == pytest.approx([-(0.2**0.5), -(0.8**0.5)], abs=1e-6)
     assert figures(along, "at the rate") == pytest.approx([3 / 5**0.5], rel=1e-5)
@@ -224,7 +198,7 @@ def test_dependent_contacts_that_are_pulled_open():
     D = Polyhedron(M2, {"floor": y, "again": 2 * y})
     text = certify(D, x**2 - 3 * y, [0.0, 0.0]).explain()
     assert "(dy = 1), at the rate 3 per scale unit" in text
-    assert not told_rates(text)  # which of the two carries it is not determined
+    assert not opening_rates(text)  # which of the two carries it is not determined
 
 
 def test_a_cusp_decides_nothing():
@@ -284,99 +258,3 @@ def test_searches_that_failed_say_so():
     c = minimise(Polyhedron(M2, {"floor": y}), x + y, [0.0, 1.0])
     assert c.explain().startswith("The energy decreases without end")
     assert "(dx = -1)" in c.explain()
-
-
-# ---------------------------------------------------------------------------------- models
-
-
-def test_every_corner_of_the_tutorial_region():
-    """Pulled to each side in turn: multipliers from the two walls' normals."""
-    region = Tutorial()
-    D = region.polyhedron
-    for angle in np.linspace(0, 2 * np.pi, 8, endpoint=False) + 0.1:
-        pull = np.array([np.cos(angle), np.sin(angle)])
-        energy = linear(region.manifold, pull, 0.0, "energy")
-        for point in region.corners().values():
-            c = certify(D, energy, point)
-            held = [D.names.index(name) for name in c.active]
-            lam = np.linalg.solve(D.gradients(point)[held].T, pull)
-            text = c.explain()
-            negative = {D.names[i]: -value for i, value in zip(held, lam, strict=True) if value < 0}
-            assert told_rates(text) == pytest.approx(negative, rel=1e-5)
-            assert text.startswith("Not a minimum" if negative else "Strict local minimum")
-
-
-def test_corners_of_the_pinball_board():
-    board = Pinball()
-    for point in board.corners():
-        c = certify(board.polyhedron, board.energy, point)
-        text = c.explain()
-        meet = len(c.stratum.pieces)
-        assert ("branches of the union meet" in text) == (meet > 1)
-        for piece in c.stratum.pieces:
-            assert ", ".join(piece) in text
-        fall = [
-            line for line in text.splitlines() if line.startswith("The energy decreases fastest")
-        ]
-        assert bool(fall) == (not c.is_minimum)
-        for line in fall:
-            way = direction(line, board.manifold)
-            lower = point + 1e-3 * way
-            assert board.energy.value(lower) < board.energy.value(point)
-            assert board.polyhedron.contains(lower, tolerance=2e-6)
-
-
-def slopes(f, q, step=1e-5):
-    """Return central differences of ``f`` along every coordinate, one column each."""
-    sides = step * np.eye(len(q))
-    return np.stack([(f(q + d) - f(q - d)) / (2 * step) for d in sides], axis=-1)
-
-
-def from_outside(pair, q, names):
-    """Return multipliers of contacts by least squares, from the definition of the gaps."""
-    rows = slopes(lambda p: gaps(pair, p), q)[[CONTACTS.index(name) for name in names]]
-    pull = slopes(lambda p: balls(pair, p)[:, 2].sum(), q)
-    return dict(zip(names, np.linalg.lstsq(rows.T, pull, rcond=None)[0], strict=True))
-
-
-@pytest.mark.parametrize("rod", [1.5, 2.85, 2.93, 2.96])
-def test_the_pair_below_and_beyond_the_critical_rod(rod):
-    """The critical rod radius is 2 r sqrt(1 - r^2/l^2) - r = 2.8936 mm."""
-    from polycorner.dumbbells import dyad_minima
-
-    pair = DumbbellPair(length=16, ball_radius=3, rod_radius=rod, drum_radius=125)
-    c = dyad_minima(pair)[0].certificate
-    text = c.explain(unit="mm")
-    lam = from_outside(pair, c.point, c.active)
-    assert c.active == ("A2B1", "A2b", "aB1")
-    if rod < 2.8936:
-        assert text.startswith("Local minimum, attained along a locus")
-        for name, value in lam.items():
-            (told,) = re.findall(rf"{NUMBER} d\({name}\)", text)
-            assert float(told) == pytest.approx(value, rel=1e-4)
-        assert "free: eta1+eta2." in text
-    else:
-        negative = {name: -value for name, value in lam.items() if value < 0}
-        assert negative
-        assert told_rates(text) == pytest.approx(negative, rel=1e-3)
-        assert "per mm: its multiplier is negative" in text
-
-
-def test_a_pair_near_its_corner_and_one_that_overlaps():
-    pair = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
-    c = minimise(pair.polyhedron, pair.energy, pair.nested("R"))
-    apart = c.point + np.array([0.01, 0, 0, 0, 0, 0])
-    text = certify(pair.polyhedron, pair.energy, apart).explain()
-    assert "in the interior of the polyhedron" in text
-    pull = slopes(lambda p: balls(pair, p)[:, 2].sum(), apart)
-    (rate,) = figures(sentence(text, "decreases fastest"), "at the rate")
-    assert rate == pytest.approx(np.linalg.norm(pull * pair.manifold.scales), rel=1e-4)
-    inside = c.point + np.array([0, -0.5, 0, 0, 0.5, 0])
-    depth = gaps(pair, inside)
-    away = depth / np.linalg.norm(
-        slopes(lambda p: gaps(pair, p), inside) * pair.manifold.scales, axis=1
-    )
-    text = certify(pair.polyhedron, pair.energy, inside).explain(unit="mm")
-    worst = int(away.argmin())
-    (told,) = re.findall(rf"the inequality {CONTACTS[worst]}: its function is {NUMBER} mm", text)
-    assert float(told) == pytest.approx(depth[worst], rel=1e-4)

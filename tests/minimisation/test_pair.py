@@ -1,4 +1,4 @@
-"""The pair of dumbbells in the drum: where it rests, and why."""
+"""Minima of the pair of dumbbells in the drum, and the evidence for them."""
 
 import math
 import re

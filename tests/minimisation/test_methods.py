@@ -1,4 +1,4 @@
-"""Generated problems: whatever a search returns must be true, and three searches must agree."""
+"""Generated problems: every result must be true, and the three methods must agree."""
 
 import numpy as np
 import pytest

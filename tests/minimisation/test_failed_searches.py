@@ -1,4 +1,4 @@
-"""What searches report where there is nothing to find, and on faces."""
+"""Results of searches without a minimum to find, and on faces."""
 
 import pytest
 import sympy as sp
