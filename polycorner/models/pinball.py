@@ -1,8 +1,8 @@
-"""A ball on a tilted board with round pins, wedges and cups: where it can come to rest, and why.
+"""Pinball: a ball on a tilted board with round pins, wedges and cups.
 
 The ball is a point.  A ball of radius ``r`` among obstacles is the point that is its centre, with
-walls moved in and pins and cups made thicker by ``r``; a wedge that is thickened in this way would
-have rounded corners, for which a thinner wedge with a pin at each corner stands.
+walls moved in and pins and cups made thicker by ``r``; a wedge thickened in this way would have
+rounded corners: use a thinner wedge with a pin at each corner.
 """
 
 import math
@@ -46,11 +46,11 @@ CUPS = ((4.3, 3.1, 0.5, 0.65), (6.0, 4.7, 0.6, 0.75))
 
 @dataclass(frozen=True)
 class Pinball(Value):
-    """A point ball on a tilted board between walls, with pins, wedges and cups in its way.
+    """A point ball on a tilted board between walls, among pins, wedges and cups.
 
     Coordinates are ``x`` across the board and ``y`` up the board, from its lower left corner.
     Obstacles may overlap each other and the walls; pockets form between them.  The functions are
-    called after what they keep the ball out of:
+    named after the obstacles:
 
     ================================  =====================================================
     ``left right floor lid``          the walls
@@ -115,7 +115,7 @@ class Pinball(Value):
 
     @cached_property
     def polyhedron(self) -> Polyhedron:
-        """Where the ball may be: inside the board and, for each obstacle, outside of it."""
+        """The free region: inside the board and outside of every obstacle."""
         parts = [
             [wall.function(self.manifold) for wall in obstacle] for obstacle in self._obstacles
         ]
@@ -194,7 +194,7 @@ def _height_formula() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
 
 
 def _rows(argument: str, values: Any, shape: tuple[int, ...], meaning: str) -> Any:
-    """Return an array of rows as nested tuples, so that the board stays a value."""
+    """Return an array of rows as nested tuples, so that the board is hashable."""
     array = finite(reals(values, argument), argument)
     if array.shape[:1] == (0,):
         return ()

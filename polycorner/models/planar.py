@@ -1,4 +1,4 @@
-"""Straight and circular walls in the plane, and what follows from them in closed form."""
+"""Straight and circular walls in the plane: intersections, arcs and corners in closed form."""
 
 import math
 from collections.abc import Sequence
@@ -184,7 +184,7 @@ def uniform_points(
 
 
 def positive(argument: str, value: object) -> float:
-    """Return a positive finite number as a float, refusing anything else."""
+    """Return a positive finite number as a float, or raise."""
     return checks.real(argument, value, above=0)
 
 

@@ -1,4 +1,4 @@
-"""Clusters of hard spheres that stick together: rigid ones are corners, hinges are edges.
+"""Clusters of sticky hard spheres: rigid clusters are corners, hinges are edges.
 
 ``n`` spheres of unit diameter do not overlap: ``|x_i - x_j|^2 >= 1`` for every pair.  Modulo
 congruence a rigid cluster is a corner of this polyhedron; breaking one contact opens a one-
@@ -68,7 +68,7 @@ class SphereCluster(Value):
 
     @cached_property
     def manifold(self) -> Manifold:
-        """Space, once for every sphere."""
+        """The product of one space for each sphere."""
         return Manifold.euclidean("x y z", unit="diameter") ** self.count
 
     @cached_property
@@ -162,9 +162,9 @@ class SphereCluster(Value):
 
 
 def _hollow(centres: list[Array], taken: set[tuple[int, ...]]) -> Array:
-    """Return the first free place that touches three spheres.
+    """Return the first free point that touches three spheres.
 
-    Three spheres without such a place are added to ``taken``: they have none beside more spheres.
+    Triples without a free point are added to ``taken``: further spheres do not free one.
     """
     others = np.array(centres)
     for triple in combinations(range(len(centres)), 3):

@@ -1,4 +1,4 @@
-"""Sets carved out by smooth inequalities joined by and/or, and the face a point lies on."""
+"""Polyhedra: sets defined by smooth inequalities joined by and/or; strata and symmetries."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""And/or trees of smooth inequalities, and the closed sets they carve out of a manifold."""
+"""And/or trees of smooth inequalities and the closed sets that they define on a manifold."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.models.disks.corners import judged
+from polycorner.models.disks.critical_points import judged
 from polycorner.models.disks.torus import IMAGES, Pairs, components, translates, uncut
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value

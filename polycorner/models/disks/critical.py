@@ -17,8 +17,8 @@ from polycorner.models.disks.configurations import (
     placed,
     with_rattlers,
 )
-from polycorner.models.disks.corners import solved
-from polycorner.models.disks.search import Candidate, candidates, smooth
+from polycorner.models.disks.critical_points import solved
+from polycorner.models.disks.smoothing import Candidate, candidates, smooth
 from polycorner.models.disks.torus import OWN
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value

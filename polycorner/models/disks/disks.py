@@ -1,4 +1,4 @@
-"""Equal hard disks on a flat torus, and the configurations where their radius is critical.
+"""Equal hard disks on a flat torus, and their critical configurations.
 
 Lengths are in units of the shortest lattice vector: the square torus has area 1, the hexagonal
 one (a regular hexagon with opposite sides identified) has area ``sqrt(3)/2`` ([EM] sec. 2).
@@ -97,7 +97,7 @@ class TorusDisks(Value):
 
     @cached_property
     def polyhedron(self) -> Polyhedron:
-        """Where no disks overlap: ``|x_j - x_i + v| >= 2r`` for all pairs and images ``v``.
+        """Placements without overlap: ``|x_j - x_i + v| >= 2r`` for all pairs and images ``v``.
 
         A distance to one image is no function on the torus: moving a disk around a circle permutes
         the images.  The functions are smooth and complete where all coordinates lie within 0.6 of
@@ -131,7 +131,7 @@ class TorusDisks(Value):
 
     @cached_property
     def ends(self) -> dict[str, tuple[int, int, tuple[int, int]]]:
-        """Which disks a contact joins, and the image of the second."""
+        """The two disks of each contact, and the image of the second."""
         pairs = combinations(range(1, self.count + 1), 2)
         ends = {f"{i}-{j}({p},{q})": (i, j, (p, q)) for i, j in pairs for p, q in IMAGES}
         return {**ends, OWN: (1, 1, (1, 0))}

@@ -76,7 +76,7 @@ class Pairs:
         self._parameters = [np.array([p, q, cosine]) for p, q in IMAGES]
 
     def derivatives(self, points: Array) -> tuple[Array, Array, Array]:
-        """Return values, gradients and Hessians, as :class:`disk_search.Local` asks."""
+        """Return values, gradients and Hessians of every pair and image; see ``Local``."""
         local = wrapped(points)[:, self.reads]
         inputs = np.concatenate([local, np.zeros((*local.shape[:2], 1))], axis=2).reshape(-1, 5)
         images = [self._kernel.over(inputs, p.ctypes.data, 2) for p in self._parameters]

@@ -1,4 +1,4 @@
-"""How long white noise needs to shake a mass out of a well, without a simulation.
+"""Mean escape times of a mass from a well under white noise, without simulation.
 
 Three answers, from the coarsest to the finest: the exponent with which the time grows as the noise
 gets weaker, the mean time where drag outweighs inertia, and the mean time for any drag, friction
@@ -21,14 +21,14 @@ from polycorner.spaces.manifold import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-NODES = 120  # of Gauss's rule
-CELLS = 80  # between 0 and the rim
-MOST_CELLS = 3000  # up to the largest speed
-CROWD = 0.2  # steps at the wall and at zero speed, over those of an even grid
+NODES = 120  # nodes of Gauss's rule
+CELLS = 80  # grid cells between 0 and the rim
+MOST_CELLS = 3000  # grid cells up to the largest speed
+CROWD = 0.2  # ratio of the steps at the wall and at zero speed to those of an even grid
 
 
 def barrier(well: Well, kick: float) -> float:
-    """Return ``S``: with weaker and weaker noise the mean time to escape grows like ``exp(S)``.
+    """Return ``S``: the mean escape time grows like ``exp(S)`` as the noise becomes weaker.
 
     ``S`` is the least of ``(integral of u^2 dt) / (2 kick^2)`` over the forces ``u(t)`` that lead
     from rest at 0 to the rim ([FW] ch. 4).  With ``D`` the depth, ``c`` the drag, ``f`` the slope,
@@ -77,7 +77,7 @@ def _sloping_barrier(well: Well, kick: float) -> float:
         lift = well.rim + well.slope * (weights @ responses)
         return float(math.log(lift**2 / (2 * kick**2 * (weights @ responses**2))))
 
-    # Without drag and spring the best time is sqrt(6 a m / f), with much drag a c / f.  A spring
+    # Without drag and spring the optimal time is sqrt(6 a m / f), with much drag a c / f.  A spring
     # shortens it, below the half swing after which the mass would be back at the wall.
     fast = math.sqrt(6 * well.rim * well.mass / well.slope)
     slow = 2 * fast + 4 * well.rim * well.drag / well.slope
@@ -171,7 +171,7 @@ def mean_escape_time(well: Well, kick: float, *, cells: int = CELLS) -> float:
 
 
 def places(well: Well, cells: int) -> Array:
-    """Return the places of the grid, both ends of the well among them; they crowd at a wall."""
+    """Return the positions of the grid, both ends of the well included; denser at a wall."""
     if not well.wall:
         return well.rim * np.linspace(-1, 1, 2 * cells + 1)
     share = np.linspace(0, 1, cells + 1)
@@ -179,7 +179,7 @@ def places(well: Well, cells: int) -> Array:
 
 
 def speeds(well: Well, kick: float, cells: int) -> Array:
-    """Return the speeds of the grid: they crowd at zero, which is none of them.
+    """Return the speeds of the grid: denser at zero, which is not one of them.
 
     They go up to what leaves the well at once, and five times what noise adds on the way.
     """
@@ -197,7 +197,7 @@ def speeds(well: Well, kick: float, cells: int) -> Array:
 
 
 def _transport(x: Array, v: Array) -> "csr_matrix":
-    """Return ``v d/dx``, differences of second order taken from where the mass will be."""
+    """Return ``v d/dx``, upwind differences of second order."""
     from scipy.sparse import csr_matrix, diags, kron
 
     outward, inward = diags(np.maximum(v, 0)), diags(np.minimum(v, 0))
@@ -238,7 +238,7 @@ def _forces(well: Well, kick: float, x: Array, v: Array) -> "csr_matrix":
 
 
 def _boundary(well: Well, x: Array, v: Array) -> "tuple[NDArray[np.bool_], csr_matrix]":
-    """Return where the equation holds, and rows for the rim and the wall elsewhere."""
+    """Return where the equation holds, and boundary rows for the rim and the wall."""
     from scipy.sparse import csr_matrix
 
     half, inside = len(v) // 2, np.ones((len(x), len(v)), dtype=np.bool_)

@@ -1,4 +1,4 @@
-"""How strongly U, half-U and half-V wells hold under the same noise.
+"""Ensembles of masses in U, half-U and half-V wells under the same noise.
 
 [GMBN] app. C calls each of the three stronger than its predecessor.  Here many copies of one mass
 are shaken independently and timed until they reach the rim.  The kinds have the same rim, depth,
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from polycorner.motion.engine.driver import Engine
     from polycorner.motion.system import System
 
-NORMAL = 1.959964  # 97.5 per cent of a normal distribution
-LOOKS = 200  # how often, at least, a run is interrupted to take out what has escaped
+NORMAL = 1.959964  # 97.5th percentile of the standard normal distribution
+LOOKS = 200  # least number of times that a run is interrupted to remove masses that have escaped
 
 
 def herd_engine(
@@ -46,7 +46,7 @@ def herd_engine(
     dt: float,
     noise: Noise | None = None,
 ) -> "Engine":
-    """Return an engine that moves independent copies of a system, each with noise of its own.
+    """Return an engine that moves independent copies of a system, each with its own noise.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def herd_engine(
 
 @dataclass(frozen=True, eq=False)
 class Escapes(Value):
-    """When copies of a mass reached the rim of its well.
+    """Escape times of copies of a mass from its well.
 
     Attributes
     ----------
@@ -87,9 +87,9 @@ class Escapes(Value):
     kick : float
         Intensity of the noise.
     times : (count,) array
-        When each reached the rim; nan for those still inside at the end.
+        Time at which each reached the rim; nan for those still inside at the end.
     duration : float
-        How long they were watched.
+        Duration of the simulation.
     """
 
     well: Well
@@ -99,15 +99,15 @@ class Escapes(Value):
 
     @property
     def escaped(self) -> NDArray[np.bool_]:
-        """Which of them reached the rim, ``(count,)``."""
+        """Whether each reached the rim, ``(count,)``."""
         return np.isfinite(self.times)
 
     @property
     def mean(self) -> float:
-        """Mean time to escape; where some are still inside, all time spent inside per escape.
+        """Mean escape time; where some are still inside, the total time inside per escape.
 
-        The second is the mean of an exponential distribution that fits best, as escapes from a well
-        that is deep against the noise are distributed.
+        The latter is the maximum-likelihood mean of an exponential distribution, which is that
+        of escapes from a well that is deep compared with the noise.
         """
         spent = float(np.where(self.escaped, self.times, self.duration).sum())
         return spent / int(self.escaped.sum()) if self.escaped.any() else math.inf
@@ -121,7 +121,7 @@ class Escapes(Value):
         return self.mean / math.sqrt(count) if count else math.inf
 
     def interval(self) -> tuple[float, float]:
-        """Return limits between which the mean lies with 95 per cent; without escapes a lower one.
+        """Return the 95 % confidence limits of the mean; without escapes, a lower limit only.
 
         Normal in the logarithm.  If none of them escaped, three times the mean number would have
         shown one with 95 per cent.
@@ -143,7 +143,7 @@ def escapes(
     places: ArrayLike = 0.0,
     speeds: ArrayLike = 0.0,
 ) -> Escapes:
-    """Shake ``count`` copies of a mass and note when each reaches the rim.
+    """Simulate ``count`` copies of a mass and return when each reaches the rim.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def ladder(depth: float, rim: float = 1.0, **others: float) -> tuple[Well, Well,
 
 
 def stays(well: Well, speeds: Sequence[float], *, duration: float, dt: float) -> NDArray[np.bool_]:
-    """Return for masses that come in at the rim with given speeds whether the well keeps them.
+    """Return whether the well captures masses that enter at the rim with given speeds.
 
     There is no noise.  :meth:`Well.capture_speed` is the answer in closed form.
     """

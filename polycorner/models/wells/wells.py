@@ -1,4 +1,4 @@
-r"""Wells on a line that hold a point mass in the three ways of [GMBN] app. C: U, half-U and half-V.
+r"""Potential wells of a point mass on a line, of the three kinds of [GMBN] app. C.
 
 ::
 
@@ -8,11 +8,11 @@ r"""Wells on a line that hold a point mass in the three ways of [GMBN] app. C: U
       `-'          |.-'          |/
        0           0             0
 
-A wall at 0 takes energy by its restitution; the rim is where the well ends.  Loss of energy is the
-same law in all wells: viscous drag ``-c v``, dry friction of constant size, or both.
+A wall at 0 dissipates energy by its restitution; the well ends at the rim.  The law of dissipation
+is the same in all wells: viscous drag ``-c v``, dry friction of constant size, or both.
 
-How long it takes until the mass is captured, when nothing shakes it, stands here in closed form;
-how hard it is to shake out stands in :mod:`polycorner.models.wells.escape`.
+Capture times without noise are given here in closed form, escape times with noise in
+:mod:`polycorner.models.wells.escape`.
 """
 
 import math
@@ -45,13 +45,13 @@ class Flight(Value):
     Attributes
     ----------
     duration : float
-        Until it is back at 0, or at rest on the way.
+        Time until it is back at 0 or at rest on the way.
     height : float
         The largest ``x``.
     speed : float
-        With which it comes back; 0 where friction holds it.
+        Speed of return; 0 where friction holds it.
     place : float
-        Where it ends: 0, or where friction holds it.
+        Final position: 0, or where friction holds it.
     """
 
     duration: float
@@ -64,7 +64,7 @@ class Flight(Value):
 class Well(Value):
     """A point mass on a line with the energy ``V(x) = slope |x| + stiffness x^2 / 2``.
 
-    With a wall at ``x = 0`` the mass lives in ``0 <= x``, otherwise on the whole line; the well
+    With a wall at ``x = 0`` the mass stays in ``0 <= x``, otherwise on the whole line; the well
     ends at ``|x| = rim``.  Units are free; those of a dyad are mm, g and s.
 
     Parameters
@@ -73,7 +73,7 @@ class Well(Value):
         Force at the wall; 0 without one.
     stiffness : float
     rim : float, optional
-        Where the well ends; default 1.
+        End of the well; default 1.
     wall : bool, optional
         Default True.
     mass : float, optional
@@ -83,7 +83,7 @@ class Well(Value):
     friction : float, optional
         Size of the force of dry friction; default 0.
     restitution : float, optional
-        Of the wall; default 0, which absorbs all energy.
+        Restitution of the wall; default 0, no rebound.
 
     Raises
     ------
@@ -134,7 +134,7 @@ class Well(Value):
 
     @property
     def kind(self) -> Entrapment:
-        """How it holds: half-V with a force at the wall, half-U without, U without a wall."""
+        """Half-V with a force at the wall, half-U without such a force, U without a wall."""
         if not self.wall:
             return Entrapment.U
         return Entrapment.HALF_V if self.slope > 0 else Entrapment.HALF_U
@@ -161,7 +161,7 @@ class Well(Value):
 
     @property
     def time_step(self) -> float:
-        """A step for simulations, short against everything that happens in the well."""
+        """Time step for simulations, short compared with the time scales of the well."""
         times = [self.rim * math.sqrt(self.mass / self.depth)]
         if self.drag > 0:
             times.append(self.mass / self.drag)
@@ -184,7 +184,7 @@ class Well(Value):
 
     @cached_property
     def polyhedron(self) -> Polyhedron:
-        """Where the mass may be: ``wall: x >= 0``, and inside the ``rim``.
+        """The admissible positions: ``wall: x >= 0``, and inside the ``rim``.
 
         The rim is no body; a simulation ends there.
         """
@@ -223,7 +223,7 @@ class Well(Value):
     # -------------------------------------------------------------------------------------- capture
 
     def flight(self, speed: float) -> Flight:
-        """Return what happens between leaving 0 with a speed and the next time there.
+        """Return the flight that leaves 0 with a given speed.
 
         For no drag; the rim is not looked at.  Up the forces ``slope + friction`` and the spring
         slow it down, and down ``slope - friction`` and the spring drive it.
@@ -237,7 +237,7 @@ class Well(Value):
         return Flight(up + down, height, back, place)
 
     def flights(self, speed: float) -> Iterator[Flight]:
-        """Yield one flight after another until the mass comes to rest, or without end."""
+        """Yield successive flights until the mass comes to rest, or without end."""
         while speed > 0:
             flight = self.flight(speed)
             yield flight
@@ -285,7 +285,7 @@ class Well(Value):
         return math.sqrt(2 / self.mass * ((self.depth + loss) / self.kept**2 - self.depth + loss))
 
     def check_no(self, name: str) -> None:
-        """Refuse a well with drag, or with friction, for what has a closed form without it only."""
+        """Raise for a well with drag or friction where the closed form excludes it."""
         if getattr(self, name) > 0:
             msg = f"{name}: expected 0, for there is no closed form; got {getattr(self, name):g}"
             raise ValueError(msg)

@@ -21,13 +21,13 @@ REACH, NEWTON_STEPS, CENTRING_STEPS = 0.1, 12, 60
 
 
 @dataclass(frozen=True, eq=False)
-class Corner:
+class CriticalPoint:
     """A critical point of ``tau = min_k d_k``, judged from the definition.
 
     Attributes
     ----------
     point : (n,) array
-        Where it is.
+        The point.
     value : float
         ``tau`` there.
     active : (a,) array of int
@@ -35,7 +35,7 @@ class Corner:
     stress : (a,) array
         ``lam >= 0`` with ``sum lam_k grad d_k = 0`` and ``sum lam_k = 1``; see :func:`balance`.
     stresses : int
-        How many solutions of either sign are independent on the support of ``stress``.
+        Number of independent solutions of either sign on the support of ``stress``.
     index, nullity : int
         Number of positive and of zero eigenvalues of ``sum lam_k hess d_k`` on the directions
         that the stressed gradients and the symmetries annihilate.
@@ -77,14 +77,14 @@ def solved(
         jacobian[m : m + n, n + 1 :] = g.T
         jacobian[-1, n + 1 :] = 1
         # Singular values that vanish at the solution, where functions are more than their rank,
-        # are small near it; steps along them would not come to an end.
+        # are small near it; steps along them would not converge.
         x = x - np.linalg.lstsq(jacobian, residual, rcond=1e-4)[0]
     near = abs(x[:n] - point).max() < REACH
     return x[:n] if near and abs(residual).max() < 10 * EXACT else None
 
 
-def judged(functions: Functions, point: Array, symmetries: Array) -> Corner | None:
-    """Return what all functions say about a point; None where it is not critical.
+def judged(functions: Functions, point: Array, symmetries: Array) -> CriticalPoint | None:
+    """Return the critical point at a point; None where it is not critical.
 
     Functions within ``1e-9`` of the least are active, and must agree to ``1e-11``; the stress
     must balance to ``1e-9``.
@@ -116,7 +116,7 @@ def judged(functions: Functions, point: Array, symmetries: Array) -> Corner | No
     )
     degenerate = bool(fewest < index or not loaded.all())
     nullity = free.shape[1] - index
-    return Corner(point, value, active, stress, stresses, index, nullity, degenerate)
+    return CriticalPoint(point, value, active, stress, stresses, index, nullity, degenerate)
 
 
 def _positive(form: Array) -> int:
@@ -140,7 +140,7 @@ def balance(gradients: Array) -> tuple[Array, int]:
     stress : (a,) array
         Zeros when there is no solution.
     stresses : int
-        How many solutions of either sign are independent on its support; 0 without a solution.
+        Number of independent solutions of either sign on its support; 0 without a solution.
     """
     count = len(gradients)
     stress, one, nothing = np.zeros(count), np.eye(count), np.zeros((count, count))
@@ -166,7 +166,7 @@ def balance(gradients: Array) -> tuple[Array, int]:
 
 
 def extreme_stresses(gradients: Array) -> list[Array]:
-    """Return the stresses ``lam >= 0``, ``sum lam_k grad d_k = 0`` that no others add up to.
+    """Return the stresses ``lam >= 0``, ``sum lam_k grad d_k = 0`` that are not sums of others.
 
     Every stress is a sum of multiples of them; each sums to 1.
     """
@@ -176,7 +176,7 @@ def extreme_stresses(gradients: Array) -> list[Array]:
 
 
 def _relations(gradients: Array) -> Array:
-    """Return a basis, as columns, of the weights with which the gradients sum to nothing."""
+    """Return a basis, as columns, of the weights whose combination of the gradients is zero."""
     sizes = np.linalg.norm(gradients, axis=1)
     return np.asarray(Rows(gradients, RANK).relations / sizes[:, None])
 

@@ -6,7 +6,8 @@
 
 has the gradient ``sum_k w_k grad d_k`` with positive weights ``w`` that sum to 1.  Its critical
 points of every index are found where ``s`` is small, followed while it grows, and their weights
-tend to a stress.  What comes out is a guess, for ``disk_corners`` to solve for and to judge.
+tend to a stress.  The results are guesses, solved for and judged in
+:mod:`~polycorner.models.disks.critical_points`.
 """
 
 from collections.abc import Callable
@@ -90,13 +91,13 @@ class Candidate:
     Attributes
     ----------
     point : (n,) array
-        Where it is.
+        The point.
     sharpness : float
-        Which energy it is a critical point of.
+        Sharpness of the energy of which it is a critical point.
     loaded : float
         Weights above this fraction of the largest become a stress.
     hits : int
-        How many descents ended there.
+        Number of descents that ended there.
     """
 
     point: Array
@@ -107,7 +108,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class _Population:
-    """Points with a slope, and how many descents ended at each."""
+    """Points with slopes and numbers of descents that ended at each."""
 
     points: Array
     slopes: Array
@@ -136,7 +137,7 @@ def candidates(
     rng: np.random.Generator,
     moves: Callable[[Array, np.random.Generator], Array],
 ) -> list[Candidate]:
-    """Return where critical points of ``tau`` seem to be, some of them several times.
+    """Return guesses of critical points of ``tau``, some of them several times.
 
     At every sharpness what is known is followed, and disturbed copies of it look for branches
     that appear there.  Points where ``|grad E_s|`` has a small positive minimum are followed
@@ -148,11 +149,11 @@ def candidates(
     functions : Local
         The ``d_k``.
     starts : (B, n) array
-        Where descents start, spread over the softer energies.
+        Starts of the descents, spread over the softer energies.
     rng : numpy.random.Generator
         Disturbs the copies.
     moves : callable
-        Disturbs points ``(N, n)`` by far; the model knows how.
+        Disturbs points ``(N, n)`` by large steps of the model.
     """
     levels = SOFTEST * GROWTH ** np.arange(np.log(SHARPEST / SOFTEST) // np.log(GROWTH) + 1)
     shares = np.array_split(starts, int((levels < RANDOM_BELOW).sum()))

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.models.disks.corners import balance, extreme_stresses, judged, solved
+from polycorner.models.disks.critical_points import balance, extreme_stresses, judged, solved
 from polycorner.models.disks.disks import TorusDisks
-from polycorner.models.disks.search import smooth
+from polycorner.models.disks.smoothing import smooth
 
 SEEDS = st.integers(0, 2**32 - 1)
 
