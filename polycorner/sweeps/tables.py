@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PENDING, DONE, FAILED = 0, 1, 2
-BLOCK = 4096  # points whose status is looked up at a time
 SHARE = 0.05  # of the time, for writing
 TEXT = np.dtypes.StringDType()
 
@@ -111,12 +110,10 @@ class Table:
     def missing(self, *, retry: bool) -> Iterator[int]:
         """Yield the points that are still to be computed; with ``retry`` the failed ones as well.
 
-        A point is looked up when its turn comes, and given once.
+        The states are those at the first point.
         """
-        for start in range(0, len(self.status), BLOCK):
-            block = self.status[start : start + BLOCK]
-            wanted = (block == PENDING) | (retry & (block == FAILED))
-            yield from (start + np.flatnonzero(wanted)).tolist()
+        wanted = (self.status == PENDING) | (retry & (self.status == FAILED))
+        yield from map(int, np.flatnonzero(wanted))
 
     def add(self, outcomes: Sequence[Outcome]) -> None:
         """Take the outcomes of points, and write what waits when it is time."""
@@ -204,9 +201,7 @@ class Table:
 
 def coordinate_arrays(grid: Grid) -> dict[str, Any]:
     """Return the parameters as xarray takes them."""
-    return {
-        name: (name, np.array(axis.values), units(axis.unit)) for name, axis in grid.axes.items()
-    }
+    return {new.name: (new.dimensions, new.fill, new.attributes) for new in coordinates(grid)}
 
 
 def _listing(columns: Iterable[Column]) -> str:

@@ -1,16 +1,18 @@
 """Values of the library in studies: regions as fixed arguments and in closures, on any workers."""
 
+import copy
 import json
 import subprocess
 import sys
 
+import elsewhere
 import numpy as np
 import pytest
 import regions
 import xarray as xr
 
 from polycorner import Polyhedron, minimise
-from polycorner.sweeps import sweep
+from polycorner.sweeps import Axis, Grid, SweepError, sweep
 from polycorner.sweeps.study import canonical
 
 GRID = {"slope": [0.5, 1.0, 2.0], "start": [-0.2, 0.2]}
@@ -32,11 +34,17 @@ def test_a_region_of_ones_own_as_argument_and_in_a_closure_on_processes(tmp_path
     def closed(slope, start):
         return lowest(slope, start, region)
 
+    def again(slope, start, found):
+        shifted = minimise(found.problem.polyhedron, plane.symbols[1], [start, 2.0 + slope])
+        return {"away": np.linalg.norm(shifted.point - found.point)}
+
     here = sweep(lowest, GRID, fixed={"region": region})
     assert (here["status"].values == 1).all()
     there = sweep(lowest, GRID, fixed={"region": region}, executor=2, store=tmp_path / "s")
     xr.testing.assert_identical(plain(here), plain(there))
     xr.testing.assert_identical(plain(here), plain(sweep(closed, GRID, executor=1)))
+    told = sweep(again, GRID, fixed={"found": certificate}, executor=1)
+    assert told["away"].max() < 1e-9
 
 
 def test_a_store_knows_its_region_again_and_refuses_another(tmp_path):
@@ -71,3 +79,10 @@ def test_the_identity_of_a_region_is_the_same_in_every_process(seed):
     )
     here = canonical({"r": regions.bowl(), "names": {"a", "b", "c"}})
     assert json.loads(there.stdout) == json.loads(here)
+
+
+def test_axes_grids_and_exceptions_travel():
+    for value in (Axis([1, 2], "mm"), Grid.of({"a": [1.0, np.inf], "b": ["R", "L"]})):
+        assert elsewhere.called(copy.deepcopy, value) == copy.deepcopy(value) == value
+    error = elsewhere.called(copy.copy, SweepError("gone", results=3))
+    assert (str(error), error.results) == ("gone", 3)
