@@ -8,19 +8,19 @@ name first; so whenever a run is killed, the folder has a state and all that bel
 import contextlib
 import hashlib
 import os
-import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from polycorner.atomic import PART, atomic
+from polycorner.atomic import PART
+from polycorner.container import BINARY, Kind
 from polycorner.files.motions import event_table, read_events, read_touches, touch_table
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.recorder import Recorder
 
-FORMAT = 1
+KIND = Kind("checkpoint", "a run", BINARY)
 STATE = "state.npz"
 ENGINE = "engine."
 
@@ -28,16 +28,6 @@ ENGINE = "engine."
 def contact_names(engine: Engine) -> tuple[str, ...]:
     """Return the names of all contacts that can occur; files have numbers instead."""
     return (*engine.bodies.body.contacts, *engine.bodies.pair_contacts)
-
-
-def _write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    with atomic(path) as temporary:
-        np.savez(temporary, **arrays)
-
-
-def _read_arrays(path: Path) -> dict[str, Any]:
-    with path.open("rb") as file, np.load(file) as arrays:
-        return {name: arrays[name] for name in arrays.files}
 
 
 class Checkpoint:
@@ -86,16 +76,15 @@ class Checkpoint:
         arrays["left"] = np.array(recorder.left[since:], dtype=np.float64)
         arrays |= touch_table(recorder.touching[since:], names)
         arrays |= event_table(recorder.events[self._events :], names)
-        _write_arrays(self._chunk(self.chunks), arrays)
+        KIND.save_arrays(self._chunk(self.chunks), arrays)
         state = {
-            "format": np.array(FORMAT),
             "key": np.array(self.key),
             "chunks": np.array(self.chunks + 1),
             "frames": np.array(len(recorder.left)),
             "gone": np.array(recorder.gone),
             **{ENGINE + name: array for name, array in recorder.engine.save().items()},
         }
-        _write_arrays(self.folder / STATE, state)
+        KIND.save_arrays(self.folder / STATE, state)
         self.chunks += 1
         self._frames, self._events = len(recorder.left), len(recorder.events)
 
@@ -112,17 +101,13 @@ class Checkpoint:
             msg = f"checkpoint: expected an unfinished run in {self.folder}; got none"
             raise ValueError(msg)
         try:
-            state = _read_arrays(self.folder / STATE)
-            written = int(state["format"])
+            state = KIND.load_arrays(self.folder / STATE)
             other = str(state["key"]) != self.key
-            if written == FORMAT and not other:
+            if not other:
                 self._fill(recorder, state)
-        except (KeyError, IndexError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        except (KeyError, IndexError, ValueError, OSError) as error:
             msg = f"checkpoint: expected an unfinished run; {self.folder} is damaged ({error})"
             raise ValueError(msg) from error
-        if written != FORMAT:
-            msg = f"checkpoint: expected version {FORMAT}; {self.folder} has version {written}"
-            raise ValueError(msg)
         if other:
             msg = f"checkpoint: expected the parameters of the run in {self.folder}; got others"
             raise ValueError(msg)
@@ -130,7 +115,7 @@ class Checkpoint:
     def _fill(self, recorder: Recorder, state: dict[str, Any]) -> None:
         names = contact_names(recorder.engine)
         for number in range(int(state["chunks"])):
-            chunk = _read_arrays(self._chunk(number))
+            chunk = KIND.load_arrays(self._chunk(number))
             for name, rows in recorder.columns.items():
                 rows.extend(chunk[name])
             recorder.left += chunk["left"].tolist()
