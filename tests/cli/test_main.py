@@ -1,4 +1,4 @@
-"""What holds for every subcommand: help, JSON, quiet and verbose, files of settings, exit codes."""
+"""Properties of every subcommand: help, examples, tables, JSON, quiet and verbose, exit codes."""
 
 import errno
 import json
@@ -11,45 +11,16 @@ from pathlib import Path
 import click
 import commands
 import pytest
+from command_tree import EVERY, LEAVES, QUICK, one_line, options
 
 from polycorner.cli import main as entry
 from polycorner.cli.main import EXIT_CODES, cli
 
 ROOT = Path(entry.__file__).parents[2]
-# Arguments with which a command answers soon.
-QUICK = {
-    "dyad": ("--drum", "inf"),
-    "atlas dyad": ("--plane", "--budget", "1"),
-    "atlas spheres": ("--count", "5"),
-    "atlas tutorial": (),
-    "atlas pinball": ("--budget", "1"),
-    "atlas disks": ("--count", "2"),
-    "cache": (),
-    "prove": ("--drum", "inf"),
-    "minima dyad": ("--starts", "5"),
-    "minima pinball": ("--starts", "5"),
-    "drum": ("--duration", "0.1", "--dt", "0.005"),
-    "paper": ("G4",),
-}
-ELSEWHERE = {"completion", "sweep", "view"}  # what these print is tested in files of their own
+ELSEWHERE = {"completion", "sweep", "view"}  # their output is tested in files of their own
 NO_SEED = {"cache", "dyad", "prove", "paper"}  # nothing random in them
 
 
-def walk(command, *names):
-    """Yield every command below one as ``(names, command)``, groups too."""
-    yield names, command
-    if isinstance(command, click.Group):
-        context = click.Context(command)
-        for name in command.list_commands(context):
-            yield from walk(command.get_command(context, name), *names, name)
-
-
-EVERY = dict(walk(cli))
-LEAVES = {
-    " ".join(names): command
-    for names, command in EVERY.items()
-    if not isinstance(command, click.Group)
-}
 every_leaf = pytest.mark.parametrize("name", LEAVES)
 every_answer = pytest.mark.parametrize("name", QUICK)
 
@@ -64,10 +35,6 @@ def own_cache(tmp_path_factory):
 
 def run(capsys, name, *arguments):
     return commands.run(capsys, *name.split(), *arguments)
-
-
-def options(command):
-    return {option: p for p in command.params for option in p.opts if option.startswith("--")}
 
 
 def test_every_subcommand_is_looked_at():
@@ -210,13 +177,6 @@ def test_unfinished_work_is_told_of_unless_quiet(capsys):
 # ---------------------------------------------------------------------------- mistakes
 
 
-def one_line(code, out, err):
-    assert (code, out) == (2, "")
-    assert err.startswith("polycorner: ")
-    assert err.count("\n") == 1
-    return err
-
-
 @every_leaf
 def test_a_misspelt_option_is_refused_and_the_right_one_suggested(capsys, name):
     first = ("bash",) if name == "completion" else ()
@@ -228,87 +188,6 @@ def test_a_misspelt_option_is_refused_and_the_right_one_suggested(capsys, name):
 @pytest.mark.parametrize(("words", "meant"), [("dyda", "dyad"), ("atlas sphere", "spheres")])
 def test_a_misspelt_subcommand_is_refused_and_the_right_one_suggested(capsys, words, meant):
     assert f"'{meant}'" in one_line(*run(capsys, words))
-
-
-SETTLED = [name for name in QUICK if "--config" in options(LEAVES[name])]
-KINDS = {
-    click.types.IntParamType: ("1.5", "a whole number"),
-    click.types.FloatParamType: ("'three'", "a number"),
-    click.types.BoolParamType: ("1", "true or false"),
-    click.Choice: ("3", ""),
-}
-
-
-def settings_of(name):
-    """Return the keys a file may hold, and their options."""
-    about_the_call = {
-        "config",
-        "json",
-        "out",
-        "quiet",
-        "verbose",
-        "resume",
-        "help",
-        "movie",
-        "list",
-    }
-    found = {word[2:].replace("-", "_"): p for word, p in options(LEAVES[name]).items()}
-    return {key: p for key, p in found.items() if key not in about_the_call}
-
-
-@pytest.mark.parametrize("name", SETTLED)
-def test_a_misspelt_key_is_refused_and_the_right_one_suggested(capsys, tmp_path, name):
-    file = tmp_path / "run.toml"
-    for key in settings_of(name):
-        if len(key) < 4:
-            continue
-        wrong = key[:-2] + key[-1] + key[-2]
-        if wrong in settings_of(name):
-            continue
-        file.write_text(f"{wrong} = 1\n")
-        err = one_line(*run(capsys, name, "--config", str(file)))
-        assert err.startswith(f"polycorner: --config: {file}: expected one of ")
-        assert err.endswith(f"; got {wrong} (did you mean {key}?)\n")
-    file.write_text("zzz = 1\n")
-    assert "did you mean" not in one_line(*run(capsys, name, "--config", str(file)))
-
-
-@pytest.mark.parametrize("name", SETTLED)
-def test_a_value_of_another_kind_is_refused_by_its_key(capsys, tmp_path, name):
-    file = tmp_path / "run.toml"
-    for key, option in settings_of(name).items():
-        kind = next((k for k in KINDS if isinstance(option.type, k)), None)
-        if kind is None or option.nargs > 1:
-            continue
-        written, expected = KINDS[kind]
-        file.write_text(f"{key} = {written}\n")
-        err = one_line(*run(capsys, name, "--config", str(file)))
-        assert err.startswith(f"polycorner: --config: {file}: {key}: ")
-        assert expected in err
-
-
-def test_a_file_stands_for_options_and_options_override_it(capsys, tmp_path):
-    file = tmp_path / "run.toml"
-    file.write_text('count = 2\ntorus = "hexagonal"\nseed = 3\n')
-    read = run(capsys, "atlas disks", "--config", str(file), "--json")
-    assert read == run(
-        capsys, "atlas disks", "--count", "2", "--torus", "hexagonal", "--seed", "3", "--json"
-    )
-    over = json.loads(
-        run(capsys, "atlas disks", "--config", str(file), "--torus", "square", "--json")[1]
-    )
-    assert over["parameters"] == {"count": 2, "torus": "square"}
-
-
-def test_a_file_may_hold_flags_lists_and_dashes(capsys, tmp_path):
-    file = tmp_path / "run.toml"
-    file.write_text('box = ["t=1.49:1.51", "l=16:16.01"]\nrod-weight = 0\ndigits = 5\n')
-    found = json.loads(run(capsys, "prove", "--config", str(file), "--json")[1])
-    assert found["box"] == {"t": [1.49, 1.51], "l": [16.0, 16.01]}
-    file.write_text("plane = true\ndrum = 80\nbudget = 1\n")
-    found = json.loads(run(capsys, "atlas dyad", "--config", str(file), "--json", "-q")[1])
-    assert found["parameters"]["drum"] == "inf"
-    one_line(*run(capsys, "atlas dyad", "--plane", "--drum", "80"))
 
 
 # -------------------------------------------------------------------------- exit codes

@@ -1,4 +1,4 @@
-"""The command line: its JSON, its table, its files, and one line for every mistake."""
+"""The command ``polycorner dyad``: JSON, table, files, and one line for every mistake."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""The claims on the command line: what is printed and written, and one line for a mistake."""
+"""The command ``polycorner paper``: output, files, names of claims and figures."""
 
 import errno
 import json

@@ -1,4 +1,4 @@
-"""Proofs on the command line: what is proved, what fails, and one line for a mistake."""
+"""The command ``polycorner prove``: proofs, failures and files."""
 
 import json
 from decimal import Decimal

@@ -1,4 +1,4 @@
-"""``polycorner view``: the page in a browser says what the library says; files; mistakes."""
+"""The command ``polycorner view``: pages in a browser, files and mistakes."""
 
 import re
 import signal
