@@ -160,7 +160,7 @@ WRONG_FILES = {
     "mu_slide = [0.3, 0.2, 0.1]": "mu_slide",
     "start = [[0, 10]]": "start",
     "tilt = '7'": "tilt",
-    "this is no TOML": "no TOML file",
+    "this is no TOML": "not a TOML file",
 }
 
 
