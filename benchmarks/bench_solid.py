@@ -17,7 +17,7 @@ import numpy as np
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.placements import forbidden_solid, relative_gap
-from polycorner.pictures.solids.meshes import Isosurface, isosurface
+from polycorner.pictures import Isosurface, isosurface
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 TURN = math.pi

@@ -59,8 +59,8 @@ def order_in_curvature() -> float:
 
 def draw(path: Path) -> Path:
     """Draw both curves of the paper and the computed ones for several rod radii."""
-    from polycorner.dumbbells.pictures.dyads import draw_heading
-    from polycorner.pictures.style import save
+    from polycorner.dumbbells.pictures import draw_heading
+    from polycorner.pictures import save
 
     return save(draw_heading(PAIR, LENGTHS.tolist(), RODS), path)
 

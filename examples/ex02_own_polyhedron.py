@@ -30,8 +30,7 @@ def main() -> Certificate:
 
 def draw(rest: Certificate, path: Path) -> Path:
     """Draw the wedge and the bead in its corner."""
-    from polycorner.pictures.regions import draw_region
-    from polycorner.pictures.style import save
+    from polycorner.pictures import draw_region, save
 
     bowl = np.linspace(GOLDEN, 1.5, 61)
     sides = [

@@ -31,8 +31,7 @@ def main() -> tuple[Certificate, Certificate]:
 
 def draw(path: Path) -> Path:
     """Draw the energy's level lines, where points are let go, and where they come to rest."""
-    from polycorner.pictures.regions import draw_region
-    from polycorner.pictures.style import save
+    from polycorner.pictures import draw_region, save
 
     rests = [minimise(OUTSIDE, ENERGY, start) for start in STARTS]
     named = [(f"rest on {rest.active[0]}, E = {rest.energy:g}", rest.point) for rest in rests]

@@ -57,8 +57,7 @@ def letter(corner: Corner) -> str:
 
 def draw(result: Result, path: Path) -> Path:
     """Draw the region with the names of its corners and sides."""
-    from polycorner.pictures.regions import draw_region
-    from polycorner.pictures.style import save
+    from polycorner.pictures import draw_region, save
 
     figure = draw_region(
         REGION.polyhedron,

@@ -21,9 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.pictures.placements import forbidden_solid, relative_placements
-from polycorner.pictures.solids.meshes import components_of_complement, write_mesh
-from polycorner.pictures.solids.rendering import draw_solid
+from polycorner.dumbbells.pictures import forbidden_solid, relative_placements
+from polycorner.pictures import components_of_complement, draw_solid, write_mesh
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 P = PAIR.ball_radius + PAIR.rod_radius
@@ -90,7 +89,7 @@ def corners() -> tuple[np.ndarray, list[str]]:
 
 def draw(path: Path, resolution: int = 128) -> Path:
     """Draw the solid over half a turn, and write it as a GLB with ``l/2`` mm to a radian."""
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     solid = forbidden_solid(PAIR, resolution, period=math.pi)
     points, names = corners()

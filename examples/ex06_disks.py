@@ -38,8 +38,7 @@ def main() -> dict[tuple[int, str], list[tuple[float, int]]]:
 
 def draw(path: Path) -> Path:
     """Draw the critical configurations of four disks on the hexagonal torus."""
-    from polycorner.pictures.disks import draw_critical
-    from polycorner.pictures.style import save
+    from polycorner.pictures import draw_critical, save
 
     model = TorusDisks(4, "hexagonal")
     return save(draw_critical(model, model.critical(np.random.default_rng(0))), path)

@@ -70,8 +70,7 @@ def held_as(rest: Certificate) -> str:
 
 def draw(result: Result, path: Path) -> Path:
     """Draw the board, its corners, and every ball where it rests, coloured by how it is held."""
-    from polycorner.pictures.regions import draw_region
-    from polycorner.pictures.style import save
+    from polycorner.pictures import draw_region, save
 
     balls = [(held_as(rest), rest.point) for group in result.rests.values() for rest in group]
     figure = draw_region(

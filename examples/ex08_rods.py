@@ -53,7 +53,7 @@ def main() -> Result:
 def draw(result: Result, whole: PairMap, folder: Path) -> list[Path]:
     """Draw the map, the atlas and its motions into a folder."""
     from polycorner.dumbbells.pictures import draw_atlas, draw_motions, draw_pair_map
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     return [
         save(draw_atlas(result.atlas), folder / "ex08_atlas.png"),

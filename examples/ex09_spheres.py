@@ -68,8 +68,7 @@ def row(atlas: Skeleton, k: int) -> Row:
 
 def draw(result: Result, folder: Path) -> list[Path]:
     """Draw the clusters, and the motion from one to the other."""
-    from polycorner.pictures.clusters import draw_clusters, draw_motion
-    from polycorner.pictures.style import save
+    from polycorner.pictures import draw_clusters, draw_motion, save
 
     points = [corner.point for corner in result.atlas.corners]
     change = next(edge for edge in result.atlas.edges if not edge.is_loop)

@@ -98,8 +98,8 @@ def apart(rod: float) -> float:
 
 def draw(folder: Path) -> list[Path]:
     """Draw the branches that meet, and the critical thickness over the length."""
-    from polycorner.dumbbells.pictures.bifurcation import draw_bifurcation, draw_critical
-    from polycorner.pictures.style import save
+    from polycorner.dumbbells.pictures import draw_bifurcation, draw_critical
+    from polycorner.pictures import save
 
     radius = PAIR.ball_radius
     drums = [math.inf, PAIR.drum_radius, 10 * radius, 4 * radius]

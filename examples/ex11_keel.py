@@ -70,8 +70,8 @@ def main() -> Result:
 
 def draw(path: Path) -> Path:
     """Draw regions of rest, turning points and torques."""
-    from polycorner.dumbbells.pictures.keel import draw_keel
-    from polycorner.pictures.style import save
+    from polycorner.dumbbells.pictures import draw_keel
+    from polycorner.pictures import save
 
     return save(draw_keel(KEEL), path)
 

@@ -87,7 +87,7 @@ def draw(result: Result, path: Path) -> Path:
     """Draw height and energies against time."""
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     motion, unit = result.path, GRAVITY * HEIGHT
     figure = Figure(figsize=(8, 5.6), layout="constrained")

@@ -115,7 +115,7 @@ def draw(result: Result, path: Path) -> Path:
     """Draw the speeds of the ball, and the block in its plane of place and velocity."""
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     figure = Figure(figsize=(9, 4), layout="constrained")
     left, right = figure.subplots(1, 2)

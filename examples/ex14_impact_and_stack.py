@@ -112,7 +112,7 @@ def draw(result: Result, path: Path) -> Path:
     """Draw the tilt of the block and its energy against time."""
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     motion = result.rocking
     figure = Figure(figsize=(8, 5.2), layout="constrained")

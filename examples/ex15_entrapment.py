@@ -79,9 +79,9 @@ def times(wells: Sequence[Well]) -> list[float]:
 
 def draw(path: Path, count: int = 100) -> Path:
     """Draw wells, paths, times to escape, capture, and the wells of the dyad."""
-    from polycorner.dumbbells.pictures.wells import draw_wells
+    from polycorner.dumbbells.pictures import draw_wells
     from polycorner.models.wells.holding import compare
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     return save(draw_wells(compare(count=count), PAIR), path)
 

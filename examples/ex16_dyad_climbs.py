@@ -57,7 +57,7 @@ def draw(result: Result, path: Path) -> Path:
     import numpy as np
     from matplotlib.figure import Figure
 
-    from polycorner.pictures.style import save
+    from polycorner.pictures import save
 
     figure = Figure(figsize=(8.5, 6.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)

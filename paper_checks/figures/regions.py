@@ -8,7 +8,7 @@ from matplotlib.figure import Figure as Drawing
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from polycorner.models import Tutorial
-from polycorner.pictures.regions import draw_region
+from polycorner.pictures import draw_region
 from polycorner.polyhedra.strata import LocalType, stratum_at
 
 REGION = Tutorial()

@@ -18,8 +18,7 @@ from paper_checks.figures.figure import Figure
 from paper_checks.figures.pairs import LETTERS, PAIR, atlas
 from polycorner.dumbbells.pictures.placements import forbidden_solid
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
-from polycorner.pictures.solids.rendering import View, place_solid
-from polycorner.pictures.solids.sharp_surfaces import SharpSurface
+from polycorner.pictures import SharpSurface, View, place_solid
 from polycorner.skeletons.refinement import traced
 
 RESOLUTION = 112  # cells of the solid along each side

@@ -19,6 +19,7 @@ from polycorner.dumbbells.pictures.symbols import energy_unit
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
 from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     from polycorner.motion.trajectory import Touch
@@ -45,7 +46,7 @@ class Words:
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class Film(Value):
     """Dumbbells at ``T`` instants.
 
     Attributes

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from polycorner.pictures.style import SHADES
+from polycorner.pictures.style import SHADES, bridged
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def draw_heading_sweep(found: "xr.Dataset", across: str, others: str | None) -> 
         multipliers = [curve[n].values for n in curve.data_vars if "multiplier" in str(n)]
         for axes, y in ((first, curve["heading"].values), (second, np.min(multipliers, axis=0))):
             axes.plot(x, np.where(minimal, y, np.nan), ".-", ms=4, color=colour, label=label)
-            axes.plot(x, np.where(_other_stretches(minimal), y, np.nan), ":", color=colour)
+            axes.plot(x, np.where(bridged(~minimal), y, np.nan), ":", color=colour)
         paper = curve["paper_heading"].values
         if not any(np.allclose(paper, p, equal_nan=True) for p in papers):
             papers.append(paper)
@@ -118,15 +118,6 @@ def draw_heading_sweep(found: "xr.Dataset", across: str, others: str | None) -> 
     second.set(ylabel=label, xlabel=_axis_label(found, across))
     first.legend(fontsize=9, frameon=False)
     return figure
-
-
-def _other_stretches(minimal: Any) -> Any:
-    """Return where a corner is no minimum, with the neighbours, so that parts of a line meet."""
-    away = ~minimal
-    near = away.copy()
-    near[1:] |= away[:-1]
-    near[:-1] |= away[1:]
-    return near
 
 
 def draw_climbing_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:

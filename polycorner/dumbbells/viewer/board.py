@@ -25,6 +25,7 @@ from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descen
 from polycorner.minimisation import Certificate, Verdict, certify
 from polycorner.polyhedra.strata import LocalType
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 DRUM = 125.0 / 16.0  # ratio of drum radius to length for a pair that starts in the plane
 FRAMES = 150  # most frames of a descent
@@ -32,7 +33,7 @@ START = 30.0  # degrees, the initial heading set by the buttons
 
 
 @dataclass(frozen=True)
-class Board:
+class Board(Value):
     """A pair with its placement and its sliders.
 
     Attributes

@@ -10,6 +10,7 @@ from polycorner.minimisation import Certificate, minimise
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -26,7 +27,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Descent:
+class Descent(Value):
     """A path of steepest descent, and the certificate of its end.
 
     Attributes

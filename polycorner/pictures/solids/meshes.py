@@ -33,6 +33,7 @@ from polycorner.pictures.solids.sewing import (
     shared,
 )
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import trimesh
@@ -42,7 +43,7 @@ LEAST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Isosurface:
+class Isosurface(Value):
     """The boundary of a region ``{f < 0}`` of a box some of whose sides may be identified.
 
     ``mesh`` is closed in the chart: where the region crosses the seam of a periodic axis, flat
