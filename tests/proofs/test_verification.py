@@ -4,6 +4,7 @@ import math
 from fractions import Fraction
 
 import mpmath
+import numpy as np
 import pytest
 import sympy as sp
 from problems import REGULAR, hs13, hs26
@@ -15,6 +16,7 @@ from polycorner import (
     Polyhedron,
     SmoothFunction,
     certify,
+    minima,
     minimise,
 )
 from polycorner.polyhedra.symmetry import Symmetry
@@ -218,6 +220,18 @@ def test_a_rotation_is_checked_when_it_is_declared():
     wrong = proof_at(ring, energy, [1, 0], symmetry=Symmetry(fields=[{"x": 1}]))
     assert wrong.conditions[SYMMETRIC] == "failed"
     assert not wrong.proved
+
+
+def test_one_symmetry_serves_the_search_and_the_proof():
+    turn = Symmetry(
+        fields=[{"x": -y, "y": x}], invariants=lambda q: np.array([np.hypot(q[0], q[1])])
+    )
+    ring = Polyhedron(M, {"f": x**2 + y**2 - 1})
+    starts = [[1.5, 0.2], [-0.3, 1.4], [-2, 1]]
+    (found,) = minima(ring, x**2 + y**2, starts=starts, symmetry=turn)
+    assert found.energy == pytest.approx(1)
+    assert not prove(found).proved
+    assert prove(found, symmetry=turn).proved
 
 
 def test_a_flat_direction_that_is_no_symmetry_is_named():
