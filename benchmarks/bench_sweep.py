@@ -1,9 +1,8 @@
-"""What a parameter study costs besides its points, and ten thousand certified headings.
+"""Overhead of a parameter study beyond its points, and ten thousand certified headings.
 
 The points of the first part do nothing, or sleep for 20 ms; what a study takes beyond that is its
-overhead, given for each point.  Studies keep their results in a store.  The others hand out the
-same calls and collect what they return, in memory, with nothing recorded: `map` of the executor
-itself, joblib, `dask.delayed`.
+overhead, given for each point.  Studies keep their results in a store.  The others submit the
+same calls and collect the results in memory: `map` of the executor itself, joblib, `dask.delayed`.
 """
 
 import multiprocessing
@@ -123,7 +122,7 @@ def overheads(tasks: Tasks, pause: float) -> dict[str, float]:
 
 
 def headings() -> dict[str, float]:
-    """Time ten thousand certified headings on two processes of a study's own, in a store."""
+    """Time ten thousand certified headings on two processes, in a store."""
     grid = {
         "length": (np.linspace(11, 40, 100), "mm"),
         "rod_radius": (np.linspace(0.3, 2.8, 100), "mm"),

@@ -59,7 +59,7 @@ def file(tmp_path):
     return path
 
 
-def test_a_study_that_ships_is_computed_kept_drawn_and_shown_again(capsys, tmp_path, file):
+def test_an_installed_study_is_computed_kept_drawn_and_shown_again(capsys, tmp_path, file):
     out = tmp_path / "out"
     code, printed, err = run(capsys, file, "--out", out, "--workers", 1, "--json")
     assert (code, err) == (0, "")
