@@ -68,7 +68,7 @@ def main() -> None:
         "polycorner": hits(falls(starts[:PART]), found),
         "SciPy SLSQP": hits([slsqp(q) for q in starts[:PART]], found),
     }
-    print_table(f"Falls of {PART} that end in a minimum", ["", ""], list(right.items()))
+    print_table(f"Descents that end in a minimum, of {PART}", ["", ""], list(right.items()))
     print(f"\n{found}")
     board_minima = minima(board.polyhedron, board.energy, starts=places)
     coarse = minima_map(starts=50)

@@ -30,7 +30,7 @@ SEEN = 1e-6  # smallest component of a unit direction that is shown
 def explanation(
     a: Analysis, stratum: Stratum, verdict: Verdict, search: Verdict | None, unit: str | None
 ) -> str:
-    """Return why a point is or is not a minimum, one or two sentences a line.
+    """Explain why a point is or is not a minimum, with one or two sentences a line.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ class Minima(Value, Printed, Sequence[Certificate]):
         return " ".join(_statement(self))
 
     def __repr__(self) -> str:
-        """Return how many minima there are, and the energies of the lowest."""
+        """Return the number of minima and the lowest energies in one line."""
         energies = ", ".join(f"{c.energy:.6g}" for c in self[:5])
         dots = ", ..." if len(self) > 5 else ""
         return f"Minima({len(self)} from {self.descents} starts; energies {energies}{dots})"

@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
@@ -190,30 +191,20 @@ def check_rates(certificate: Certificate, parameters: Iterable[str] | Rates | No
 
     A name stands for itself; None stands for all parameters with one value in the whole problem.
     """
-    known: dict[str, set[float]] = {}
-    d = certificate.problem.polyhedron
-    for f in (*d.functions, *d.equations, certificate.problem.energy):
-        for name, value in zip(f.family.parameters, f.parameters, strict=True):
-            known.setdefault(name, set()).add(value)
+    problem = certificate.problem
     if parameters is None:
-        parameters = [name for name, values in known.items() if len(values) == 1]
+        known = problem.parameter_values.items()
+        parameters = [name for name, values in known if len(values) == 1]
     if isinstance(parameters, str):
-        msg = f"parameters: expected a list of names or a mapping; got the string {parameters!r}"
-        raise TypeError(msg)
+        checks.refuse("parameters", "a list of names or a mapping", parameters, TypeError)
     if not isinstance(parameters, Mapping):
         parameters = {name: {name: 1.0} for name in parameters}
-    if not all(isinstance(moved, Mapping) for moved in parameters.values()):
-        msg = f"parameters: expected a mapping from names to rates of each; got {parameters!r}"
-        raise TypeError(msg)
+    for moved in parameters.values():
+        if not isinstance(moved, Mapping):
+            checks.refuse("parameters", "a mapping from names to rates", parameters, TypeError)
     used = list(dict.fromkeys(name for moved in parameters.values() for name in moved))
-    unknown = [str(name) for name in used if name not in known]
-    if unknown or not used:
-        listed = ", ".join(known) or "none, since no function has a parameter"
-        msg = f"parameters: expected names among {listed}; got {', '.join(unknown) or 'none'}"
-        raise ValueError(msg)
-    for name in used:
-        if len(known[name]) > 1:
-            values = ", ".join(f"{value:g}" for value in sorted(known[name]))
-            msg = f"parameters: expected one value of {name} in all functions; got {values}"
-            raise ValueError(msg)
+    if not used:
+        known_names = ", ".join(problem.parameter_values) or "none"
+        checks.refuse("parameters", f"names among {known_names}", parameters)
+    problem.check_parameters(used)
     return {name: dict(moved) for name, moved in parameters.items()}

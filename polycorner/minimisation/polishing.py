@@ -18,7 +18,7 @@ SETTLED = 1e-8  # last step of Newton's method, in scale units, up to which it h
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Where a descent ended inside one piece of a polyhedron, and how it failed, if it did."""
+    """End point of a descent inside one piece of a polyhedron, with its failure, if any."""
 
     point: Array
     iterations: int

@@ -1,6 +1,6 @@
 """Energies on polyhedra, and their layout as flat arrays for the compiled descent."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -73,6 +73,27 @@ class Problem(Value):
         if order >= 2:
             results[2] = results[2] * np.outer(self.scales, self.scales)
         return tuple(results)
+
+    @cached_property
+    def parameter_values(self) -> dict[str, frozenset[float]]:
+        """The values of every parameter of the functions, by name."""
+        d = self.polyhedron
+        found: dict[str, frozenset[float]] = {}
+        for f in (*d.functions, *d.equations, self.energy):
+            for name, value in zip(f.family.parameters, f.parameters, strict=True):
+                found[name] = found.get(name, frozenset()) | {value}
+        return found
+
+    def check_parameters(self, names: Iterable[str]) -> None:
+        """Raise ValueError for names without one value in all functions."""
+        chosen = list(names)
+        checks.names("parameters", chosen, self.parameter_values)
+        for name in chosen:
+            values = self.parameter_values[name]
+            if len(values) > 1:
+                got = ", ".join(f"{value:g}" for value in sorted(values))
+                msg = f"parameters: expected one value of {name} in all functions; got {got}"
+                raise ValueError(msg)
 
     def check_energy(self, q: Array, argument: str) -> None:
         """Raise ValueError for a point at which the energy is not finite."""

@@ -42,7 +42,7 @@ def start_points(
 def _sampled(
     problem: Problem, count: int, low: Array, high: Array, rng: np.random.Generator
 ) -> Array:
-    """Return points sampled uniformly from where the inequalities hold and the energy is finite."""
+    """Return uniform samples with satisfied inequalities and a finite energy."""
     d = problem.polyhedron
     found = np.empty((0, problem.dimension))
     tries = 0

@@ -229,7 +229,7 @@ def _refusal(reason: str) -> str:
 
 
 def _reason(certificate: Certificate) -> str:
-    """Return why the implicit function theorem does not apply; empty if it does."""
+    """Return the reason why the implicit function theorem does not apply, or an empty string."""
     analysis, d = certificate.analysis, certificate.problem.polyhedron
     values, gradients = analysis.local.values, analysis.local.gradients
     if analysis.verdict is Verdict.OUTSIDE:

@@ -4,7 +4,7 @@ from enum import Enum
 
 
 class Verdict(Enum):
-    """Whether a point is a local minimum of an energy on a polyhedron, as a sentence."""
+    """Verdict on a point as a local minimum of an energy on a polyhedron, as a sentence."""
 
     STRICT_MINIMUM = "strict local minimum: no other point nearby is as low"
     MINIMUM_ALONG_LOCUS = "local minimum, attained along a locus on which the energy is constant"
@@ -28,7 +28,7 @@ _MINIMA = frozenset({Verdict.STRICT_MINIMUM, Verdict.MINIMUM_ALONG_LOCUS, Verdic
 
 
 class Entrapment(Enum):
-    """How the energy holds a point in one direction ([GMBN] app. C)."""
+    """Kind of entrapment of a point by the energy in one direction ([GMBN] app. C)."""
 
     HALF_V = "half-V"
     HALF_U = "half-U"

@@ -48,25 +48,9 @@ def check_parameters(problem: Problem, parameters: Any) -> tuple[dict[str, Inter
         return {}, []
     if not isinstance(parameters, Mapping) or not parameters:
         checks.refuse("parameters", "a mapping from names to (lower, upper)", parameters, TypeError)
-    known = _bound(problem)
-    checks.names("parameters", parameters, known)
+    problem.check_parameters(parameters)
     sides = {name: _side(name, side) for name, side in parameters.items()}
-    for name in sides:
-        if len(known[name]) > 1:
-            values = ", ".join(f"{value:g}" for value in sorted(known[name]))
-            msg = f"parameters: expected one value of {name} in all functions; got {values}"
-            raise ValueError(msg)
-    return sides, [min(known[name]) for name in sides]
-
-
-def _bound(problem: Problem) -> dict[str, set[float]]:
-    """Return the values that every parameter of the problem's functions has."""
-    d = problem.polyhedron
-    found: dict[str, set[float]] = {}
-    for f in (*d.functions, *d.equations, problem.energy):
-        for name, value in zip(f.family.parameters, f.parameters, strict=True):
-            found.setdefault(name, set()).add(value)
-    return found
+    return sides, [min(problem.parameter_values[name]) for name in sides]
 
 
 def _side(name: str, side: Any) -> Interval:
