@@ -239,5 +239,7 @@ def listed(words: Iterable[str]) -> str:
 
 
 def _bounds(*limits: tuple[str, float | None]) -> str:
-    shown = [f"{sign} {value:g}" for sign, value in limits if value is not None]
+    shown = [
+        f"{sign} {value:g}" for sign, value in limits if value is not None and math.isfinite(value)
+    ]
     return f" {' and '.join(shown)}" if shown else ""
