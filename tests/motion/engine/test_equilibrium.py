@@ -2,6 +2,7 @@
 
 import cvxpy as cp
 import numpy as np
+import pytest
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
@@ -42,6 +43,7 @@ def spare(engine, before):
     return share.value
 
 
+@pytest.mark.slow
 def test_a_pile_remains_at_rest_as_long_as_it_can():
     """Carried up by the drum, it slides when forces can no longer balance, and not before.
 
