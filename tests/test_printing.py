@@ -1,6 +1,7 @@
 """What is printed: aligned text, clean HTML, the same cells in both, units for angles."""
 
 import math
+import pickle
 from html.parser import HTMLParser
 
 import numpy as np
@@ -138,6 +139,12 @@ def test_wide_tables_are_wrapped_and_wider_ones_become_lines():
     assert table.text(80) == "name   contacts\ndelta  A2B1 A2b aB1"
     assert table.text(15) == "name   contacts\ndelta  A2B1 A2b\n       aB1"
     assert table.text(12) == "name\n  delta\ncontacts\n  A2B1 A2b\n  aB1"
+
+
+@given(tables())
+def test_sheets_are_values(table):
+    sheet = Sheet("title", (table, "words"))
+    assert pickle.loads(pickle.dumps(sheet)) == sheet
 
 
 def test_zero_has_no_sign():

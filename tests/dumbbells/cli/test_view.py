@@ -128,12 +128,12 @@ def test_a_shape_that_cannot_be_is_explained(tab, live):
     tab.wait(READY)
     moved_to(tab, "rod_radius", 5.0)
     problem = texts(tab, "problem")["problem"]
-    assert "rod_radius: expected less than the ball radius 3 mm" in problem
+    assert "rod_radius: expected a number > 0 and < 3 in mm" in problem
     assert tab.value("document.getElementById('rod_radius').value") == "1.5"
 
 
 @pytest.mark.parametrize(("button", "hand"), [("right", "R"), ("left", "L")])
-def test_the_fall_ends_at_the_corner_with_the_library_s_heading(tab, live, button, hand):
+def test_the_descent_ends_at_the_corner_with_the_library_s_heading(tab, live, button, hand):
     tab.open(live, width=1200)
     tab.wait(READY)
     tab.click(f"#{button}")
@@ -148,7 +148,7 @@ def test_the_fall_ends_at_the_corner_with_the_library_s_heading(tab, live, butto
     assert found["stratum"] == "dimension 3, rank 3, quadrant"
     closed = tab.value("[...document.querySelectorAll('.gaps .closed')].map(e => e.id.slice(4))")
     assert set(closed) == set(corner.active)
-    assert "the energy falls from" in texts(tab, "way")["way"]
+    assert "the energy decreases from" in texts(tab, "way")["way"]
     assert tab.value("board.trail.flat().length") > 10
     moved_to(tab, "lateral_A", 3.0)  # whatever is moved afterwards ends the show
     assert texts(tab, "verdict")["verdict"] == ""
