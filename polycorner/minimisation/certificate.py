@@ -81,8 +81,9 @@ class Certificate(Value, Printed):
     search: Verdict | None = field(default=None)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", self.problem.polyhedron.manifold.wrap(self.point))
-        super().__post_init__()
+        point = self.problem.polyhedron.manifold.wrap(self.point)
+        point.flags.writeable = False  # the only array: the base class would search for others
+        object.__setattr__(self, "point", point)
 
     @cached_property
     def analysis(self) -> Analysis:

@@ -116,10 +116,11 @@ class Manifold(Value):
         return scales
 
     @cached_property
-    def _circles(self) -> tuple[list[int], Array]:
+    def _circles(self) -> tuple[NDArray[np.intp], Array]:
         """Positions and periods of the coordinates that are circles."""
-        positions = [i for i, period in enumerate(self.periods) if period < math.inf]
-        return positions, np.array([self.periods[i] for i in positions])
+        periods = np.array(self.periods, dtype=np.float64)
+        positions = np.flatnonzero(periods < math.inf)
+        return positions, periods[positions]
 
     def points(self, q: ArrayLike, argument: str = "q") -> Array:
         """Check that ``q`` is one point ``(n,)`` or a batch ``(..., n)`` of finite reals.
@@ -169,7 +170,7 @@ class Manifold(Value):
 
     def _principal(self, array: Array) -> Array:
         circles, periods = self._circles
-        if circles:
+        if circles.size:
             values = array[..., circles]
             array[..., circles] = values - periods * np.ceil(values / periods - 0.5)
         return array
