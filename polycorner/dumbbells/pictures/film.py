@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import refuse
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.pairs import Handed, Sizes, dyads_among
 from polycorner.dumbbells.dynamics.runs import DrumRun
@@ -137,8 +138,7 @@ def pair_film(
     """
     points = np.atleast_2d(finite(reals(q, "q"), "q"))
     if points.ndim != 2 or points.shape[1] != 6 or not len(points):
-        msg = f"q: expected shape (T, 6) with T at least 1; got {np.shape(q)}"
-        raise ValueError(msg)
+        refuse("q", "shape (T, 6) with T >= 1", np.shape(q))
     if times is None:
         scales = pair.manifold.scale_array
         steps = np.linalg.norm(pair.manifold.difference(points[1:], points[:-1]) / scales, axis=1)
@@ -169,8 +169,7 @@ def pair_film(
 def _increasing(times: ArrayLike, count: int) -> Array:
     instants = finite(reals(times, "times"), "times")
     if instants.shape != (count,) or not (np.diff(instants) > 0).all():
-        msg = f"times: expected {count} increasing numbers; got shape {instants.shape}"
-        raise ValueError(msg)
+        refuse("times", f"{count} increasing numbers", instants)
     return instants
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from polycorner.atomic import atomic
+from polycorner.checks import missing_extra, refuse
 from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.dumbbells.pictures.drum import DrumView
 
@@ -46,13 +47,9 @@ def check_movie(path: str | os.PathLike[str]) -> None:
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        msg = f"movie: expected a file name that ends in .mp4 or .gif; got {os.fspath(path)!r}"
-        raise ValueError(msg)
+        refuse("movie", "a file name that ends in .mp4 or .gif", os.fspath(path))
     if suffix == ".mp4" and not can_encode():
-        msg = (
-            "movie: expected imageio-ffmpeg to be installed for .mp4 files, as by "
-            "pip install 'polycorner[movies]'; got none (.gif files need nothing)"
-        )
+        msg = f"movie: {missing_extra('imageio-ffmpeg', 'movies')}; .gif files need no extra"
         raise ValueError(msg)
 
 

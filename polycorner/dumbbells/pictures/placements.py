@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner.checks import refuse
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.pictures.solids.charts import Gaps
 from polycorner.pictures.solids.grids import FEWEST_CELLS, Function
@@ -44,8 +45,7 @@ def relative_placements(
     q = np.zeros((*p.shape[:-1], 6))
     if mean_heading is None:
         if not pair.is_plane:
-            msg = "mean_heading: expected an angle in radians for a pair in a drum; got None"
-            raise ValueError(msg)
+            refuse("mean_heading", "an angle in radians for a pair in a drum", None)
         q[..., 3:] = p
         return q
     half = p / 2 if pair.is_plane else p / np.array([2 * pair.centre_radius, 2.0, 2.0])
@@ -153,12 +153,10 @@ def forbidden_solid(
         dumbbell changes the mean heading by a quarter turn.
     """
     if not any(math.isclose(period, whole) for whole in (math.pi, math.tau)):
-        msg = f"period: expected pi or 2 pi; got {period:g}"
-        raise ValueError(msg)
+        refuse("period", "pi or 2 pi", period)
     half = math.isclose(period, math.pi)
     if half and mean_heading is not None:
-        msg = "period: expected 2 pi at fixed mean heading, where it is the only one; got pi"
-        raise ValueError(msg)
+        refuse("period", "2 pi, the only one at fixed mean heading", period)
     low = -period / 2 if start is None else float(start)
     if isinstance(resolution, int | np.integer):
         turn = max(FEWEST_CELLS, resolution // 2) if half else resolution

@@ -14,6 +14,7 @@ from matplotlib.colors import to_rgba
 from numpy.typing import ArrayLike
 
 from polycorner.atomic import write_atomically
+from polycorner.checks import refuse
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import (
@@ -100,12 +101,10 @@ def drum_scene(drum: DumbbellDrum, q: ArrayLike) -> "trimesh.Scene":
     """
     places = np.atleast_2d(reals(q, "q"))
     if places.ndim != 2 or places.shape[0] != drum.count or places.shape[1] not in (3, 4):
-        msg = f"q: expected shape ({drum.count}, 3) or ({drum.count}, 4); got {places.shape}"
-        raise ValueError(msg)
+        refuse("q", f"shape ({drum.count}, 3) or ({drum.count}, 4)", places.shape)
     here = np.flatnonzero(np.isfinite(places[:, :3]).all(axis=1))
     if not len(here):
-        msg = "q: expected at least one dumbbell with finite coordinates; got none"
-        raise ValueError(msg)
+        refuse("q", "at least one dumbbell with finite coordinates", places)
     centres = dumbbell_centres(drum.pair, places[here])
     names = [(f"{k + 1}.1", f"{k + 1}.2", f"{k + 1}") for k in here.tolist()]
     scene: trimesh.Scene = library().Scene()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import refuse
 from polycorner.minimisation import Certificate, minimise
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.strata import distances
@@ -85,8 +86,7 @@ def descent(
         For a polyhedron that is a union, or arguments that :func:`~polycorner.minimise` refuses.
     """
     if polyhedron.is_union:
-        msg = "polyhedron: expected an intersection; got a union"
-        raise ValueError(msg)
+        refuse("polyhedron", "an intersection", polyhedron)
     problem = pose(polyhedron, energy)
     q = polyhedron.manifold.point(start, "start")
     points = _steepest(problem, q, stride, most)

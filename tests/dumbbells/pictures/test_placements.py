@@ -288,23 +288,6 @@ def test_in_the_plane_the_first_dumbbell_is_the_frame():
     np.testing.assert_array_equal(q[:, 3:], points)
 
 
-@pytest.mark.parametrize(
-    ("drum", "options", "message"),
-    [
-        (math.inf, {"period": 3.0}, "period: expected pi or 2 pi; got 3"),
-        (
-            60.0,
-            {"period": math.pi, "mean_heading": 0.0},
-            "period: expected 2 pi at fixed mean heading",
-        ),
-        (60.0, {}, "mean_heading: expected an angle in radians for a pair in a drum; got None"),
-    ],
-)
-def test_wrong_use_is_named(drum, options, message):
-    with pytest.raises(ValueError, match=message):
-        forbidden_solid(DumbbellPair(16, 3, 1.5, drum), 8, **options)
-
-
 def test_the_example_gives_what_it_says():
     result = ex05_solid.main(resolution=40)
     assert result.volume == pytest.approx(sliced_volume(PAIR) / 2, rel=5e-5)

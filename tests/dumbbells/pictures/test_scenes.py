@@ -2,7 +2,6 @@
 
 import io
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,23 +83,6 @@ def test_dumbbells_of_a_drum_and_one_that_has_left():
     expected = drum.pair.ball_centres(np.concatenate([q[0, :3], q[2, :3]]))
     places = [found.graph[name][0][:3, 3] for name in ("1.1", "1.2", "3.1", "3.2")]
     np.testing.assert_allclose(places, expected, atol=2e-5)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: scenes.drum_scene(DumbbellDrum(count=2), np.zeros((3, 3))), r"q: expected shape"),
-        (lambda: scenes.drum_scene(DumbbellDrum(), [[math.nan] * 3]), "q: expected at least one"),
-        (lambda: scenes.pair_scene(DRUM, [math.nan] * 6), "q: expected finite numbers"),
-        (
-            lambda: scenes.write_scene(scenes.pair_scene(DRUM, DRUM.nested("L")), Path("a.obj")),
-            "path: exp",
-        ),
-    ],
-)
-def test_what_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
 
 
 # -------------------------------------------------------------------------------------- the wall

@@ -74,11 +74,6 @@ def test_a_trimesh_without_three_is_one_sentence(monkeypatch):
         three_script.__wrapped__()
 
 
-def test_pages_are_html_files(tmp_path):
-    with pytest.raises(ValueError, match=r"path: expected a name ending in \.html; got 'page.txt'"):
-        write_page("", tmp_path / "page.txt")
-
-
 # ----------------------------------------------------------------------------------- the browser
 
 

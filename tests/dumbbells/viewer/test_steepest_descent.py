@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from polycorner import AnyOf, Manifold, Polyhedron, minimise, stratum_at
+from polycorner import Manifold, Polyhedron, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.viewer.steepest_descent import descent
 
@@ -64,6 +64,3 @@ def test_a_descent_begins_at_the_nearest_point_of_the_polyhedron():
     nowhere = descent(Polyhedron(M, {"low": x - 1, "high": -x - 1}), x, [0.0])
     assert nowhere.points.tolist() == [[0.0]]
     assert nowhere.certificate.verdict.name == "INFEASIBLE"
-    union = Polyhedron(M, AnyOf(*Polyhedron(M, {"a": x, "b": -x - 1}).functions))
-    with pytest.raises(ValueError, match="polyhedron: expected an intersection; got a union"):
-        descent(union, x, [0.5])

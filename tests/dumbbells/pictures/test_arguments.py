@@ -1,0 +1,58 @@
+"""Wrong arguments of pictures and pages: one table of call, exception and argument named."""
+
+import math
+
+import numpy as np
+import pytest
+
+from polycorner import AnyOf, Manifold, Polyhedron
+from polycorner.dumbbells import DumbbellDrum, DumbbellPair
+from polycorner.dumbbells.pictures import (
+    drum_scene,
+    forbidden_solid,
+    pair_film,
+    pair_scene,
+    write_movie,
+    write_scene,
+)
+from polycorner.dumbbells.viewer import descent, write_page
+
+DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
+NESTED = DRUM.nested("L")
+LINE = Manifold.euclidean("x")
+(X,) = LINE.symbols
+UNION = Polyhedron(LINE, AnyOf(*Polyhedron(LINE, {"a": X, "b": -X - 1}).functions))
+
+
+def film(q, **more):
+    return lambda _: pair_film(DRUM, q, **more)
+
+
+def solid(pair, **more):
+    return lambda _: forbidden_solid(pair, 8, **more)
+
+
+WRONG = [
+    (film(np.zeros((3, 5))), ValueError, "q"),
+    (film(np.zeros((0, 6))), ValueError, "q"),
+    (film(np.full(6, math.inf)), ValueError, "q"),
+    (film([NESTED, NESTED], times=[0.0, 0.0]), ValueError, "times"),
+    (film([NESTED, NESTED], times=[0.0]), ValueError, "times"),
+    (solid(PLANE, period=3.0), ValueError, "period"),
+    (solid(DRUM, period=math.pi, mean_heading=0.0), ValueError, "period"),
+    (solid(DRUM), ValueError, "mean_heading"),
+    (lambda _: drum_scene(DumbbellDrum(count=2), np.zeros((3, 3))), ValueError, "q"),
+    (lambda _: drum_scene(DumbbellDrum(), [[math.nan] * 3]), ValueError, "q"),
+    (lambda _: pair_scene(DRUM, [math.nan] * 6), ValueError, "q"),
+    (lambda at: write_scene(pair_scene(DRUM, NESTED), at / "a.obj"), ValueError, "path"),
+    (lambda at: write_page("", at / "page.txt"), ValueError, "path"),
+    (lambda at: write_movie(None, at / "motion.avi"), ValueError, "movie"),
+    (lambda _: descent(UNION, X, [0.5]), ValueError, "polyhedron"),
+]
+
+
+@pytest.mark.parametrize(("call", "error", "argument"), WRONG)
+def test_wrong_arguments_are_named(call, error, argument, tmp_path):
+    with pytest.raises(error, match=rf"^{argument}: expected (.|\n)*; got"):
+        call(tmp_path)
+    assert not list(tmp_path.iterdir())
