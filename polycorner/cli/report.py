@@ -1,8 +1,9 @@
 """Tables of atlases for the terminal."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from polycorner.printing import Sheet, Table
+if TYPE_CHECKING:
+    from polycorner.printing import Sheet, Table
 
 COUNTS = {
     "components": "components of the strata",
@@ -22,8 +23,10 @@ def label(corner: int | None) -> str:
     return "-" if corner is None else f"C{corner}"
 
 
-def atlas_sheet(answer: dict[str, Any]) -> Sheet:
+def atlas_sheet(answer: dict[str, Any]) -> "Sheet":
     """Return an atlas as a sheet."""
+    from polycorner.printing import Sheet
+
     parts: list[Table | str] = [f"{words}: {_counts(answer[key])}" for key, words in _told(answer)]
     if "singular_count" in answer:
         parts.append(
@@ -47,8 +50,10 @@ def atlas_sheet(answer: dict[str, Any]) -> Sheet:
     )
 
 
-def critical_sheet(answer: dict[str, Any]) -> Sheet:
+def critical_sheet(answer: dict[str, Any]) -> "Sheet":
     """Return the critical configurations of disks as a sheet."""
+    from polycorner.printing import Sheet, Table
+
     head = ("radius", "index", "nullity", "contacts", "hits")
     rows = (
         (f"{row['radius']:.9f}", *(str(row[key]) for key in head[1:])) for row in answer["critical"]
@@ -66,7 +71,9 @@ def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{n} of dimension {d}" for d, n in counts.items())
 
 
-def _corners(answer: dict[str, Any]) -> Table:
+def _corners(answer: dict[str, Any]) -> "Table":
+    from polycorner.printing import Table
+
     kinds = any("kind" in corner for corner in answer["corners"])
     head = ("corner", *["kind"] * kinds, "active", "rank", "type", "edges to")
     return Table(

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -37,6 +36,8 @@ SHOWN = 5  # messages of failed points
 
 def named_files() -> dict[str, Path]:
     """Return the study files of the package by name."""
+    from importlib.resources import files
+
     folder = Path(str(files(NAMED)))
     return {file.stem: file for file in sorted(folder.glob("*.toml"))}
 
@@ -47,7 +48,8 @@ def _epilog() -> str:
         f"  {name:<9} {file.read_text(encoding='utf-8').partition(':')[0].lstrip('# ')}"
         for name, file in named_files().items()
     ]
-    return EPILOG.format(studies="\n".join(titles), folder=Path(str(files(NAMED))))
+    folder = next(iter(named_files().values())).parent
+    return EPILOG.format(studies="\n".join(titles), folder=folder)
 
 
 EPILOG = """\b
