@@ -22,6 +22,7 @@ from side_by_side import interleave, peak, print_table, ratio, write
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 from polycorner.dumbbells.dynamics.starts import scatter
 from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import start
 
 ROUNDS = 5
 DYAD = 2
@@ -58,7 +59,7 @@ def ours(count: int, seconds: float) -> Task:
         rubbing=(scene.mu_contact, scene.mu_contact),
         ball_mass=scene.ball_mass,
     )
-    engine = drum.engine(start(count), dt=scene.dt)
+    engine = start(drum, drum.state(placements(count)), scene.dt)
     engine.advance(round(SETTLE / scene.dt))
     return partial(engine.advance, round(seconds / scene.dt))
 
@@ -66,12 +67,12 @@ def ours(count: int, seconds: float) -> Task:
 def theirs(count: int, seconds: float, **changes: Any) -> Task:
     """Return the task that moves `count` dumbbells on by `seconds` in MuJoCo, once settled."""
     drum = MujocoDrum(DrumScene(**SIZES, **DRUM, count=count, **changes))
-    drum.set_placements(start(count))
+    drum.set_placements(placements(count))
     drum.step(round(SETTLE / drum.scene.dt))
     return partial(drum.step, round(seconds / drum.scene.dt))
 
 
-def start(count: int) -> np.ndarray:
+def placements(count: int) -> np.ndarray:
     """Return placements: a right-handed dyad about to roll, or rows not quite parallel."""
     if count == DYAD:
         pair = DumbbellPair(**SIZES, drum_radius=DRUM["drum_radius"])
@@ -132,7 +133,7 @@ def heaps() -> dict[str, Any]:
         for seed in range(STARTS):
             rng = np.random.default_rng(seed)
             placed = scatter(drum, rng, width=0.35, height=SPACE * count, tries=1000)
-            engine = drum.engine(placed, dt=1e-3, noise=Noise(chatter=chatter, seed=3))
+            engine = start(drum, drum.state(placed), 1e-3, noise=Noise(chatter=chatter, seed=3))
             engine.advance(10)
             begun = time.process_time()
             engine.advance(round(seconds / 1e-3))

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def first_interrupt(noted: Callable[[], object]) -> Iterator[None]:
-    """Call ``noted`` at the first Ctrl-C; the second one is as it was.
+    """Call ``noted`` at the first Ctrl-C; the second one has its usual effect.
 
-    Elsewhere than in the main thread, and where Ctrl-C does not interrupt, nothing is changed.
+    Outside the main thread, and where Ctrl-C has another handler, nothing is changed.
     """
     usual = signal.getsignal(signal.SIGINT)
     main = threading.current_thread() is threading.main_thread()

@@ -11,7 +11,7 @@ from paper_checks.appendixA.forces import STATIC, TILT, does, frame, judged, tex
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import RestRegion, exact_eastern_boundary
-from polycorner.motion.simulation import run
+from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
 
@@ -122,8 +122,7 @@ def nudged(azimuth: Callable[[Array], Array], headings: Array) -> Trajectory:
     across = -NUDGE * np.cos(headings) / drum.centre_radius
     spin = np.full(count, NUDGE / drum.ball_radius)
     v = np.stack([across, NUDGE * np.sin(headings), 0 * headings, spin], axis=-1)
-    engine = drum.engine(q, v)
-    return run(engine, 1500, 10).trajectory(engine.bodies)
+    return simulate(drum, drum.state(q, v), 1.5, 1e-3, every=10)
 
 
 def middle(headings: Array) -> Array:

@@ -27,7 +27,7 @@ from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.pair import Chirality
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import run
+from polycorner.motion.simulation import simulate
 from polycorner.spaces.manifold import Array
 
 PICTURE = (8.0, 2.0, 0.5)  # l, r, t of the paper's picture of a bunch
@@ -73,7 +73,7 @@ def partitions(
         found.append(0 < rolls < slides - 1.0)
         listed.append(f"{count:.1f} roll at {rolls:.1f}° and the others slide at {slides:.1f}°")
         numbers |= {f"rolling_{seed}": float(rolls), f"sliding_{seed}": float(slides)}
-        lost = max(lost, followed.unconverged / followed.islands)
+        lost = max(lost, followed.trajectory.missed)
     return Finding(
         Verdict.HOLDS_UNDER if all(found) == apart else Verdict.REFUTED,
         f"{LEAVING[0]} dumbbells of {sizes[0]:g} mm, no noise, means from 15 to 30 s in {starts} "
@@ -113,8 +113,8 @@ def encounters(count: int, duration: float, chatter: float) -> tuple[DumbbellDru
     q[..., 1] += APART * np.arange(count)[:, None]
     q *= [1 / DRUM.centre_radius, 1.0, math.pi / 180]
     many = replace(DRUM, count=2 * count)
-    engine = many.engine(q.reshape(-1, 3), dt=2e-3, noise=Noise(chatter=chatter, seed=9))
-    path = run(engine, round(duration / 2e-3), 500).trajectory(engine.bodies)
+    noise = Noise(chatter=chatter, seed=9)
+    path = simulate(many, many.state(q.reshape(-1, 3)), duration, 2e-3, every=500, noise=noise)
     return replace(DRUM, count=2), path.q.reshape(len(path), count, 2, 4)
 
 

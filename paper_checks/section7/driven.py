@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from paper_checks.appendixA.torque import DRUM
-from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, follow_pairs
 from polycorner.dumbbells.pair import Chirality
-from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import run
+from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 
 Kind = Literal["end_to_end", "side_by_side"]
@@ -20,7 +20,6 @@ TWO = replace(DRUM, count=2)
 LASTING, LATE = 300.0, 150.0  # s, of runs for steady headings, and from when means are taken
 CLEARANCE = 0.05  # mm, between the dumbbells at the start
 APART = 1e4  # mm along the drum, between pairs that must not meet
-SOLVER = Solver(tolerance=1e-6, sweeps=300)
 
 
 def dyads(
@@ -55,17 +54,9 @@ def pairs(
         "end_to_end": two.pair.end_to_end(gap=CLEARANCE),
         "side_by_side": two.pair.side_by_side(clearance=CLEARANCE),
     }[kind].reshape(2, 3)
-    offset = APART * np.repeat(np.arange(count), 2)
     places = np.tile(start, (count, 1))
-    places[:, 1] += offset
-    noise = Noise(chatter=chatter, seed=3)
-    engine = replace(two, count=2 * count).engine(places, dt=2e-3, noise=noise, solver=SOLVER)
-    path = run(engine, round(duration / 2e-3), 50).trajectory(engine.bodies)
-    q = path.q.copy()
-    q[..., 1] -= offset
-    kinds: tuple[tuple[Chirality, float], ...] = (("R", 0.0),) * count
-    whole = q.reshape(len(path), count, 2, 4)
-    return DyadPaths(two, kinds, noise, path.times, whole, path.effort.unconverged)
+    places[:, 1] += APART * np.repeat(np.arange(count), 2)
+    return follow_pairs(two, places, duration, noise=Noise(chatter=chatter, seed=3))
 
 
 @cache
@@ -87,4 +78,4 @@ def one_dyad(
     q[:, 1] += height
     noise = Noise(chatter=chatter, seed=2)
     dt = 2e-3 if closed else 1e-3
-    return drum.simulate(q, duration, dt=dt, every=10, noise=noise)
+    return simulate(drum, drum.state(q), duration, dt, every=10, noise=noise)

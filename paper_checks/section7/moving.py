@@ -16,6 +16,7 @@ from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from paper_checks.section7.driven import CLEARANCE, LASTING, LATE, TWO, Starts, dyads, pairs
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, handedness, minimiser_heading
 from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate
 from polycorner.spaces.manifold import Array
 
 BOTH: Starts = (("R", 8.0), ("L", -8.0))
@@ -104,7 +105,9 @@ def sorting_needs_no_chirality(
     q = two.pair.nested("R", heading=0.2, clearance=CLEARANCE).reshape(2, 3)
     place = q * image + half
     noise = Noise(chatter=STRONG, seed=11)
-    first, second = (two.simulate(p, 9.5, noise=noise).q[..., :3] for p in (q, place))
+    first, second = (
+        simulate(two, two.state(p), 9.5, 1e-3, noise=noise).q[..., :3] for p in (q, place)
+    )
     moved = float(np.abs(first[-1, :, 1] - first[0, :, 1]).max())
     apart = float(np.abs(second * image + half - first)[-1].max())
     hands = [int(handedness(two, p)) for p in (q, place)]

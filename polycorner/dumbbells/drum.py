@@ -1,21 +1,21 @@
-"""Dumbbells in a slowly rotating, tilted drum: the experiment of [GMBN], in motion.
+"""The mechanical system of [GMBN]: dumbbells in a slowly rotating, tilted drum.
 
 Each dumbbell has four coordinates: azimuth ``phi``, axial position ``eta``, heading ``theta`` and
-the spin ``psi`` about its own axis, for a rigid dumbbell is an axle.  Its balls grip the drum by
-dry friction, its rolling is resisted by a torque of its own, and dumbbells that touch rub; what
-keels, zigzags and climbs follows from that.  Units: mm, g, s, rad; energies in g mm^2/s^2 = nJ.
+the spin ``psi`` about its own axis; balls and rod are one rigid axle.  Dry friction acts between
+balls and drum and between dumbbells that touch, and a torque of its own resists rolling; keel
+effect, zigzag and climbing follow from these.  Units: mm, g, s, rad; energies in
+g mm^2/s^2 = nJ.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner.checks import real, refuse, whole
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.pair import DumbbellPair
@@ -23,29 +23,28 @@ from polycorner.formulas.bundles import Call
 from polycorner.formulas.cache import source_key
 from polycorner.formulas.families import Family
 from polycorner.motion import formulation as equations
-from polycorner.motion.bodies import Body, ContactFamily, FrictionContact, IdenticalBodies
+from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts
 from polycorner.motion.friction import Disc, Interval
-from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import check_step, run, whole_steps, whole_stride
+from polycorner.motion.mechanics import MechanicalSystem, State
+from polycorner.motion.noise import Solver
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
-    from polycorner.motion.engine.driver import Engine
     from polycorner.motion.trajectory import Trajectory
 
 GRAVITY = 9806.65  # mm/s^2
 COORDINATES = ("phi", "eta", "theta", "psi")
 PARAMETERS = ("l", "r", "rho", "m", "surface", "weight", "pull")
-FREE_FALL = 0.1  # of the rod radius, that gravity may move a ball within one step
-HEAPS = Solver(tolerance=1e-4, sweeps=62)  # where many touch
+FREE_FALL = 0.1  # part of the rod radius by which a ball may fall within one step
+PILES = Solver(tolerance=1e-4, sweeps=62)  # default for more than two dumbbells
 OVERLAP = 1e-6  # mm up to which a start counts as touching
 
 Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class DumbbellDrum:
-    """Dumbbells in a drum that turns.
+class DumbbellDrum(MechanicalSystem):
+    """Dumbbells in a rotating drum, a system for :func:`~polycorner.motion.simulation.simulate`.
 
     Parameters
     ----------
@@ -98,25 +97,15 @@ class DumbbellDrum:
 
     def __post_init__(self) -> None:
         _ = self.pair  # checks the lengths
-        if isinstance(self.count, bool) or not isinstance(self.count, int) or self.count < 1:
-            msg = f"count: expected a positive whole number; got {self.count!r}"
-            raise ValueError(msg)
+        whole("count", self.count, least=1)
         for name in ("sliding", "rolling", "rubbing"):
             object.__setattr__(self, name, _coefficients(name, getattr(self, name)))
-        for name, low, high, expected in (
-            ("tilt", -math.pi / 2, math.pi / 2, "an angle between -pi/2 and pi/2 rad"),
-            ("spin", -math.inf, math.inf, "an angular speed in rad/s"),
-            ("restitution", -1e-300, 1 + 1e-15, "a number from 0 to 1"),
-            ("ball_mass", 0.0, math.inf, "a positive mass in g"),
-            ("top", 0.0, math.nan, "a positive length in mm or inf"),
-        ):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, Real) or not low < float(value):
-                msg = f"{name}: expected {expected}; got {value!r}"
-                raise ValueError(msg)
-            if float(value) >= high:
-                msg = f"{name}: expected {expected}; got {value!r}"
-                raise ValueError(msg)
+        real("tilt", self.tilt, above=-math.pi / 2, below=math.pi / 2, unit="rad")
+        real("spin", self.spin, unit="rad/s")
+        real("restitution", self.restitution, least=0, most=1)
+        real("ball_mass", self.ball_mass, above=0, unit="g")
+        real("top", self.top, above=0, infinite=True, unit="mm")
+        super().__post_init__()
 
     @cached_property
     def pair(self) -> DumbbellPair:
@@ -140,7 +129,7 @@ class DumbbellDrum:
         return IdenticalBodies(
             self._body,
             count=self.count,
-            contacts=self._contact_family(reach) if self.count > 1 else None,
+            contacts=self._pair_contacts(reach) if self.count > 1 else None,
             position=(0, 1),
             substrate_speed=self.spin * self.centre_radius,
             exit_coordinate=1 if math.isfinite(self.top) else -1,
@@ -179,13 +168,13 @@ class DumbbellDrum:
             1.0,
         )
 
-    def _contact_family(self, reach: float) -> ContactFamily:
+    def _pair_contacts(self, reach: float) -> PairContacts:
         names = ("length", "ball_radius", "rod_radius", "centre_radius")
         length, r, t, rho = (float(getattr(self, name)) for name in names)
         gaps = dumbbell_formulas.drum_gaps()
         reads = tuple((int(name[-1]) - 1, COORDINATES.index(name[:-1])) for name in gaps.variables)
         values = {"l": length, "r": r, "t": t, "rho": rho}
-        return ContactFamily(
+        return PairContacts(
             gaps,
             tuple(values[name] for name in gaps.parameters),
             reads,
@@ -197,21 +186,26 @@ class DumbbellDrum:
         )
 
     @property
-    def largest_step(self) -> float:
-        """The longest step, in s: gravity moves a ball by a tenth of the rod radius in it."""
-        return math.sqrt(2 * FREE_FALL * self.rod_radius / GRAVITY)
+    def solver(self) -> Solver:
+        """How exactly steps are solved by default.
 
-    def engine(
-        self,
-        q: ArrayLike,
-        v: ArrayLike | None = None,
-        *,
-        dt: float = 1e-3,
-        start: float = 0.0,
-        noise: Noise | None = None,
-        solver: Solver | None = None,
-    ) -> "Engine":
-        """Return an engine with the dumbbells at ``q``, carried by the drum or moving with ``v``.
+        To 1e-8 of the speeds, and to 1e-4 with at most 62 sweeps for more than two dumbbells: in
+        a heap a slip of 1e-4 of the drum's speed is 2 mm in four hours.
+        """
+        return Solver() if self.count <= 2 else PILES
+
+    def largest_step(self, state: State) -> tuple[float, str]:
+        """Return the time in which gravity moves a ball by a tenth of the rod radius."""
+        del state  # it is the same everywhere in the drum
+        longest = math.sqrt(2 * FREE_FALL * self.rod_radius / GRAVITY)
+        return longest, "in which a ball falls by a tenth of the rod's radius"
+
+    def described(self) -> dict[str, Any]:
+        """Return the parameters of the drum by name."""
+        return asdict(self)
+
+    def state(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> State:
+        """Return a state of the dumbbells, after checking that nothing overlaps.
 
         Parameters
         ----------
@@ -219,62 +213,28 @@ class DumbbellDrum:
             ``phi, eta, theta`` and, if given, ``psi`` of each dumbbell.
         v : (count, 4) array, optional
             Velocities; default those of the drum, every contact sticking.
-        solver : Solver, optional
-            How exactly steps are solved; default to 1e-8 of the speeds, and to 1e-4 with at most
-            62 sweeps for more than two dumbbells: in a heap a slip of 1e-4 of the drum's speed is
-            2 mm in four hours.
+        time : float, optional
+            In s.
 
         Raises
         ------
         ValueError
             If dumbbells overlap, with each other or the bottom, naming the worst.
         """
-        from polycorner.motion.engine.driver import Engine
-
         places = self.placed(q)
-        check_step(dt, self.largest_step, "in which a ball falls by a tenth of the rod's radius")
-        sticking = np.ones((self.count, 3), dtype=np.bool_)
-        if v is None:
-            speeds = np.zeros((self.count, 4))
-            speeds[:, 0] = self.spin
-        else:
-            speeds = np.array(v, dtype=np.float64)
-            if speeds.shape != (self.count, 4) or not np.isfinite(speeds).all():
-                msg = f"v: expected finite numbers of shape ({self.count}, 4); got {speeds.shape}"
-                raise ValueError(msg)
-            sticking[:] = (speeds == [self.spin, 0, 0, 0]).all(axis=1)[:, None]
-        return Engine(
-            self.bodies,
-            places,
-            speeds,
-            sticking,
-            dt,
-            start=start,
-            noise=noise or Noise(),
-            solver=solver or (Solver() if self.count <= 2 else HEAPS),
-        )
+        carried = np.array([self.spin, 0.0, 0.0, 0.0])
+        speeds = np.tile(carried, (self.count, 1)) if v is None else np.array(v, dtype=np.float64)
+        if speeds.shape != (self.count, 4) or not np.isfinite(speeds).all():
+            refuse("v", f"finite numbers of shape ({self.count}, 4)", speeds.shape)
+        at_rest = (speeds == carried).all(axis=1)
+        return State(float(time), places, speeds, np.repeat(at_rest[:, None], 3, axis=1))
 
-    def simulate(
-        self,
-        q: ArrayLike,
-        duration: float,
-        *,
-        dt: float = 1e-3,
-        every: int | None = None,
-        noise: Noise | None = None,
-        progress: Callable[[float], None] | None = None,
-    ) -> "Trajectory":
-        """Follow the dumbbells for ``duration`` s from rest on the drum at ``q``.
-
-        ``every``: record every so many steps, default about a thousand times.  See
-        :func:`polycorner.motion.simulation.simulate`.
-        """
-        engine = self.engine(q, dt=dt, noise=noise)
-        steps = whole_steps(duration, dt)
-        return run(engine, steps, whole_stride(every, steps), progress).trajectory(self.bodies)
+    def check_placement(self, q: Array) -> None:
+        """Raise ValueError if dumbbells overlap or do not lie in the drum, naming the worst."""
+        self.placed(q)
 
     def placed(self, q: ArrayLike) -> Array:
-        """Return placements ``(count, 4)``, refusing what overlaps or does not lie in the drum."""
+        """Return placements ``(count, 4)`` after checking that they lie in the drum and apart."""
         array = np.array(q, dtype=np.float64)
         if array.ndim == 1:
             array = array[None]
@@ -317,24 +277,22 @@ class DumbbellDrum:
             raise ValueError(msg)
 
     def _check_overlap(self, q: Array) -> None:
-        reach = self.length + 2 * self.ball_radius
-        worst = (0.0, 0, 0, "")
-        for i in range(self.count - 1):
-            rest = q[i + 1 :]
-            apart = np.hypot(self.centre_radius * (rest[:, 0] - q[i, 0]), rest[:, 1] - q[i, 1])
-            close = i + 1 + np.flatnonzero(apart < reach)
-            if close.size:
-                pairs = np.concatenate([np.tile(q[i, :3], (close.size, 1)), q[close, :3]], axis=1)
-                gaps = self.pair.polyhedron.bundle.evaluate(pairs, 0)[0]
-                at, name = divmod(int(np.argmin(gaps)), gaps.shape[1])
-                names = dumbbell_formulas.CONTACTS
-                worst = min(worst, (float(gaps.min()), i + 1, int(close[at]) + 1, names[name]))
-        if worst[0] < -OVERLAP:
+        gap, (i, j), name = self.bodies.least_pair_gap(q)
+        if gap < -OVERLAP:
             msg = (
-                f"q: expected dumbbells that do not overlap; numbers {worst[1]} and {worst[2]} "
-                f"overlap by {-worst[0]:.6g} mm at contact {worst[3]}"
+                f"q: expected dumbbells that do not overlap; numbers {i + 1} and {j + 1} overlap "
+                f"by {-gap:.6g} mm at contact {name}"
             )
             raise ValueError(msg)
+
+
+def drum_of(trajectory: "Trajectory") -> DumbbellDrum:
+    """Return the drum of a trajectory, or raise TypeError for that of another system."""
+    if not isinstance(trajectory.system, DumbbellDrum):
+        got = type(trajectory.system).__name__
+        msg = f"trajectory: expected one of dumbbells in a drum; got one of a {got}"
+        raise TypeError(msg)
+    return trajectory.system
 
 
 def dumbbell_motion() -> equations.Formulation:

@@ -1,13 +1,13 @@
-"""The formulas of motion in a rotating, tilted drum: grips, weight, inertia, floor and rubbing.
+"""Formulas of motion in a rotating, tilted drum: slips, loads, weight, inertia, gaps.
 
 A dumbbell has the coordinates ``phi``, ``eta``, ``theta`` and its spin ``psi`` about its own axis:
-balls and rod are one rigid axle.  Velocities live in the developed plane ``(rho phi, eta)``: there
-``w = (rho phi', eta')`` is the velocity of the centre, ``u_s = (sin theta, cos theta)`` the axis
-and ``u_r = (-cos theta, sin theta)`` the direction of rolling ([GMBN] app. A).  Ball 1 is at
-``e = -1`` along the axis, ball 2 at ``e = +1``.  What is curved about the drum enters through the
-weight and the loads alone.  The spin is the one relative to the axes ``u_r, u_s``, which turn as
-the azimuth grows; the lowest points are ``r`` further out than the centres, so that slip velocities
-differ from those in the curved drum by a share of the order ``r / rho``.
+balls and rod are one rigid axle.  Velocities are those in the developed plane ``(rho phi, eta)``:
+there ``w = (rho phi', eta')`` is the velocity of the centre, ``u_s = (sin theta, cos theta)`` the
+axis and ``u_r = (-cos theta, sin theta)`` the direction of rolling ([GMBN] app. A).  Ball 1 is at
+``e = -1`` along the axis, ball 2 at ``e = +1``.  The drum's curvature enters only through the
+weight and the loads.  The spin is that relative to the axes ``u_r, u_s``, which turn as the
+azimuth grows; the lowest points are ``r`` further out than the centres, so slip velocities differ
+from those in the curved drum by a relative amount of order ``r / rho``.
 
 =================  ==============================================================
 ``theta' > 0``     the axis turns from the meridian towards growing azimuth
@@ -44,7 +44,7 @@ RATES = tuple(f"{name}{k}_dot" for k in (1, 2) for name in ("phi", "eta", "theta
 
 @lru_cache(maxsize=1)
 def grip() -> families.Family:
-    """Return how a dumbbell slips on the drum and how it loads it; parameters as below.
+    """Return slip velocities and normal loads of a dumbbell on the drum.
 
     ``slip1_r``, ``slip1_s``, ``slip2_r``, ``slip2_s`` are the velocities of the balls' lowest
     points relative to the wall, along ``u_r`` and ``u_s`` (mm/s); ``spin`` is ``r psi'`` (mm/s);
@@ -88,11 +88,11 @@ def floors() -> families.Family:
 
 @lru_cache(maxsize=3)
 def rubs(kind: Rub) -> families.Family:
-    """Return the velocity with which the surface of body 1 rubs along that of body 2.
+    """Return the slip velocity between the surfaces of body 1 and body 2.
 
     ``tangential`` is the component along ``t = (-n_y, n_x)`` in the developed plane, ``n`` the
     unit normal from body 1 to body 2; ``vertical`` points away from the wall.  Both are linear in
-    the velocities and in mm/s.  They are taken at a point P half-way between the surfaces.
+    the velocities and in mm/s.  They refer to a point P half-way between the surfaces.
 
     ============  ==================================================================
     "ball_ball"   P in the middle between the centres
@@ -101,9 +101,9 @@ def rubs(kind: Rub) -> families.Family:
                   ``n`` is perpendicular to the bisector of the axes
     ============  ==================================================================
 
-    Balls are thicker than rods, so in the plane two rods cannot touch before a ball touches a
-    rod; in the drum thin rods that cross can, one lying on the other, and parallel rods are the
-    limit of rods as thick as balls.
+    Balls are thicker than rods, so two rods in the plane cannot touch before a ball touches a
+    rod.  In the drum thin rods that cross can, one on the other; parallel rods that touch are the
+    limiting case of rods as thick as balls.
 
     Reads ``PLACES`` and ``RATES`` (azimuths counted in the same turn); parameters
     ``l r t rho e1 e2``, ``e`` being -1 for ball 1 and +1 for ball 2.  ``e2`` is not used by
@@ -159,7 +159,7 @@ def _dot(u: "Vector", v: "Vector") -> "sympy.Expr":
 
 
 def _at(offset: "Vector", velocity: "Vector", turning: "sympy.Expr") -> "Vector":
-    """Return the velocity at an offset from the centre of a body that moves in the plane."""
+    """Return the velocity at an offset from the centre of a rigid body in the plane."""
     return velocity[0] + turning * offset[1], velocity[1] - turning * offset[0]
 
 
@@ -184,7 +184,7 @@ def _grip() -> "Formulas":
 
 
 def _weight() -> "Formulas":
-    """Half of what two dumbbells at the same place weigh: the heights are written once."""
+    """Half the energy of two dumbbells at the same place, so that heights are written once."""
     phi, eta, theta, heavy, pull = _symbols("phi", "eta", "theta", "weight", "pull")
     heights = dumbbell_formulas.drum_energy().expression("height")
     here = {"phi1": phi, "phi2": phi, "theta1": theta, "theta2": theta, "R": 0, "w": 0}
@@ -193,7 +193,7 @@ def _weight() -> "Formulas":
 
 
 def _kinetic() -> "Formulas":
-    """Two balls that move, turn with the axis and spin about it."""
+    """Kinetic energy of two balls that translate, rotate with the axis and spin about it."""
     import sympy
 
     theta, *speeds = _symbols("theta", *SPEEDS)
@@ -217,14 +217,14 @@ def _floors() -> "Formulas":
 
 
 def _placed() -> "tuple[Vector, list[Vector], list[Vector]]":
-    """Return the centre of body 2 as seen from that of body 1, all ``u_r`` and all ``u_s``."""
+    """Return the centre of body 2 relative to that of body 1, all ``u_r`` and all ``u_s``."""
     phi1, eta1, theta1, phi2, eta2, theta2, rho = _symbols(*PLACES, "rho")
     rolling, axes = zip(_axes(theta1), _axes(theta2), strict=True)
     return (rho * (phi2 - phi1), eta2 - eta1), list(rolling), list(axes)
 
 
 def _rubbing(definitions: "Expressions") -> "Formulas":
-    """Return the velocities from definitions of ``Px Py`` (seen from body 1) and ``nx ny``."""
+    """Return the velocities from definitions of ``Px Py`` (relative to body 1) and ``nx ny``."""
     rho, point, normal = *_symbols("rho"), _symbols("Px", "Py"), _symbols("nx", "ny")
     apart, rolling, _ = _placed()
     tangential, vertical = [], []
@@ -254,7 +254,7 @@ def _ball_ball() -> "Formulas":
 
 
 def _ball_rod() -> "Formulas":
-    """Across the rod, ``side`` is where the line of the axis lies, as seen from the ball."""
+    """``side`` is the coordinate across the rod of its axis, relative to the ball."""
     import sympy
 
     length, r, t, first = _symbols("l", "r", "t", "e1")

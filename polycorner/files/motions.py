@@ -2,8 +2,9 @@
 
 import io
 import json
+import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,15 +13,16 @@ import numpy as np
 
 from polycorner.container import Kind, versions
 from polycorner.motion.engine.driver import Effort
-from polycorner.motion.events import Event, EventKind
-from polycorner.motion.trajectory import Touch, Trajectory
+from polycorner.motion.events import EventKind
+from polycorner.motion.mechanics import MechanicalSystem
+from polycorner.motion.noise import Noise
+from polycorner.motion.tables import event_table, read_events, read_touches, touch_table
+from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from polycorner.motion.bodies import IdenticalBodies
-    from polycorner.motion.system import System
 
 EFFORT = tuple(field.name for field in fields(Effort))
 T = TypeVar("T")
@@ -35,59 +37,6 @@ class MotionUnits:
     energy: str = "not stated"
     force: str = "not stated"
     impulse: str = "not stated"
-
-
-# ------------------------------------------------------------------------------ contacts and events
-
-
-def touch_table(touching: Sequence[Sequence[Touch]], names: Sequence[str]) -> dict[str, Any]:
-    """Return contacts as columns: instant, bodies (-1: none), contact, force."""
-    rows = [
-        (index, bodies[0], bodies[1] if len(bodies) > 1 else -1, names.index(contact), force)
-        for index, touches in enumerate(touching)
-        for bodies, contact, force in touches
-    ]
-    whole = np.array([row[:4] for row in rows], dtype=np.int64).reshape(-1, 4)
-    return {"touch": whole, "touch_force": np.array([row[4] for row in rows], dtype=np.float64)}
-
-
-def read_touches(table: Any, names: Sequence[str], count: int) -> list[tuple[Touch, ...]]:
-    """Return contacts by instant from :func:`touch_table`."""
-    found: list[list[Touch]] = [[] for _ in range(count)]
-    for (index, i, j, which), force in zip(
-        table["touch"].tolist(), table["touch_force"].tolist(), strict=True
-    ):
-        found[index].append(((i,) if j < 0 else (i, j), names[which], force))
-    return [tuple(touches) for touches in found]
-
-
-def event_table(events: Iterable[Event], names: Sequence[str]) -> dict[str, Any]:
-    """Return events as columns: kind, bodies (-1: none), contact (-1: none); time, impulse."""
-    listed = list(events)
-    whole = [
-        (
-            int(event.kind),
-            event.bodies[0],
-            event.bodies[1] if len(event.bodies) > 1 else -1,
-            names.index(event.contact) if event.contact else -1,
-        )
-        for event in listed
-    ]
-    numbers = [(event.time, event.impulse) for event in listed]
-    return {
-        "event": np.array(whole, dtype=np.int64).reshape(-1, 4),
-        "event_numbers": np.array(numbers, dtype=np.float64).reshape(-1, 2),
-    }
-
-
-def read_events(table: Any, names: Sequence[str]) -> list[Event]:
-    """Return events from :func:`event_table`."""
-    return [
-        Event(time, EventKind(kind), (i,) if j < 0 else (i, j), "" if at < 0 else names[at], value)
-        for (kind, i, j, at), (time, value) in zip(
-            table["event"].tolist(), table["event_numbers"].tolist(), strict=True
-        )
-    ]
 
 
 # ------------------------------------------------------------------------------------------ dataset
@@ -161,12 +110,23 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
         "max_penetration": path.max_penetration,
         "contacts": json.dumps(list(names)),
         **{f"effort_{name}": getattr(path.effort, name) for name in EFFORT},
+        "seed": np.int64(path.noise.seed),
+        "noise_chatter": float(path.noise.chatter),
+        "noise_correlation_time": float(path.noise.correlation_time),
+        "noise_kicks": json.dumps(dict(path.noise.kicks)),
+        "every": np.int64(path.every),
+        "duration": _duration(path),
+        "steps_per_second": path.steps_per_second,
     }
 
 
-def read_motion(
-    content: "xr.Dataset", system: "System | IdenticalBodies", q: Array, v: Array
-) -> Trajectory:
+def _duration(path: Trajectory) -> float:
+    """Return the time that was asked for, in s."""
+    end = float(path.times[-1]) if path.t_end is None else path.t_end
+    return end - float(path.times[0])
+
+
+def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Array) -> Trajectory:
     """Return the trajectory in a dataset, given its coordinates and velocities."""
     at = content.attrs
     names = json.loads(at["contacts"])
@@ -201,6 +161,21 @@ def read_motion(
         events=tuple(read_events(events, names)),
         max_penetration=float(at["max_penetration"]),
         effort=Effort(**whole, residual=float(at["effort_residual"])),
+        noise=_noise(at),
+        every=int(at.get("every", 1)),
+        t_end=float(of("time")[0]) + float(at["duration"]) if "duration" in at else None,
+        steps_per_second=float(at.get("steps_per_second", math.nan)),
+    )
+
+
+def _noise(at: Mapping[Any, Any]) -> Noise:
+    if "seed" not in at:  # files of the first version
+        return Noise()
+    return Noise(
+        chatter=float(at["noise_chatter"]),
+        correlation_time=float(at["noise_correlation_time"]),
+        kicks=json.loads(at["noise_kicks"]),
+        seed=int(at["seed"]),
     )
 
 

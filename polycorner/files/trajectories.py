@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 KIND = Kind("trajectory", "save_trajectory", BINARY)
 OTHERS = ("time", "energy", "force", "impulse", "gap")
+GAP = ("time", "body", "gap")
 NOT_STATED = "not stated"
 
 
@@ -48,9 +49,9 @@ def trajectory_dataset(
     Returns
     -------
     xarray.Dataset
-        ``q`` and ``v`` over ``time``, ``body`` and ``coordinate``, ``gaps`` over ``time`` and
-        ``gap``, energies, contacts, events, dissipation and work by cause, and the computational
-        effort.
+        ``q`` and ``v`` over ``time``, ``body`` and ``coordinate``, ``gaps`` over ``time``,
+        ``body`` and ``gap``, energies, contacts, events, dissipation and work by cause, and the
+        computational effort.
     """
     import xarray as xr
 
@@ -66,10 +67,10 @@ def trajectory_dataset(
     data = {
         "q": (dimensions, trajectory.q, {"long_name": "coordinates, not wrapped"} | each),
         "v": (dimensions, trajectory.v, {"long_name": f"velocities, per {motion.time}"} | each),
-        "gaps": column(("time", "gap"), _gaps(trajectory), every["gap"], "gaps of the contacts"),
+        "gaps": column(GAP, _gaps(trajectory), every["gap"], "gaps of the contacts"),
     }
     return xr.Dataset(
-        data | motion_data(trajectory, system.contacts, motion),
+        data | motion_data(trajectory, system.bodies.contact_names, motion),
         motion_coordinates(trajectory, motion)
         | {"coordinate": list(system.manifold.names), "gap": list(system.contacts)},
         _attributes(trajectory, system),
@@ -154,7 +155,7 @@ def _system(trajectory: Trajectory) -> System:
 def _attributes(trajectory: Trajectory, system: System) -> dict[str, Any]:
     return {
         "title": "Motion of a system with unilateral contacts",
-        **motion_attributes(trajectory, system.contacts),
+        **motion_attributes(trajectory, system.bodies.contact_names),
         "system": json.dumps(_told(system)),
     }
 
@@ -175,7 +176,7 @@ def _told(system: System) -> dict[str, Any]:
         ]
         for f in system.friction
     }
-    return {
+    told = {
         "coordinates": list(manifold.names),
         "periods": [str(period) for period in manifold.periods],
         "scales": list(manifold.scales),
@@ -187,16 +188,19 @@ def _told(system: System) -> dict[str, Any]:
         "forces": {name: text(force) for name, force in system.forces.items()},
         "gaps": {f.name: [text(f.expression), *f.parameters] for f in polyhedron.functions},
     }
+    if (between := system.between) is not None:
+        told["between"] = [*between.gaps, str(between.static), str(between.dynamic)]
+    return told
 
 
 def _read(content: "xr.Dataset", system: System) -> "str | Trajectory":
     written, here = json.loads(content.attrs["system"]), _told(system)
     for key, value in here.items():
-        if written[key] != value:
+        if written.get(key) != value:
             return f"{key}: written {written[key]}, found {value}"
     q, v = (np.array(content[name].values) for name in ("q", "v"))
     return read_motion(content, system, q, v)
 
 
 def _gaps(trajectory: Trajectory) -> Any:
-    return _system(trajectory).polyhedron.values(trajectory.q[:, 0])
+    return _system(trajectory).polyhedron.values(trajectory.q)

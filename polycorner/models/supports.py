@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from polycorner.models.textbook import GRAVITY, Point
+from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.convex_sets import ConvexSet
-from polycorner.motion.system import Friction, System, velocities
+from polycorner.motion.system import System
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
 

@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.convex_sets import ConvexSet
-from polycorner.motion.system import Friction, System, velocities
+from polycorner.motion.system import System
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
 

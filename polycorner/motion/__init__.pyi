@@ -1,11 +1,16 @@
+from .checkpoints import Checkpoint
+from .contacts import ContactFamily, Friction, pair_coordinates, pair_velocities, velocities
 from .events import Event, EventKind
 from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
+from .mechanics import MechanicalSystem, State
 from .noise import Noise, Solver
 from .simulation import simulate, step
-from .system import Friction, State, System, velocities
+from .system import System
 from .trajectory import Trajectory
 
 __all__ = [
+    "Checkpoint",
+    "ContactFamily",
     "ConvexPolygon",
     "ConvexSet",
     "CutDisc",
@@ -15,11 +20,14 @@ __all__ = [
     "EventKind",
     "Friction",
     "Interval",
+    "MechanicalSystem",
     "Noise",
     "Solver",
     "State",
     "System",
     "Trajectory",
+    "pair_coordinates",
+    "pair_velocities",
     "simulate",
     "step",
     "velocities",

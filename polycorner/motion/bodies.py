@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
 from polycorner.motion.convex_sets import ConvexSet
@@ -74,7 +76,7 @@ class Body(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class ContactFamily(Value):
+class PairContacts(Value):
     """The contacts between any two of several identical bodies.
 
     Attributes
@@ -113,7 +115,7 @@ class IdenticalBodies(Value):
     ----------
     body : Body
     count : int
-    contacts : ContactFamily, optional
+    contacts : PairContacts, optional
         Contacts between the bodies; none by default.
     position : (int, int)
         The two coordinates that are a body's position.
@@ -127,7 +129,7 @@ class IdenticalBodies(Value):
 
     body: Body
     count: int = 1
-    contacts: ContactFamily | None = None
+    contacts: PairContacts | None = None
     position: tuple[int, int] = (0, 0)
     substrate_speed: float = 0.0
     exit_coordinate: int = -1
@@ -150,3 +152,38 @@ class IdenticalBodies(Value):
     def pair_contacts(self) -> tuple[str, ...]:
         """Names of the contacts between two bodies."""
         return () if self.contacts is None else self.contacts.gaps.names
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of all contacts: those of a body with its surroundings, then those of a pair."""
+        return (*self.body.contacts, *self.pair_contacts)
+
+    def least_pair_gap(self, q: Array) -> tuple[float, tuple[int, int], str]:
+        """Return the least gap between two bodies, the bodies, and the contact.
+
+        Parameters
+        ----------
+        q : (count, k) array
+            Placements of all bodies.
+
+        Returns
+        -------
+        gap : float
+            ``inf`` if no two bodies are near enough to touch.
+        bodies : (int, int)
+        contact : str
+        """
+        least = (np.inf, (0, 0), "")
+        if self.contacts is None:
+            return least
+        family, reads = self.contacts.gaps, self.contacts.reads
+        numbers = np.array([*self.contacts.parameters, 0.0])
+        positions = q[:, list(self.position)] * self.body.units[list(self.position)]
+        for i in range(self.count - 1):
+            apart = np.linalg.norm(positions[i + 1 :] - positions[i], axis=1)
+            for j in (i + 1 + np.flatnonzero(apart < self.contacts.reach)).tolist():
+                at = np.array([q[(i, j)[body], c] for body, c in reads])
+                (values,) = family.kernel.at(at, numbers.ctypes.data, 0)
+                worst = int(np.argmin(values))
+                least = min(least, (float(values[worst]), (i, j), family.names[worst]))
+        return least

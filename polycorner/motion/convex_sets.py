@@ -1,4 +1,4 @@
-"""What every set of friction forces can be asked; see :mod:`polycorner.motion.friction`."""
+"""Base class of the convex sets of friction forces; see :mod:`polycorner.motion.friction`."""
 
 import math
 from abc import ABC, abstractmethod
@@ -12,7 +12,7 @@ from polycorner.spaces.manifold import Array, finite, reals, scalar
 INTERVAL, DISC, ELLIPSE, CUT_DISC, POLYGON = range(5)
 Code = tuple[int, tuple[float, float, float, float], Array]
 
-# Inclusions hold, and corners lie on an edge, up to this part of the size of the sets.
+# Tolerance of inclusions, and of corners on an edge, relative to the size of the sets.
 ROUNDING = 1e-12
 
 
@@ -71,8 +71,8 @@ class ConvexSet(ABC):
     def within(self, other: "ConvexSet") -> bool:
         """Whether ``C`` is a subset of another set, up to rounding; exact for all five kinds.
 
-        A polygon contains what reaches no farther than its edges along their normals, the other
-        sets contain what has its ``tips`` there.
+        A polygon contains a set whose support along the edges' normals does not exceed the
+        edges' distances; the other kinds contain a set whose ``tips`` they contain.
 
         Raises
         ------
@@ -93,7 +93,7 @@ class ConvexSet(ABC):
     @property
     @abstractmethod
     def tips(self) -> Array:
-        """Points ``(k, d)`` of ``C`` that decide whether all of ``C`` is in another set.
+        """Points ``(k, d)`` of ``C`` that decide whether another set contains ``C``.
 
         An interval, a disc, an ellipse or a cut disc contains ``C`` exactly if it contains them.
         """
@@ -120,7 +120,7 @@ class ConvexSet(ABC):
 
 
 def coefficient(argument: str, value: Any, sign: int = 1) -> float:
-    """Return the size of a number, checked to be finite and of the given sign or zero."""
+    """Return the magnitude of a finite number that has the given sign or is zero."""
     number = reals(value, argument)
     if number.ndim or not np.isfinite(number) or sign * number < 0:
         side = "at least" if sign > 0 else "at most"

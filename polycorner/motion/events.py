@@ -1,11 +1,11 @@
-"""What happens during a motion."""
+"""Events of a motion and their kinds."""
 
 from dataclasses import dataclass
 from enum import IntEnum
 
 
 class EventKind(IntEnum):
-    """Kinds of events; the numbers are those of the compiled core."""
+    """Kinds of events, with the engine's numbers."""
 
     MADE = 0
     LOST = 1
@@ -16,7 +16,7 @@ class EventKind(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What happened, in words."""
+        """The event in words."""
         return _SENTENCES[self]
 
 
@@ -32,7 +32,7 @@ _SENTENCES = {
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at a time.
+    """An event: a contact, the rest or the exit of bodies at a time.
 
     Attributes
     ----------

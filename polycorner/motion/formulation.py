@@ -1,4 +1,4 @@
-"""The equations of motion, derived in SymPy from energies and compiled once.
+"""Equations of motion, derived from energies in SymPy and compiled.
 
 From a kinetic energy ``T = v . M(q) v / 2``, a potential ``V(q)`` and applied forces ``Q(q, v)``
 Lagrange's equations give ``M v' = F`` with ``F = Q - dV/dq + dT/dq - (dM/dt) v`` ([Lanczos] ch. 5).
@@ -25,7 +25,7 @@ def dotted(name: str) -> str:
 
 @dataclass(frozen=True)
 class Laws:
-    """What a motion obeys, in SymPy.
+    """The laws of a motion, in SymPy.
 
     Attributes
     ----------
@@ -55,11 +55,11 @@ class Formulation:
     coordinates, parameters : tuple of str
         Names of the symbols the laws are written in.
     laws : callable
-        Returns the :class:`Laws`; with a ``key`` only called when nothing is compiled yet.
+        Returns the :class:`Laws`; with a ``key`` it is called only if nothing is compiled yet.
     slips, loads : int
-        How many there are.
+        Numbers of slip velocities and of known loads.
     key : str
-        Identifies the laws between processes.
+        Identifies the laws across processes.
     """
 
     coordinates: tuple[str, ...]
@@ -148,11 +148,11 @@ class Formulation:
         return [*upper, *total, *applied, *(sympy.sympify(load) for load in laws.loads)]
 
     def check(self) -> None:
-        """Refuse laws that are not of the stated form, naming the one that is not."""
+        """Raise ValueError for laws that are not of the stated form, naming the first."""
         import sympy
 
         laws = self.laws()
-        q, v = self._symbols()
+        _, v = self._symbols()
         kinetic = sympy.sympify(laws.kinetic)
         still = dict.fromkeys(v, 0)
         lower = [kinetic.subs(still), *(sympy.diff(kinetic, x).subs(still) for x in v)]
@@ -175,7 +175,6 @@ class Formulation:
         if unknown:
             msg = f"forces: expected the coordinates {', '.join(self.coordinates)}; got {unknown}"
             raise ValueError(msg)
-        del q
 
 
 @dataclass(frozen=True)
@@ -226,3 +225,18 @@ def energies(
     numbers = np.array([*parameters, 0.0])
     (values,) = formulation.energies.kernel.at(np.concatenate([q, v]), numbers.ctypes.data, 0)
     return float(values[0]), float(values[1])
+
+
+def highest_square(
+    formulation: Formulation, parameters: Array, scales: Array, q: Array, v: Array
+) -> float:
+    """Return the square of the highest frequency of small motions about a placement."""
+    stiffness = np.empty((len(scales), len(scales)))
+    for i, scale in enumerate(scales):
+        change = np.zeros(len(scales))
+        change[i] = 1e-5 * scale
+        forth = moment(formulation, parameters, q + change, v).force
+        back = moment(formulation, parameters, q - change, v).force
+        stiffness[:, i] = -(forth - back) / (2 * change[i])
+    mass = moment(formulation, parameters, q, v).mass
+    return float(np.abs(np.linalg.eigvals(np.linalg.solve(mass, stiffness))).max())

@@ -1,8 +1,8 @@
-"""Friction as convex sets: the forces that a unit load can oppose to slip.
+"""Convex sets of friction forces per unit load.
 
 A dry contact under the load ``L`` holds any force in ``L C``; when it slips at the velocity ``s``
 it answers with the force of ``L C`` that dissipates most, so that ``-s`` lies in the normal cone
-of ``L C`` at the force ([Moreau]).  Everything a time step asks about ``C`` is its
+of ``L C`` at the force ([Moreau]).  A time step uses of ``C`` its
 
     support     h(s) = max {s.p : p in C},    the power ``L h(-s)`` that slip dissipates,
     projection  the point of C nearest to p,
@@ -198,8 +198,8 @@ class Ellipse(ConvexSet):
 class CutDisc(ConvexSet):
     """A disc cut by a strip, ``C = {|p| <= mu, |p_1| <= width}``.
 
-    A ball that may roll along the first axis gives way there at ``width``, its rolling friction,
-    and slides at ``mu``.  With ``width >= mu`` nothing is cut off.
+    A ball that can roll along the first axis yields there at ``width``, its rolling friction, and
+    slides at ``mu``.  With ``width >= mu`` the set is the disc.
 
     Raises
     ------
@@ -236,7 +236,7 @@ class CutDisc(ConvexSet):
         return np.array([self.corner, [0.0, self.mu]])
 
     def _support(self, s: Array) -> Array:
-        # On the arc where the farthest point of the disc is in the strip, at the corner otherwise.
+        # The maximiser is on the arc if that of the disc lies in the strip, else at the corner.
         size, across = length(s), abs(s[..., 0])
         c, top = self.corner
         on_arc = self.mu * across <= c * size
@@ -268,8 +268,8 @@ def _onto_ellipse(p: Array, axes: Array) -> Array:
     """Return the points of an ellipse nearest to points ``(k, 2)`` outside.
 
     They are ``a_i^2 p_i / (t + a_i^2)`` with ``sum (a_i p_i / (t + a_i^2))^2 = 1``.  That sum is
-    convex and falls in ``t``: from below the root, where one term alone is 1, Newton's method
-    climbs monotonically, and it ends when rounding stops the climb.
+    convex and decreasing in ``t``: from below the root, where one term alone is 1, Newton's method
+    increases ``t`` monotonically until rounding stops it.
     """
     if axes.min() == 0:  # a segment or a point
         return np.clip(p, -axes, axes)

@@ -1,12 +1,14 @@
-"""Seeded noise, and how exactly steps are solved: what a simulation is told besides its system."""
+"""Noise in the loads and forces of a simulation, and the accuracy of its solver."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Real
+
+from polycorner.checks import mapping, real, whole
+from polycorner.values import Value
 
 
 @dataclass(frozen=True)
-class Solver:
+class Solver(Value):
     """How exactly the inclusion of each step is solved.
 
     Parameters
@@ -22,26 +24,22 @@ class Solver:
     sweeps: int = 2000
 
     def __post_init__(self) -> None:
-        if not isinstance(self.tolerance, Real) or not 0 < float(self.tolerance) < 1:
-            msg = f"tolerance: expected a number between 0 and 1; got {self.tolerance!r}"
-            raise ValueError(msg)
-        if isinstance(self.sweeps, bool) or not isinstance(self.sweeps, int) or self.sweeps < 1:
-            msg = f"sweeps: expected a positive whole number; got {self.sweeps!r}"
-            raise ValueError(msg)
+        real("tolerance", self.tolerance, above=0, below=1)
+        whole("sweeps", self.sweeps, least=1)
 
 
 @dataclass(frozen=True)
-class Noise:
+class Noise(Value):
     """Chattering loads and random impulses.
 
-    A substrate that is not quite smooth presses irregularly.  *Chatter*: every known load ``N`` is
+    On a substrate that is not quite smooth loads fluctuate.  *Chatter*: every known load ``N`` is
     multiplied by ``max(0, 1 + A xi)`` with ``xi`` standard normal, independent for each body and
-    load, held for a correlation time and then drawn anew.  What is held by less than its full
-    friction slips now and then: these are the slippages of [GMBN] sec. 3.  *Kicks*: white noise
-    forces, impulses ``sigma sqrt(h) xi`` in each step of length ``h``.
+    load, held for a correlation time and then drawn anew.  Bodies that need almost all of their
+    friction then slip now and then: these are the slippages of [GMBN] sec. 3.  *Kicks*: white
+    noise forces, impulses ``sigma sqrt(h) xi`` in each step of length ``h``.
 
-    Each number is a function of the seed, the time, the body and the place (SplitMix64,
-    [Steele]): a run resumed in the middle meets the same noise.
+    Each number is a function of the seed, the time, the body and its use (SplitMix64, [Steele]), so
+    a run that resumes meets the same noise.
 
     Parameters
     ----------
@@ -62,17 +60,8 @@ class Noise:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, least in (("chatter", 0.0), ("correlation_time", 1e-12)):
-            value = getattr(self, name)
-            if not isinstance(value, Real) or not least <= float(value) < float("inf"):
-                expected = "a number not below 0" if least == 0 else "a positive time in s"
-                msg = f"{name}: expected {expected}; got {value!r}"
-                raise ValueError(msg)
-        for name, value in self.kicks.items():
-            if not isinstance(value, Real) or not 0 <= float(value) < float("inf"):
-                msg = f"kicks: expected a number not below 0 for {name!r}; got {value!r}"
-                raise ValueError(msg)
-        whole = isinstance(self.seed, int) and not isinstance(self.seed, bool)
-        if not whole or not 0 <= self.seed < 2**63:
-            msg = f"seed: expected a whole number from 0 to 2^63 - 1; got {self.seed!r}"
-            raise ValueError(msg)
+        real("chatter", self.chatter, least=0)
+        real("correlation_time", self.correlation_time, least=1e-12, unit="s")
+        for size in mapping("kicks", self.kicks).values():
+            real("kicks", size, least=0)
+        whole("seed", self.seed, least=0, most=2**63 - 1)

@@ -1,4 +1,4 @@
-"""Convex polygons of friction forces, given by their vertices or around a support function."""
+"""Convex polygons of friction forces, from vertices or from a support function."""
 
 import math
 from collections.abc import Callable
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import whole
 from polycorner.motion.convex_sets import (
     POLYGON,
     ROUNDING,
@@ -27,14 +28,15 @@ class ConvexPolygon(ConvexSet):
     ----------
     vertices : (k, 2) array
         Points in any order, each on the boundary of their convex hull, which contains 0 and has
-        an area.  They are kept counterclockwise from the least; points on an edge are dropped.
+        an area.  They are stored counterclockwise from the lexicographically least; points on an
+        edge are dropped.
     error : float, optional
-        How far, at most, a set that the polygon stands for stays inside it (default: nowhere).
+        Largest distance from the polygon to the set that it encloses and approximates; default 0.
 
     Raises
     ------
     ValueError, TypeError
-        If the vertices are none of a convex polygon around 0.
+        If the points are not the vertices of a convex polygon around 0.
 
     Examples
     --------
@@ -78,7 +80,7 @@ class ConvexPolygon(ConvexSet):
         away = p[..., None, :] - starts
         along = np.clip((away * sides).sum(axis=-1) / (sides**2).sum(axis=-1), 0.0, 1.0)
         feet = starts + along[..., None] * sides
-        # Far away all distances are equal up to rounding: their differences from the least are not.
+        # For distant points all distances agree up to rounding; their differences are computed.
         first = _pick(feet, length(p[..., None, :] - feet).argmin(axis=-1))
         away = (first[..., None, :] - feet) * (2 * p[..., None, :] - feet - first[..., None, :])
         foot = _pick(feet, away.sum(axis=-1).argmin(axis=-1))
@@ -89,26 +91,26 @@ class ConvexPolygon(ConvexSet):
         return np.asarray(np.maximum(over(_dots(p, normals), distances).max(axis=-1), 0.0))
 
     def covers(self, inner: ConvexSet) -> bool:
-        """Whether a set reaches no farther than the edges along their normals."""
+        """Whether the support of a set along the edges' normals stays within the edges."""
         normals, distances = self.edges
         slack = ROUNDING * abs(self.tips).max()
         return bool((inner.support(normals) <= distances + slack).all())
 
 
 def from_support(h: Callable[[Array], float], directions: int = 64) -> ConvexPolygon:
-    """Return the polygon ``{p : u_k.p <= h(u_k)}`` around a set known by its support function.
+    """Return the polygon ``{p : u_k.p <= h(u_k)}`` around a set with support function ``h``.
 
-    The set touches each of the ``N`` lines, so that it comes at least as close to a vertex as the
-    chord between the far ends of the two edges that meet there; the largest of these distances is
-    the polygon's ``error``.  It falls like ``N^-2`` for a smooth set, like ``N^-1`` at a straight
-    edge that no ``u_k`` is normal to.
+    The set touches each of the ``N`` lines, so it is at least as close to a vertex as the chord
+    between the far ends of the two edges that meet there; the largest of these distances is the
+    polygon's ``error``.  It decreases like ``N^-2`` for a smooth set, and like ``N^-1`` at a
+    straight edge to which no ``u_k`` is normal.
 
     Parameters
     ----------
     h : function of a unit vector (2,)
         The support function.
     directions : int, optional
-        How many directions ``u_k = (cos, sin)(2 pi k / N)``, at least 5.
+        Number ``N`` of directions ``u_k = (cos, sin)(2 pi k / N)``, at least 5.
 
     Raises
     ------
@@ -121,9 +123,7 @@ def from_support(h: Callable[[Array], float], directions: int = 64) -> ConvexPol
     >>> round(outer.gauge([0.0, 0.3]), 12), outer.error < 0.002
     (1.0, True)
     """
-    if isinstance(directions, bool) or not isinstance(directions, int) or directions < 5:
-        msg = f"directions: expected a whole number, at least 5; got {directions!r}"
-        raise ValueError(msg)
+    directions = whole("directions", directions, least=5)
     angles = math.tau / directions * np.arange(directions)
     u = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     heights = np.array([coefficient("h", h(direction)) for direction in u])
@@ -165,8 +165,8 @@ def _edges(corners: Array) -> tuple[Array, Array]:
 def _corners(values: ArrayLike, argument: str) -> Array:
     """Return the corners of a convex polygon around 0, counterclockwise from the least.
 
-    Seen from their mean the points of a convex polygon stand in order; one that stands out no
-    farther than rounding from its neighbours' line is none or has been counted, and is dropped.
+    Sorted by their angle about the mean, the points of a convex polygon are in order; a point
+    that lies within rounding on the line through its neighbours is dropped.
     """
     points = finite(reals(values, argument), argument)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
@@ -198,7 +198,7 @@ def _corners(values: ArrayLike, argument: str) -> Array:
 
 
 def _heights(corners: Array) -> Array:
-    """Return how far each corner stands out from the line through its neighbours."""
+    """Return the distance of each corner outward from the line through its neighbours."""
     before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
     chord, side = after - before, corners - before
     spans = length(chord)

@@ -1,4 +1,4 @@
-"""Collects what a running engine passes through, and turns it into a trajectory."""
+"""Recording of a running engine as a trajectory."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +9,7 @@ from polycorner.motion.events import Event, EventKind
 from polycorner.motion.trajectory import Touch, Trajectory
 
 if TYPE_CHECKING:
-    from polycorner.motion.bodies import IdenticalBodies
-    from polycorner.motion.system import System
+    from polycorner.motion.mechanics import MechanicalSystem
 
 WORK = ("substrate", "applied", "noise")
 
@@ -49,8 +48,8 @@ class Recorder:
             if event.kind == EventKind.EXIT:
                 self.gone -= self.engine.energy_of(event.bodies[0])
 
-    def trajectory(self, system: "System | IdenticalBodies") -> Trajectory:
-        """Return what was recorded."""
+    def trajectory(self, system: "MechanicalSystem", **run: Any) -> Trajectory:
+        """Return what was recorded; ``run`` are the arguments of the simulation."""
         bodies, columns = self.engine.bodies, self.columns
         sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
         work = {name: sums[:, i] for i, name in enumerate(WORK)}
@@ -72,4 +71,5 @@ class Recorder:
             events=tuple(self.events),
             max_penetration=float(self.engine.motion.sums[3]),
             effort=self.engine.effort,
+            **run,
         )

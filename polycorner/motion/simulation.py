@@ -37,18 +37,22 @@ the resolution of the step, and Zeno's infinitely many bounces end there.
 """
 
 import math
-from collections.abc import Callable
-from numbers import Real
-from typing import TYPE_CHECKING
+import threading
+import time
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner import __version__
+from polycorner.checks import instance, names, real, refuse, whole
 from polycorner.errors import SolverError
-from polycorner.motion.formulation import moment
+from polycorner.interrupts import first_interrupt
+from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.system import State, System, bodies_of
+from polycorner.progress import Progress
 
 if TYPE_CHECKING:
+    from polycorner.motion.checkpoints import Checkpoint, SavedRun
     from polycorner.motion.engine.driver import Engine
     from polycorner.motion.recorder import Recorder
     from polycorner.motion.trajectory import Trajectory
@@ -58,7 +62,7 @@ LONGEST = 1e12  # s
 
 
 def simulate(
-    system: System,
+    system: MechanicalSystem,
     state: State,
     t_end: float,
     dt: float,
@@ -66,9 +70,10 @@ def simulate(
     every: int | None = None,
     noise: Noise | None = None,
     solver: Solver | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
+    checkpoint: "Checkpoint | None" = None,
 ) -> "Trajectory":
-    """Follow a system from a state until ``t_end`` by Moreau-Jean time stepping.
+    """Simulate a system from a state until ``t_end`` by Moreau-Jean time stepping.
 
     Each step solves the inclusion stated in :mod:`polycorner.motion.simulation` ([Moreau], [AB]).
     Smooth motion is of second order in ``dt``; impacts and the onset of slip are located to
@@ -76,7 +81,7 @@ def simulate(
 
     Parameters
     ----------
-    system : System
+    system : System or another MechanicalSystem, such as a DumbbellDrum
     state : State
         See :meth:`System.state`.
     t_end, dt : float
@@ -85,9 +90,14 @@ def simulate(
         Record every so many steps; default such that about a thousand instants are recorded.
     noise : Noise, optional
     solver : Solver, optional
-        How exactly steps are solved.
+        How exactly steps are solved; default ``system.solver``.
     progress : callable, optional
-        Called with the time now and then.
+        Called at every record with the time simulated and the time to simulate, in s.
+    checkpoint : Checkpoint, optional
+        Where progress is saved.  A run that was interrupted or killed continues from there, on
+        the same machine and version bit for bit as if it had never stopped.  The first Ctrl-C
+        then ends the run at the next record, and returns what was done, saved and not
+        ``finished``; the second one, or one without a checkpoint, interrupts at once.
 
     Returns
     -------
@@ -96,13 +106,13 @@ def simulate(
     Raises
     ------
     TypeError, ValueError
-        Naming the argument; for ``dt`` with the largest that is stable at the start.
+        Naming the argument; for ``dt`` with the largest that is stable at the start, for
+        ``checkpoint`` with the parameter that differs from those of the saved run.
 
     Examples
     --------
-    >>> from polycorner import Manifold, Polyhedron
-    >>> from polycorner.motion.events import EventKind
-    >>> from polycorner.motion.system import velocities
+    >>> from polycorner import Manifold, Polyhedron, System, velocities
+    >>> from polycorner.motion import EventKind
     >>> M = Manifold.euclidean("y")
     >>> (y,), (v,) = M.symbols, velocities(M)
     >>> ball = System(Polyhedron(M, {"floor": y}), v**2 / 2, 9.81 * y, restitution=1.0)
@@ -110,50 +120,107 @@ def simulate(
     >>> len(path.of_kind(EventKind.IMPACT)), round(path.events[0].time, 3)
     (2, 0.452)
     """
-    engine = start(system, state, dt, noise=noise, solver=solver)
-    if not isinstance(t_end, Real) or not state.time <= float(t_end) < math.inf:
-        msg = f"t_end: expected a time not before that of the state, {state.time:g}; got {t_end!r}"
-        raise ValueError(msg)
-    steps = round((float(t_end) - state.time) / dt)
-    return run(engine, steps, whole_stride(every, steps), progress).trajectory(system)
-
-
-def whole_steps(duration: float, dt: float) -> int:
-    """Return how many steps of ``dt`` a time takes, refusing what is no time in s."""
-    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0 <= duration < LONGEST:
-        msg = f"duration: expected a time in s; got {duration!r}"
-        raise ValueError(msg)
-    return round(float(duration) / dt)
-
-
-def whole_stride(every: int | None, steps: int) -> int:
-    """Return how many steps to do between records."""
-    if every is None:
-        return max(1, steps // FRAMES)
-    if isinstance(every, bool) or not isinstance(every, int) or every < 1:
-        msg = f"every: expected a positive whole number of steps; got {every!r}"
-        raise ValueError(msg)
-    return every
-
-
-def run(
-    engine: "Engine", steps: int, stride: int, progress: Callable[[float], None] | None = None
-) -> "Recorder":
-    """Advance an engine until it has done so many steps; record every ``stride`` of them."""
+    from polycorner.motion.checkpoints import SavedRun
     from polycorner.motion.recorder import Recorder
 
-    recorder = Recorder(engine)
-    recorder.instant()
-    while engine.steps < steps:
-        recorder.advance(min(stride, steps - engine.steps))
+    noise, solver = noise or Noise(), solver or system_solver(system)
+    engine = start(system, state, dt, noise=noise, solver=solver)
+    end = real("t_end", t_end, least=state.time, most=LONGEST, unit="s")
+    steps = round((end - state.time) / dt)
+    stride = max(1, steps // FRAMES) if every is None else whole("every", every, least=1)
+    recorder, saved = Recorder(engine), None
+    if checkpoint is not None:
+        told = _parameters(system, state, end, dt, stride, noise, solver)
+        saved = SavedRun(checkpoint, told)
+    if saved is None or not saved.begin(recorder):
         recorder.instant()
+    rate = _follow(recorder, steps, stride, saved, progress)
+    return recorder.trajectory(
+        system, noise=noise, solver=solver, every=stride, t_end=end, steps_per_second=rate
+    )
+
+
+def _follow(
+    recorder: "Recorder",
+    steps: int,
+    stride: int,
+    saved: "SavedRun | None",
+    progress: Progress | None,
+) -> float:
+    """Advance to the end or to Ctrl-C and return the steps in a second of real time."""
+    if saved is None:
+        return _advance(recorder, steps, stride, None, progress, threading.Event())
+    asked = threading.Event()
+    with first_interrupt(asked.set):
+        rate = _advance(recorder, steps, stride, saved, progress, asked)
+        saved.save(recorder, finished=recorder.engine.steps >= steps)
+    return rate
+
+
+def _advance(
+    recorder: "Recorder",
+    steps: int,
+    stride: int,
+    saved: "SavedRun | None",
+    progress: Progress | None,
+    asked: threading.Event,
+) -> float:
+    engine = recorder.engine
+    counted, spent, first, last_save = 0, 0.0, True, time.monotonic()
+    while engine.steps < steps and not asked.is_set():
+        before, clock = engine.steps, time.perf_counter()
+        recorder.advance(min(stride, steps - before))
+        if not first:
+            counted += engine.steps - before
+            spent += time.perf_counter() - clock
+        first = False
+        recorder.instant()
+        if saved is not None and time.monotonic() - last_save >= saved.checkpoint.seconds:
+            saved.save(recorder, finished=False)
+            last_save = time.monotonic()
         if progress is not None:
-            progress(engine.time)
-    return recorder
+            progress(engine.steps * engine.dt, steps * engine.dt, "s simulated")
+    return counted / spent if spent > 0 else math.nan
+
+
+def _parameters(
+    system: MechanicalSystem,
+    state: State,
+    t_end: float,
+    dt: float,
+    every: int,
+    noise: Noise,
+    solver: Solver,
+) -> dict[str, Any]:
+    """Return everything that a run depends on, by name."""
+    from polycorner.motion.checkpoints import fingerprint
+
+    return {
+        "polycorner": __version__,
+        **system.described(),
+        "t_end": t_end,
+        "dt": float(dt),
+        "every": every,
+        "noise.chatter": float(noise.chatter),
+        "noise.correlation_time": float(noise.correlation_time),
+        "noise.kicks": {name: float(size) for name, size in sorted(noise.kicks.items())},
+        "noise.seed": int(noise.seed),
+        "solver.tolerance": float(solver.tolerance),
+        "solver.sweeps": int(solver.sweeps),
+        "state.time": float(state.time),
+        "state.q": fingerprint(state.q),
+        "state.v": fingerprint(state.v),
+        "state.sticking": fingerprint(state.sticking),
+    }
+
+
+def system_solver(system: object) -> Solver:
+    """Return the default solver of what has to be a mechanical system."""
+    return instance("system", system, MechanicalSystem).solver  # type: ignore[type-abstract]
 
 
 def start(
-    system: System,
+    system: MechanicalSystem,
     state: State,
     dt: float,
     *,
@@ -163,24 +230,26 @@ def start(
     """Return the engine of a system at a state, after checking both."""
     from polycorner.motion.engine.driver import Engine
 
-    if not isinstance(system, System):
-        msg = f"system: expected a System; got {type(system).__name__}"
-        raise TypeError(msg)
-    if not isinstance(state, State):
-        msg = f"state: expected a State, as system.state(q, v) makes; got {type(state).__name__}"
-        raise TypeError(msg)
+    solver = solver or system_solver(system)
+    instance("state", state, State, "system.state(q, v)")
+    bodies = system.bodies
+    shape = (bodies.count, bodies.dimension)
+    if state.q.size != shape[0] * shape[1]:
+        refuse("state", f"one of {shape[0]} bodies of {shape[1]} coordinates", state.q.shape)
     system.check_placement(state.q)
-    check_step(dt, largest_step(system, state))
-    noise = noise or Noise()
-    unknown = sorted(set(noise.kicks) - set(system.manifold.names))
-    if unknown:
-        msg = f"kicks: expected coordinates {', '.join(system.manifold.names)}; got {unknown}"
+    real("dt", dt, above=0, unit="s")
+    largest, why = system.largest_step(state)
+    if dt > largest:
+        msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
         raise ValueError(msg)
+    noise = noise or Noise()
+    names("kicks", noise.kicks, bodies.body.formulation.coordinates)
+    sticking = np.reshape(state.sticking, (bodies.count, -1))
     return Engine(
-        bodies_of(system),
-        state.q[None],
-        state.v[None],
-        state.sticking[None],
+        bodies,
+        state.q.reshape(shape),
+        state.v.reshape(shape),
+        sticking,
         dt,
         start=state.time,
         noise=noise,
@@ -188,36 +257,7 @@ def start(
     )
 
 
-UNSTABLE = "beyond which the motion is unstable"
-
-
-def check_step(dt: object, largest: float, why: str = UNSTABLE) -> None:
-    """Refuse a step that is no positive time or longer than the largest, with the reason."""
-    if isinstance(dt, bool) or not isinstance(dt, Real) or not 0 < float(dt) < math.inf:
-        msg = f"dt: expected a positive time in s; got {dt!r}"
-        raise ValueError(msg)
-    if float(dt) > largest:
-        msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
-        raise ValueError(msg)
-
-
-def largest_step(system: System, state: State) -> float:
-    """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog's limit."""
-    f, numbers = system.formulation, system.parameters
-    scales = system.manifold.scale_array
-    mass = moment(f, numbers, state.q, state.v).mass
-    stiffness = np.empty((len(scales), len(scales)))
-    for i, scale in enumerate(scales):
-        change = np.zeros(len(scales))
-        change[i] = 1e-5 * scale
-        forth = moment(f, numbers, state.q + change, state.v).force
-        back = moment(f, numbers, state.q - change, state.v).force
-        stiffness[:, i] = -(forth - back) / (2 * change[i])
-    squared = float(np.abs(np.linalg.eigvals(np.linalg.solve(mass, stiffness))).max())
-    return 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
-
-
-def step(system: System, state: State, dt: float) -> State:
+def step(system: MechanicalSystem, state: State, dt: float) -> State:
     """Return the state one step later.
 
     The same step as in :func:`simulate`, which is much faster for many of them.
@@ -234,5 +274,9 @@ def step(system: System, state: State, dt: float) -> State:
         msg = f"the step was not solved: its residual is {effort.residual:.3g} of the speeds in it"
         raise SolverError(msg)
     motion = engine.motion
-    q, v = motion.q[0].copy(), motion.v[0].copy()
-    return State(state.time + dt, q, v, motion.sticks[0].astype(np.bool_))
+    return State(
+        state.time + dt,
+        motion.q.reshape(state.q.shape).copy(),
+        motion.v.reshape(state.v.shape).copy(),
+        (motion.sticks != 0).reshape(state.sticking.shape),
+    )

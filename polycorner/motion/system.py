@@ -1,6 +1,7 @@
-"""A mechanical system on a polyhedron: energies, contacts, friction, and its state."""
+"""Mechanical systems written in SymPy: energies, contacts, friction, any number of bodies."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -9,139 +10,50 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import instance, mapping, names, real, refuse, whole
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
-from polycorner.motion.formulation import Formulation, Laws, dotted, energies
-from polycorner.motion.friction import ConvexSet
+from polycorner.motion.contacts import ContactFamily, Friction
+from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
+from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
     import sympy
 
-OVERLAP = 1e-4  # scaled depth up to which a start counts as touching: what a step may leave
-
-
-def velocities(manifold: Manifold) -> "tuple[sympy.Symbol, ...]":
-    """Return the velocities as real SymPy symbols: ``x_dot`` for the coordinate ``x``."""
-    import sympy
-
-    return tuple(sympy.Symbol(dotted(name), real=True) for name in manifold.names)
-
-
-@dataclass(frozen=True)
-class Friction:
-    """Dry friction: a force in a convex set that grows with a normal load.
-
-    The force per unit load ``p`` lies in ``C``, and where it slips it does so against the force
-    that dissipates most: ``-s`` is normal to ``C`` at ``p`` ([Moreau]).  ``C`` is ``static`` while
-    the contact sticks (its slip was exactly zero) and ``dynamic`` while it slips.
-
-    Parameters
-    ----------
-    name : str
-        What the contact is called.
-    slip : sequence of sympy.Expr
-        One or two components of the slip velocity, affine in the velocities ``x_dot``.  A
-        substrate that moves is a term without velocities.
-    static : ConvexSet
-        Forces per unit load that may hold it, of as many dimensions as ``slip``.
-    load : str, sympy.Expr or sequence of sympy.Expr
-        The unilateral contact whose force presses, by name; or the known normal force as a
-        function of the coordinates (several: their sum).
-    dynamic : ConvexSet, optional
-        Forces per unit load while it slips, inside ``static``; default ``static``.
-    kind : str, optional
-        Under which cause its dissipation is booked: ``"sliding"`` (default), ``"rolling"``, ...
-
-    Raises
-    ------
-    TypeError, ValueError
-        Naming the parameter, what was expected and what came.
-    """
-
-    name: str
-    slip: "tuple[sympy.Expr, ...]"
-    static: ConvexSet
-    load: "str | tuple[sympy.Expr, ...]"
-    dynamic: ConvexSet | None = None
-    kind: str = "sliding"
-
-    def __post_init__(self) -> None:
-        slip = tuple(self.slip) if isinstance(self.slip, Sequence) else (self.slip,)
-        object.__setattr__(self, "slip", slip)
-        if not isinstance(self.load, str):
-            several = isinstance(self.load, Sequence)
-            object.__setattr__(self, "load", tuple(self.load) if several else (self.load,))
-        if not isinstance(self.static, ConvexSet):
-            msg = f"static: expected a convex set such as Disc(0.3); got {self.static!r}"
-            raise TypeError(msg)
-        if self.dynamic is None:
-            object.__setattr__(self, "dynamic", self.static)
-        check_sets(self.name, self.static, self.dynamic)
-        if len(slip) != self.static.dimension:
-            msg = (
-                f"slip: expected {self.static.dimension} components for friction {self.name!r}, "
-                f"as its set has; got {len(slip)}"
-            )
-            raise ValueError(msg)
-
-    @property
-    def moving(self) -> ConvexSet:
-        """The set while the contact slips."""
-        return self.static if self.dynamic is None else self.dynamic
-
-
-def check_sets(name: str, static: ConvexSet, dynamic: ConvexSet | None) -> None:
-    """Refuse a dynamic set that is not inside the static one."""
-    if dynamic is None:
-        return
-    if not isinstance(dynamic, ConvexSet) or dynamic.dimension != static.dimension:
-        msg = f"dynamic: expected a convex set like {static} for {name!r}; got {dynamic!r}"
-        raise ValueError(msg)
-    if not dynamic.within(static):
-        msg = f"dynamic: expected a set inside {static} for friction {name!r}; got {dynamic}"
-        raise ValueError(msg)
+UNSTABLE = "beyond which the motion is unstable"
 
 
 @dataclass(frozen=True, eq=False)
-class State:
-    """Where a system is, how it moves, and which friction contacts stick.
-
-    Attributes
-    ----------
-    time : float
-    q, v : (n,) array
-        Coordinates (not wrapped, so that turns are counted) and velocities.
-    sticking : (F,) array of bool
-        For each friction contact, whether its slip was exactly zero: its static set holds.
-    """
-
-    time: float
-    q: Array
-    v: Array
-    sticking: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class System:
-    """A system with unilateral contacts and friction.
+class System(MechanicalSystem):
+    """One body, or several identical ones, with unilateral contacts and friction.
 
     Parameters
     ----------
     polyhedron : Polyhedron
-        The placements without overlap: an intersection of ``f_i(q) >= 0``.  Each ``f_i`` is the
-        gap of one contact.
+        The placements of a body without overlap: an intersection of ``f_i(q) >= 0``.  Each
+        ``f_i`` is the gap of one contact with the surroundings.
     kinetic : sympy.Expr
-        ``T(q, v)``, a quadratic form in the velocities (:func:`velocities`).
+        ``T(q, v)`` of a body, a quadratic form in the velocities (:func:`velocities`).
     potential : sympy.Expr, optional
         ``V(q)``; default 0.
     forces : mapping from str to sympy.Expr, optional
         Further generalised forces by coordinate, functions of coordinates and velocities.
     friction : sequence of Friction, optional
+        Friction with the surroundings.
     restitution : float or mapping from str to float, optional
         Newton's coefficient ``0 <= e <= 1``, for all contacts or by name; default 0, plastic.
         Several contacts at once obey the law together, as in [Moreau]: after the impact
         ``J_i v+ >= -e_i J_i v-`` with an impulse only where equality holds.
+    count : int, optional
+        Number of bodies; default 1.
+    between : ContactFamily, optional
+        Contacts between any two of the bodies; default none: they pass through each other.
+    substrate : mapping from str to float, optional
+        The coordinate along which the substrate moves, and its velocity; default at rest.  Bodies
+        at rest on it move with it.  The slip of :class:`Friction` has to be relative to it.
+    exits : mapping from str to float, optional
+        A coordinate and its limit: a body that passes it leaves the system for good.
 
     Raises
     ------
@@ -150,13 +62,34 @@ class System:
 
     Examples
     --------
-    >>> from polycorner import Manifold, Polyhedron
+    >>> from polycorner import Manifold, Polyhedron, velocities
     >>> M = Manifold.euclidean("x y")
     >>> x, y = M.symbols
     >>> vx, vy = velocities(M)
     >>> ball = System(Polyhedron(M, {"floor": y}), (vx**2 + vy**2) / 2, 9.81 * y, restitution=0.5)
     >>> ball.state([0.0, 1.0], [1.0, 0.0]).v.tolist()
     [1.0, 0.0]
+
+    Three discs of radius 1 between two walls, the third on top of the others:
+
+    >>> import sympy
+    >>> from polycorner.motion import ContactFamily, pair_coordinates, simulate
+    >>> (x1, y1), (x2, y2) = pair_coordinates(M)
+    >>> distance = sympy.sqrt((x2 - x1) ** 2 + (y2 - y1) ** 2)
+    >>> tray = Polyhedron(M, {"floor": y - 1, "left": x - 1, "right": 4 - x})
+    >>> discs = System(
+    ...     tray,
+    ...     (vx**2 + vy**2) / 2,
+    ...     9.81 * y,
+    ...     count=3,
+    ...     between=ContactFamily({"discs": distance - 2}, reach=2.0),
+    ... )
+    >>> start = discs.state([[1.0, 1.0], [4.0, 1.0], [2.5, 3.0]])
+    >>> path = simulate(discs, start, 2.0, 1e-3)
+    >>> [(bodies, contact) for bodies, contact, _ in path.touching[-1] if len(bodies) == 2]
+    [((0, 2), 'discs'), ((1, 2), 'discs')]
+    >>> round(float(path.q[-1, 2, 1]), 3)  # 1 + sqrt(2^2 - 1.5^2)
+    2.323
     """
 
     polyhedron: Polyhedron
@@ -165,11 +98,13 @@ class System:
     forces: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
     friction: tuple[Friction, ...] = ()
     restitution: float | Mapping[str, float] = 0.0
+    count: int = 1
+    between: ContactFamily | None = None
+    substrate: Mapping[str, float] = field(default_factory=dict)
+    exits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.polyhedron, Polyhedron):
-            msg = f"polyhedron: expected a Polyhedron; got {type(self.polyhedron).__name__}"
-            raise TypeError(msg)
+        instance("polyhedron", self.polyhedron, Polyhedron)
         if self.polyhedron.equations or self.polyhedron.is_union:
             msg = (
                 "polyhedron: expected an intersection of inequalities; got one with equations or "
@@ -179,24 +114,40 @@ class System:
         object.__setattr__(self, "friction", tuple(self.friction))
         for friction in self.friction:
             if not isinstance(friction, Friction):
-                msg = f"friction: expected Friction values; got {friction!r}"
-                raise TypeError(msg)
+                refuse("friction", "Friction values", friction, TypeError)
             if isinstance(friction.load, str) and friction.load not in self.contacts:
-                msg = (
-                    f"load: expected one of the contacts {', '.join(self.contacts)} or an "
-                    f"expression for friction {friction.name!r}; got {friction.load!r}"
+                expected = (
+                    f"one of the contacts {', '.join(self.contacts)} or an expression for "
+                    f"friction {friction.name!r}"
                 )
-                raise ValueError(msg)
-        _ = self.restitutions, self.formulation
+                refuse("load", expected, friction.load)
+        whole("count", self.count, least=1)
+        if self.between is not None:
+            instance("between", self.between, ContactFamily)
+            names("position", self.between.position, self.manifold.names)
+            if len(self.between.position) > 2:
+                refuse("position", "one or two coordinates", self.between.position)
+        self._check_single("substrate")
+        self._check_single("exits")
+        _ = self.restitutions, self.formulation, self.bodies
+        super().__post_init__()
+
+    def _check_single(self, argument: str) -> None:
+        given = mapping(argument, getattr(self, argument))
+        names(argument, given, self.manifold.names)
+        if len(given) > 1:
+            refuse(argument, "one coordinate", sorted(given))
+        checked = {name: real(argument, value) for name, value in given.items()}
+        object.__setattr__(self, argument, checked)
 
     @property
     def manifold(self) -> Manifold:
-        """The configuration manifold."""
+        """The configuration manifold of a body."""
         return self.polyhedron.manifold
 
     @cached_property
     def contacts(self) -> tuple[str, ...]:
-        """Names of the unilateral contacts."""
+        """Names of the unilateral contacts of a body with its surroundings."""
         return tuple(f.name for f in self.polyhedron.functions)
 
     @cached_property
@@ -204,11 +155,10 @@ class System:
         """Coefficient of restitution of each contact, ``(m,)``."""
         given = self.restitution
         by_name = given if isinstance(given, Mapping) else dict.fromkeys(self.contacts, given)
-        unknown = sorted(set(by_name) - set(self.contacts))
-        if unknown:
-            msg = f"restitution: expected contacts among {', '.join(self.contacts)}; got {unknown}"
-            raise ValueError(msg)
-        values = [coefficient(by_name.get(name, 0.0)) for name in self.contacts]
+        names("restitution", by_name, self.contacts)
+        values = [
+            real("restitution", by_name.get(name, 0.0), least=0, most=1) for name in self.contacts
+        ]
         return np.array(values, dtype=np.float64)
 
     @cached_property
@@ -234,7 +184,7 @@ class System:
 
     @cached_property
     def formulation(self) -> Formulation:
-        """The compiled equations of motion."""
+        """The compiled equations of motion of a body."""
         slips = tuple(e for f in self.friction for e in f.slip)
         laws = Laws(self.kinetic, self.potential, dict(self.forces), slips, self._loads)
         return Formulation.of(self.manifold.names, (), laws)
@@ -244,72 +194,164 @@ class System:
         """Values of the parameters of the laws; here none."""
         return np.empty(0)
 
+    @cached_property
+    def bodies(self) -> IdenticalBodies:
+        """The bodies and their contacts, for the engine."""
+        friction = tuple(
+            FrictionContact(f.name, len(f.slip), f.static, f.moving, gap, loads, f.kind)
+            for f, gap, loads in zip(self.friction, self.owners, self.load_sources, strict=True)
+        )
+        scales, coordinates = self.manifold.scale_array, self.manifold.names
+        body = Body(
+            self.formulation,
+            self.parameters,
+            friction,
+            self.polyhedron.bundle.calls,
+            self.contacts,
+            self.restitutions,
+            1 / scales,
+            float(scales.min()),
+        )
+        position, contacts = self._position(), None
+        if self.between is not None and self.count > 1:
+            contacts = self.between.compiled(self.manifold)
+        speed = sum(v / scales[coordinates.index(x)] for x, v in self.substrate.items())
+        leaving = [(coordinates.index(x), limit) for x, limit in self.exits.items()]
+        exit_at, limit = leaving[0] if leaving else (-1, 0.0)
+        return IdenticalBodies(
+            body, self.count, contacts, position, float(speed), exit_at, float(limit)
+        )
+
+    def _position(self) -> tuple[int, int]:
+        """Return the two coordinates of a position; the first is that of the substrate."""
+        known, n = self.manifold.names, self.manifold.dimension
+        given = () if self.between is None else self.between.position
+        chosen = [known.index(name) for name in given] or list(range(min(2, n)))
+        moving = [known.index(name) for name in self.substrate]
+        if moving and moving[0] not in chosen:
+            if self.between is not None and self.count > 1:
+                expected = f"a coordinate of the position, {', '.join(known[c] for c in chosen)}"
+                refuse("substrate", expected, next(iter(self.substrate)))
+            chosen = [moving[0]]
+        chosen.sort(key=lambda c: c not in moving)
+        return chosen[0], chosen[-1]
+
+    # -------------------------------------------------------------------------------------- states
+
     def state(
         self, q: ArrayLike | Mapping[str, float], v: ArrayLike | None = None, time: float = 0.0
     ) -> State:
-        """Return a state, checking that nothing overlaps.
+        """Return a state, after checking that nothing overlaps.
 
         A friction contact sticks where its slip is exactly zero.
+
+        Parameters
+        ----------
+        q : (n,) or (count, n) array, or mapping from str to float
+            Placement of the body, or of all bodies.
+        v : array of the same shape, optional
+            Velocities; default those of the substrate.
+        time : float, optional
         """
-        point = self.manifold.point(q).copy()
-        speed = np.zeros(point.size) if v is None else self.manifold.point(v, "v").copy()
-        self.check_placement(point)
-        return State(float(time), point, speed, self.sticks(point, speed))
+        if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
+            places = self.manifold.point(q).copy()
+        else:
+            places = self.manifold.points(q, "q").copy()  # type: ignore[arg-type]
+        speeds = np.zeros(places.shape)
+        for name, speed in self.substrate.items():
+            speeds[..., self.manifold.names.index(name)] = speed
+        if v is not None:
+            speeds = self.manifold.points(v, "v").copy()
+        for argument, array in (("q", places), ("v", speeds)):
+            shape = places.shape if self.count == 1 else (self.count, self.manifold.dimension)
+            if array.shape != shape or array.size != self.count * self.manifold.dimension:
+                refuse(argument, f"shape ({self.count}, {self.manifold.dimension})", array.shape)
+        self.check_placement(places)
+        return State(float(time), places, speeds, self.sticks(places, speeds))
 
     def check_placement(self, q: Array) -> None:
-        """Refuse a placement where a contact overlaps, naming the worst."""
-        gaps = self.polyhedron.values(q)
+        """Raise ValueError if a contact overlaps, naming the worst."""
+        gaps = self.polyhedron.values(q).reshape(-1, len(self.contacts))
         deep = -OVERLAP * min(self.manifold.scales)
-        if gaps.size and (worst := int(np.argmin(gaps))) is not None and gaps[worst] < deep:
+        body, contact = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
+        if gaps[body, contact] < deep:
+            which = f" of body {body}" if self.count > 1 else ""
             msg = (
-                f"q: expected a placement without overlap; contact {self.contacts[worst]!r} "
-                f"overlaps by {-gaps[worst]:.6g}"
+                f"q: expected a placement without overlap; contact {self.contacts[contact]!r}"
+                f"{which} overlaps by {-gaps[body, contact]:.6g}"
+            )
+            raise ValueError(msg)
+        gap, (i, j), name = self.bodies.least_pair_gap(q.reshape(self.count, -1))
+        if gap < deep:
+            msg = (
+                f"q: expected a placement without overlap; bodies {i} and {j} overlap by "
+                f"{-gap:.6g} at contact {name!r}"
             )
             raise ValueError(msg)
 
     def sticks(self, q: Array, v: Array) -> NDArray[np.bool_]:
-        """Return for each friction contact whether its slip is zero."""
-        numbers = np.array([*self.parameters, 0.0])
+        """Return for each friction contact whether its slip is zero, ``(..., F)``."""
         if not self.friction:
-            return np.empty(0, dtype=np.bool_)
-        at = np.concatenate([q, v])
-        (slips,) = self.formulation.slip.kernel.at(at, numbers.ctypes.data, 0)
-        starts = np.cumsum([0, *(len(f.slip) for f in self.friction)])
-        ends = pairwise(starts.tolist())
-        return np.array([not slips[a:b].any() for a, b in ends], dtype=np.bool_)
+            return np.empty((*q.shape[:-1], 0), dtype=np.bool_)
+        numbers = np.array([*self.parameters, 0.0])
+        at = np.ascontiguousarray(np.concatenate([q, v], axis=-1)).reshape(-1, 2 * q.shape[-1])
+        (slips,) = self.formulation.slip.kernel.over(at, numbers.ctypes.data, 0)
+        starts = np.cumsum([0, *(len(f.slip) for f in self.friction)]).tolist()
+        still = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
+        return np.asarray(still.reshape(*q.shape[:-1], len(self.friction)))
 
     def energies(self, state: State) -> tuple[float, float]:
-        """Return kinetic and potential energy."""
-        return energies(self.formulation, self.parameters, state.q, state.v)
+        """Return kinetic and potential energy of all bodies."""
+        n = self.manifold.dimension
+        each = [
+            energies(self.formulation, self.parameters, q, v)
+            for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
+        ]
+        kinetic, potential = np.sum(each, axis=0)
+        return float(kinetic), float(potential)
 
-
-def coefficient(value: Any) -> float:
-    """Check a coefficient of restitution."""
-    number = float(value)
-    if not 0 <= number <= 1:
-        msg = f"restitution: expected a number from 0 to 1; got {number:g}"
-        raise ValueError(msg)
-    return number
-
-
-def bodies_of(system: System | IdenticalBodies) -> IdenticalBodies:
-    """Return a system as the engine's description: one body that is not repeated."""
-    if isinstance(system, IdenticalBodies):
-        return system
-    friction = tuple(
-        FrictionContact(f.name, len(f.slip), f.static, f.moving, gap, loads, f.kind)
-        for f, gap, loads in zip(system.friction, system.owners, system.load_sources, strict=True)
-    )
-    scales = system.manifold.scale_array
-    return IdenticalBodies(
-        Body(
-            system.formulation,
-            system.parameters,
-            friction,
-            system.polyhedron.bundle.calls,
-            system.contacts,
-            system.restitutions,
-            1 / scales,
-            float(scales.min()),
+    def largest_step(self, state: State) -> tuple[float, str]:
+        """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
+        n, scales = self.manifold.dimension, self.manifold.scale_array
+        squared = max(
+            highest_square(self.formulation, self.parameters, scales, q, v)
+            for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
         )
-    )
+        return (2 / math.sqrt(squared) if squared > 1e-12 else math.inf), UNSTABLE
+
+    def described(self) -> dict[str, Any]:
+        """Return everything that a motion depends on, by name, as plain values."""
+        manifold, between = self.manifold, self.between
+        told: dict[str, Any] = {
+            "coordinates": [*manifold.names],
+            "periods": [str(period) for period in manifold.periods],
+            "scales": [*manifold.scales],
+            "kinetic": str(self.kinetic),
+            "potential": str(self.potential),
+            "count": self.count,
+            "restitution": dict(zip(self.contacts, self.restitutions.tolist(), strict=True)),
+            "substrate": dict(self.substrate),
+            "exits": dict(self.exits),
+            "formulas": self._digests(),
+        }
+        told |= {f"force {name}": str(force) for name, force in self.forces.items()}
+        told |= {f"gap {f.name}": str(f.expression) for f in self.polyhedron.functions}
+        told |= {
+            f"friction {f.name}": f"{f.slip}, {f.static}, {f.moving}, {f.load}, {f.kind}"
+            for f in self.friction
+        }
+        if between is not None:
+            told |= {f"gap {name}": str(gap) for name, gap in between.gaps.items()}
+            told["friction between bodies"] = f"{between.slip}, {between.static}, {between.dynamic}"
+            told["restitution between bodies"] = between.restitution
+            told["reach"] = between.reach
+        return told
+
+    def _digests(self) -> list[str]:
+        """Return the keys of all compiled formulas: expressions to the last digit."""
+        found = [self.formulation.key]
+        found += [f"{call.family.key} {call.parameters.tolist()}" for call in self.bodies.body.gaps]
+        contacts = self.bodies.contacts
+        if contacts is not None:
+            found += [contacts.gaps.key, *(family.key for family, _, _ in contacts.slips)]
+        return found

@@ -1,7 +1,8 @@
-"""A motion as it was recorded: states, contacts, energies, and where the energy went."""
+"""Trajectories: recorded states, contacts, events, and the balance of energy."""
 
+import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,12 +10,14 @@ from numpy.typing import NDArray
 
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
+from polycorner.motion.mechanics import MechanicalSystem
+from polycorner.motion.noise import Noise, Solver
+from polycorner.motion.system import System
 from polycorner.printing import Printed, Sheet, Table, facts, listed, number, titled
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
-    from polycorner.motion.bodies import IdenticalBodies
-    from polycorner.motion.system import System
     from polycorner.polyhedra.strata import Stratum
 
 ANGLES = "Angles are in radians, times in s, all else in the units of the system."
@@ -22,13 +25,13 @@ Touch = tuple[tuple[int, ...], str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Printed):
+class Trajectory(Value, Printed):
     """A motion, recorded at ``T`` instants and at every event between them.
 
     Attributes
     ----------
-    system : System or IdenticalBodies
-        What moves: ``N`` bodies (one, for a system) of ``k`` coordinates.
+    system : MechanicalSystem
+        The system: ``N`` bodies of ``k`` coordinates.
     dt : float
         The step, in s.
     times : (T,) array
@@ -49,9 +52,19 @@ class Trajectory(Printed):
     max_penetration : float
         The deepest overlap met, in units of the gaps.
     effort : Effort
+    noise : Noise
+    solver : Solver or None
+        None if it is not known.
+    every : int
+        Steps between records.
+    t_end : float or None
+        The end that was asked for; None if it is not known.
+    steps_per_second : float
+        Steps in a second of real time, the first record left out, which includes loading the
+        compiled engine; nan if there is no other.
     """
 
-    system: "System | IdenticalBodies"
+    system: MechanicalSystem
     dt: float
     times: Array
     q: Array
@@ -66,6 +79,11 @@ class Trajectory(Printed):
     events: tuple[Event, ...]
     max_penetration: float
     effort: Effort
+    noise: Noise = field(default_factory=Noise)
+    solver: Solver | None = None
+    every: int = 1
+    t_end: float | None = None
+    steps_per_second: float = math.nan
 
     def __len__(self) -> int:
         """Return the number of recorded instants."""
@@ -82,9 +100,48 @@ class Trajectory(Printed):
         return Sheet("Trajectory", (facts(_summary(self)), *tables, ANGLES))
 
     @property
+    def finished(self) -> bool:
+        """Whether the end that was asked for was reached."""
+        if self.t_end is None:
+            return True
+        return self.effort.steps >= round((self.t_end - float(self.times[0])) / self.dt)
+
+    @property
     def converged(self) -> bool:
         """Whether every step was solved to the tolerance."""
         return self.effort.unconverged == 0
+
+    @property
+    def missed(self) -> float:
+        """Share of the islands that were not solved to the tolerance."""
+        return self.effort.unconverged / max(1, self.effort.islands)
+
+    @property
+    def solver_error(self) -> float:
+        """Bound on the displacements that unsolved islands caused, in scaled lengths.
+
+        The residual of an island is relative to the speeds in it, so an island that is not solved
+        misplaces its bodies by at most residual times speed times step.  This is the sum over all
+        of them with the worst residual and the highest recorded speed.  It does not include what
+        an unstable motion makes of a small displacement later.
+        """
+        speeds = np.abs(self.v) * self.system.bodies.body.units
+        fastest = float(speeds.max(initial=0.0))
+        return self.effort.unconverged * self.effort.residual * fastest * self.dt
+
+    @property
+    def convergence(self) -> str:
+        """How many islands missed the solver's tolerance, by how much, and what follows."""
+        effort = self.effort
+        if self.converged:
+            return f"all islands solved; worst residual {effort.residual:.1e}"
+        limit = "" if self.solver is None else f" {self.solver.tolerance:g}"
+        share = number(100 * self.missed, 2)
+        return (
+            f"{effort.unconverged} of {effort.islands} islands ({share} %) missed the "
+            f"tolerance{limit}, at worst with a residual of {effort.residual:.1e} of their "
+            f"speeds; together they displace bodies by at most {number(self.solver_error, 2)}"
+        )
 
     @property
     def energy_audit(self) -> Array:
@@ -116,13 +173,12 @@ class Trajectory(Printed):
     def stratum(self, index: int, *, tolerance: float = 1e-6) -> "Stratum":
         """Return the face of the polyhedron at a recorded instant.
 
-        Only for a :class:`~polycorner.motion.system.System`, which has a polyhedron.
+        Only for a :class:`~polycorner.motion.system.System` of one body.
         """
-        from polycorner.motion.system import System
         from polycorner.polyhedra.strata import stratum_at
 
-        if not isinstance(self.system, System):
-            msg = f"stratum: expected the trajectory of a System; got one of {self.system!r}"
+        if not isinstance(self.system, System) or self.q.shape[1] != 1:
+            msg = f"stratum: expected the trajectory of a System of one body; got {self!r}"
             raise TypeError(msg)
         return stratum_at(self.system.polyhedron, self.q[index, 0], tolerance=tolerance)
 
@@ -137,10 +193,12 @@ class Trajectory(Printed):
 def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
     effort = path.effort
     yield "bodies", f"{path.q.shape[1]}, of {path.q.shape[2]} coordinates"
-    yield "time", f"{path.times[0]:g} s to {path.times[-1]:g} s, in {len(path)} instants"
+    unfinished = "" if path.finished else f"; unfinished, {path.t_end:g} s were asked for"
+    instants = f"in {len(path)} instants{unfinished}"
+    yield "time", f"{path.times[0]:g} s to {path.times[-1]:g} s, {instants}"
     yield "step", f"{path.dt:g} s"
-    solved = "all solved" if path.converged else f"{effort.unconverged} islands not solved"
-    yield "steps", f"{effort.steps}, {solved}; worst residual {effort.residual:.1e}"
+    yield "steps", str(effort.steps)
+    yield "solver", path.convergence
     yield "deepest overlap", f"{number(path.max_penetration, 3)} (unit of the gaps)"
     yield "energy audit", f"{number(path.audit, 3)} of the energy that was moved"
     present = path.present[-1]
@@ -166,13 +224,11 @@ def _events(path: Trajectory) -> Table:
 
 
 def _last(path: Trajectory) -> Table:
-    from polycorner.motion.system import System
-
     if isinstance(path.system, System):
         manifold = path.system.manifold
         titles = list(map(titled, manifold.names, manifold.periods))
     else:
-        titles = list(path.system.body.formulation.coordinates)
+        titles = list(path.system.bodies.body.formulation.coordinates)
     rows = ((str(k), *(number(x, 6) for x in q)) for k, q in enumerate(path.q[-1]))
     columns = tuple(range(len(titles) + 1))
     return listed("Placement at last", ("body", *titles), rows, path.q.shape[1], columns)

@@ -12,6 +12,7 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import Keel, exact_eastern_boundary
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate
 
 DRUM = DumbbellDrum()
 KEEL = Keel(DRUM.tilt, DRUM.rolling[0], DRUM.sliding[0], DRUM.rolling[1], DRUM.sliding[1])
@@ -20,7 +21,7 @@ STEP = DRUM.spin * 1e-3
 
 
 def first_slip(drum, azimuth, heading, duration):
-    path = drum.simulate([[azimuth, 0.0, heading]], duration, every=10)
+    path = simulate(drum, drum.state([[azimuth, 0.0, heading]]), duration, 1e-3, every=10)
     began = path.of_kind(EventKind.MOTION)
     assert began
     return path, began[0].time
@@ -68,7 +69,7 @@ def test_while_carried_nothing_else_moves(degrees):
 def test_rolling_keeps_the_heading_and_goes_along_a_helix_of_the_drum(degrees):
     """Without axial slip ``eta' = -tan(theta) rho (phi' - omega)``, at rest and in rolling."""
     theta = math.radians(degrees)
-    path = DRUM.simulate([[0.0, 0.0, theta]], 25.0)
+    path = simulate(DRUM, DRUM.state([[0.0, 0.0, theta]]), 25.0, 1e-3)
     assert len(path.of_kind(EventKind.MOTION)) >= 2
     phi, eta, heading, _ = path.q[:, 0].T
     law = math.tan(theta) * DRUM.centre_radius * (DRUM.spin * path.times - phi)
@@ -86,7 +87,7 @@ def test_it_stops_where_its_energy_is_used_up(degrees):
     """
     theta = math.radians(degrees)
     turning = KEEL.turning(theta)
-    path = DRUM.simulate([[turning.upper - 0.002, 0.0, theta]], 1.5, every=1)
+    path = simulate(DRUM, DRUM.state([[turning.upper - 0.002, 0.0, theta]]), 1.5, 1e-3, every=1)
     moved = path.of_kind(EventKind.MOTION)[0].time
     stop = next(e.time for e in path.of_kind(EventKind.REST) if e.time > moved)
     lower = path.q[path.at(stop + 1e-9), 0, 0]
@@ -101,7 +102,7 @@ def test_a_raft_has_no_keel():
     raft = replace(boat, sliding=(0.1, 0.1))
     climbs, spins = [], []
     for drum in (boat, raft):
-        path = drum.simulate([[0.08, 0.0, 0.2]], 20.0)
+        path = simulate(drum, drum.state([[0.08, 0.0, 0.2]]), 20.0, 1e-3)
         assert path.of_kind(EventKind.MOTION)
         phi, eta, _, psi = path.q[-1, 0]
         carried = drum.centre_radius * (drum.spin * 20.0 - (phi - 0.08))
@@ -118,8 +119,8 @@ def test_the_mirror_image_in_a_drum_that_turns_the_other_way(noise):
     """``phi, theta, psi, omega`` change sign: reflection in the vertical plane of the axis."""
     q = np.array([[0.05, 1.0, 0.2]])
     image = replace(DRUM, spin=-DRUM.spin)
-    first = DRUM.simulate(q, 12.0, noise=noise).q
-    second = image.simulate(q * [-1, 1, -1], 12.0, noise=noise).q
+    first = simulate(DRUM, DRUM.state(q), 12.0, 1e-3, noise=noise).q
+    second = simulate(image, image.state(q * [-1, 1, -1]), 12.0, 1e-3, noise=noise).q
     assert first[-1, 0, 1] != first[0, 0, 1]
     assert second * [-1, 1, -1, -1] == pytest.approx(first, abs=1e-5)
 
@@ -128,8 +129,9 @@ def test_the_mirror_image_in_a_drum_that_turns_the_other_way(noise):
 def test_in_a_level_drum_the_opposite_heading_climbs_as_far_down(noise):
     """``eta -> -eta``, ``theta -> pi - theta`` keeps the drum, its spin, and the ball's numbers."""
     level = replace(DRUM, tilt=0.0)
-    first = level.simulate([[0.05, 0.0, 0.2]], 12.0, noise=noise).q[:, 0]
-    second = level.simulate([[0.05, 0.0, math.pi - 0.2]], 12.0, noise=noise).q[:, 0]
+    first = simulate(level, level.state([[0.05, 0.0, 0.2]]), 12.0, 1e-3, noise=noise).q[:, 0]
+    turned = level.state([[0.05, 0.0, math.pi - 0.2]])
+    second = simulate(level, turned, 12.0, 1e-3, noise=noise).q[:, 0]
     assert abs(first[-1, 1]) > 0.1
     assert second[:, :2] == pytest.approx(first[:, :2] * [1, -1], abs=1e-5)
     assert math.pi - second[:, 2] == pytest.approx(first[:, 2], abs=1e-6)
@@ -139,7 +141,7 @@ def test_energy_is_accounted_for_better_with_shorter_steps():
     """What is left is the scheme's own error: at least of first order in the step."""
     errors = []
     for dt in (1e-3, 2.5e-4):
-        path = DRUM.simulate([[0.1, 0.0, 0.2]], 12.0, dt=dt)
+        path = simulate(DRUM, DRUM.state([[0.1, 0.0, 0.2]]), 12.0, dt)
         assert path.converged
         assert path.work["substrate"][-1] > 0
         errors.append(path.audit)

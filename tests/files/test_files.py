@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from kept_files import motion, same_atlas, same_certificate, same_graph, same_motion, same_run
+from kept_files import motion, same_atlas, same_certificate, same_graph, same_motion
 
 from polycorner import Manifold, Polyhedron, minimise, skeleton
 from polycorner import files as room
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics import files as run_files
-from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.files import certificates as certificate_files
 from polycorner.files import graphs as graph_files
 from polycorner.files import skeletons as skeleton_files
@@ -72,9 +71,10 @@ def trajectory():
 
 def run():
     drum = DumbbellDrum(floor=True, top=60.0, tilt=0.5, spin=0.02)
-    path = motion(drum.bodies, 1, 4, "floor1")
-    value = DrumRun(drum, Noise(chatter=0.3, kicks={"phi": 1e-3}, seed=7), path, 0.4, 20, 50.0)
-    return Sample(value, run_files.save_run, run_files.load_run, same_run, run_files)
+    path = motion(drum, 1, 4, "floor1")
+    noise = Noise(chatter=0.3, kicks={"phi": 1e-3}, seed=7)
+    value = replace(path, noise=noise, every=20, t_end=0.8)
+    return Sample(value, run_files.save_run, run_files.load_run, same_motion, run_files)
 
 
 @pytest.fixture(scope="module", params=[certificate, atlas, graph, trajectory, run])

@@ -29,11 +29,13 @@ from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.errors import SolverError
 from polycorner.models import supports
 from polycorner.models import textbook as scenes
+from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
+from polycorner.motion.mechanics import State
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import start, step
-from polycorner.motion.system import Friction, State, System, velocities
+from polycorner.motion.system import System
 
 ACCURATE = Solver(1e-10)
 SAME = 1e-8  # of the speeds in a step
@@ -413,7 +415,7 @@ def thrown_together(drum, rng):
     q = np.array([[-13.0 / rho, 50.0, 0.2], [13.0 / rho, 52.0, -0.1]])
     q[:, 2] += 0.3 * rng.normal(size=2)
     v = np.array([[90.0 / rho, 0, 1, 20], [-90.0 / rho, 0, -1, -20]])
-    return drum.engine(q, v * rng.uniform(0.7, 1.3, (2, 4)), dt=1e-3, solver=ACCURATE)
+    return start(drum, drum.state(q, v * rng.uniform(0.7, 1.3, (2, 4))), 1e-3, solver=ACCURATE)
 
 
 # In other draws one step in some hundreds misses 1e-10, and says so in Effort.unconverged.
@@ -440,7 +442,7 @@ def test_a_dyad_rests_where_the_inclusion_says_so():
     certificate = minimise(drum.pair.polyhedron, drum.pair.energy, drum.pair.nested("R"))
     q = np.array(certificate.point).reshape(2, 3)
     q[:, 1] += 50.0
-    engine = drum.engine(q)
+    engine = start(drum, drum.state(q), 1e-3)
     engine.advance(100)
     motion = engine.motion
     assert motion.rests.all()

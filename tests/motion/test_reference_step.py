@@ -14,8 +14,9 @@ from strategies import reals, vectors
 
 from polycorner import Manifold, Polyhedron
 from polycorner.errors import SolverError
+from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
-from polycorner.motion.system import Friction, System, velocities
+from polycorner.motion.system import System
 
 G = 9.81
 

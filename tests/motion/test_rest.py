@@ -12,9 +12,9 @@ from polycorner.models import supports
 from polycorner.models import textbook as scenes
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Disc, Interval
+from polycorner.motion.mechanics import State
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import simulate, start
-from polycorner.motion.system import State
 
 G = scenes.GRAVITY
 LONG = 100_000  # steps
@@ -183,7 +183,7 @@ def test_a_sliding_table_stays_down_on_all_legs():
 
 def carried(drum, q, steps, dt=1e-3):
     """Displacements relative to the drum ``(10, count, 4)``, at ten instants."""
-    engine = drum.engine(q, dt=dt)
+    engine = start(drum, drum.state(q), dt)
     begin, found = engine.motion.q.copy(), []
     for _ in range(10):
         engine.advance(steps // 10)
@@ -223,7 +223,8 @@ def test_what_rests_in_a_drum_that_stands_does_not_move_a_bit(count, placed):
 
 def test_friction_carries_a_dumbbell_as_far_as_it_can():
     """Then it rolls back: rest ends where the forces fit no more."""
-    path = DumbbellDrum(spin=0.02).simulate(single(None), 10.0)
+    drum = DumbbellDrum(spin=0.02)
+    path = simulate(drum, drum.state(single(None)), 10.0, 1e-3)
     (begin, *_) = path.of_kind(EventKind.MOTION)
     angle = 0.02 * begin.time
     assert path.rests[path.at(begin.time) - 1].all()

@@ -6,9 +6,7 @@ import numpy as np
 
 from polycorner import stratum_at
 from polycorner.dumbbells.drum import GRAVITY
-from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.motion.engine.driver import Effort
-from polycorner.motion.noise import Noise
 from polycorner.motion.recorder import WORK
 from polycorner.motion.trajectory import Trajectory
 
@@ -23,29 +21,36 @@ def moved(drum, places, *, leaves=None):
     present = np.ones((count, bodies), dtype=bool)
     if leaves is not None:
         present[leaves[1] :, leaves[0]] = False
-    return DrumRun(
+    return recorded(
         drum,
-        Noise(),
-        Trajectory(
-            system=drum.bodies,
-            dt=0.1,
-            times=0.1 * np.arange(count),
-            q=q,
-            v=np.zeros_like(q),
-            rests=np.zeros((count, bodies), dtype=bool),
-            present=present,
-            touching=tuple(touches(drum, instant) for instant in places),
-            kinetic=np.zeros(count),
-            potential=np.where(present, heights(drum, places), 0.0).sum(axis=1),
-            dissipated={cause: np.zeros(count) for cause in drum.bodies.causes},
-            work={cause: np.zeros(count) for cause in WORK},
-            events=(),
-            max_penetration=0.0,
-            effort=Effort(count - 1, 0, 0, 0, 0, 0.0),
-        ),
-        0.1 * (count - 1),
-        1,
+        0.1 * np.arange(count),
+        q,
+        present=present,
+        touching=tuple(touches(drum, instant) for instant in places),
+        potential=np.where(present, heights(drum, places), 0.0).sum(axis=1),
     )
+
+
+def recorded(drum, times, q, **given):
+    """Return a trajectory of dumbbells at placements ``(T, N, 4)``, written down by hand."""
+    count, bodies = q.shape[:2]
+    zeros = np.zeros(count)
+    usual = {
+        "rests": np.zeros((count, bodies), dtype=bool),
+        "present": np.ones((count, bodies), dtype=bool),
+        "touching": ((),) * count,
+        "kinetic": zeros,
+        "potential": zeros,
+        "dissipated": dict.fromkeys(drum.bodies.causes, zeros),
+        "work": dict.fromkeys(WORK, zeros),
+        "events": (),
+        "max_penetration": 0.0,
+        "effort": Effort(round((times[-1] - times[0]) / 0.1), 0, 0, 0, 0, 0.0),
+    }
+    return Trajectory(
+        system=drum, dt=0.1, times=times, q=q, v=np.zeros_like(q), t_end=float(times[-1]),
+        **(usual | given),
+    )  # fmt: skip
 
 
 def heights(drum, places):

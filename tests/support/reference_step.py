@@ -33,7 +33,8 @@ from step_residual import NO_LOAD, compliance, natural_residual, nearest, speed
 from polycorner.errors import SolverError
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.friction import CutDisc, Disc, Ellipse, Interval
-from polycorner.motion.system import State, System
+from polycorner.motion.mechanics import State
+from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
 
 SETTLED = 1e-11  # residual, relative to the step's speed, at which a step is solved
@@ -90,7 +91,8 @@ def reference_step(system: System, state: State, dt: float) -> State:
 
     >>> from polycorner import Manifold, Polyhedron
     >>> from polycorner.motion.friction import Interval
-    >>> from polycorner.motion.system import Friction, System, velocities
+    >>> from polycorner.motion.contacts import Friction, velocities
+    >>> from polycorner.motion.system import System
     >>> M = Manifold.euclidean("x")
     >>> (x,), (vx,) = M.symbols, velocities(M)
     >>> table = Friction("table", (vx,), Interval(0.3), 9.81)

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexSet
-from polycorner.motion.system import OVERLAP, State, System
+from polycorner.motion.mechanics import OVERLAP, State
+from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
 
 CLOSED = 1e-9  # scaled depth up to which a gap counts as zero

@@ -1,5 +1,6 @@
 """``polycorner drum``: motion of dumbbells in a slowly rotating, tilted drum."""
 
+import hashlib
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from polycorner.cli.output import (
     deliver,
     fail,
     prepare,
+    remark,
     shown,
     timed,
     unfinished,
@@ -25,8 +27,10 @@ from polycorner.dumbbells.cli.drum_report import drum_answer, drum_sheet
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.runs import DrumRun
+    from polycorner.motion.checkpoints import Checkpoint
+    from polycorner.motion.mechanics import State
     from polycorner.motion.noise import Noise
+    from polycorner.motion.trajectory import Trajectory
 
 EPILOG = (
     examples(
@@ -42,6 +46,9 @@ Ctrl-C ends a run, keeps it and reports what was done (exit code 130); the same 
 --resume continues it, also after the process was killed.
 """
 )
+STATE = "drum-state"  # folder of the saved run in that of --out
+INTERVAL = 0.1  # s between records, or less in a short run
+FRAMES = 1000  # records of a short run
 # Options by the library's names of what they set.
 NAMES = {
     "count": "count",
@@ -62,7 +69,8 @@ NAMES = {
     "heading": "heading",
     "headings": "heading",
     "q": "start",
-    "checkpoint": "resume",
+    "t_end": "duration",
+    "checkpoint": "out",
     "movie": "movie",
 }
 
@@ -75,11 +83,11 @@ def drum(resume: bool, movie: str | None, as_json: bool, out: Path | None, **opt
     film = _film(movie, out)
     prepare(out)
     with _named_options():
-        model, noise, q = _described(values)
-        folder = _folder(model, q, values, noise, out)
-        run = _run(model, noise, q, values, folder, resume=resume)
+        model, noise, state = _described(values)
+        checkpoint = _checkpoint(model, state, values, noise, out, resume=resume)
+        run = _run(model, noise, state, values, checkpoint)
         answer = drum_answer(run, values)
-    _finish(run, answer, out, film, folder, as_json=as_json)
+    _finish(run, answer, out, film, checkpoint, as_json=as_json)
 
 
 @contextmanager
@@ -97,8 +105,8 @@ def _named_options() -> Iterator[None]:
 # ------------------------------------------------------------------------------------- the problem
 
 
-def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, Any]":
-    """Return the drum, the noise and the placements that the options describe."""
+def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, State]":
+    """Return the drum, the noise and the state that the options describe."""
     import numpy as np
 
     _check_angles(values)
@@ -107,7 +115,6 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, Any]":
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics import starts as drum_starts
     from polycorner.motion.noise import Noise
-    from polycorner.motion.simulation import check_step
 
     model = DumbbellDrum(
         length=values["length"],
@@ -124,7 +131,6 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, Any]":
         top=math.inf if values["top"] is None else values["top"],
     )
     noise = Noise(chatter=values["noise"], seed=values["seed"])
-    check_step(values["dt"], model.largest_step)
     headings = [math.radians(h) for h in values["heading"] or ()]
     if values["start"]:
         q = np.array(values["start"]) * [math.radians(1), 1.0, math.radians(1)]
@@ -136,8 +142,7 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, Any]":
         q = drum_starts.bunch(model, np.random.default_rng(values["seed"]))
     else:
         q = drum_starts.isolated(model, headings or [math.radians(10)])
-    model.placed(q)
-    return model, noise, q
+    return model, noise, model.state(q)
 
 
 def _check_angles(values: dict[str, Any]) -> None:
@@ -173,36 +178,42 @@ def _count(values: dict[str, Any]) -> int:
 # ------------------------------------------------------------------------------------------ the run
 
 
-def _folder(
-    model: "DumbbellDrum", q: Any, values: dict[str, Any], noise: "Noise", out: Path | None
-) -> Path:
-    """Return the folder of an unfinished run."""
+def _checkpoint(
+    model: "DumbbellDrum", state: "State", values: dict[str, Any], noise: "Noise",
+    out: Path | None, *, resume: bool,
+) -> "Checkpoint":  # fmt: skip
+    """Return where the run is saved: in the folder of --out, or else in the cache."""
+    from polycorner.motion.checkpoints import Checkpoint, fingerprint
+
     if out is not None:
-        return out / "drum-state"
-    from polycorner.dumbbells.dynamics.checkpoints import Checkpoint
-    from polycorner.dumbbells.dynamics.runs import parameters
+        return Checkpoint(out / STATE, resume=resume)
     from polycorner.formulas.cache import cache_folder
 
-    chosen = parameters(model, q, values["duration"], values["dt"], noise)
-    return cache_folder() / f"drum-{Checkpoint('', chosen).key[:16]}"
+    told = repr((model, noise, values["duration"], values["dt"], fingerprint(state.q)))
+    name = hashlib.sha256(told.encode()).hexdigest()[:16]
+    return Checkpoint(cache_folder() / f"drum-{name}", resume=resume)
 
 
 def _run(
-    model: "DumbbellDrum", noise: "Noise", q: Any, values: dict[str, Any], folder: Path,
-    *, resume: bool,
-) -> "DrumRun":  # fmt: skip
-    from polycorner.dumbbells.dynamics.runs import Saving, run
+    model: "DumbbellDrum", noise: "Noise", state: "State", values: dict[str, Any],
+    checkpoint: "Checkpoint",
+) -> "Trajectory":  # fmt: skip
+    from polycorner.motion.simulation import simulate
 
-    seconds = values["duration"]
+    seconds, dt, folder = values["duration"], values["dt"], Path(checkpoint.folder)
+    if checkpoint.resume and not folder.exists():
+        remark(f"nothing to resume in {folder}; the run starts from the beginning")
+    every = max(1, round(min(INTERVAL, seconds / FRAMES) / dt)) if seconds < math.inf else None
     with writing(folder), working("simulating", "s") as progress:
-        return run(
+        return simulate(
             model,
-            q,
+            state,
             seconds,
-            dt=values["dt"],
+            dt,
+            every=every,
             noise=noise,
-            saving=Saving(folder, resume=resume),
-            progress=lambda done: progress(done, seconds, ""),
+            progress=progress,
+            checkpoint=checkpoint,
         )
 
 
@@ -225,8 +236,8 @@ def _film(movie: str | None, out: Path | None) -> Path | None:
 
 
 def _finish(
-    run: "DrumRun", answer: dict[str, Any], out: Path | None, film: Path | None, folder: Path,
-    *, as_json: bool,
+    run: "Trajectory", answer: dict[str, Any], out: Path | None, film: Path | None,
+    checkpoint: "Checkpoint", *, as_json: bool,
 ) -> None:  # fmt: skip
     """Print the answer, write the files, and end the process if the run was stopped."""
 
@@ -238,14 +249,13 @@ def _finish(
 
     deliver(answer, lambda: shown(drum_sheet(answer)), write, as_json=as_json)
     if not run.finished:
-        unfinished(folder)
+        unfinished(Path(checkpoint.folder))
         raise click.exceptions.Exit(130)
-    from polycorner.dumbbells.dynamics.checkpoints import Checkpoint
+    if out is None:  # beside its results a finished run stays, so that --resume finds it finished
+        checkpoint.clear()
 
-    Checkpoint(folder, {}).clear()
 
-
-def _write(run: "DrumRun", answer: dict[str, Any], out: Path) -> list[Path]:
+def _write(run: "Trajectory", answer: dict[str, Any], out: Path) -> list[Path]:
     from polycorner.dumbbells.dynamics.files import save_run
     from polycorner.dumbbells.pictures import drum as pictures
     from polycorner.pictures import style as plots
@@ -259,7 +269,7 @@ def _write(run: "DrumRun", answer: dict[str, Any], out: Path) -> list[Path]:
         ]
 
 
-def _write_film(run: "DrumRun", film: Path) -> Path:
+def _write_film(run: "Trajectory", film: Path) -> Path:
     from polycorner.dumbbells.pictures.movies import write_movie
 
     with writing(film, "--movie"), working("filming", "pictures") as progress:

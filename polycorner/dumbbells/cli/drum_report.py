@@ -5,24 +5,23 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from polycorner.dumbbells.dynamics.runs import DrumRun
+    from polycorner.motion.trajectory import Trajectory
     from polycorner.printing import Sheet
 
 
-def drum_answer(run: "DrumRun", values: dict[str, Any]) -> dict[str, Any]:
+def drum_answer(path: "Trajectory", values: dict[str, Any]) -> dict[str, Any]:
     """Return the answer as JSON."""
     import numpy as np
 
     from polycorner.dumbbells.dynamics import pairs as drum_pairs
 
-    path = run.trajectory
     heading = np.degrees(drum_pairs.mean_heading(path))
     heading = heading[np.isfinite(heading)]
     top, bottom = (math.degrees(x) for x in drum_pairs.turning_azimuths(path))
-    two = run.drum.count == 2
+    two = path.q.shape[1] == 2
     return {
-        "parameters": {**values, "count": run.drum.count},
-        "finished": run.finished,
+        "parameters": {**values, "count": path.q.shape[1]},
+        "finished": path.finished,
         "time": float(path.times[-1]),
         "chirality": drum_pairs.handedness(path) if two else None,
         "heading_deg": {
@@ -37,8 +36,9 @@ def drum_answer(run: "DrumRun", values: dict[str, Any]) -> dict[str, Any]:
         "exits": drum_pairs.exits(path),
         "max_penetration": path.max_penetration,
         "energy_audit": path.audit,
-        "steps_per_second": run.steps_per_second,
+        "steps_per_second": path.steps_per_second,
         "converged": path.converged,
+        "convergence": path.convergence,
         "effort": {
             name: getattr(path.effort, name)
             for name in ("steps", "islands", "sweeps", "newton_steps", "unconverged", "residual")
@@ -76,5 +76,5 @@ def _rows(answer: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "deepest overlap", f"{answer['max_penetration']:.3g} mm"
     yield "energy audit", f"{answer['energy_audit']:.3g}"
     effort = answer["effort"]
-    solved = "all solved" if answer["converged"] else f"{effort['unconverged']} islands not solved"
-    yield "steps", f"{effort['steps']}, {solved}, {answer['steps_per_second']:.0f} per second"
+    yield "steps", f"{effort['steps']}, {answer['steps_per_second']:.0f} per second"
+    yield "solver", answer["convergence"]

@@ -119,6 +119,7 @@ def atlas(
 @serving_options
 def trajectory(file: Path, out: Path | None, port: int, host: str, no_browser: bool) -> None:
     """Play a motion in the drum, FILE being written by polycorner drum --out."""
+    from polycorner.dumbbells.drum import drum_of
     from polycorner.dumbbells.dynamics.files import load_run
 
     try:
@@ -131,7 +132,7 @@ def trajectory(file: Path, out: Path | None, port: int, host: str, no_browser: b
 
     _deliver(
         lambda: scene_page.film_page(scene_film.run_film(run)),
-        lambda: scenes.drum_scene(run.drum, run.trajectory.q[-1]),
+        lambda: scenes.drum_scene(drum_of(run), run.q[-1]),
         out, host, port, browser=not no_browser,
     )  # fmt: skip
 

@@ -1,30 +1,34 @@
-"""A bunch of dumbbells at the bottom of the turning drum: who rolls, who slides, who leaves.
+"""A bunch of dumbbells at the bottom of the rotating drum: rollers, sliders, and exits at the top.
 
-The experiment of [GMBN] sec. 3.2: 60 dumbbells are put into the bottom, and after twenty minutes
+The experiment of [GMBN] sec. 3.2: 60 dumbbells are placed at the bottom, and after twenty minutes
 some forty have left at the top, as right-handed dyads.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import LEFT_AS, Handed, Sizes, dyads_among, left_as
 from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.dynamics.starts import scatter
+from polycorner.motion.checkpoints import Checkpoint
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import run, whole_steps
+from polycorner.motion.simulation import simulate
+from polycorner.motion.trajectory import Trajectory
+from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
 COUNT = 60
-WIDTH = 0.35  # rad, half the width of the strip in which the bunch is put
-TRIES = 1000  # places in vain before the strip grows
+WIDTH = 0.35  # rad, half the width of the strip in which the bunch is placed
+TRIES = 1000  # rejected draws in a row after which the strip grows
 WINDOW = 10.0  # s, longer than a zigzag
 ROLLING = math.radians(30.0)  # own spin within the window beyond which it counts as a roller
 KINDS = tuple(LEFT_AS.values())
@@ -38,40 +42,49 @@ def drum_for_bunch(drum: DumbbellDrum, *, count: int = COUNT, top: float = TOP) 
 def scattered(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WIDTH) -> Array:
     """Return dumbbells scattered near the bottom without overlap, ``(count, 3)``.
 
-    Places and headings are uniform in a strip ``|phi| <= width``; what overlaps is drawn anew, and
-    the strip, at first two lengths high, grows by a tenth whenever it is full.
+    Positions and headings are uniform in a strip ``|phi| <= width``; a dumbbell that overlaps is
+    drawn again, and the strip, at first two lengths high, grows by a tenth whenever it is full.
     """
     height = 2 * drum.length + 2 * drum.ball_radius
     return scatter(drum, rng, width=width, height=height, tries=TRIES)
 
 
 @dataclass(frozen=True, eq=False)
-class BunchRun:
-    """A bunch followed for a time.
+class BunchRun(Value):
+    """Analysis of the trajectory of a bunch.
 
     Attributes
     ----------
-    drum : DumbbellDrum
-    times : (T,) array
-    q : (T, N, 4) array
-        Placements; those of dumbbells that have left stay as they were.
-    present : (T, N) array of bool
-    exits : tuple of (float, int)
-        Time of leaving at the top, and number.
-    unconverged, islands : int
-        Islands of touching dumbbells not solved to the tolerance, and all that were solved.
-    max_penetration : float
-        In mm.
+    trajectory : Trajectory
+        Of dumbbells in a drum.
     """
 
-    drum: DumbbellDrum
-    times: Array
-    q: Array
-    present: NDArray[np.bool_]
-    exits: tuple[tuple[float, int], ...]
-    unconverged: int
-    islands: int
-    max_penetration: float
+    trajectory: Trajectory
+
+    @property
+    def drum(self) -> DumbbellDrum:
+        """The drum."""
+        return drum_of(self.trajectory)
+
+    @property
+    def times(self) -> Array:
+        """Times of the records, ``(T,)``."""
+        return self.trajectory.times
+
+    @property
+    def q(self) -> Array:
+        """Placements, ``(T, N, 4)``; those of dumbbells that have left stay as they were."""
+        return self.trajectory.q
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Which dumbbells have not left, ``(T, N)``."""
+        return self.trajectory.present
+
+    @cached_property
+    def exits(self) -> tuple[tuple[float, int], ...]:
+        """Time of leaving at the top, and number."""
+        return tuple((e.time, e.bodies[0]) for e in self.trajectory.of_kind(EventKind.EXIT))
 
     def dyads(self, index: int) -> list[Handed]:
         """Return the dyads at an instant: two numbers and the chirality +1 (right) or -1.
@@ -82,7 +95,7 @@ class BunchRun:
 
     @cached_property
     def exit_kinds(self) -> tuple[str, ...]:
-        """As what each dumbbell left, in the order of :attr:`exits`.
+        """How each dumbbell left, in a ``right`` or ``left`` dyad or ``single``, as :attr:`exits`.
 
         By :func:`polycorner.dumbbells.dynamics.pairs.left_as`.
         """
@@ -95,7 +108,7 @@ class BunchRun:
     def census(self, index: int) -> dict[str, int]:
         """Return how many dumbbells are in right and left dyads, single, and present.
 
-        Of several dyads the commoner chirality counts; where they balance, ``both``.
+        Of several dyads the more frequent chirality counts; if they balance, ``both``.
         """
         hands: dict[int, int] = {}
         for i, j, hand in self.dyads(index):
@@ -107,7 +120,7 @@ class BunchRun:
         return counts | {"single": present - len(hands), "present": present}
 
     def rollers(self, index: int) -> NDArray[np.bool_]:
-        """Return which dumbbells roll, ``(N,)``: sliders and those that left do not.
+        """Return which dumbbells roll, ``(N,)``; those that slide or have left do not.
 
         A roller has turned about its own axis by more than 30 degrees, in sum, up and down, within
         the 10 s before the instant.
@@ -135,7 +148,8 @@ def follow_bunch(
     chatter: float = 0.0,
     dt: float = 1e-3,
     interval: float = 0.5,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> BunchRun:
     """Follow a scattered bunch for ``duration`` s.
 
@@ -149,34 +163,26 @@ def follow_bunch(
         Amplitude of the noise of the loads.
     dt, interval : float, optional
         Step, and time between records, in s.
-    progress : callable, optional
-        Called with the time now and then.
+    progress, checkpoint : optional
+        See :func:`~polycorner.motion.simulation.simulate`.
     """
     if not drum.floor:
         msg = "drum: expected one with a bottom, on which the bunch lies; got floor=False"
         raise ValueError(msg)
     q = scattered(drum, np.random.default_rng(seed))
     noise = Noise(chatter=chatter, seed=seed)
-    engine = drum.engine(q, dt=dt, noise=noise)
-    steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
-    path = run(engine, steps, stride, progress).trajectory(engine.bodies)
-    left = tuple((e.time, e.bodies[0]) for e in path.of_kind(EventKind.EXIT))
-    effort = path.effort
+    stride = max(1, round(interval / dt))
     return BunchRun(
-        drum,
-        path.times,
-        path.q,
-        path.present,
-        left,
-        effort.unconverged,
-        effort.islands,
-        path.max_penetration,
-    )
+        simulate(
+            drum, drum.state(q), duration, dt,
+            every=stride, noise=noise, progress=progress, checkpoint=checkpoint,
+        )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Exits:
-    """How many of a bunch left, over an ensemble: mean with standard error of each kind."""
+    """Numbers of exits in an ensemble: mean and standard error, by kind and in total."""
 
     duration: float
     count: int

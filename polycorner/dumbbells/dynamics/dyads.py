@@ -1,8 +1,8 @@
-"""Dyads driven by the turning drum: what heading they take, how they climb, how long they hold.
+"""Dyads driven by the rotating drum: their headings, climbing and lifetimes.
 
-Nested pairs are started at chosen headings and followed under noise, many in one run, far apart
-from each other.  The heading they take is set against the minimiser of the energy, which knows
-nothing of friction ([GMBN] sec. 7); nothing is fitted.
+Nested pairs start at chosen headings and move under noise, many in one simulation, far apart from
+each other.  Their heading is compared with the minimiser of the energy, in which friction does not
+occur ([GMBN] sec. 7); nothing is fitted.
 """
 
 import math
@@ -11,16 +11,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Sizes, chirality, gaps
 from polycorner.dumbbells.dynamics.singles import APART, Mean
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import run, whole_steps
+from polycorner.motion.simulation import simulate
+from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 Start = tuple[Chirality, float]
 SOLVER = Solver(tolerance=1e-6, sweeps=300)
@@ -43,29 +45,49 @@ def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True, eq=False)
-class DyadPaths:
-    """Motions of ``n`` pairs in one run, recorded at ``T`` instants.
+class DyadPaths(Value):
+    """Analysis of the trajectory of ``n`` pairs, far apart from each other.
 
     Attributes
     ----------
-    drum : DumbbellDrum
-        With ``count = 2``.
-    starts : tuple of (str, float)
-        Chirality and heading, in rad, at the start.
-    noise : Noise
-    times : (T,) array
-    q : (T, n, 2, 4) array
-        ``phi, eta, theta, psi`` of both dumbbells; ``eta`` counted from the start's mean.
-    unconverged : int
-        Islands of touching dumbbells not solved to the tolerance.
+    trajectory : Trajectory
+        Of ``2 n`` dumbbells in a drum: 0 and 1 are the first pair, 2 and 3 the second, ...; pairs
+        are multiples of ``APART`` apart along the axis.
     """
 
-    drum: DumbbellDrum
-    starts: tuple[Start, ...]
-    noise: Noise
-    times: Array
-    q: Array
-    unconverged: int
+    trajectory: Trajectory
+
+    @cached_property
+    def drum(self) -> DumbbellDrum:
+        """The drum with the two dumbbells of one pair."""
+        return replace(drum_of(self.trajectory), count=2)
+
+    @property
+    def noise(self) -> Noise:
+        """The noise."""
+        return self.trajectory.noise
+
+    @property
+    def times(self) -> Array:
+        """Times of the records, ``(T,)``."""
+        return self.trajectory.times
+
+    @cached_property
+    def q(self) -> Array:
+        """``phi, eta, theta, psi`` of both dumbbells, ``(T, n, 2, 4)``.
+
+        ``eta`` is counted from the multiple of ``APART`` at which the pair started.
+        """
+        path = self.trajectory
+        q = path.q.reshape(len(path), -1, 2, 4).copy()
+        q[..., 1] -= APART * np.round(q[0, :, :, 1].mean(axis=1) / APART)[:, None]
+        q.setflags(write=False)
+        return q
+
+    @property
+    def signs(self) -> NDArray[np.int64]:
+        """+1 for pairs that start right-handed, or without a chirality, and -1 for others."""
+        return np.where(self.hand[0] < 0, -1, 1)
 
     @cached_property
     def heading(self) -> Array:
@@ -165,15 +187,23 @@ def follow_dyads(
     places = np.concatenate([nest.reshape(2, 3) for nest in nests])
     offset = APART * np.repeat(np.arange(len(starts)), 2)
     places[:, 1] += offset
-    drum = replace(drum, count=len(places))
-    engine = drum.engine(places, dt=dt, noise=noise, solver=SOLVER)
-    steps, stride = whole_steps(duration, dt), max(1, round(interval / dt))
-    path = run(engine, steps, stride).trajectory(engine.bodies)
-    q = path.q.copy()
-    q[..., 1] -= offset
-    q = q.reshape(len(path), len(starts), 2, 4)
-    noise, lost = noise or Noise(), path.effort.unconverged
-    return DyadPaths(two, tuple(starts), noise, path.times, q, lost)
+    return follow_pairs(drum, places, duration, noise=noise, dt=dt, interval=interval)
+
+
+def follow_pairs(
+    drum: DumbbellDrum,
+    places: ArrayLike,
+    duration: float,
+    *,
+    noise: Noise | None = None,
+    dt: float = 2e-3,
+    interval: float = 0.1,
+) -> DyadPaths:
+    """Follow pairs of dumbbells from rest at ``places``, ``(2 n, 3)``; see :class:`DyadPaths`."""
+    many = replace(drum, count=len(np.asarray(places)))
+    stride = max(1, round(interval / dt))
+    start = many.state(places)
+    return DyadPaths(simulate(many, start, duration, dt, every=stride, noise=noise, solver=SOLVER))
 
 
 @dataclass(frozen=True)
@@ -228,7 +258,7 @@ def steady(paths: DyadPaths, *, after: float) -> Steady:
     if not late.any():
         msg = f"after: expected a time before the end, {paths.times[-1]:g} s; got {after:g}"
         raise ValueError(msg)
-    sign = np.array([1.0 if hand == "R" else -1.0 for hand, _ in paths.starts])
+    sign = paths.signs
     held = np.isinf(paths.lifetimes)
     heading = np.degrees(sign * paths.heading[late])[:, held]
     half = max(1, len(heading) // 2)

@@ -1,6 +1,5 @@
 """Runs in the drum as NetCDF files: self-describing, and read back bit for bit."""
 
-import json
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -9,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.container import BINARY, Kind
-from polycorner.dumbbells.drum import COORDINATES, DumbbellDrum
-from polycorner.dumbbells.dynamics.runs import DrumRun
+from polycorner.dumbbells.drum import COORDINATES, DumbbellDrum, drum_of
 from polycorner.files.motions import (
     MotionUnits,
     column,
@@ -21,7 +19,7 @@ from polycorner.files.motions import (
     read_motion,
     save_dataset,
 )
-from polycorner.motion.noise import Noise
+from polycorner.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,59 +50,48 @@ PLACES = (
 MOTION = MotionUnits(energy="nJ", force="uN", impulse="g mm/s")  # nJ = g mm^2/s^2
 
 
-def dataset(run: DrumRun) -> "xr.Dataset":
-    """Return a run as an xarray dataset with units, parameters, seed and versions."""
+def dataset(path: Trajectory) -> "xr.Dataset":
+    """Return a run in the drum as an xarray dataset with units, parameters, seed and versions."""
     import xarray as xr
 
-    path, names = run.trajectory, _contacts(run)
+    names = list(drum_of(path).bodies.contact_names)
     data: dict[str, Any] = {}
     for k, (name, unit, words) in enumerate(PLACES):
         data[name] = column(("time", "body"), path.q[..., k], unit, words)
         speed = column(("time", "body"), path.v[..., k], f"{unit}/s", f"velocity of {name}")
         data[f"{name}_dot"] = speed
     data |= motion_data(path, names, MOTION)
-    return xr.Dataset(data, motion_coordinates(path, MOTION), _attributes(run, names))
+    return xr.Dataset(data, motion_coordinates(path, MOTION), _attributes(path, names))
 
 
-def _contacts(run: DrumRun) -> list[str]:
-    bodies = run.drum.bodies
-    return [*bodies.body.contacts, *bodies.pair_contacts]
-
-
-def _attributes(run: DrumRun, names: list[str]) -> dict[str, Any]:
+def _attributes(path: Trajectory, names: list[str]) -> dict[str, Any]:
     values: dict[str, Any] = {
         "title": "Dumbbells in a slowly rotating, tilted drum",
-        **motion_attributes(run.trajectory, names),
+        **motion_attributes(path, names),
     }
     for name, unit in UNITS.items():
-        value = getattr(run.drum, name)
+        value = getattr(drum_of(path), name)
         whole = isinstance(value, bool | int)
         values[name] = np.int64(value) if whole else np.array(value, dtype=np.float64)
         values[f"{name}_units"] = unit
-    return values | {
-        "seed": np.int64(run.noise.seed),
-        "noise_chatter": float(run.noise.chatter),
-        "noise_correlation_time": float(run.noise.correlation_time),
-        "noise_kicks": json.dumps(dict(run.noise.kicks)),
-        "duration": run.duration,
-        "every": np.int64(run.every),
-        "steps_per_second": run.steps_per_second,
-    }
+    return values
 
 
-def save_run(run: DrumRun, path: str | os.PathLike[str]) -> Path:
-    """Write a run as NetCDF, atomically.
+def save_run(trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
+    """Write the trajectory of dumbbells in a drum as NetCDF, atomically.
 
     Raises
     ------
+    TypeError
+        If the trajectory is one of another system.
     OSError
         If the file cannot be written.
     """
-    return save_dataset(KIND, path, dataset(run))
+    return save_dataset(KIND, path, dataset(trajectory))
 
 
-def load_run(path: str | os.PathLike[str]) -> DrumRun:
-    """Read a run that :func:`save_run` wrote.
+def load_run(path: str | os.PathLike[str]) -> Trajectory:
+    """Read a trajectory that :func:`save_run` wrote; its ``system`` is the drum.
 
     Raises
     ------
@@ -114,7 +101,7 @@ def load_run(path: str | os.PathLike[str]) -> DrumRun:
     return load_dataset(KIND, path, _read)
 
 
-def _read(content: "xr.Dataset") -> DrumRun:
+def _read(content: "xr.Dataset") -> Trajectory:
     at = content.attrs
     values: dict[str, Any] = {}
     for field in fields(DumbbellDrum):
@@ -125,12 +112,6 @@ def _read(content: "xr.Dataset") -> DrumRun:
             values[field.name] = tuple(float(x) for x in value)
         else:
             values[field.name] = float(value)
-    drum = DumbbellDrum(**values)
-    kicks, seed = json.loads(at["noise_kicks"]), int(at["seed"])
-    chatter, hold = float(at["noise_chatter"]), float(at["noise_correlation_time"])
-    noise = Noise(chatter=chatter, correlation_time=hold, kicks=kicks, seed=seed)
-    rate = float(at["steps_per_second"])
     q = np.stack([content[name].values for name in COORDINATES], axis=-1)
     v = np.stack([content[f"{name}_dot"].values for name in COORDINATES], axis=-1)
-    path = read_motion(content, drum.bodies, q, v)
-    return DrumRun(drum, noise, path, float(at["duration"]), int(at["every"]), rate)
+    return read_motion(content, DumbbellDrum(**values), q, v)

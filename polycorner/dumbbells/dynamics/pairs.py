@@ -1,6 +1,7 @@
-"""Which dumbbells in a drum are dyads, how they are handed, and as what they leave.
+"""Dyads in a drum: their recognition and chirality, their headings, climbing and exits.
 
-Everything is read off places in the developed plane ``(rho phi, eta)``, for all pairs at once.
+Everything is computed from placements in the developed plane ``(rho phi, eta)``, for all pairs at
+once.
 """
 
 import math
@@ -12,10 +13,9 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.dumbbells.drum import PARAMETERS, DumbbellDrum
+from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
-from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.events import EventKind
 from polycorner.spaces.manifold import Array
 
@@ -33,7 +33,7 @@ LEFT_AS = {1: "right", -1: "left", 0: "single"}
 
 @dataclass(frozen=True)
 class Sizes:
-    """Lengths in mm: ``l``, ``r``, ``rho = R - r`` and ``t`` (nan if there is one dumbbell)."""
+    """Lengths in mm: ``l``, ``r``, ``rho = R - r`` and ``t``."""
 
     length: float
     ball_radius: float
@@ -43,18 +43,7 @@ class Sizes:
     @classmethod
     def of(cls, trajectory: "Trajectory") -> "Sizes":
         """Return those of the dumbbells of a trajectory in the drum."""
-        system = trajectory.system
-        if (
-            not isinstance(system, IdenticalBodies)
-            or system.body.formulation.parameters != PARAMETERS
-        ):
-            msg = f"trajectory: expected one of dumbbells in a drum; got one of {system!r}"
-            raise TypeError(msg)
-        numbers = dict(zip(PARAMETERS, system.body.parameters.tolist(), strict=True))
-        between = system.contacts
-        if between is not None:
-            numbers |= dict(zip(between.gaps.parameters, between.parameters, strict=True))
-        return cls(numbers["l"], numbers["r"], numbers["rho"], numbers.get("t", math.nan))
+        return cls.of_drum(drum_of(trajectory))
 
     @classmethod
     def of_drum(cls, drum: DumbbellDrum) -> "Sizes":
@@ -227,11 +216,11 @@ def left_as(
     dyads_at: Callable[[int], list[Handed]],
     memory: float = MEMORY,
 ) -> list[str]:
-    """Return as what dumbbells left: as members of ``right`` or ``left`` dyads, or ``single``.
+    """Return how dumbbells left: in ``right`` or ``left`` dyads, or ``single``.
 
     A dumbbell counts with the dyads it was last recorded in, if that was at most ``memory`` s
     before it left; so both members count although one leaves first.  Of several dyads the commoner
-    chirality counts; where they balance, the record before decides.
+    chirality counts; if they balance, the record before decides.
 
     Parameters
     ----------
@@ -257,7 +246,7 @@ def left_as(
 
 
 def exits(trajectory: "Trajectory", *, memory: float = MEMORY) -> dict[str, int]:
-    """Return how many dumbbells left, as what: see :func:`left_as`."""
+    """Return how many dumbbells left in dyads of each chirality and single; see :func:`left_as`."""
     sizes, q, present = Sizes.of(trajectory), trajectory.q, trajectory.present
     left = [(event.time, event.bodies[0]) for event in trajectory.of_kind(EventKind.EXIT)]
     kinds = left_as(
@@ -292,7 +281,7 @@ def mean_heading(trajectory: "Trajectory") -> Array:
 
     Headings are directions modulo ``pi``, and so is their mean: half the argument of the sum of
     ``exp(2 i theta)``.  It follows the motion continuously from a value in ``(-pi/2, pi/2]``; nan
-    where nobody is left.
+    where no dumbbell is left.
     """
     here = trajectory.present
     total = np.where(here, np.exp(2j * trajectory.q[..., 2]), 0).sum(axis=1)

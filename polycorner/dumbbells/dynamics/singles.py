@@ -1,9 +1,9 @@
-"""Single dumbbells in the turning drum: where they start to roll and stop, how they climb.
+"""Single dumbbells in the rotating drum: onsets and ends of slips, climbing.
 
-Zigzags are read off runs of :class:`polycorner.dumbbells.drum.DumbbellDrum`, in which the keel
-effect is not put in, and set against the regions of rest of
-:mod:`polycorner.dumbbells.statics.keel` ([GMBN] sec. 4, app. A).  Many dumbbells are followed in
-one run, far apart from each other.
+Zigzags are computed from trajectories of :class:`polycorner.dumbbells.drum.DumbbellDrum`, which
+does not assume the keel effect, and are compared with the regions of rest of
+:mod:`polycorner.dumbbells.statics.keel` ([GMBN] sec. 4, app. A).  Many dumbbells move in one
+simulation, far apart from each other.
 """
 
 import math
@@ -18,7 +18,7 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import Keel, exact_eastern_boundary
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import run, whole_steps
+from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array, reals
 
@@ -141,8 +141,8 @@ def follow(
         raise ValueError(msg)
     theta = np.atleast_1d(reals(headings, "headings"))
     q = np.stack([np.full_like(theta, azimuth), APART * np.arange(len(theta)), theta], axis=-1)
-    engine = replace(drum, count=len(theta)).engine(q, dt=dt, noise=noise, solver=Solver())
-    return run(engine, whole_steps(duration, dt), STRIDE).trajectory(engine.bodies)
+    many = replace(drum, count=len(theta))
+    return simulate(many, many.state(q), duration, dt, every=STRIDE, noise=noise, solver=Solver())
 
 
 def zigzags(trajectory: Trajectory, spin: float) -> tuple[Zigzag, ...]:

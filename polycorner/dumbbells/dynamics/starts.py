@@ -1,4 +1,4 @@
-"""Where dumbbells are put into the drum: alone, as a nested pair, or as a bunch at the bottom."""
+"""Initial placements in the drum: single dumbbells, nested pairs, a bunch at the bottom."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from polycorner.spaces.manifold import Array
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
 ROOM = 3.0  # area of that strip in areas of the dumbbells
 GAP = 0.05  # mm, between dumbbells of a bunch
-TRIES = 2000  # places in vain before the strip grows
+TRIES = 2000  # rejected draws in a row after which the strip grows
 NEWTON_STEPS = 30
 
 
@@ -22,7 +22,7 @@ def isolated(
 ) -> Array:
     """Return dumbbells too far apart to touch, ``(N, 3)``.
 
-    The steepest heading is highest, so that those that climb and those that descend part.
+    The steepest heading is highest, so dumbbells that climb and that descend move apart.
 
     Parameters
     ----------
@@ -57,17 +57,17 @@ def nested_pair(
 
     Notes
     -----
-    The certified minimiser of the energy is turned as a whole in the developed plane.  The drum's
-    curvature spoils the contacts a little, so Newton's method restores them: where a
-    dumbbell is as seen from the other is three unknowns, as many as there are contacts.
+    The certified minimiser of the energy is rotated as a whole in the developed plane.  The drum's
+    curvature then opens or closes the contacts slightly, and Newton's method restores them: the
+    placement of one dumbbell relative to the other is three unknowns for three contacts.
 
     Raises
     ------
     ValueError
-        If there is no such corner, as with rods almost as thick as balls or at steep headings.
+        If there is no such corner, as for rods almost as thick as balls or at steep headings.
     """
     pair = drum.pair
-    start = pair.nested(chirality)  # refuses what is no chirality
+    start = pair.nested(chirality)  # raises for anything but a chirality
     rest = minimise(pair.polyhedron, pair.energy, start)
     cornered = len(rest.active) == 3 and pair.chirality(rest.point) == chirality
     q = rest.point if cornered else start
@@ -97,7 +97,7 @@ def _cornered(pair: DumbbellPair, q: Array) -> Array:
     """Return the nearby pair with the same mean placement whose three nearest contacts touch."""
     bundle, unit = pair.polyhedron.bundle, np.array([pair.centre_radius, 1.0, pair.length / 2])
     nearest = np.argsort(bundle.evaluate(q, 0)[0])[:3]
-    change = np.concatenate([-np.eye(3), np.eye(3)]) / unit  # of both, against each other
+    change = np.concatenate([-np.eye(3), np.eye(3)]) / unit  # of both, in opposite directions
     for _ in range(NEWTON_STEPS):
         gaps, slopes = bundle.evaluate(q, 1)
         try:
@@ -121,8 +121,8 @@ def _cornered(pair: DumbbellPair, q: Array) -> Array:
 def bunch(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WIDTH) -> Array:
     """Return dumbbells scattered without overlap near the bottom, ``(N, 3)``.
 
-    Places and headings are uniform in a strip about the lowest line; what overlaps is drawn anew
-    (random sequential addition), and the strip grows when it is full.
+    Positions and headings are uniform in a strip about the lowest line; a dumbbell that overlaps is
+    drawn again (random sequential addition), and the strip grows when it is full.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ def scatter(
     ----------
     rng : Generator
     width, height : float
-        Half the strip's width as an angle, in rad, and up to where centres lie, in mm.
+        Half the strip's width as an angle, in rad, and its height, in mm.
     tries : int
-        Places in vain before the strip grows by a tenth.
+        Rejected draws in a row after which the strip grows by a tenth.
     """
     found, vain = np.empty((0, 3)), 0
     while len(found) < drum.count:

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Sizes, dyads, mean_heading
-from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.pictures.symbols import HANDS, WORDS, sizes_in_words
+from polycorner.motion.trajectory import Trajectory
 from polycorner.pictures.style import BODIES
 from polycorner.spaces.manifold import Array
 
@@ -31,7 +31,7 @@ TALL = 11.0  # inches at most, of a drum
 PANELS = ("azimuth φ (degrees)", "axial position η (mm)", "heading θ (degrees)")
 
 
-def draw_history(run: DrumRun) -> Figure:
+def draw_history(run: Trajectory) -> Figure:
     """Draw azimuth, axial position and heading against time, as in [GMBN] fig. 4 and 6.
 
     For two dumbbells their average is drawn in black.  More than ``FEW`` dumbbells share one
@@ -39,7 +39,7 @@ def draw_history(run: DrumRun) -> Figure:
     """
     figure = Figure(figsize=(9, 8), layout="constrained")
     panels = figure.subplots(3, 1, sharex=True)
-    path = run.trajectory
+    path = run
     N = path.q.shape[1]
     curves = _curves(run)
     hands = _hands_in_time(run) if N > FEW else None
@@ -74,25 +74,25 @@ def _frame(axes: Axes) -> None:
         axes.axhline(0, color="0.6", linewidth=0.8, zorder=0.5)
 
 
-def title(run: DrumRun) -> str:
+def title(run: Trajectory) -> str:
     """Return the parameters of a run as the title of its figures."""
-    drum = run.drum
+    drum = drum_of(run)
     place = f"R = {drum.drum_radius:g} mm, α = {math.degrees(drum.tilt):g}°"
     noise = f", noise {run.noise.chatter:g}" if run.noise.chatter else ""
     return f"{sizes_in_words(drum.pair)};  {place}, ω = {drum.spin:g} rad/s{noise}"
 
 
-def _curves(run: DrumRun) -> tuple[Array, Array, Array]:
+def _curves(run: Trajectory) -> tuple[Array, Array, Array]:
     """Return azimuth, axial position and heading ``(T, N)`` as drawn; nan breaks a line."""
-    q = run.trajectory.q
+    q = run.q
     heading = np.degrees(q[..., 2])
     wrapped = heading - 180 * np.ceil(heading / 180 - 0.5)
     jumps = np.abs(np.diff(wrapped, axis=0, prepend=wrapped[:1])) > 90
     return np.degrees(q[..., 0]), q[..., 1], np.where(jumps, np.nan, wrapped)
 
 
-def _draw_average(panels: Sequence[Axes], run: DrumRun, curves: tuple[Array, ...]) -> None:
-    path = run.trajectory
+def _draw_average(panels: Sequence[Axes], run: Trajectory, curves: tuple[Array, ...]) -> None:
+    path = run
     both = path.present.all(axis=1)
     heading = np.degrees(mean_heading(path))
     heading = heading - 180 * np.ceil(heading / 180 - 0.5)
@@ -102,9 +102,9 @@ def _draw_average(panels: Sequence[Axes], run: DrumRun, curves: tuple[Array, ...
         axes.plot(path.times, shown, color=AVERAGE, lw=1.3, label="average", zorder=3)
 
 
-def _hands_in_time(run: DrumRun) -> NDArray[np.int64]:
+def _hands_in_time(run: Trajectory) -> NDArray[np.int64]:
     """Return +1, -1 or 0 for each instant and dumbbell: the chirality of its dyad."""
-    path = run.trajectory
+    path = run
     hands = np.zeros(path.present.shape, dtype=np.int64)
     for index in range(len(path)):
         for i, j, hand in dyads(path, index):
@@ -135,7 +135,7 @@ def _legend(axes: Axes, count: int, hands: NDArray[np.int64] | None) -> None:
     axes.legend(handles=handles, ncols=len(handles), fontsize=9, frameon=False, **place)
 
 
-def draw_drum(run: DrumRun, index: int = -1) -> Figure:
+def draw_drum(run: Trajectory, index: int = -1) -> Figure:
     """Draw the drum unrolled with the dumbbells at a recorded instant, dyads coloured."""
     return DrumView(run).show(index)
 
@@ -145,15 +145,15 @@ class DrumView:
 
     Parameters
     ----------
-    run : DrumRun
+    run : Trajectory
         The extent of the figure covers all its instants.
     width : float, optional
         Of the figure, in inches.
     """
 
-    def __init__(self, run: DrumRun, *, width: float = 7.0) -> None:
+    def __init__(self, run: Trajectory, *, width: float = 7.0) -> None:
         self.run = run
-        self.sizes = Sizes.of(run.trajectory)
+        self.sizes = Sizes.of(run)
         (left, right), (low, high) = self._extent()
         height = (width - 1.6) * (high - low) / (right - left) + 1.6
         if height > TALL:
@@ -176,14 +176,14 @@ class DrumView:
         self.balls = PolyCollection([], linewidths=0.5, zorder=3)
         self.axes.add_collection(self.rods)
         self.axes.add_collection(self.balls)
-        if handles := _key(run.drum):
+        if handles := _key(drum_of(run)):
             place: dict[str, Any] = {"loc": "outside lower center", "ncols": 2, "frameon": False}
             self.figure.legend(handles=handles, fontsize=8, **place)
         self.words = self.figure.suptitle(" ", fontsize=11)
         self.moving = (self.rods, self.balls, self.words)
 
     def _extent(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        path, drum = self.run.trajectory, self.run.drum
+        path, drum = self.run, drum_of(self.run)
         reach = drum.length / 2 + 1.6 * drum.ball_radius
         # Dumbbells that left keep their last coordinates, so all instants can be used.
         across, along = self.sizes.centre_radius * path.q[..., 0], path.q[..., 1]
@@ -199,7 +199,7 @@ class DrumView:
         return (float(left), float(right)), (float(low), float(high))
 
     def _draw_drum(self, low: float, high: float) -> None:
-        drum, axes = self.run.drum, self.axes
+        drum, axes = drum_of(self.run), self.axes
         axes.set_facecolor("#FBFAF7")
         axes.axvline(0, zorder=1, **LOWEST)
         if drum.floor:
@@ -216,17 +216,19 @@ class DrumView:
 
     def show(self, index: int = -1) -> Figure:
         """Show a recorded instant and return the figure."""
-        path = self.run.trajectory
+        path = self.run
         index = index % len(path)
         here = np.flatnonzero(path.present[index])
-        colours = dict.fromkeys(here.tolist(), BODIES[0] if self.run.drum.count == 1 else SINGLE)
+        colours = dict.fromkeys(
+            here.tolist(), BODIES[0] if drum_of(self.run).count == 1 else SINGLE
+        )
         for i, j, hand in dyads(path, index):
             colours[i] = colours[j] = HANDS[hand]
         balls = self.sizes.balls(path.q[index, here])
         faces = [colours[body] for body in here.tolist()]
-        self.rods.set_verts(list(rod_outlines(balls, self.run.drum.rod_radius)))
+        self.rods.set_verts(list(rod_outlines(balls, drum_of(self.run).rod_radius)))
         self.rods.set(facecolor=[(*_rgb(c), 0.75) for c in faces], edgecolor="white")
-        self.balls.set_verts(_disks(balls.reshape(-1, 2), self.run.drum.ball_radius))
+        self.balls.set_verts(_disks(balls.reshape(-1, 2), drum_of(self.run).ball_radius))
         self.balls.set(facecolor=[c for c in faces for _ in range(2)], edgecolor="white")
         left = path.present.shape[1] - len(here)
         gone = f",  {left} left" if left else ""

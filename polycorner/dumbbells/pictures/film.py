@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import refuse
-from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Handed, Sizes, dyads_among
-from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.symbols import energy_unit
+from polycorner.motion.trajectory import Trajectory
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
 from polycorner.spaces.manifold import Array, finite, reals
@@ -176,7 +176,9 @@ def _increasing(times: ArrayLike, count: int) -> Array:
 # ------------------------------------------------------------------------------------------ a run
 
 
-def run_film(run: DrumRun, *, frames: int = FRAMES, title: str = "Dumbbells in the drum") -> Film:
+def run_film(
+    run: Trajectory, *, frames: int = FRAMES, title: str = "Dumbbells in the drum"
+) -> Film:
     """Return a motion in the drum as a film of at most ``frames`` of its instants.
 
     Contacts are those recorded with the motion, named ``A1b`` for one or two dumbbells and
@@ -184,7 +186,7 @@ def run_film(run: DrumRun, *, frames: int = FRAMES, title: str = "Dumbbells in t
     of the closed contacts, and the chirality; for more dumbbells, the number of dyads of each
     chirality (:func:`~polycorner.dumbbells.dynamics.pairs.dyads_among`).
     """
-    path, drum = run.trajectory, run.drum
+    path, drum = run, drum_of(run)
     chosen = chosen_frames(len(path), frames)
     q = np.where(path.present[chosen][..., None], path.q[chosen], np.nan)
     centres = dumbbell_centres(drum.pair, np.nan_to_num(q))
@@ -230,8 +232,8 @@ class _Shot:
     dyads: "list[Handed]"
 
     @classmethod
-    def of(cls, run: DrumRun, index: int, centres: Array) -> "_Shot":
-        path, drum = run.trajectory, run.drum
+    def of(cls, run: Trajectory, index: int, centres: Array) -> "_Shot":
+        path, drum = run, drum_of(run)
         q, present = path.q[index], path.present[index]
         dyads = dyads_among(Sizes.of_drum(drum), q, present) if drum.count > 2 else []
         return cls(drum.pair, q, present, centres, path.touching[index], dyads)

@@ -16,8 +16,8 @@ from PIL import Image
 
 from polycorner.atomic import atomic
 from polycorner.checks import missing_extra, refuse
-from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.dumbbells.pictures.drum import DrumView
+from polycorner.motion.trajectory import Trajectory
 
 Picture = NDArray[np.uint8]
 FRAMES = 300  # at most
@@ -60,7 +60,7 @@ def chosen_frames(count: int, most: int = FRAMES) -> list[int]:
 
 
 def write_movie(
-    run: DrumRun,
+    run: Trajectory,
     path: str | os.PathLike[str],
     *,
     frames: int = FRAMES,
@@ -71,7 +71,7 @@ def write_movie(
 
     Parameters
     ----------
-    run : DrumRun
+    run : Trajectory
     path : path
         Ends in ``.mp4`` or ``.gif``; the file appears whole or not at all.
     frames, rate : int, optional
@@ -88,7 +88,7 @@ def write_movie(
     """
     check_movie(path)
     target = Path(path)
-    numbers = chosen_frames(len(run.trajectory), frames)
+    numbers = chosen_frames(len(run), frames)
     suffix = target.suffix.lower()
     write = _write_mp4 if suffix == ".mp4" else _write_gif
 

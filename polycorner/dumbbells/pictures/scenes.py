@@ -97,7 +97,7 @@ def drum_scene(drum: DumbbellDrum, q: ArrayLike) -> "trimesh.Scene":
     ----------
     drum : DumbbellDrum
     q : (N, k) array
-        ``phi, eta, theta`` (and ``psi``) of each dumbbell, as a row of ``run.trajectory.q``.
+        ``phi, eta, theta`` (and ``psi``) of each dumbbell, as a row of ``trajectory.q``.
     """
     places = np.atleast_2d(reals(q, "q"))
     if places.ndim != 2 or places.shape[0] != drum.count or places.shape[1] not in (3, 4):

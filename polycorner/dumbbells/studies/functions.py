@@ -205,8 +205,8 @@ def bunch(
         "single": census["single"],
         "rollers": int(run.rollers(-1).sum()),
         "reach": (float(run.q[-1, there, 1].mean()) if there.any() else math.nan, "mm"),
-        "max_penetration": (run.max_penetration, "mm"),
-        "missed": run.unconverged / max(1, run.islands),
+        "max_penetration": (run.trajectory.max_penetration, "mm"),
+        "missed": run.trajectory.missed,
     }
 
 

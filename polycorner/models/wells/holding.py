@@ -19,7 +19,6 @@ deep as half-U; alike in their spread at rest, ``<x^2> = s^2``, it is deeper as 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,54 +26,12 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.models.wells.escape import mean_escape_time
 from polycorner.models.wells.wells import KINDS, Well
 from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate, start
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-if TYPE_CHECKING:
-    from polycorner.motion.engine.driver import Engine
-    from polycorner.motion.system import System
-
 NORMAL = 1.959964  # 97.5th percentile of the standard normal distribution
 LOOKS = 200  # least number of times that a run is interrupted to remove masses that have escaped
-
-
-def herd_engine(
-    system: "System",
-    q: ArrayLike,
-    v: ArrayLike | None = None,
-    *,
-    dt: float,
-    noise: Noise | None = None,
-) -> "Engine":
-    """Return an engine that moves independent copies of a system, each with its own noise.
-
-    Parameters
-    ----------
-    system : System
-    q, v : (count, n) array
-        Where each copy starts, and how fast; default at rest.
-    dt : float
-        Step; at most what is stable for the first copy.
-    noise : Noise, optional
-
-    Raises
-    ------
-    ValueError
-        For starts that overlap, a step that is too long, or noise on unknown coordinates.
-    """
-    from polycorner.motion.engine.driver import Engine
-    from polycorner.motion.simulation import start
-    from polycorner.motion.system import bodies_of
-
-    places = system.manifold.points(q)
-    speeds = np.zeros_like(places) if v is None else np.broadcast_to(v, places.shape)
-    start(system, system.state(places[0]), dt, noise=noise)
-    for place in places[system.polyhedron.values(places).min(axis=-1) < 0]:
-        system.check_placement(place)
-    sticking = np.array([system.sticks(a, b) for a, b in zip(places, speeds, strict=True)])
-    bodies = replace(bodies_of(system), count=len(places))
-    sticking = sticking.reshape(len(places), -1)
-    return Engine(bodies, places, speeds, sticking, dt, noise=noise or Noise())
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +120,9 @@ def escapes(
     """
     q, v = (np.broadcast_to(np.asarray(x, float), (count,))[:, None] for x in (places, speeds))
     step = well.time_step if dt is None else dt
-    engine = herd_engine(well.system, q, v, dt=step, noise=Noise(kicks={"x": kick}, seed=seed))
+    copies = replace(well.system, count=count)
+    noise = Noise(kicks={"x": kick}, seed=seed)
+    engine = start(copies, copies.state(q, v), step, noise=noise)
     steps = math.ceil(duration / step)
     times = np.full(count, math.nan)
     while engine.steps < steps and np.isnan(times).any():
@@ -202,9 +161,9 @@ def rests(
 ) -> tuple[Array, Array]:
     """Return places and speeds of masses after a time without noise, each ``(count,)``."""
     q, v = np.asarray(places, dtype=np.float64), np.asarray(speeds, dtype=np.float64)
-    engine = herd_engine(well.system, q[:, None], v[:, None], dt=dt)
-    engine.advance(math.ceil(duration / dt))
-    return engine.motion.q[:, 0].copy(), engine.motion.v[:, 0].copy()
+    copies = replace(well.system, count=len(q))
+    path = simulate(copies, copies.state(q[:, None], v[:, None]), duration, dt)
+    return path.q[-1, :, 0].copy(), path.v[-1, :, 0].copy()
 
 
 @dataclass(frozen=True, eq=False)

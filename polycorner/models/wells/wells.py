@@ -202,8 +202,9 @@ class Well(Value):
     @cached_property
     def system(self) -> "System":
         """The mass with its wall, drag and friction; reaching ``rim`` is a contact."""
+        from polycorner.motion.contacts import Friction, velocities
         from polycorner.motion.friction import Interval
-        from polycorner.motion.system import Friction, System, velocities
+        from polycorner.motion.system import System
 
         (v,) = velocities(self.manifold)
         rubbing = Friction("friction", (v,), Interval(1.0), self.friction + 0 * v)

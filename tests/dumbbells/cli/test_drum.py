@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from polycorner.dumbbells.drum import DumbbellDrum
-from polycorner.dumbbells.dynamics import runs as drum_runs
 from polycorner.dumbbells.dynamics.files import load_run
 from polycorner.dumbbells.pictures import movies
+from polycorner.motion import Checkpoint, simulate
+from polycorner.motion.checkpoints import STATE
 
 SHORT = ("--duration", "0.5", "--dt", "0.005")
 ANSWER = {
@@ -32,15 +33,8 @@ ANSWER = {
     "steps_per_second",
     "converged",
     "effort",
+    "convergence",
 }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory):
-    """Keep unfinished runs, and compiled kernels, away from the user's."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
-        yield
 
 
 def run(capsys, *arguments):
@@ -104,12 +98,12 @@ def test_files_are_written(capsys, tmp_path):
     assert (code, err) == (0, "")
     movie = f"drum{movies.movie_suffix()}"
     names = {"drum.json", "trajectory.nc", "history.png", "drum.png", movie}
-    assert {entry.name for entry in out.iterdir()} == names
+    assert {entry.name for entry in out.iterdir()} == names | {"drum-state"}
     assert all(f"wrote {out / name}" in said for name in names)
     path = load_run(out / "trajectory.nc")
     told = json.loads((out / "drum.json").read_text())
-    assert path.trajectory.effort.steps == told["effort"]["steps"] == 100
-    assert path.drum.tilt == math.radians(7)
+    assert path.effort.steps == told["effort"]["steps"] == 100
+    assert path.system.tilt == math.radians(7)
 
 
 def test_a_movie_with_a_name_needs_no_folder(capsys, tmp_path):
@@ -200,7 +194,6 @@ WRONG = [
     ("--spin", "nan"),
     ("--seed", "-1"),
     ("--duration", "inf"),
-    ("--resume", "--seed", "99"),
     ("--movie",),
     ("--movie", "film.avi"),
     ("--config", "no-such-file.toml"),
@@ -261,22 +254,61 @@ def test_a_stopped_run_goes_on(capsys, tmp_path, how):
     assert code == 0
     code, other, _ = run(capsys, *LONG, "--out", str(tmp_path / "whole"))
     assert code == 0
-    one, two = (load_run(at / "trajectory.nc").trajectory for at in (out, tmp_path / "whole"))
+    one, two = (load_run(at / "trajectory.nc") for at in (out, tmp_path / "whole"))
     np.testing.assert_array_equal(one.q, two.q)
     assert one.events == two.events
-    assert not (out / "drum-state").exists()
     mine, theirs = json.loads(said), json.loads(other)
     for found in (mine, theirs):
         found.pop("steps_per_second")
     assert mine == theirs
 
 
-def test_a_resumed_run_needs_the_same_options(capsys, tmp_path):
-    drum = DumbbellDrum()
-    drum_runs.run(drum, [[0.0, 0.0, 0.1]], 0.2, saving=drum_runs.Saving(tmp_path / "drum-state"))
-    code, out, err = run(capsys, *SHORT, "--out", str(tmp_path), "--resume")
+def unfinished(folder):
+    """Leave a run that Ctrl-C stopped, of options that are SHORT but for --tilt 7."""
+
+    def interrupt(*_):
+        signal.raise_signal(signal.SIGINT)
+
+    drum = DumbbellDrum(tilt=0.2)
+    state = drum.state([[0.0, 0.0, math.radians(10)]])
+    checkpoint = Checkpoint(folder / "drum-state")
+    path = simulate(drum, state, 0.5, 5e-3, progress=interrupt, checkpoint=checkpoint)
+    assert not path.finished
+    return {entry: entry.read_bytes() for entry in (folder / "drum-state").iterdir()}
+
+
+@pytest.mark.parametrize("resume", [(), ("--resume",)])
+def test_an_unfinished_run_of_other_options_is_neither_resumed_nor_deleted(
+    capsys, tmp_path, resume
+):
+    kept = unfinished(tmp_path)
+    code, out, err = run(capsys, *SHORT, "--out", str(tmp_path), *resume)
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith("polycorner: --resume: expected the parameters of the run in")
+    assert err.startswith("polycorner: --out: expected tilt = 0.2 as in the unfinished run in")
+    assert {entry: entry.read_bytes() for entry in kept} == kept
+
+
+def test_a_finished_run_is_finished(capsys, tmp_path):
+    """Resumed, it gives the same answer at once; without --resume it gives way to a new run."""
+    arguments = (*SHORT, "--noise", "0.2", "--out", str(tmp_path), "--json")
+    code, first, _ = run(capsys, *arguments)
+    assert code == 0
+    written = (tmp_path / "drum-state" / STATE).stat().st_mtime_ns
+    code, again, _ = run(capsys, *arguments, "--resume")
+    assert code == 0
+    told, same = json.loads(first), json.loads(again)
+    for found in (told, same):
+        found.pop("steps_per_second")
+    assert told == same
+    code, _, _ = run(capsys, *SHORT, "--out", str(tmp_path))
+    assert code == 0
+    assert (tmp_path / "drum-state" / STATE).stat().st_mtime_ns > written
+
+
+def test_without_anything_to_resume_a_run_starts(capsys):
+    code, _, err = run(capsys, *SHORT, "--resume")
+    assert code == 0
+    assert "nothing to resume" in err
 
 
 def test_help_names_every_option(capsys):

@@ -184,7 +184,7 @@ def recorded(tmp_path_factory):
     q = np.linspace(start, start + np.array([0.1, 9, 0, 0.1, 9, 0]), 12)
     motion = moved(DumbbellDrum(count=2), q.reshape(-1, 2, 3))
     file = save_run(motion, tmp_path_factory.mktemp("run") / "trajectory.nc")
-    return motion.trajectory, file
+    return motion, file
 
 
 def test_a_trajectory_becomes_a_page_and_a_scene(capsys, recorded, tmp_path):

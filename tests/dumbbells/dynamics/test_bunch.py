@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from drum_motions import recorded
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import (
@@ -17,6 +18,7 @@ from polycorner.dumbbells.dynamics.bunch import (
 )
 from polycorner.dumbbells.dynamics.dyads import handedness
 from polycorner.dumbbells.dynamics.pairs import is_dyad
+from polycorner.motion.events import Event, EventKind
 
 SMALL = drum_for_bunch(DumbbellDrum(length=8, ball_radius=2, rod_radius=0.5), count=8)
 
@@ -30,7 +32,8 @@ def still(drum, q, times, present=None, exits=()):
     shape = (len(times), len(q))
     here = np.ones(shape, dtype=bool) if present is None else present
     many = np.broadcast_to(places, (*shape, 4)).copy()
-    return BunchRun(drum, np.array(times), many, here, tuple(exits), 0, 0, 0.0)
+    events = tuple(Event(t, EventKind.EXIT, (body,), "", 0.0) for t, body in exits)
+    return BunchRun(recorded(drum, np.array(times), many, present=here, events=events))
 
 
 @pytest.mark.parametrize("count", [8, 60])
@@ -99,8 +102,10 @@ def test_statistics_over_runs():
 
 def test_what_spins_rolls_and_what_does_not_slides():
     q = np.array([[0.02, 40.0, 0.1], [0.2, 80.0, 0.1]])
-    run = still(replace(SMALL, count=2), q, np.arange(0, 21.0))
-    run.q[:, 0, 3] = np.where(np.arange(21) % 2, 0.0, 0.2)
+    still_path = still(replace(SMALL, count=2), q, np.arange(0, 21.0)).trajectory
+    moved = still_path.q.copy()
+    moved[:, 0, 3] = np.where(np.arange(21) % 2, 0.0, 0.2)
+    run = BunchRun(replace(still_path, q=moved))
     assert run.rollers(20).tolist() == [True, False]
     assert run.azimuths(20) == pytest.approx((0.02, 0.2))
     assert math.isnan(run.azimuths(0)[0])
@@ -110,7 +115,7 @@ def test_a_bunch_stays_in_the_drum_and_sorts_itself():
     run = follow_bunch(SMALL, 1.0, seed=2, dt=2e-3)
     assert run.present.all()
     assert run.exits == ()
-    assert run.max_penetration < 0.01
+    assert run.trajectory.max_penetration < 0.01
     low = run.q[-1, :, 1] - SMALL.length / 2 * abs(np.cos(run.q[-1, :, 2])) - SMALL.ball_radius
     assert low.min() > -0.01
     assert sum(run.census(-1)[k] for k in ("right", "left", "both", "single")) == 8

@@ -20,6 +20,7 @@ from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.minima import dyad_minima
 from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate
 
 DRUM = DumbbellDrum()
 LEVEL = replace(DRUM, tilt=0.0)
@@ -69,7 +70,9 @@ def test_in_a_level_drum_left_pairs_are_right_pairs_upside_down():
     image = q * [1, -1, -1] + [0, 0, math.pi]
     assert handedness(DRUM, image) == -handedness(DRUM, q)
     two = replace(LEVEL, count=2)
-    first, second = (two.simulate(place, 9.5, noise=CHATTER).q for place in (q, image))
+    first, second = (
+        simulate(two, two.state(place), 9.5, 1e-3, noise=CHATTER).q for place in (q, image)
+    )
     moved = abs(first[-1, :, 1] - first[0, :, 1]).max()
     assert moved > 0.02
     back = second * [1, -1, -1, -1] + [0, 0, math.pi, 0]
@@ -81,7 +84,7 @@ def test_mirrored_pairs_in_a_drum_that_turns_the_other_way_are_mirrored():
     paths = []
     for sign in (1, -1):
         drum = replace(DRUM, count=2, spin=sign * DRUM.spin)
-        paths.append(drum.simulate(q * [sign, 1, sign], 9.5, noise=CHATTER).q)
+        paths.append(simulate(drum, drum.state(q * [sign, 1, sign]), 9.5, 1e-3, noise=CHATTER).q)
     moved = abs(paths[0][-1, :, 1] - paths[0][0, :, 1]).max()
     assert moved > 0.02
     back = paths[1] * [-1, 1, -1, -1]

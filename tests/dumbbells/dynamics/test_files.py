@@ -1,24 +1,29 @@
 """Runs in the drum in files."""
 
+from dataclasses import replace
+
 import pytest
 import xarray as xr
 from kept_files import motion
-from kept_files import same_run as same
+from kept_files import same_motion as same
 
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics.files import KIND, dataset, load_run, save_run
-from polycorner.dumbbells.dynamics.runs import DrumRun
 from polycorner.files.motions import save_dataset
+from polycorner.models.textbook import bouncing_ball
 from polycorner.motion.noise import Noise
 
 DRUM = DumbbellDrum(floor=True, top=60.0, tilt=0.5, spin=0.02)
 NOISE = Noise(chatter=0.3, kicks={"phi": 1e-3}, seed=7)
-RUN = DrumRun(DRUM, NOISE, motion(DRUM.bodies, 1, 4, "floor1"), 0.4, 20, 50.0)
+RUN = replace(motion(DRUM, 1, 4, "floor1"), noise=NOISE, every=20, t_end=0.8)
 
 
 def test_a_run_names_its_drum_and_its_noise(tmp_path):
     path = save_run(RUN, tmp_path / "deep" / "run.nc")
-    same(load_run(path), RUN)
+    read = load_run(path)
+    same(read, RUN)
+    assert read.system == DRUM
+    assert read.finished == RUN.finished
     with xr.open_dataset(path, engine="h5netcdf") as data:
         units = {name: data[name].attrs["units"] for name in ("phi", "eta", "theta_dot", "time")}
         assert (data.attrs["tilt"], data.attrs["tilt_units"]) == (0.5, "rad")
@@ -36,3 +41,9 @@ def test_attributes_that_cannot_be_are_refused(tmp_path, attributes):
 def test_a_missing_file_is_not_found(tmp_path):
     with pytest.raises(FileNotFoundError):
         load_run(tmp_path / "none.nc")
+
+
+def test_the_trajectory_of_another_system_is_refused(tmp_path):
+    path = motion(bouncing_ball(), 1, 1, "floor")
+    with pytest.raises(TypeError, match=r"^trajectory: expected one of dumbbells in a drum"):
+        save_run(path, tmp_path / "run.nc")

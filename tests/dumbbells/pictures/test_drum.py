@@ -13,11 +13,11 @@ from PIL import Image
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics import starts as drum_starts
 from polycorner.dumbbells.dynamics.pairs import dyads
-from polycorner.dumbbells.dynamics.runs import run
 from polycorner.dumbbells.pictures import movies
 from polycorner.dumbbells.pictures.drum import AVERAGE, SINGLE, DrumView, draw_drum, draw_history
 from polycorner.dumbbells.pictures.symbols import HANDS
 from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate
 from polycorner.pictures.style import BODIES, save
 
 NOISE = Noise(chatter=0.2, seed=1)
@@ -26,14 +26,14 @@ NOISE = Noise(chatter=0.2, seed=1)
 @pytest.fixture(scope="module")
 def one():
     drum = DumbbellDrum()
-    return run(drum, [[0.08, 20.0, 0.2]], 2.0, noise=NOISE, every=50)
+    return simulate(drum, drum.state([[0.08, 20.0, 0.2]]), 2.0, 1e-3, noise=NOISE, every=50)
 
 
 @pytest.fixture(scope="module")
 def two():
     drum = DumbbellDrum(count=2)
     q = drum_starts.nested_pair(drum, "R", eta=40.0) + np.array([0.09, 0.0, 0.0])
-    return run(drum, q, 2.0, noise=NOISE, every=50)
+    return simulate(drum, drum.state(q), 2.0, 1e-3, noise=NOISE, every=50)
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +45,10 @@ def many():
     q[:2, 1] += [30.0, 26.0]  # the inner balls have parted by 4 mm
     q[2:4] = drum_starts.nested_pair(DumbbellDrum(count=2), "L", eta=100.0)
     q[4:, :2] = [[0.08, 60.0], [-0.08, 60.0], [0.0, 130.0]]
-    path = run(drum, q, 0.5, every=25)
-    present = path.trajectory.present.copy()
+    path = simulate(drum, drum.state(q), 0.5, 1e-3, every=25)
+    present = path.present.copy()
     present[10:, 6] = False
-    return replace(path, trajectory=replace(path.trajectory, present=present))
+    return replace(path, present=present)
 
 
 def lines(axes, colour):
@@ -57,12 +57,12 @@ def lines(axes, colour):
 
 def test_the_history_of_one_is_its_coordinates(one):
     panels = draw_history(one).axes
-    q = one.trajectory.q[:, 0]
+    q = one.q[:, 0]
     for axes, values in zip(
         panels, (np.degrees(q[:, 0]), q[:, 1], np.degrees(q[:, 2])), strict=True
     ):
         (line,) = lines(axes, BODIES[0])
-        np.testing.assert_array_equal(line.get_xdata(), one.trajectory.times)
+        np.testing.assert_array_equal(line.get_xdata(), one.times)
         np.testing.assert_allclose(line.get_ydata(), values, atol=1e-12)
         low, high = axes.get_ylim()
         assert low < values.min() <= values.max() < high
@@ -71,7 +71,7 @@ def test_the_history_of_one_is_its_coordinates(one):
 
 def test_the_history_of_two_has_their_average(two):
     panels = draw_history(two).axes
-    q = two.trajectory.q
+    q = two.q
     for k, (axes, unit) in enumerate(
         zip(panels, (math.degrees(1), 1, math.degrees(1)), strict=True)
     ):
@@ -91,13 +91,13 @@ def test_the_history_of_many_marks_dyads(many):
         assert len(lines(axes, SINGLE)) == 7
         assert len(lines(axes, HANDS["R"])) == len(lines(axes, HANDS["L"])) == 2
         (gone,) = [line for line in lines(axes, SINGLE) if np.isnan(line.get_ydata()).any()]
-        assert np.isnan(gone.get_ydata()).tolist() == [k >= 10 for k in range(len(many.trajectory))]
+        assert np.isnan(gone.get_ydata()).tolist() == [k >= 10 for k in range(len(many))]
 
 
 def test_a_heading_beyond_a_right_angle_comes_in_on_the_other_side(one):
-    q = one.trajectory.q.copy()
+    q = one.q.copy()
     q[:, 0, 2] = np.radians(np.linspace(80, 100, len(q)))
-    figure = draw_history(replace(one, trajectory=replace(one.trajectory, q=q)))
+    figure = draw_history(replace(one, q=q))
     shown = lines(figure.axes[2], BODIES[0])[0].get_ydata()
     broken = np.isnan(shown)
     assert broken.sum() == 1  # the line does not run across
@@ -116,7 +116,7 @@ def test_bodies_are_drawn_where_they_are(two, index):
     view = DrumView(two)
     view.show(index)
     balls, rods = shapes(view)
-    phi, eta, theta, _ = two.trajectory.q[index].T
+    phi, eta, theta, _ = two.q[index].T
     centres = [
         [122 * (p + math.asin(e * 8 * math.sin(t) / 122)), z + e * 8 * math.cos(t)]
         for p, z, t in zip(phi, eta, theta, strict=True)
@@ -138,7 +138,7 @@ def test_bodies_are_drawn_where_they_are(two, index):
 def test_dyads_are_coloured_and_who_left_is_not_drawn(many):
     view = DrumView(many)
     view.show(0)
-    assert dyads(many.trajectory, 0) == [(0, 1, "R"), (2, 3, "L")]
+    assert dyads(many, 0) == [(0, 1, "R"), (2, 3, "L")]
     colours = [tuple(colour[:3]) for colour in view.rods.get_facecolor()]
     assert colours == [to_rgb(c) for c in [HANDS["R"]] * 2 + [HANDS["L"]] * 2 + [SINGLE] * 3]
     view.show(-1)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drum_motions import recorded
 from matplotlib.colors import same_color
 
 from polycorner.dumbbells.drum import DumbbellDrum
@@ -23,6 +24,7 @@ from polycorner.dumbbells.pictures.experiments import (
     draw_exits,
     draw_steady_headings,
 )
+from polycorner.motion.events import Event, EventKind
 from polycorner.pictures.style import save
 
 DRUM = DumbbellDrum()
@@ -204,7 +206,9 @@ def bunch():
     present = np.ones((41, 5), dtype=bool)
     present[21:, 4] = present[31:, 0] = False
     exits = ((20.5, 4), (30.5, 0))
-    return BunchRun(drum, times, np.tile(q, (41, 1, 1)), present, exits, 0, 0, 0.0)
+    events = tuple(Event(t, EventKind.EXIT, (body,), "", 0.0) for t, body in exits)
+    q = np.tile(q, (41, 1, 1))
+    return BunchRun(recorded(drum, times, q, present=present, events=events))
 
 
 def stairs(axes, kind):
@@ -232,7 +236,8 @@ def test_who_is_in_the_drum_is_counted(bunch):
 
 
 def test_bunches_stand_side_by_side(bunch, tmp_path):
-    figure = draw_exits({"one": bunch, "two": replace(bunch, exits=())})
+    nobody = BunchRun(replace(bunch.trajectory, events=()))
+    figure = draw_exits({"one": bunch, "two": nobody})
     assert [axes.get_title() for axes in figure.axes[:2]] == ["one", "two"]
     assert stairs(figure.axes[1], "single")[-1].tolist() == [40, 0]
     assert save(figure, tmp_path / "exits.png").read_bytes().startswith(b"\x89PNG")

@@ -49,7 +49,7 @@ def test_a_film_of_a_run_agrees_with_the_polyhedron(way):
         assert film.words[k].stratum.startswith(
             f"dimension {stratum.dimension}, rank {stratum.rank}, "
         )
-        assert film.words[k].chirality == HANDS[handedness(run.trajectory, k)]
+        assert film.words[k].chirality == HANDS[handedness(run, k)]
     assert len(run_film(run, frames=7)) == 7
 
 

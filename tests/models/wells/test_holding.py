@@ -4,6 +4,7 @@ Statistical bounds are four standard errors, with fixed seeds.
 """
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +17,6 @@ from polycorner.models.wells.holding import (
     Escapes,
     compare,
     escapes,
-    herd_engine,
     kick_of,
     ladder,
     rests,
@@ -24,19 +24,25 @@ from polycorner.models.wells.holding import (
 )
 from polycorner.models.wells.wells import KINDS, Well
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
+from polycorner.motion.simulation import simulate, start
 
 U, HALF_U, HALF_V = KINDS
 HALF = (HALF_U, HALF_V)
 
 
-# -------------------------------------------------------------------------------------------- herds
+def copies(well, places, *, dt, noise=None):
+    """An engine of independent copies of a mass."""
+    many = replace(well.system, count=len(places))
+    return start(many, many.state(places), dt, noise=noise)
 
 
-def test_the_first_of_a_herd_moves_as_if_alone():
+# ------------------------------------------------------------------------------------------- copies
+
+
+def test_the_first_of_many_moves_as_if_alone():
     well = Well.of_depth(HALF_V, 3.0, drag=1.0, friction=0.1, restitution=0.4)
     noise = Noise(kicks={"x": 1.0}, seed=7)
-    engine = herd_engine(well.system, np.full((5, 1), 0.2), dt=0.01, noise=noise)
+    engine = copies(well, np.full((5, 1), 0.2), dt=0.01, noise=noise)
     path = simulate(well.system, well.system.state([0.2]), 3.0, 0.01, every=1, noise=noise)
     for step in range(1, 301):
         engine.advance(1)
@@ -48,21 +54,21 @@ def test_copies_are_shaken_independently():
     """Free flights before drag matters: speeds are normal with ``<v^2> = (kick/m)^2 t``."""
     well = Well.of_depth(U, 1.0, 1e6, mass=2.0)
     kick = Noise(kicks={"x": 3.0}, seed=1)
-    engine = herd_engine(well.system, np.zeros((1000, 1)), dt=0.01, noise=kick)
+    engine = copies(well, np.zeros((1000, 1)), dt=0.01, noise=kick)
     engine.advance(100)
     speeds = engine.motion.v[:, 0] / 1.5
     assert kstest(speeds, "norm").pvalue > 1e-3
     assert np.corrcoef(speeds[:-1], speeds[1:])[0, 1] == pytest.approx(0, abs=4 / math.sqrt(1000))
 
 
-def test_herds_are_checked():
+def test_copies_are_checked():
     well = Well.of_depth(HALF_V, 3.0)
-    with pytest.raises(ValueError, match="contact 'wall' overlaps by"):
-        herd_engine(well.system, [[0.1], [-0.1]], dt=0.01)
-    with pytest.raises(ValueError, match="kicks: expected coordinates x; got"):
-        herd_engine(well.system, [[0.1]], dt=0.01, noise=Noise(kicks={"y": 1.0}))
-    with pytest.raises(ValueError, match="dt: expected a positive time"):
-        herd_engine(well.system, [[0.1]], dt=0.0)
+    with pytest.raises(ValueError, match="contact 'wall' of body 1 overlaps by"):
+        copies(well, [[0.1], [-0.1]], dt=0.01)
+    with pytest.raises(ValueError, match="kicks: expected names among x; got"):
+        copies(well, [[0.1]], dt=0.01, noise=Noise(kicks={"y": 1.0}))
+    with pytest.raises(ValueError, match="dt: expected a number > 0"):
+        copies(well, [[0.1]], dt=0.0)
 
 
 # -------------------------------------------------------------------------------------- equilibrium
@@ -75,7 +81,7 @@ def warm():
     for kind in KINDS:
         well = Well.of_depth(kind, 20.0, 4.0, drag=2.0, restitution=1.0)
         noise = Noise(kicks={"x": kick_of(well, 1.0)}, seed=5)
-        engine = herd_engine(well.system, np.full((500, 1), 0.1), dt=0.01, noise=noise)
+        engine = copies(well, np.full((500, 1), 0.1), dt=0.01, noise=noise)
         engine.advance(800)
         found[kind] = well, engine.motion.q[:, 0].copy(), engine.motion.v[:, 0].copy()
     return found
@@ -99,7 +105,7 @@ def test_absorbing_walls_cool(kind):
     """Nearer to the wall, and slower, than the temperature of noise and drag says."""
     well = Well.of_depth(kind, 20.0, 4.0, drag=0.5)
     noise = Noise(kicks={"x": kick_of(well, 1.0)}, seed=5)
-    engine = herd_engine(well.system, np.full((400, 1), 0.1), dt=0.01, noise=noise)
+    engine = copies(well, np.full((400, 1), 0.1), dt=0.01, noise=noise)
     engine.advance(1200)
     warm = 2 / well.slope**2 if kind is HALF_V else 1 / well.stiffness
     for values, expected in ((engine.motion.q, warm), (engine.motion.v, 1.0)):

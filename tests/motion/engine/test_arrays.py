@@ -5,6 +5,7 @@ import pytest
 
 from polycorner import Manifold, Polyhedron
 from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.motion.contacts import velocities
 from polycorner.motion.engine.arrays import (
     Log,
     Model,
@@ -20,7 +21,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.system import System, bodies_of, velocities
+from polycorner.motion.system import System
 
 THREE = DumbbellDrum(count=3, floor=True).bodies
 SIZES = Sizes.of(THREE, 16)
@@ -86,7 +87,7 @@ def test_constants_are_brought_to_their_type_and_shape():
 
 def test_a_body_without_friction_has_arrays():
     M = Manifold.euclidean("x")
-    bodies = bodies_of(System(Polyhedron(M, {"floor": M.symbols[0]}), velocities(M)[0] ** 2 / 2))
+    bodies = System(Polyhedron(M, {"floor": M.symbols[0]}), velocities(M)[0] ** 2 / 2).bodies
     model = model_of(bodies, Sizes.of(bodies, 1), Noise(), Solver())
     assert model.load_sources.shape == (0, 1)
     assert model.slip_start.tolist() == [0]

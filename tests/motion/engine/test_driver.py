@@ -6,15 +6,16 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.formulas.compilation import sources_digest
 from polycorner.motion.engine import driver, entry_point
+from polycorner.motion.simulation import start
 
 
 def test_room_for_contacts_grows(monkeypatch):
     """Contacts of sleepers are kept while others meet: both need room."""
     drum = DumbbellDrum(count=12, floor=True)
     starts = bunch(drum, np.random.default_rng(3))
-    ample = drum.engine(starts)
+    ample = start(drum, drum.state(starts), 1e-3)
     monkeypatch.setattr(driver, "CONTACTS_PER_BODY", 0)
-    narrow = drum.engine(starts)
+    narrow = start(drum, drum.state(starts), 1e-3)
     assert narrow.capacity < ample.capacity
     for _ in range(300):  # a repeated step starts from other impulses
         ample.advance(1)

@@ -8,6 +8,7 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.motion.engine.arrays import OWN_FRICTION
 from polycorner.motion.engine.sets import DISC
+from polycorner.motion.simulation import start
 
 
 def spare(engine, before):
@@ -51,7 +52,7 @@ def test_a_pile_remains_at_rest_as_long_as_it_can():
     there is none when the pile starts to slide.
     """
     drum = DumbbellDrum(count=8, floor=True)
-    engine = drum.engine(bunch(drum, np.random.default_rng(3)))
+    engine = start(drum, drum.state(bunch(drum, np.random.default_rng(3))), 1e-3)
     engine.advance(9500)
     left, slides = [], []
     while engine.time < 30:

@@ -1,0 +1,193 @@
+"""Checkpoints of a simulation: a folder from which an interrupted run continues bit for bit.
+
+The folder has ``state.npz``, the engine's state, and ``chunk-*.npz``, what was recorded between
+two saves.  A chunk is written before the state that counts it, and every file atomically; so
+whenever a run is killed, the folder has a state and all that belongs to it.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from polycorner.atomic import PART
+from polycorner.checks import real
+from polycorner.container import BINARY, Kind
+from polycorner.motion.recorder import Recorder
+from polycorner.motion.tables import event_table, read_events, read_touches, touch_table
+from polycorner.values import Value
+
+KIND = Kind("checkpoint", "a simulation", BINARY)
+STATE = "state.npz"
+ENGINE = "engine."
+SHOWN = 40  # characters of a value in an error
+DAMAGE = (KeyError, IndexError, ValueError, OSError)
+
+
+@dataclass(frozen=True)
+class Checkpoint(Value):
+    """Where and how often a simulation saves its progress, and whether it continues from there.
+
+    ==================================  =======================  ==========================
+    In the folder                       ``resume=True``          ``resume=False``
+    ==================================  =======================  ==========================
+    nothing                             starts                   starts
+    unfinished run, same parameters     continues                starts anew
+    finished run, same parameters       returns it               starts anew
+    unfinished run, other parameters    refused                  refused
+    finished run, other parameters      refused                  starts anew
+    ==================================  =======================  ==========================
+
+    An error names the parameter that differs.  What does not belong to a run is never removed.
+
+    Parameters
+    ----------
+    folder : path
+        It is made if need be.
+    seconds : float, optional
+        Save at the first record after so many seconds of real time; default 30.
+    resume : bool, optional
+        Default True, so that one and the same script starts a run and continues it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+    """
+
+    folder: str | os.PathLike[str]
+    seconds: float = 30.0
+    resume: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", Path(self.folder))
+        object.__setattr__(self, "seconds", real("seconds", self.seconds, least=0))
+        super().__post_init__()
+
+    def clear(self) -> None:
+        """Remove the saved run, and the folder when nothing else is in it."""
+        folder = Path(self.folder)
+        if not folder.is_dir():
+            return
+        for pattern in (STATE, "chunk-*.npz", f".state-*{PART}.npz", f".chunk-*{PART}.npz"):
+            for entry in folder.glob(pattern):
+                entry.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+
+
+class SavedRun:
+    """The run in the folder of a checkpoint.
+
+    Parameters
+    ----------
+    checkpoint : Checkpoint
+    parameters : mapping
+        Everything that the run depends on, by name, as values that JSON can hold.
+    """
+
+    def __init__(self, checkpoint: Checkpoint, parameters: Mapping[str, Any]) -> None:
+        self.checkpoint, self.folder = checkpoint, Path(checkpoint.folder)
+        self.parameters = json.loads(json.dumps(parameters, default=str))
+        self._chunks = self._frames = self._events = 0
+
+    def begin(self, recorder: Recorder) -> bool:
+        """Bring a fresh recorder to where the run was saved; return whether there was one.
+
+        Raises
+        ------
+        ValueError
+            If the saved run has other parameters, another format, or damaged files.
+        """
+        if not (self.folder / STATE).exists():
+            self.checkpoint.clear()  # chunks of a run that was killed before its first state
+            return False
+        try:
+            state = KIND.load_arrays(self.folder / STATE)
+            finished, resume = bool(state["finished"]), self.checkpoint.resume
+            if resume or not finished:
+                self._compare(json.loads(str(state["parameters"])), finished=finished)
+            if resume:
+                self._fill(recorder, state)
+        except _RefusedError as error:
+            raise ValueError(str(error)) from None
+        except DAMAGE as error:
+            msg = f"checkpoint: expected a saved run; {self.folder} is damaged ({error})"
+            raise ValueError(msg) from error
+        if not resume:
+            self.checkpoint.clear()
+        return resume
+
+    def _compare(self, saved: dict[str, Any], *, finished: bool) -> None:
+        """Raise for the first parameter that differs from that of the saved run."""
+        for name in [*self.parameters, *saved]:
+            here, there = self.parameters.get(name), saved.get(name)
+            if here != there:
+                kind = "finished" if finished else "unfinished"
+                msg = (
+                    f"checkpoint: expected {name} = {_short(there)} as in the {kind} run in "
+                    f"{self.folder}; got {_short(here)}: choose another folder or remove that run"
+                )
+                raise _RefusedError(msg)
+
+    def save(self, recorder: Recorder, *, finished: bool) -> None:
+        """Add what was recorded since the last save, and the present state."""
+        names, since = recorder.engine.bodies.contact_names, self._frames
+        arrays = {name: np.array(rows[since:]) for name, rows in recorder.columns.items()}
+        arrays["left"] = np.array(recorder.left[since:], dtype=np.float64)
+        arrays |= touch_table(recorder.touching[since:], names)
+        arrays |= event_table(recorder.events[self._events :], names)
+        KIND.save_arrays(self._chunk(self._chunks), arrays)
+        state = {
+            "parameters": np.array(json.dumps(self.parameters)),
+            "finished": np.array(finished),
+            "chunks": np.array(self._chunks + 1),
+            "frames": np.array(len(recorder.left)),
+            "gone": np.array(recorder.gone),
+            **{ENGINE + name: array for name, array in recorder.engine.save().items()},
+        }
+        KIND.save_arrays(self.folder / STATE, state)
+        self._chunks += 1
+        self._frames, self._events = len(recorder.left), len(recorder.events)
+
+    def _chunk(self, number: int) -> Path:
+        return self.folder / f"chunk-{number:06d}.npz"
+
+    def _fill(self, recorder: Recorder, state: dict[str, Any]) -> None:
+        names = recorder.engine.bodies.contact_names
+        for number in range(int(state["chunks"])):
+            chunk = KIND.load_arrays(self._chunk(number))
+            for name, rows in recorder.columns.items():
+                rows.extend(chunk[name])
+            recorder.left += chunk["left"].tolist()
+            recorder.touching += read_touches(chunk, names, len(chunk["left"]))
+            recorder.events += read_events(chunk, names)
+        if len(recorder.left) != int(state["frames"]):
+            msg = f"{int(state['frames'])} instants were saved, {len(recorder.left)} are there"
+            raise ValueError(msg)
+        recorder.gone = float(state["gone"])
+        saved = {name.removeprefix(ENGINE): a for name, a in state.items() if ENGINE in name}
+        recorder.engine.load(saved)
+        self._chunks = int(state["chunks"])
+        self._frames, self._events = len(recorder.left), len(recorder.events)
+
+
+class _RefusedError(Exception):
+    """A saved run that is whole, but not the one that was asked for."""
+
+
+def fingerprint(array: Any) -> str:
+    """Return a digest of an array's numbers, to the last bit."""
+    content = np.ascontiguousarray(array)
+    return hashlib.sha256(content.tobytes()).hexdigest()[:16]
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."

@@ -1,0 +1,233 @@
+"""Friction contacts of a body and families of contacts between identical bodies, in SymPy."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from polycorner.checks import mapping, names, real, refuse
+from polycorner.formulas.families import Family
+from polycorner.motion.bodies import PairContacts
+from polycorner.motion.convex_sets import ConvexSet
+from polycorner.motion.formulation import dotted
+from polycorner.motion.friction import Disc, Interval
+from polycorner.spaces.manifold import Manifold
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    import sympy
+
+    Symbols = tuple[sympy.Symbol, ...]
+
+PAIR = (1, 2)  # numbers of the two bodies of a pair in names of coordinates
+
+
+def velocities(manifold: Manifold) -> "Symbols":
+    """Return the velocities as real SymPy symbols: ``x_dot`` for the coordinate ``x``."""
+    return _symbols(dotted(name) for name in manifold.names)
+
+
+def pair_coordinates(manifold: Manifold) -> "tuple[Symbols, Symbols]":
+    """Return the coordinates of two bodies: of the coordinate ``x`` the symbols ``x1``, ``x2``."""
+    one, two = (_symbols(f"{name}{k}" for name in manifold.names) for k in PAIR)
+    return one, two
+
+
+def pair_velocities(manifold: Manifold) -> "tuple[Symbols, Symbols]":
+    """Return the velocities of two bodies: for the coordinate ``x`` ``x1_dot`` and ``x2_dot``."""
+    one, two = (_symbols(dotted(f"{name}{k}") for name in manifold.names) for k in PAIR)
+    return one, two
+
+
+def _symbols(written: Any) -> "Symbols":
+    import sympy
+
+    return tuple(sympy.Symbol(name, real=True) for name in written)
+
+
+@dataclass(frozen=True)
+class Friction(Value):
+    """Dry friction: a force in a convex set that grows with a normal load.
+
+    The force per unit load ``p`` lies in ``C``, and where it slips it does so against the force
+    that dissipates most: ``-s`` is normal to ``C`` at ``p`` ([Moreau]).  ``C`` is ``static`` while
+    the contact sticks (its slip was exactly zero) and ``dynamic`` while it slips.
+
+    Parameters
+    ----------
+    name : str
+        Name of the contact.
+    slip : sequence of sympy.Expr
+        One or two components of the slip velocity, affine in the velocities ``x_dot``.  A
+        substrate that moves is a term without velocities.
+    static : ConvexSet
+        Forces per unit load that may hold it, of as many dimensions as ``slip``.
+    load : str, sympy.Expr or sequence of sympy.Expr
+        The unilateral contact whose force presses, by name; or the known normal force as a
+        function of the coordinates (several: their sum).
+    dynamic : ConvexSet, optional
+        Forces per unit load while it slips, inside ``static``; default ``static``.
+    kind : str, optional
+        Cause under which its dissipation is booked: ``"sliding"`` (default), ``"rolling"``, ...
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+    """
+
+    name: str
+    slip: "tuple[sympy.Expr, ...]"
+    static: ConvexSet
+    load: "str | tuple[sympy.Expr, ...]"
+    dynamic: ConvexSet | None = None
+    kind: str = "sliding"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "slip", _several(self.slip))
+        if not isinstance(self.load, str):
+            object.__setattr__(self, "load", _several(self.load))
+        check_set("static", self.static)
+        check_sets(self.name, self.static, self.dynamic)
+        if self.dynamic is None:
+            object.__setattr__(self, "dynamic", self.static)
+        if len(self.slip) != self.static.dimension:
+            components = f"{self.static.dimension} components for friction {self.name!r}"
+            refuse("slip", f"{components}, as its set has", len(self.slip))
+        super().__post_init__()
+
+    @property
+    def moving(self) -> ConvexSet:
+        """The set while the contact slips."""
+        return self.static if self.dynamic is None else self.dynamic
+
+
+def check_set(argument: str, shape: object) -> ConvexSet:
+    """Return a convex set, or raise TypeError."""
+    if not isinstance(shape, ConvexSet):
+        refuse(argument, "a convex set such as Disc(0.3)", shape, TypeError)
+    return shape
+
+
+def check_sets(name: str, static: ConvexSet, dynamic: ConvexSet | None) -> None:
+    """Raise unless the dynamic set is inside the static one."""
+    if dynamic is None:
+        return
+    if not isinstance(dynamic, ConvexSet) or dynamic.dimension != static.dimension:
+        refuse("dynamic", f"a convex set like {static} for {name!r}", dynamic)
+    if not dynamic.within(static):
+        refuse("dynamic", f"a set inside {static} for friction {name!r}", dynamic)
+
+
+def _several(values: Any) -> tuple[Any, ...]:
+    return tuple(values) if isinstance(values, Sequence) else (values,)
+
+
+@dataclass(frozen=True)
+class ContactFamily(Value):
+    """The contacts between any two of several identical bodies.
+
+    Expressions are written for a pair, in the coordinates of both: of the coordinate ``x`` they
+    are ``x1`` and ``x2`` (:func:`pair_coordinates`), its velocities ``x1_dot`` and ``x2_dot``
+    (:func:`pair_velocities`).
+
+    Parameters
+    ----------
+    gaps : mapping from str to sympy.Expr
+        The gaps of a pair by name, positive while the two do not touch there.
+    reach : float
+        Distance of positions, in scaled coordinates, beyond which two bodies cannot touch.
+    position : sequence of str, optional
+        One or two coordinates that are the position of a body, by which near pairs are found;
+        default the first two.
+    slip : mapping from str to sequence of sympy.Expr, optional
+        One or two components of the slip velocity at each of the gaps, affine in the velocities;
+        default no friction.
+    static, dynamic : ConvexSet, optional
+        Friction force per unit normal force while a contact sticks and while it slips, of as many
+        dimensions as ``slip``; of one dimension an ``Interval(mu)``.  Default of ``dynamic`` is
+        ``static``.
+    restitution : float, optional
+        Newton's coefficient ``0 <= e <= 1``; default 0, plastic.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+    """
+
+    gaps: "Mapping[str, sympy.Expr]"
+    reach: float
+    position: tuple[str, ...] = ()
+    slip: "Mapping[str, tuple[sympy.Expr, ...]]" = field(default_factory=dict)
+    static: ConvexSet | None = None
+    dynamic: ConvexSet | None = None
+    restitution: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not mapping("gaps", self.gaps):
+            refuse("gaps", "at least one gap of a pair", self.gaps)
+        object.__setattr__(self, "gaps", dict(self.gaps))
+        object.__setattr__(self, "reach", real("reach", self.reach, above=0))
+        position = (self.position,) if isinstance(self.position, str) else tuple(self.position)
+        object.__setattr__(self, "position", position)
+        slip = {name: _several(rows) for name, rows in mapping("slip", self.slip).items()}
+        object.__setattr__(self, "slip", slip)
+        object.__setattr__(
+            self, "restitution", real("restitution", self.restitution, least=0, most=1)
+        )
+        self._check_friction()
+        super().__post_init__()
+
+    def _check_friction(self) -> None:
+        if not self.slip:
+            if self.static is not None or self.dynamic is not None:
+                refuse("slip", "the slip velocity at each gap beside static", self.slip)
+            return
+        static = check_set("static", self.static)
+        names("slip", self.slip, self.gaps)
+        if missing := [name for name in self.gaps if name not in self.slip]:
+            refuse("slip", f"the slip velocity at every gap, {missing[0]!r} included", [*self.slip])
+        for name, rows in self.slip.items():
+            if len(rows) != static.dimension:
+                refuse(
+                    "slip", f"{static.dimension} components at {name!r}, as static has", len(rows)
+                )
+        check_sets("between bodies", static, self.dynamic)
+        for argument in ("static", "dynamic"):
+            shape = getattr(self, argument)
+            if isinstance(shape, Interval) and shape.lower != -shape.upper:
+                refuse(
+                    argument, "an interval that is symmetric, for the bodies are identical", shape
+                )
+
+    def compiled(self, manifold: Manifold) -> PairContacts:
+        """Return the compiled contacts of bodies whose coordinates are those of a manifold."""
+        coordinates = tuple(s.name for one in pair_coordinates(manifold) for s in one)
+        rates = tuple(s.name for one in pair_velocities(manifold) for s in one)
+        static = self.static or Disc(0.0)
+        slips = tuple(
+            (_slip_family(self.slip[name], (*coordinates, *rates)), False, ())
+            for name in self.gaps
+            if self.slip
+        )
+        n = manifold.dimension
+        return PairContacts(
+            Family.of(self.gaps, coordinates),
+            (),
+            tuple((body, c) for body in range(2) for c in range(n)),
+            slips,
+            _plane(static),
+            _plane(self.dynamic or static),
+            self.restitution,
+            self.reach,
+        )
+
+
+def _slip_family(rows: "tuple[sympy.Expr, ...]", variables: tuple[str, ...]) -> Family:
+    padded = (*rows, *[0] * (2 - len(rows)))  # the engine's contacts slip in two directions
+    return Family.of({f"s{i}": row for i, row in enumerate(padded)}, variables)
+
+
+def _plane(shape: ConvexSet) -> ConvexSet:
+    """Return a set of two dimensions, of which the second is not used if there was but one."""
+    return Disc(shape.upper) if isinstance(shape, Interval) else shape

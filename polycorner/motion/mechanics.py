@@ -1,0 +1,78 @@
+"""States, and the base of everything that a simulation can move."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.noise import Solver
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+OVERLAP = 1e-4  # scaled depth up to which a start counts as touching: what a step may leave
+
+
+@dataclass(frozen=True, eq=False)
+class State(Value):
+    """Placement, velocity, and the friction contacts that stick.
+
+    Attributes
+    ----------
+    time : float
+    q, v : (n,) or (N, k) array
+        Coordinates (not wrapped, so that turns are counted) and velocities, of one body or of
+        ``N`` bodies.
+    sticking : (F,) or (N, F) array of bool
+        For each friction contact, whether its slip was exactly zero: its static set holds.
+    """
+
+    time: float
+    q: Array
+    v: Array
+    sticking: NDArray[np.bool_]
+
+
+class MechanicalSystem(Value, ABC):
+    """Base of the systems that :func:`~polycorner.motion.simulation.simulate` moves.
+
+    :class:`~polycorner.motion.system.System` is written in SymPy expressions; a model may derive
+    from this class to bring formulas of its own.
+    """
+
+    @property
+    @abstractmethod
+    def bodies(self) -> IdenticalBodies:
+        """The bodies and their contacts, for the engine."""
+
+    @abstractmethod
+    def state(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> State:
+        """Return a state, after checking that nothing overlaps.
+
+        Parameters
+        ----------
+        q : array
+            Placement of all bodies.
+        v : array, optional
+            Velocities; by default every body is at rest on its substrate.
+        time : float, optional
+        """
+
+    @abstractmethod
+    def check_placement(self, q: Array) -> None:
+        """Raise ValueError if bodies overlap, naming the worst contact."""
+
+    @abstractmethod
+    def largest_step(self, state: State) -> tuple[float, str]:
+        """Return the largest step in s, and what limits it."""
+
+    @abstractmethod
+    def described(self) -> dict[str, Any]:
+        """Return everything that a motion depends on, by name, as plain values."""
+
+    @property
+    def solver(self) -> Solver:
+        """How exactly steps are solved unless something else is asked for."""
+        return Solver()

@@ -1,0 +1,237 @@
+"""Runs that are saved: interrupted or killed they continue bit for bit, others are refused."""
+
+import itertools
+import math
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from discs import DISCS, START
+from kept_files import same_motion as same
+
+from polycorner import atomic as writing
+from polycorner.models.textbook import bouncing_ball
+from polycorner.motion import Checkpoint, Noise, Solver, simulate
+from polycorner.motion.checkpoints import STATE
+
+NOISE = Noise(kicks={"x": 0.3}, seed=5)
+LASTING = 1.5
+
+
+def followed(folder=None, *, system=DISCS, state=None, t_end=LASTING, dt=1e-3, **options):
+    """Discs that fall, collide, settle and leave, saved at every record."""
+    saving = {name: options.pop(name) for name in ("resume", "seconds") if name in options}
+    if folder is not None:
+        options["checkpoint"] = Checkpoint(folder, **({"seconds": 0.0} | saving))
+    state = system.state(START) if state is None else state
+    return simulate(system, state, t_end, dt, **({"every": 20, "noise": NOISE} | options))
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Return the run that was never stopped."""
+    path = followed()
+    assert len(path.events) > 10
+    assert any(len(touches) > 1 for touches in path.touching)
+    assert path.finished
+    return path
+
+
+def test_saving_changes_nothing(whole, tmp_path):
+    same(followed(tmp_path / "deep" / "state"), whole)
+
+
+class Killed(BaseException):
+    """A process that is killed handles nothing."""
+
+
+@pytest.mark.parametrize("moment", range(1, 30, 3))
+def test_a_run_killed_while_a_file_is_written_continues(whole, tmp_path, monkeypatch, moment):
+    """Every save synchronises two files and their folder twice; the run dies at one of these."""
+    usual, seen = writing._synchronise, itertools.count(1)
+
+    def dying(path):
+        if next(seen) == moment:
+            raise Killed
+        usual(path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writing, "_synchronise", dying)
+        patch.setattr("pathlib.Path.unlink", lambda *_, **__: None)  # nor does it tidy up
+        with pytest.raises(Killed):
+            followed(tmp_path / "state")
+    assert (tmp_path / "state" / STATE).exists() == (moment > 3)
+    same(followed(tmp_path / "state"), whole)
+
+
+SCRIPT = """
+import sys
+sys.path[:0] = {path!r}
+from test_checkpoints import followed
+followed({folder!r})
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+def test_a_killed_process_loses_nothing(whole, tmp_path):
+    """Kill it again and again at random moments; it saves almost all the time."""
+    rng = np.random.default_rng()
+    here = Path(__file__).parent
+    path = [str(here), str(here.parent / "support"), str(here.parents[1])]
+    state, kills = tmp_path / STATE, 0
+    for _ in range(4):
+        before = state.stat().st_mtime_ns if state.exists() else 0
+        code = SCRIPT.format(path=path, folder=str(tmp_path))
+        process = subprocess.Popen([sys.executable, "-c", code])
+        while process.poll() is None and (not state.exists() or state.stat().st_mtime_ns == before):
+            time.sleep(0.001)
+        time.sleep(rng.uniform(0, 0.05))
+        process.kill()
+        kills += process.wait() == -signal.SIGKILL
+    assert kills >= 1
+    same(followed(tmp_path), whole)
+
+
+def interrupting(*times):
+    """Return a progress that presses Ctrl-C at these times."""
+    left = list(times)
+
+    def progress(done, total, note):
+        assert total == pytest.approx(LASTING)
+        assert note
+        if left and done > left[0]:
+            left.pop(0)
+            signal.raise_signal(signal.SIGINT)
+
+    return progress
+
+
+def test_an_interrupted_run_keeps_what_is_done(whole, tmp_path):
+    part = followed(tmp_path, seconds=1e6, progress=interrupting(0.5))
+    assert not part.finished
+    assert "unfinished" in str(part)
+    assert 0.5 < part.times[-1] < 0.6
+    np.testing.assert_array_equal(part.q, whole.q[: len(part)])
+    same(followed(tmp_path), whole)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_second_interruption_ends_at_once_and_so_does_one_without_a_checkpoint(tmp_path):
+    def impatient(*_):
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        followed(tmp_path, progress=impatient)
+    with pytest.raises(KeyboardInterrupt):
+        followed(progress=interrupting(0.5))
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_the_clock_decides_when_a_run_is_saved(tmp_path):
+    saves = []
+
+    def counting(*_):
+        saves.append(len(list(tmp_path.glob("chunk-*"))))
+
+    followed(tmp_path, seconds=1e6, progress=counting)
+    assert max(saves) == 0
+    assert len(list(tmp_path.glob("chunk-*"))) == 1
+    followed(tmp_path, resume=False, seconds=0.0, progress=counting)
+    assert max(saves) == len(saves) // 2
+
+
+def test_progress_is_reported_at_every_record():
+    told = []
+    followed(progress=lambda done, _total, _note: told.append(done))
+    np.testing.assert_allclose(told, np.arange(1, 76) * 0.02, atol=1e-12)
+
+
+# ----------------------------------------------------------------------------------- other runs
+
+CHANGES = {
+    "noise.seed": {"noise": replace(NOISE, seed=6)},
+    "noise.kicks": {"noise": Noise(kicks={"x": 0.2}, seed=5)},
+    "dt": {"dt": 5e-4},
+    "every": {"every": 10},
+    "t_end": {"t_end": 2.0},
+    "solver.tolerance": {"solver": Solver(tolerance=1e-6)},
+    "state.q": {"state": DISCS.state(START + np.array([1e-9, 0.0]))},
+    "restitution": {"system": replace(DISCS, restitution=0.1)},
+    "exits": {"system": replace(DISCS, exits={"x": 9.0})},
+}
+
+
+@pytest.mark.parametrize("resume", [True, False])
+@pytest.mark.parametrize("name", CHANGES)
+def test_an_unfinished_run_of_other_parameters_is_refused_and_kept(tmp_path, name, resume):
+    followed(tmp_path, progress=interrupting(0.1))
+    before = {entry: entry.read_bytes() for entry in tmp_path.iterdir()}
+    with pytest.raises(ValueError, match=rf"^checkpoint: expected {name} = .* unfinished run in"):
+        followed(tmp_path, resume=resume, **CHANGES[name])
+    assert {entry: entry.read_bytes() for entry in tmp_path.iterdir()} == before
+
+
+def test_a_finished_run_is_returned_or_gives_way_to_a_new_one(whole, tmp_path):
+    followed(tmp_path)
+    told = []
+    same(followed(tmp_path, progress=lambda *_: told.append(1)), whole)
+    assert not told
+    with pytest.raises(ValueError, match=r"^checkpoint: expected dt = 0\.001 .* finished run in"):
+        followed(tmp_path, dt=5e-4)
+    assert followed(tmp_path, dt=5e-4, resume=False).dt == 5e-4
+
+
+def test_a_new_run_removes_nothing_but_the_old_one(whole, tmp_path):
+    followed(tmp_path, progress=interrupting(1.0))
+    (tmp_path / "mine.txt").write_text("kept")
+    same(followed(tmp_path, resume=False, seconds=1e6), whole)
+    assert len(list(tmp_path.glob("chunk-*"))) == 1
+    Checkpoint(tmp_path).clear()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_damaged_files_are_refused(tmp_path):
+    followed(tmp_path, progress=interrupting(0.5))
+    chunks = sorted(tmp_path.glob("chunk-*"))
+    content = chunks[1].read_bytes()
+    flipped = bytearray(content)
+    flipped[len(content) // 2] ^= 1
+    for damaged in (content[: len(content) // 2], b"", bytes(flipped)):
+        chunks[1].write_bytes(damaged)
+        with pytest.raises(ValueError, match=r"^checkpoint: .* is damaged"):
+            followed(tmp_path)
+    chunks[1].unlink()
+    with pytest.raises(ValueError, match=r"^checkpoint: .* is damaged"):
+        followed(tmp_path)
+    (tmp_path / STATE).write_text("something else")
+    with pytest.raises(ValueError, match=r"^checkpoint: .* is damaged"):
+        followed(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["one body", "dumbbells"])
+def test_any_system_continues(kind, tmp_path):
+    if kind == "one body":
+        system = bouncing_ball(0.5)
+        state = system.state([1.0])
+    else:
+        from polycorner.dumbbells import DumbbellDrum
+
+        system = DumbbellDrum(count=2)
+        state = system.state(system.pair.nested("R", clearance=0.05).reshape(2, 3))
+    options = {"system": system, "state": state, "noise": None, "every": 10}
+    part = followed(tmp_path, **options, progress=interrupting(0.7))
+    assert not part.finished
+    same(followed(tmp_path, **options), followed(**options))
+
+
+@pytest.mark.parametrize("seconds", [-1.0, math.nan, "often"])
+def test_seconds_are_checked(seconds):
+    with pytest.raises((TypeError, ValueError), match=r"^seconds: expected a number >= 0"):
+        Checkpoint("state", seconds)
