@@ -20,7 +20,7 @@ def drum_answer(path: "Trajectory", values: dict[str, Any]) -> dict[str, Any]:
     top, bottom = (math.degrees(x) for x in drum_pairs.turning_azimuths(path))
     two = path.q.shape[1] == 2
     return {
-        "parameters": {**values, "count": path.q.shape[1]},
+        "parameters": _parameters(values) | {"count": path.q.shape[1]},
         "finished": path.finished,
         "time": float(path.times[-1]),
         "chirality": drum_pairs.handedness(path) if two else None,
@@ -44,6 +44,13 @@ def drum_answer(path: "Trajectory", values: dict[str, Any]) -> dict[str, Any]:
             for name in ("steps", "islands", "sweeps", "newton_steps", "unconverged", "residual")
         },
     }
+
+
+def _parameters(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the options, those in degrees under keys that end in ``_deg``."""
+    told = {f"{k}_deg" if k in ("tilt", "heading") else k: v for k, v in values.items()}
+    names = ("azimuth_deg", "eta", "heading_deg")
+    return told | {"start": [dict(zip(names, s, strict=True)) for s in values["start"] or ()]}
 
 
 def _upright(degrees: float) -> float:

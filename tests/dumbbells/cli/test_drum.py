@@ -11,6 +11,7 @@ import commands
 import numpy as np
 import pytest
 
+from polycorner.dumbbells.cli.drum_report import _parameters
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.files import load_run
 from polycorner.dumbbells.pictures import movies
@@ -316,3 +317,12 @@ def test_help_names_every_option(capsys):
     assert (code, err) == (0, "")
     for option in ("--pair", "--heading", "--mu-slide", "--movie", "--resume", "--json", "--out"):
         assert option in out
+
+
+def test_options_in_degrees_have_keys_that_say_so():
+    values = {"tilt": 7.0, "heading": (5.0,), "start": ((0.0, 10.0, 5.0),), "spin": 0.01}
+    told = _parameters(values)
+    assert told["tilt_deg"] == 7.0
+    assert told["heading_deg"] == (5.0,)
+    assert told["start"] == [{"azimuth_deg": 0.0, "eta": 10.0, "heading_deg": 5.0}]
+    assert _parameters(values | {"start": None})["start"] == []
