@@ -1,4 +1,4 @@
-"""Figures of regions, solids, clusters, disks and sweeps; never imported by the core."""
+"""Figures of regions, solids, clusters, disks and proofs; never imported by the core."""
 
 import lazy_loader
 
