@@ -188,15 +188,19 @@ def _told(system: System) -> dict[str, Any]:
         "forces": {name: text(force) for name, force in system.forces.items()},
         "gaps": {f.name: [text(f.expression), *f.parameters] for f in polyhedron.functions},
     }
-    if (between := system.between) is not None:
-        told["between"] = [*between.gaps, str(between.static), str(between.dynamic)]
-    return told
+    between = system.between and {
+        "gaps": {name: text(gap) for name, gap in system.between.gaps.items()},
+        "slip": {name: [text(s) for s in slip] for name, slip in system.between.slip.items()},
+        "friction": f"{system.between.static}, {system.between.dynamic}",
+        "restitution": system.between.restitution,
+    }
+    return told | {"count": system.count, "between": between}
 
 
 def _read(content: "xr.Dataset", system: System) -> "str | Trajectory":
     written, here = json.loads(content.attrs["system"]), _told(system)
     for key, value in here.items():
-        if written.get(key) != value:
+        if written[key] != value:
             return f"{key}: written {written[key]}, found {value}"
     q, v = (np.array(content[name].values) for name in ("q", "v"))
     return read_motion(content, system, q, v)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from discs import DISCS
 from kept_files import motion
 from kept_files import same_motion as same
 
@@ -164,3 +165,11 @@ def test_a_file_that_another_program_wrote_is_refused(tmp_path):
     data.to_netcdf(tmp_path / "anew.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match=r"^path: expected a trajectory .* was changed or cut off"):
         load_trajectory(tmp_path / "anew.nc", BALL)
+
+
+def test_several_bodies_are_those_of_the_system(tmp_path):
+    known = motion(DISCS, DISCS.count, DISCS.manifold.dimension, DISCS.contacts[0])
+    path = save_trajectory(known, tmp_path / "discs.nc")
+    same(load_trajectory(path, DISCS), known)
+    with pytest.raises(ValueError, match="between: written"):
+        load_trajectory(path, replace(DISCS, between=replace(DISCS.between, restitution=0.9)))

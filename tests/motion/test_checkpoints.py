@@ -8,16 +8,19 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from discs import DISCS, START
+from hypothesis import given
+from hypothesis import strategies as st
 from kept_files import same_motion as same
 
 from polycorner import atomic as writing
 from polycorner.models.textbook import bouncing_ball
-from polycorner.motion import Checkpoint, Noise, Solver, simulate
-from polycorner.motion.checkpoints import STATE
+from polycorner.motion import Checkpoint, Event, EventKind, Noise, Solver, simulate
+from polycorner.motion.checkpoints import KIND, STATE, SavedRun
 
 NOISE = Noise(kicks={"x": 0.3}, seed=5)
 LASTING = 1.5
@@ -213,6 +216,58 @@ def test_damaged_files_are_refused(tmp_path):
     (tmp_path / STATE).write_text("something else")
     with pytest.raises(ValueError, match=r"^checkpoint: .* is damaged"):
         followed(tmp_path)
+
+
+def test_a_newer_checkpoint_is_refused_naming_both_versions(tmp_path):
+    replace(KIND, version=2).save_arrays(tmp_path / STATE, {"finished": np.array(False)})
+    with pytest.raises(ValueError, match=r"^checkpoint: .* has version 2, .* up to version 1"):
+        followed(tmp_path)
+
+
+class Engine:
+    """The part of an engine that checkpoints use."""
+
+    def __init__(self):
+        self.q = np.array([1.0, 2.0])
+        self.bodies = SimpleNamespace(contact_names=("left", "right"))
+
+    def save(self):
+        return {"q": self.q}
+
+    def load(self, arrays):
+        self.q = arrays["q"]
+
+
+def recorder(rows):
+    return SimpleNamespace(
+        engine=Engine(),
+        columns={"times": [0.1 * k for k in range(rows)]},
+        left=[0.0] * rows,
+        touching=[(((0,), "left", 1.5),)] * rows,
+        events=[Event(0.05, EventKind.IMPACT, (0,), "right", 2.0)] * bool(rows),
+        gone=0.25,
+    )
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """Return the files of a run that was saved once."""
+    folder = tmp_path_factory.mktemp("saved")
+    SavedRun(Checkpoint(folder), {"count": 1}).save(recorder(3), finished=False)
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@given(data=st.data())
+def test_a_single_flipped_bit_is_noticed(saved, tmp_path_factory, data):
+    name = data.draw(st.sampled_from(sorted(saved)))
+    changed = bytearray(saved[name])
+    position = data.draw(st.integers(0, 8 * len(changed) - 1))
+    changed[position // 8] ^= 1 << position % 8
+    folder = tmp_path_factory.mktemp("flipped")
+    for other, content in (saved | {name: bytes(changed)}).items():
+        (folder / other).write_bytes(content)
+    with pytest.raises(ValueError, match=rf"^checkpoint: .* is damaged .*{name}"):
+        SavedRun(Checkpoint(folder), {"count": 1}).begin(recorder(0))
 
 
 @pytest.mark.parametrize("kind", ["one body", "dumbbells"])

@@ -32,6 +32,7 @@ def motion(system, bodies, coordinates, contact, *, instants=9, seed=0):
         ),
         max_penetration=1e-7,
         effort=Effort(*range(5), residual=1e-12),
+        t_end=0.1 * (instants - 1),
     )
 
 
