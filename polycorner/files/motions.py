@@ -115,15 +115,9 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
         "noise_correlation_time": float(path.noise.correlation_time),
         "noise_kicks": json.dumps(dict(path.noise.kicks)),
         "every": np.int64(path.every),
-        "duration": _duration(path),
+        "t_end": math.nan if path.t_end is None else path.t_end,
         "steps_per_second": path.steps_per_second,
     }
-
-
-def _duration(path: Trajectory) -> float:
-    """Return the time that was asked for, in s."""
-    end = float(path.times[-1]) if path.t_end is None else path.t_end
-    return end - float(path.times[0])
 
 
 def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Array) -> Trajectory:
@@ -163,7 +157,7 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         effort=Effort(**whole, residual=float(at["effort_residual"])),
         noise=_noise(at),
         every=int(at.get("every", 1)),
-        t_end=float(of("time")[0]) + float(at["duration"]) if "duration" in at else None,
+        t_end=None if math.isnan(at["t_end"]) else float(at["t_end"]),
         steps_per_second=float(at.get("steps_per_second", math.nan)),
     )
 
