@@ -108,7 +108,9 @@ def descend(problem, use, m, rows, u, size, limit):
             outcome, v, exact, way = classify(problem, use, on, m, u, F, J, H, size, energy)
             if outcome == MINIMUM:
                 return CONVERGED, iteration, v, exact
-            if outcome == SADDLE and leave_saddle(problem, use, on, m, v, way, F, J, H, size):
+            if outcome == SADDLE and leave_saddle(
+                problem, use, on, m, v, way, F, J, H, size, energy
+            ):
                 for k in range(n):
                     u[k] = v[k]
                 continue
@@ -132,7 +134,9 @@ def descend(problem, use, m, rows, u, size, limit):
             factor *= 0.5
         if not accepted:
             outcome, v, exact, way = classify(problem, use, on, m, u, F, J, H, size, energy)
-            if outcome == SADDLE and leave_saddle(problem, use, on, m, v, way, F, J, H, size):
+            if outcome == SADDLE and leave_saddle(
+                problem, use, on, m, v, way, F, J, H, size, energy
+            ):
                 for k in range(n):
                     u[k] = v[k]
                 continue

@@ -111,20 +111,23 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
         rows[i] = rows[i] and lam[i] * length(J[i]) > 1e-9 * reference
     if least_curvature(F, J, H, lam, rows, m, direction) >= -CURVED:
         return MINIMUM, v, lam, direction
-    # Returning to a saddle that was left must be impossible, even by a rounding error.
-    return (SADDLE if F[last] <= energy else REJECTED), v, lam, direction
+    return SADDLE, v, lam, direction
 
 
 @njit
-def leave_saddle(problem, use, on, m, v, direction, F, J, H, size):
-    """Move ``v`` off a saddle to a lower feasible point along ``direction``; return success.
+def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
+    """Move ``v`` off a saddle along ``direction`` to a feasible point below ``energy``.
+
+    ``energy`` is that of the last iterate, so that a descent which leaves a saddle cannot return to
+    it, not even by a rounding error.  An iterate within the tolerance of feasibility may be lower
+    than the saddle itself; the point reached has to be below both.  Returns whether one was found.
 
     For each length a straight step is projected onto the set; if the set's curvature defeats it,
     the step follows the face instead.
     """
     never_inline()
     evaluate(problem, v, F, J, H, size, False)
-    energy = F[F.size - 1]
+    energy = min(energy, F[F.size - 1])
     along = np.zeros((1, v.size))
     along[0] = direction / length(direction)
     for k in range(48):
