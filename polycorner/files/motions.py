@@ -156,15 +156,13 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         max_penetration=float(at["max_penetration"]),
         effort=Effort(**whole, residual=float(at["effort_residual"])),
         noise=_noise(at),
-        every=int(at.get("every", 1)),
+        every=int(at["every"]),
         t_end=None if math.isnan(at["t_end"]) else float(at["t_end"]),
-        steps_per_second=float(at.get("steps_per_second", math.nan)),
+        steps_per_second=float(at["steps_per_second"]),
     )
 
 
 def _noise(at: Mapping[Any, Any]) -> Noise:
-    if "seed" not in at:  # files of the first version
-        return Noise()
     return Noise(
         chatter=float(at["noise_chatter"]),
         correlation_time=float(at["noise_correlation_time"]),

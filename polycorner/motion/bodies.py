@@ -158,6 +158,16 @@ class IdenticalBodies(Value):
         """Names of all contacts: those of a body with its surroundings, then those of a pair."""
         return (*self.body.contacts, *self.pair_contacts)
 
+    @property
+    def formula_keys(self) -> list[str]:
+        """Keys of all compiled formulas: they identify expressions to the last digit."""
+        found = [self.body.formulation.key]
+        found += [f"{call.family.key} {call.parameters.tolist()}" for call in self.body.gaps]
+        if self.contacts is not None:
+            slips = [family.key for family, _, _ in self.contacts.slips]
+            found += [self.contacts.gaps.key, *slips]
+        return found
+
     def least_pair_gap(self, q: Array) -> tuple[float, tuple[int, int], str]:
         """Return the least gap between two bodies, the bodies, and the contact.
 

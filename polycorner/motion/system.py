@@ -332,7 +332,7 @@ class System(MechanicalSystem):
             "restitution": dict(zip(self.contacts, self.restitutions.tolist(), strict=True)),
             "substrate": dict(self.substrate),
             "exits": dict(self.exits),
-            "formulas": self._digests(),
+            "formulas": self.bodies.formula_keys,
         }
         told |= {f"force {name}": str(force) for name, force in self.forces.items()}
         told |= {f"gap {f.name}": str(f.expression) for f in self.polyhedron.functions}
@@ -346,12 +346,3 @@ class System(MechanicalSystem):
             told["restitution between bodies"] = between.restitution
             told["reach"] = between.reach
         return told
-
-    def _digests(self) -> list[str]:
-        """Return the keys of all compiled formulas: expressions to the last digit."""
-        found = [self.formulation.key]
-        found += [f"{call.family.key} {call.parameters.tolist()}" for call in self.bodies.body.gaps]
-        contacts = self.bodies.contacts
-        if contacts is not None:
-            found += [contacts.gaps.key, *(family.key for family, _, _ in contacts.slips)]
-        return found
