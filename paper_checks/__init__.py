@@ -17,7 +17,7 @@ from paper_checks import (
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from paper_checks.framework.records import SECTIONS
 
-ORDER = tuple(SECTIONS)  # the paper's sections, then its appendices
+ORDER = tuple(SECTIONS)  # sections of the paper first, then appendices
 PARTS = (section2, section3, section4, section5, section6, section7, section8)
 APPENDICES = (appendixA, appendixB, appendixC)
 

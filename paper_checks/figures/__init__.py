@@ -1,4 +1,4 @@
-"""The paper's figures, regenerated from the model as far as that can be without its raw data."""
+"""The paper's figures, regenerated from the model as far as possible without its raw data."""
 
 from collections.abc import Callable, Iterable
 from os import PathLike
@@ -16,6 +16,7 @@ from paper_checks.figures import (
     solid,
 )
 from paper_checks.figures.figure import Figure
+from polycorner import checks
 
 FIGURES: dict[str, Figure] = {
     figure.name: figure
@@ -44,18 +45,18 @@ def write(
     Parameters
     ----------
     folder : path
-        It is made if need be.
+        Created if it does not exist.
     names : iterable of str, optional
-        Which; default all of :data:`FIGURES`.
+        Names of the figures to draw; default all of :data:`FIGURES`.
     slow : bool, optional
-        Whether figures that take a simulation are among all; those that are named are drawn.
+        Whether the default includes figures that take a simulation.
     progress : callable, optional
         Called with the name of each figure once it is written.
 
     Returns
     -------
     list of Path
-        What was written, two for each figure.
+        The files written, two for each figure.
 
     Raises
     ------
@@ -65,10 +66,7 @@ def write(
     if isinstance(names, str):
         names = [names]
     chosen = list(FIGURES) if names is None else list(dict.fromkeys(names))
-    for name in chosen:
-        if name not in FIGURES:
-            msg = f"names: expected some of {', '.join(FIGURES)}; got {name!r}"
-            raise ValueError(msg)
+    checks.names("names", chosen, FIGURES)
     written = []
     for name in chosen:
         figure = FIGURES[name]

@@ -13,14 +13,14 @@ from paper_checks.figures.figure import Figure
 
 DRUM = style.DRUM
 TILT, RADIUS = DRUM.tilt, DRUM.drum_radius
-LONG = 330.0  # mm, length of the drum that is drawn; the paper does not give it
+LONG = 330.0  # mm, length of the drum as drawn; the paper does not give it
 PLACE = (math.radians(30), 180.0, math.radians(24))  # phi, eta, theta of the dumbbell in space
-ENLARGED = 5  # times its size there
+ENLARGED = 5  # magnification of the dumbbell there
 EYE = np.array([0.46, -0.42, 0.55])
 
 
 def laboratory(phi: Any, eta: Any, radius: float = RADIUS) -> Any:
-    """Return ``x, y, z`` of places on the tilted drum, ``(..., 3)``; ``z`` is vertical."""
+    """Return ``x, y, z`` of points on the tilted drum, ``(..., 3)``; ``z`` is vertical."""
     phi, eta = np.broadcast_arrays(np.asarray(phi, dtype=float), np.asarray(eta, dtype=float))
     below = radius * np.cos(phi)  # the axis, towards the lowest line
     sine, cosine = math.sin(TILT), math.cos(TILT)
@@ -30,7 +30,7 @@ def laboratory(phi: Any, eta: Any, radius: float = RADIUS) -> Any:
 
 
 def seen(points: Any) -> Any:
-    """Return places on the page ``(..., 2)`` of points in space, looked at along parallel rays."""
+    """Return the parallel projection ``(..., 2)`` of points in space to the page."""
     eye = EYE / np.linalg.norm(EYE)
     right = np.cross([0.0, 0.0, 1.0], eye)
     right /= np.linalg.norm(right)

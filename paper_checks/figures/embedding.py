@@ -12,11 +12,11 @@ from paper_checks.framework.typesetting import html, plain
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawn
 
-LARGEST_SVG = 400_000  # bytes, above which a picture of many small parts goes in as pixels
+LARGEST_SVG = 400_000  # bytes; a larger picture of many small parts is embedded as pixels
 
 
 def embedded_figures(run: Run, *, slow: bool = False) -> dict[str, Embedded]:
-    """Draw the figures that claims of a run refer to, those that take long only if asked to.
+    """Draw the figures to which claims of a run refer, slow ones only on request.
 
     A figure that cannot be drawn is reported in its place.
     """
@@ -33,7 +33,7 @@ def _embedded(name: str, slow: bool) -> Embedded | None:
         if figure.slow and not slow:
             return None
         data = _data(figure.draw())
-    except Exception as error:  # whatever it is must not cost the report
+    except Exception as error:  # no exception may prevent the report
         problem = " ".join(f"{type(error).__name__}: {error}".split())
         return Embedded(name, name, "", problem)
     alternative = escape(plain(figure.alt), quote=True)

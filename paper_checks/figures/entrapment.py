@@ -15,21 +15,24 @@ from polycorner.dumbbells import dyad_minima
 from polycorner.models.wells.holding import ladder
 from polycorner.models.wells.wells import Well
 
-FRICTION, RESTITUTION = 0.04, 0.6  # of the depth per rim; of the wall
-START, TIME = 0.9, 16.0  # where the mass is let go, in rims; in rims times sqrt(mass / depth)
+FRICTION, RESTITUTION = 0.04, 0.6  # friction in units of depth per rim; restitution of the wall
+START, TIME = (
+    0.9,
+    16.0,
+)  # starting position of the mass, in rims; duration, in rims times sqrt(mass / depth)
 WELLS = ladder(1.0, friction=FRICTION, restitution=RESTITUTION)
 COLOURS = ("#0072B2", "#E69F00", "#D55E00")
-SHOWN = 0.62  # place of the mass in the drawing of its well, in rims
+SHOWN = 0.62  # position of the mass in the drawing of its well, in rims
 
 
 @cache
 def motions() -> tuple[tuple[Any, Any], ...]:
-    """Return times and places of a mass let go in each well, in closed form, phase by phase."""
+    """Return times and positions of a mass released in each well, in closed form for each phase."""
     return tuple(_motion(well) for well in WELLS)
 
 
 def _motion(well: Well) -> tuple[Any, Any]:
-    """Follow falls and rises until no speed is left; where there is no wall, on both sides of 0."""
+    """Follow falls and rises until the mass is at rest, on both sides of 0 if there is no wall."""
     grid = np.linspace(0.0, TIME, 4001)
     places = np.full_like(grid, math.nan)
     clock, side, height = 0.0, 1.0, START
@@ -55,7 +58,7 @@ def _record(grid: Any, places: Any, phase: "_Phase", clock: float, side: float) 
 
 @dataclass(frozen=True)
 class _Phase:
-    """Motion of a unit mass under a force towards 0 and a spring, until it turns or is at 0.
+    """Motion of a unit mass under a force towards 0 and a spring, until it turns or reaches 0.
 
     It starts at ``start``; ``speed`` points away from 0.
     """
@@ -66,7 +69,7 @@ class _Phase:
     stiffness: float
 
     def place(self, time: Any) -> Any:
-        """Return where it is after a time in the phase."""
+        """Return its position after a time in the phase."""
         if self.stiffness == 0:
             return self.start + self.speed * time - self.force * time**2 / 2
         omega, centre = math.sqrt(self.stiffness), self.force / self.stiffness
@@ -75,7 +78,7 @@ class _Phase:
 
     @property
     def duration(self) -> float:
-        """How long it takes until it turns round (rising) or is at 0 or at rest (falling)."""
+        """Time until it turns round (rising), or reaches 0 or rests (falling)."""
         omega = math.sqrt(self.stiffness)
         if self.speed > 0:
             if omega == 0:
@@ -92,12 +95,12 @@ class _Phase:
 
     @property
     def end(self) -> float:
-        """Return where the phase ends."""
+        """Return the position at which the phase ends."""
         return float(self.place(self.duration))
 
     @property
     def end_speed(self) -> float:
-        """Return the size of its speed then, from the energy."""
+        """Return its speed at that position, from the energy."""
         end = max(self.end, 0.0)
         gain = self.force * (self.start - end) + self.stiffness * (self.start**2 - end**2) / 2
         return math.sqrt(max(0.0, self.speed**2 + 2 * gain))
@@ -105,7 +108,7 @@ class _Phase:
 
 @style.styled()
 def draw_entrapment() -> Drawing:
-    """Draw the three wells with their forces, and how a mass that is let go is captured."""
+    """Draw the three wells with their forces, and the capture of a released mass."""
     figure = style.canvas(style.WIDE, 4.4)
     grid = figure.subplots(2, 3, sharey="row")
     names = ("U: harmonic", "half-U: harmonic, wall", "half-V: triangular, wall")
@@ -138,12 +141,12 @@ def _draw_well(axes: Axes, well: Well, colour: str) -> None:
 
 
 def force(well: Well, place: float) -> float:
-    """Return minus the slope of the energy at or to the right of a place, per depth and rim."""
+    """Return minus the right-hand slope of the energy, in units of depth per rim."""
     return -(well.slope + well.stiffness * place)
 
 
 def _draw_force(axes: Axes, well: Well, place: float) -> None:
-    """Draw the force below the bottom, as an arrow that ends where it acts, or a dot if it is 0."""
+    """Draw the force below the bottom: an arrow ending at its point of action, a dot if it is 0."""
     size = force(well, place)
     if size == 0:
         axes.plot(place, -0.17, "o", color="0.2", ms=3.5, mfc="white")
@@ -164,7 +167,7 @@ def _draw_motion(axes: Axes, path: tuple[Any, Any], well: Well, colour: str) -> 
 
 
 def captured(path: tuple[Any, Any]) -> float:
-    """Return when a motion is within a thousandth of where it ends; inf if only at the end."""
+    """Return the time from which a motion is within a thousandth of its end; inf if only there."""
     times, places = path
     away = np.flatnonzero(abs(places - places[-1]) > 1e-3)
     last = int(away[-1]) + 1

@@ -1,4 +1,4 @@
-"""Figures: a name, the texts that belong to it, and the function that draws it."""
+"""Figures: a name, caption and alternative text, and the function that draws it."""
 
 import io
 from collections.abc import Callable
@@ -28,16 +28,16 @@ class Figure:
     Attributes
     ----------
     name : str
-        By which it is asked for.
+        Name by which it is selected.
     title : str
-        A few words.
+        Title in a few words.
     caption_words, alt_words : str or callable
-        Its caption and its alternative text. Functions are called when they are first read: their
-        numbers are computed.
+        Its caption and its alternative text. Functions are called when the text is first read,
+        because they compute the numbers in it.
     draw : callable
         Returns the matplotlib figure.
     slow : bool
-        Whether that takes a simulation.
+        Whether drawing takes a simulation.
     """
 
     name: str
@@ -49,16 +49,16 @@ class Figure:
 
     @cached_property
     def caption(self) -> str:
-        """What is drawn, with parameters and units."""
+        """Description of the drawing, with parameters and units."""
         return self.caption_words if isinstance(self.caption_words, str) else self.caption_words()
 
     @cached_property
     def alt(self) -> str:
-        """What a reader who does not see it has to know."""
+        """Alternative text for readers who cannot see the figure."""
         return self.alt_words if isinstance(self.alt_words, str) else self.alt_words()
 
     def write(self, folder: Path) -> list[Path]:
-        """Write ``name.png`` and ``name.svg``; text in them needs no fonts where they are shown."""
+        """Write ``name.png`` and ``name.svg``; text in them needs no installed fonts."""
         drawing = self.draw()
         paths = [folder / f"{self.name}.{ending}" for ending in ("png", "svg")]
         with styled():
@@ -69,7 +69,7 @@ class Figure:
 
 
 def _save_png(drawing: Drawing, path: Path) -> None:
-    """Save with few colours, which halves the file and is not seen."""
+    """Save with a palette of few colours, which halves the file without visible change."""
     FigureCanvasAgg(drawing)
     raw = io.BytesIO()
     drawing.savefig(raw, format="png", dpi=DPI)

@@ -14,10 +14,10 @@ from polycorner.dumbbells.dynamics.singles import keel_of
 from polycorner.dumbbells.statics.keel import Turning
 
 DRUM = style.DRUM
-RHO = DRUM.centre_radius  # of the cylinder on which the centres of the balls move
-LONG = 300.0  # mm of the drum that are drawn
-HEADING = 12.0  # degrees, of the zigzags
-START = 150.0  # mm, where they begin
+RHO = DRUM.centre_radius  # radius of the cylinder of ball centres
+LONG = 300.0  # mm, length of the drum as drawn
+HEADING = 12.0  # degrees, heading of the zigzags
+START = 150.0  # mm, axial position at which they begin
 STEP = 20.0  # mm between level curves
 NEAR = (-4.0, 10.0, 21.0)  # second panel: least and largest azimuth (degrees), mm up and down
 COLOURS = {1: style.RIGHT[0], -1: style.LEFT[0]}
@@ -38,15 +38,15 @@ def flow_line(phi: float, fall: Any) -> Any:
 
 
 def turning(sign: int) -> Turning:
-    """Return where a single dumbbell of heading ``HEADING`` times a sign turns round."""
+    """Return the turning points of a single dumbbell of heading ``HEADING`` times a sign."""
     return keel_of(DRUM).turning(math.radians(sign * HEADING))
 
 
 def zigzag(sign: int, rise: float) -> Any:
     """Return a path of azimuths and axial positions ``(k, 2)`` that ends ``rise`` mm away.
 
-    Carried along a latitude from where it stopped to where it starts to roll, then rolling back
-    across its axis; it begins on the lowest line.
+    The dumbbell is carried along a latitude from its stop to the onset of rolling, then rolls back
+    across its axis; the path begins on the lowest line.
     """
     found = turning(sign)
     gain = RHO * math.tan(math.radians(sign * HEADING)) * (found.upper - found.coasting)

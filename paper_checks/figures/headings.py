@@ -14,14 +14,14 @@ from polycorner.dumbbells.pair import Chirality
 
 PAIR = style.PAIR
 LENGTHS = np.linspace(8.0, 30.0, 23)  # mm
-# What the paper's text gives as numbers: for l = 16 mm the heading is about 15 degrees, and a dyad
-# keeps it to within 2 degrees.  The points of the paper's figure are not given as numbers.
+# Numbers in the paper's text: for l = 16 mm the heading is about 15 degrees, and a dyad keeps it
+# to within 2 degrees.  The points of the paper's figure are not given as numbers.
 OBSERVED = (16.0, 15.0, 2.0)
 
 
 @cache
 def computed(hand: Chirality) -> Any:
-    """Return headings, in degrees, of the certified minimisers in the drum; nan: there is none."""
+    """Return headings in degrees of the certified minimisers in the drum; nan if there is none."""
     headings, rests = heading_curve(PAIR, LENGTHS, hand)
     return np.where(rests, headings, np.nan)
 
@@ -43,7 +43,7 @@ def stated(lengths: Any) -> Any:
 
 @style.styled()
 def draw_heading_length() -> Drawing:
-    """Draw headings of both hands, and how little the drum's curvature matters."""
+    """Draw the headings of dyads of either hand, and the small effect of the drum's curvature."""
     figure = style.canvas(style.NARROW + 0.9, 5.0)
     upper, lower = figure.subplots(2, 1, height_ratios=[3.4, 1], sharex=True)
     _draw_headings(upper)
@@ -96,7 +96,7 @@ def _draw_headings(axes: Axes) -> None:
 
 
 def _draw_difference(axes: Axes) -> None:
-    """Draw how far the drum's minimiser is from the plane's, in thousandths of a degree."""
+    """Draw the distance of the drum's minimiser from the plane's, in thousandths of a degree."""
     difference = 1e3 * (computed("R") - closed_form(LENGTHS))
     axes.plot(LENGTHS, difference, color=style.RIGHT[0])
     style.grid(axes)
@@ -105,7 +105,7 @@ def _draw_difference(axes: Axes) -> None:
 
 
 def _numbers() -> tuple[float, float, float, float]:
-    """Return the headings of the experiment's dyad, and how far the plane is off at most."""
+    """Return the headings of the experiment's dyad, and the largest error of the plane."""
     at = int(np.argmin(abs(LENGTHS - PAIR.length)))
     worst = float(np.nanmax(abs(computed("R") - closed_form(LENGTHS))))
     return float(computed("R")[at]), float(closed_form(PAIR.length)), float(stated(16.0)), worst

@@ -18,8 +18,8 @@ from polycorner.motion.noise import Noise
 from polycorner.motion.trajectory import Trajectory
 
 STEP = 2e-3  # s
-EARLY = 60.0  # s that are shown enlarged
-LONG = 240.0  # s, of all
+EARLY = 60.0  # s, duration shown enlarged
+LONG = 240.0  # s, whole duration
 NOISE = Noise(chatter=0.275, correlation_time=0.05, seed=2)
 SINGLES = (15.0, -15.0)  # headings in degrees
 DYADS: tuple[tuple[Chirality, float], ...]  # and the heading in degrees
@@ -35,7 +35,7 @@ SMALL = {"ncols": 4, "fontsize": 8.5, "columnspacing": 0.9, "handlelength": 1.1,
 
 @cache
 def singles() -> Trajectory:
-    """Return the motion of two single dumbbells of opposite headings, far from each other."""
+    """Return the motion of two single dumbbells of opposite headings, far apart."""
     headings = np.radians(SINGLES)
     return follow(style.SHORT_DRUM, headings, LONG, noise=NOISE, dt=STEP)
 
@@ -48,7 +48,7 @@ def quiet() -> Trajectory:
 
 @cache
 def dyads() -> DyadPaths:
-    """Return the motion of four dyads, far from each other: two of either chirality."""
+    """Return the motion of four dyads, far apart: two of either chirality."""
     starts = [(hand, math.radians(heading)) for hand, heading in DYADS]
     return follow_dyads(style.DRUM, starts, LONG, noise=NOISE, dt=STEP)
 
@@ -63,7 +63,7 @@ def shown(q: Any) -> tuple[Any, Any, Any]:
 
 @style.styled()
 def draw_single_history() -> Drawing:
-    """Draw the early time of one dumbbell, and all the time of both."""
+    """Draw the early motion of one dumbbell, and the whole motion of both."""
     path = singles()
     figure = style.canvas(style.WIDE, 4.7)
     grid = figure.add_gridspec(6, 2, width_ratios=[1, 1.05])
@@ -88,7 +88,7 @@ def draw_single_history() -> Drawing:
 
 
 def _finish(panels: list[Axes], until: float, letters: str) -> None:
-    """Give the panels a letter and room for it and a legend, and a common time."""
+    """Give the panels letters, space for a legend, and a common time axis."""
     for axes, name in zip(panels, letters, strict=True):
         style.grid(axes)
         low, high = axes.get_ylim()
@@ -106,7 +106,7 @@ def _finish(panels: list[Axes], until: float, letters: str) -> None:
 
 
 def early_slips(path: Trajectory) -> Zigzag:
-    """Return the slips of the first dumbbell that end within the early time."""
+    """Return the slips of the first dumbbell that end within the early motion."""
     found = zigzags(path, style.SHORT_DRUM.spin)[0]
     early = found.stops <= EARLY
     kept = {name: values[early] for name, values in vars(found).items()}
@@ -162,7 +162,7 @@ def _single_alt() -> str:
 
 @style.styled()
 def draw_dyad_history() -> Drawing:
-    """Draw dyads of either hand and a pair without, the early time of one, and four histories."""
+    """Draw dyads of either hand and a pair without, early motion of one, and four histories."""
     paths = dyads()
     figure = style.canvas(style.WIDE, 4.9)
     grid = figure.add_gridspec(6, 3, width_ratios=[0.44, 1, 1])

@@ -16,7 +16,7 @@ BOUNDS = (-3.9, 4.1, -3.2, 3.5)
 
 
 def inward() -> list[str]:
-    """Return the sides that bulge into the region: the middles of their chords lie outside."""
+    """Return the sides that bulge into the region: the midpoints of their chords lie outside."""
     found = []
     for name, line in REGION.sides().items():
         if REGION.polyhedron.implicit((line[0] + line[-1]) / 2) < -1e-9:

@@ -1,4 +1,4 @@
-"""Regions of rest of a dumbbell on the tilted drum, turning points and directions."""
+"""Regions of rest of a dumbbell on the tilted drum, turning points, and the sign of the torque."""
 
 import math
 from typing import Any
@@ -16,8 +16,11 @@ from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
 
 KEEL = keel_of(style.DRUM)
 TILT = KEEL.tilt
-# Coefficients of rolling and angles epsilon of the paper's captions, which its text contradicts.
-OTHERS = {0.6: (4, 2), 1.2: (1, 1.5)}  # coefficients for which the boundary is drawn, too: dashes
+# Coefficients of rolling and angles epsilon in the paper's captions; its text contradicts them.
+OTHERS = {
+    0.6: (4, 2),
+    1.2: (1, 1.5),
+}  # further coefficients for which the boundary is drawn, with their dashes
 DASHED = "#8E5A93"
 CAPTIONS = (("b", "single dumbbells", 0.1, 8.0), ("c", "dyads", 0.2, 20.0))
 
@@ -102,7 +105,7 @@ def _rest_alt() -> str:
 
 @style.styled()
 def draw_torque() -> Drawing:
-    """Draw S and where the torque on a sliding dumbbell increases its heading, and a part of it."""
+    """Draw S and the region in which the torque on a sliding dumbbell increases its heading."""
     figure = style.canvas(style.WIDE, 4.1)
     first, second = figure.subplots(1, 2)
     for axes in (first, second):

@@ -22,10 +22,10 @@ from polycorner.pictures import SharpSurface, View, place_solid
 from polycorner.skeletons.refinement import traced
 
 RESOLUTION = 112  # cells of the solid along each side
-REACH = (0.0, 0.45, 0.9)  # of the instants of a motion, in the manifold's scales, from the corner
-FADED = (1.0, 0.55, 0.3)  # how strong they are drawn
+REACH = (0.0, 0.45, 0.9)  # distances from the corner of the instants shown, in scales
+FADED = (1.0, 0.55, 0.3)  # opacity of these instants
 VIEW = View(height=1.05)
-# Which rod a ball lies on tells the two motions apart in which one ball of each touch.
+# The rod on which a ball lies distinguishes the two motions with one ball-ball contact.
 COLOURS = {
     "slide": ("#1A1A1A", "two balls slide on the rods"),
     "first": ("#D55E00", "two balls touch, that of B on the rod of A"),
@@ -35,7 +35,7 @@ COLOURS = {
 
 
 def motion(contacts: tuple[str, ...]) -> str:
-    """Return which kind of motion keeps the contacts: a key of ``COLOURS``."""
+    """Return the kind of motion that keeps the contacts: a key of ``COLOURS``."""
     rods = [name for name in contacts if len(name) == 3]
     if len(rods) != 1:
         return "slide" if rods else "twice"
@@ -97,7 +97,7 @@ def draw_solid() -> Drawing:
 
 
 def _draw_pair(axes: Axes, qs: Any, colour: str | None) -> None:
-    """Draw A in grey, standing still, and B at several instants, the later the paler."""
+    """Draw A in grey, at rest, and B at several instants, later ones paler."""
     radii = (PAIR.ball_radius, PAIR.rod_radius)
     for k, q in reversed(list(enumerate(qs))):
         centres = _facing(q)

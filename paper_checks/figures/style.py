@@ -25,8 +25,8 @@ SHORT_DRUM = DumbbellDrum(length=14)
 # and negative headings green, in every figure.
 RIGHT, LEFT, NEITHER = ("#0072B2", "#56B4E9"), ("#009E73", "#8AD6BF"), ("0.35", "0.68")
 HANDS = {"R": RIGHT, "L": LEFT, None: NEITHER}
-GRAVITY = "#D55E00"  # flow lines of gravity, and S, where dumbbells lie along them
-PAPER = "#A0457E"  # what the paper states, where that differs from what is computed
+GRAVITY = "#D55E00"  # flow lines of gravity, and the curve S of dumbbells along them
+PAPER = "#A0457E"  # statements of the paper that differ from the computation
 MEASURED = "#D55E00"
 LIT = "#F0E442"  # contacts
 FAINT, LINE = "0.72", "0.45"
@@ -75,7 +75,7 @@ def parts(figure: FigureBase, rows: int, columns: int, **options: Any) -> list[S
 
 
 def letter(axes: Axes, name: str, words: str = "") -> None:
-    """Write a panel's letter in bold, and what it shows, above its left corner."""
+    """Write a panel's letter in bold and its subject above its left corner."""
     axes.set_title(rf"$\bf({name})$ {words}".rstrip(), loc="left", pad=5)
 
 
@@ -99,13 +99,13 @@ def minus(text: str) -> str:
 
 
 def bare(axes: Axes) -> None:
-    """Leave nothing but what is drawn, at equal scales."""
+    """Remove axes and frame, and set equal scales."""
     axes.set_aspect("equal")
     axes.set_axis_off()
 
 
 def grid(axes: Axes) -> None:
-    """Draw faint lines behind the curves, and zero a little darker."""
+    """Draw faint grid lines behind the curves, and zero a little darker."""
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.axhline(0, color=FAINT, linewidth=0.7, zorder=0.9)
@@ -159,7 +159,7 @@ def draw_pair(
 
 
 def touching(pair: DumbbellPair, centres: Any, name: str) -> Any:
-    """Return where a ball touches a ball or a rod in the plane, ``(2,)``; the contact by name."""
+    """Return the point of contact of a named contact in the plane, ``(2,)``."""
     ball = dict(zip(("A1", "A2", "B1", "B2"), np.asarray(centres), strict=True))
     if len(name) == 4:
         return (ball[name[:2]] + ball[name[2:]]) / 2
@@ -171,7 +171,7 @@ def touching(pair: DumbbellPair, centres: Any, name: str) -> Any:
 
 
 def mark_contacts(axes: Axes, pair: DumbbellPair, centres: Any, names: Any) -> None:
-    """Light the contacts of the given names."""
+    """Highlight the contacts of the given names."""
     for name in names:
         x, y = touching(pair, centres, name)
         axes.plot(x, y, "o", color=LIT, mec="black", mew=0.7, ms=4.2, zorder=6)

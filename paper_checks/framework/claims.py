@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class Verdict(Enum):
-    """What became of a claim."""
+    """Outcome of the check of a claim."""
 
     HOLDS = "holds"
     HOLDS_UNDER = "holds under stated conditions"
@@ -16,7 +16,7 @@ class Verdict(Enum):
 
 
 class Means(Enum):
-    """How a claim was checked, the strongest first."""
+    """Means by which a claim is checked, the strongest first."""
 
     SYMBOLIC = "symbolic"
     PROOF = "proof"
@@ -26,19 +26,19 @@ class Means(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check found.
+    """Result of a check.
 
     Attributes
     ----------
     verdict : Verdict
-        What became of the claim.
+        Whether the claim holds.
     evidence : str
         One to three sentences. Every number and expression in it was computed when the check ran.
         Formulas are TeX between dollars.
     numbers : mapping from str to float
         Those numbers by name; all finite.
     correction : str
-        The right statement where the printed one is corrected, or the condition under which it
+        The right statement if the printed one is corrected, or the condition under which it
         holds; what an author would act on.
     """
 
@@ -57,9 +57,9 @@ class Claim:
     id : str
         A letter and a number, such as ``E4``; a part of a claim has one more letter, ``E4a``.
     section : str
-        Of the paper, as it prints it: ``2`` to ``8``, ``A``, ``B`` or ``C``.
+        Section of the paper: ``2`` to ``8``, ``A``, ``B`` or ``C``.
     place : str
-        Where in that section, in words.
+        Place in that section, in words.
     statement : str
         The claim in our words and symbols. Formulas are TeX between dollars.
     means : Means
@@ -67,8 +67,8 @@ class Claim:
     check : callable
         Takes no arguments, returns the finding.
     perturbed : callable or None
-        The same check of a deliberately different statement: its verdict must be another one, or
-        the check could not fail. None only for a claim that is not testable.
+        The same check of a deliberately wrong statement.  Its verdict has to differ, which shows
+        that the check can fail. None only for a claim that is not testable.
     slow : bool
         Whether the check takes more than about ten seconds.
     figure : str or None

@@ -8,16 +8,16 @@ from paper_checks.framework.running import Result, Run
 from paper_checks.framework.typesetting import sentence
 
 VERDICTS = (*(verdict.value for verdict in Verdict), "error")
-# What there is to do for an author.
+# Kinds of action for an author.
 TO_DO = ("To correct", "Not found in simulations", "Conditions to state")
-# What the sections of the paper are about; A, B and C are its appendices.
+# Subjects of the paper's sections; A, B and C are its appendices.
 SECTIONS = {
     "2": "The experiment and its coordinates",
-    "3": "What was observed",
-    "4": "Why a single dumbbell moves as it does",
+    "3": "Observations",
+    "4": "The motion of a single dumbbell explained",
     "5": "The configuration space of a pair",
-    "6": "Where the energy rests",
-    "7": "How a dyad moves",
+    "6": "Minima of the energy",
+    "7": "The motion of dyads",
     "8": "Conclusion",
     "A": "Friction of a single dumbbell",
     "B": "Curvilinear polyhedra",
@@ -26,19 +26,19 @@ SECTIONS = {
 
 
 def section_name(section: str) -> str:
-    """Return the number of a section, as in a heading, and what it is about."""
+    """Return the heading of a section: its number and subject."""
     kind = "Appendix" if section.isalpha() else "Section"
     return f"{kind} {section}: {SECTIONS[section]}"
 
 
 def counts(run: Run) -> dict[str, int]:
-    """Return how many claims came to each verdict, in the order of the verdicts."""
+    """Return the number of claims with each verdict, in the order of the verdicts."""
     counted = Counter(result.verdict for result in run.results)
     return {verdict: counted[verdict] for verdict in VERDICTS if counted[verdict]}
 
 
 def to_act_on(run: Run) -> dict[str, tuple[Result, ...]]:
-    """Return what an author would act on, by what there is to do, in the order of the paper."""
+    """Return the results an author would act on, by kind of action, in the order of the paper."""
     groups: dict[str, list[Result]] = {title: [] for title in TO_DO}
     for result in run.results:
         if (title := _to_do(result)) is not None:

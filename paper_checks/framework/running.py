@@ -13,19 +13,20 @@ from importlib import import_module
 from multiprocessing import active_children, get_context
 
 from paper_checks.framework.claims import Claim, Finding
+from polycorner import checks
 
-# Each process has a core; threads inside the linear algebra would only compete.
+# Each process has a core of its own; threads of the linear algebra would compete for it.
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
-# What is told while checking: how many are done, and the claims being checked.
+# Reports progress: the number of checks done, and the claims being checked.
 Progress = Callable[[int, Sequence[str]], None]
-# What a process sends back: the finding or None, the error, seconds.
+# Result sent back by a process: the finding or None, the error, seconds.
 Examined = tuple[Finding | None, str, float]
 
 
 @dataclass(frozen=True)
 class Result:
-    """A claim and what its check came to: a finding, or an error in one line."""
+    """A claim with the outcome of its check: a finding, or an error in one line."""
 
     claim: Claim
     finding: Finding | None
@@ -34,22 +35,22 @@ class Result:
 
     @property
     def verdict(self) -> str:
-        """The verdict in words, ``error`` where the check broke."""
+        """The verdict in words, ``error`` if the check raised an exception."""
         return "error" if self.finding is None else self.finding.verdict.value
 
 
 @dataclass(frozen=True)
 class Run:
-    """Results in the order of the claims, and the claims that were not checked, and why.
+    """Results in the order of the claims, and the claims that were not checked.
 
     Attributes
     ----------
     results : tuple of Result
-        Of every check that ran.
+        Results of all checks that ran.
     slow : tuple of Claim
-        Left out because their checks take long.
+        Claims left out because their checks are slow.
     missed : tuple of Claim
-        Not reached because the run was interrupted.
+        Claims not reached because the run was interrupted.
     """
 
     results: tuple[Result, ...]
@@ -58,7 +59,7 @@ class Run:
 
     @property
     def errors(self) -> tuple[Result, ...]:
-        """The checks that broke."""
+        """The results of checks that raised an exception."""
         return tuple(result for result in self.results if result.finding is None)
 
 
@@ -69,10 +70,10 @@ def select(
     *,
     slow: bool = False,
 ) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
-    """Return the claims that are asked for, and those among them left out because they are slow.
+    """Return the selected claims, and those left out of the selection because they are slow.
 
-    An id stands for its parts too: ``E4`` for ``E4a`` and ``E4b``. A slow claim that is asked for
-    by its id is not left out.
+    An id stands for its parts too: ``E4`` for ``E4a`` and ``E4b``. Slow claims selected by id are
+    never left out.
 
     Raises
     ------
@@ -82,14 +83,10 @@ def select(
     wanted = tuple(claims)
     sections, ids = tuple(sections), tuple(ids)
     known = dict.fromkeys(claim.section for claim in claims)
-    for section in sections:
-        if section not in known:
-            msg = f"section: expected one of {', '.join(known)}; got {section!r}"
-            raise ValueError(msg)
+    checks.names("section", sections, known)
     for name in ids:
         if not any(_is_called(claim, name) for claim in claims):
-            msg = f"id: expected one such as {claims[0].id} or {claims[-1].id}; got {name!r}"
-            raise ValueError(msg)
+            checks.refuse("id", f"one such as {claims[0].id} or {claims[-1].id}", name)
     if sections:
         wanted = tuple(claim for claim in wanted if claim.section in sections)
     if ids:
@@ -113,19 +110,19 @@ def run(
     """Check claims in several processes.
 
     A check that raises, or whose process dies, is an error of that claim; all others still run.
-    Claims of one letter go to one process as far as possible, because they share what they
-    compute. Ctrl-C ends the processes and keeps what was found.
+    Claims of one letter go to one process as far as possible, because they share intermediate
+    results. Ctrl-C ends the processes; the results so far are kept.
 
     Parameters
     ----------
     claims : sequence of Claim
-        What to check.
+        Claims to check.
     workers : int, optional
-        How many processes.
+        Number of processes.
     progress : callable, optional
         Called as ``progress(done, ids being checked)`` whenever a check begins or ends.
     catalogue : str, optional
-        Module whose ``CLAIMS`` the processes look claims up in.
+        Module in whose ``CLAIMS`` the processes look up the claims.
     """
     found: dict[str, Result] = {}
     others = set(active_children())
@@ -165,18 +162,18 @@ def _check_all(
 
 
 class _Queue:
-    """Claims in groups by letter; a process goes on with its group, then helps with another."""
+    """Claims in groups by letter; a process finishes its group, then helps with another."""
 
     def __init__(self, claims: Sequence[Claim], workers: int) -> None:
         groups: dict[str, deque[Claim]] = {}
         for claim in claims:
             groups.setdefault(claim.id[:1], deque()).append(claim)
-        # What takes long is begun first, so that no process is left alone with it at the end.
+        # Slow groups start first, so that none of them is left for a single process at the end.
         self._waiting = sorted(groups.values(), key=lambda group: -sum(c.slow for c in group))
         self._own: list[deque[Claim]] = [deque() for _ in range(workers)]
 
     def next(self, number: int) -> Claim | None:
-        """Return what a process should check next, None when nothing is left."""
+        """Return the next claim for a process, None when nothing is left."""
         own = self._own[number]
         if not own and self._waiting:
             own = self._own[number] = self._waiting.pop(0)
@@ -196,7 +193,7 @@ class _Lane:
         self._executor: ProcessPoolExecutor | None = None
 
     def start(self, claim: Claim) -> None:
-        """Begin with a claim."""
+        """Start the check of a claim."""
         if self._executor is None:
             # Forking a process that runs threads is not safe.
             self._executor = ProcessPoolExecutor(1, get_context("spawn"), _leave_to_parent)
@@ -204,7 +201,7 @@ class _Lane:
         self.future = self._executor.submit(_examine, self.catalogue, claim.id)
 
     def collect(self) -> Result | None:
-        """Return the result if there is one."""
+        """Return the result if the check has ended."""
         if self.future is None or self.claim is None or not self.future.done():
             return None
         claim, future = self.claim, self.future
@@ -218,22 +215,20 @@ class _Lane:
         return Result(claim, finding, error, seconds)
 
     def close(self) -> None:
-        """End the process once it has nothing to do."""
+        """End the process once it is idle."""
         if self._executor is not None:
             self._executor.shutdown(wait=True, cancel_futures=True)
 
 
 def _examine(catalogue: str, name: str) -> Examined:
-    """Run the check of one claim, in the process that it was sent to."""
+    """Run the check of one claim, in a worker process."""
     (claim,) = (claim for claim in import_module(catalogue).CLAIMS if claim.id == name)
     start = time.perf_counter()
     try:
         finding = claim.check()
-        if not isinstance(finding, Finding):
-            msg = f"expected a Finding; got {type(finding).__name__}"
-            raise TypeError(msg)
+        checks.instance("check", finding, Finding)
         finding, error = replace(finding, numbers=dict(finding.numbers)), ""
-    except Exception as problem:  # whatever it is belongs to this claim
+    except Exception as problem:  # every exception is a result of this claim
         finding, error = None, " ".join(f"{type(problem).__name__}: {problem}".split())
     return finding, error, time.perf_counter() - start
 
@@ -245,7 +240,7 @@ def _leave_to_parent() -> None:
 
 @contextmanager
 def _single_threads() -> Iterator[None]:
-    """Let processes that are started here use one thread each."""
+    """Limit processes started in this context to one thread each."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:

@@ -23,7 +23,7 @@ WIDTH = 120
 
 
 def run_text(run: Run, *, quiet: bool = False, width: int = WIDTH) -> str:
-    """Return claims with verdicts and evidence, what to act on, and the counts.
+    """Return claims with verdicts and evidence, corrections to act on, and the counts.
 
     Verdicts are coloured by ANSI sequences; ``quiet`` returns the counts alone.
     """
@@ -80,7 +80,7 @@ def _verdict(result: Result) -> str:
 
 
 def _indented(text: str, width: int, mark: str = "") -> str:
-    """Return a sentence wrapped between words, behind the column of the ids."""
+    """Return a sentence wrapped between words, to the right of the ids."""
     space = " " * INDENT
     return textwrap.fill(
         mark + plain(sentence(text)),

@@ -1,6 +1,6 @@
 """Sentences with TeX between dollars, as HTML with MathML and as plain text for a terminal.
 
-MathML is what a browser typesets by itself: no script and no font has to be fetched.
+Browsers typeset MathML themselves: neither scripts nor fonts have to be fetched.
 """
 
 import re
@@ -9,15 +9,17 @@ from functools import cache
 from html import escape
 from xml.etree import ElementTree as ET
 
+from polycorner import checks
+
 NAMESPACE = ' xmlns="http://www.w3.org/1998/Math/MathML"'
 FORMULA = re.compile(r"\$([^$]+)\$")
 CODE = re.compile(r"`([^`]+)`")
-# Punctuation goes with the formula that it touches; all of this stays on one line.
+# Punctuation next to a formula stays on the same line as the formula.
 CLINGING = re.compile(r"(\(?<math>(?:(?!<math>).)*?</math>[.,;:)?°]+)")
-# A line may be broken before these, so that a long formula fits on a narrow screen.
+# Signs before which a line may be broken, so that long formulas fit on narrow screens.
 RELATIONS = frozenset("=<>≤≥≠≈≃∼≡∈∉⊂⊆→↦⟹⇒⇔∪∩")
 JOINTS = frozenset("+−/")
-LONG = 20  # characters, as plain text, from which on a formula may be broken
+LONG = 20  # least number of characters, as plain text, of a formula that may be broken
 SYMBOLS = {
     "cdot": "·", "times": "×", "le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "ne": "≠", "neq": "≠",
     "approx": "≈", "sim": "~", "simeq": "≃", "equiv": "≡", "pm": "±", "mp": "∓", "to": "→",
@@ -56,13 +58,13 @@ def html(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Return a text with a capital at its beginning and a full stop at its end."""
+    """Return a text with an initial capital and a full stop at its end."""
     first = text[:1].upper() if text[1:2].islower() or text[1:2] == " " else text[:1]
     return first + text[1:] + ("" if text.endswith((".", "!", "?", ":")) else ".")
 
 
 def plain(text: str) -> str:
-    """Return a sentence for a terminal, its formulas in Unicode as far as that goes."""
+    """Return a sentence for a terminal, its formulas in Unicode as far as possible."""
     return "".join(_unicode(part) if is_formula else part for part, is_formula in pieces(text))
 
 
@@ -75,7 +77,7 @@ def pieces(text: str) -> Iterator[tuple[str, bool]]:
 
 @cache
 def mathml(tex: str) -> str:
-    """Return a formula as MathML, in parts between which a line may be broken.
+    """Return a formula as MathML, in parts between which lines may be broken.
 
     Raises
     ------
@@ -88,8 +90,7 @@ def mathml(tex: str) -> str:
     row = ET.fromstring(written.replace(NAMESPACE, "", 1))[0]
     unknown = [leaf.text for leaf in row.iter() if leaf.text and "\\" in leaf.text]
     if unknown:
-        msg = f"formula: expected TeX that MathML can show; got {unknown[0]} in ${tex}$"
-        raise ValueError(msg)
+        checks.refuse("formula", f"TeX without {unknown[0]}, which MathML lacks", tex)
     for inner in list(row.iter("mrow")):
         _join_letters(inner)
         _space_functions(inner)
@@ -101,7 +102,7 @@ def mathml(tex: str) -> str:
 
 
 def _broken(row: list[ET.Element]) -> Iterator[list[ET.Element]]:
-    """Split a row before its relations, and what is still long before sums and slashes."""
+    """Split a row before its relations, and parts that are still long before sums and slashes."""
     for part in _split(row, RELATIONS):
         if len(_letters(part)) <= LONG:
             yield part
@@ -121,7 +122,7 @@ def _split(nodes: list[ET.Element], signs: frozenset[str]) -> Iterator[list[ET.E
         mark = (node.text or " ") if node.tag == "mo" else " "
         depth += (mark in "([{") - (mark in ")]}")
         if part and depth == 0 and mark in signs and not (len(part) == 1 and part[0].tag == "mo"):
-            if mark in "+−":  # at the beginning of a part it would be set as a sign
+            if mark in "+−":  # at the start of a part it would be typeset as a unary sign
                 node.attrib.update(form="infix")
             yield part
             part = []
@@ -131,7 +132,7 @@ def _split(nodes: list[ET.Element], signs: frozenset[str]) -> Iterator[list[ET.E
 
 
 def _join_letters(row: ET.Element) -> None:
-    """Make one word of upright letters that follow each other."""
+    """Join consecutive upright letters into one word."""
     word: ET.Element | None = None
     for node in list(row):
         if node.tag != "mi" or node.get("mathvariant") != "normal":

@@ -55,7 +55,7 @@ def drum_energy() -> families.Family:
 def plane_energy() -> families.Family:
     """Return half the weighted sum of squared lateral positions, in mm^2; parameters ``l w``.
 
-    It is the limit of ``rho`` times the height above the lowest as the drum grows.
+    It is the limit, as the drum grows, of ``rho`` times the height above the lowest one.
     """
     return _family(("trough",), PLANE, ("l", "w"), _plane_heights, "mm^2")
 

@@ -114,8 +114,8 @@ class DumbbellPair(Value):
     def symmetry(self) -> Symmetry:
         """Motions of the pair as a whole.
 
-        All of them in the plane; in the drum rolling, shifting and the half-turn about a vertical
-        axis.
+        In the plane these are all rigid motions; in the drum rolling, shifting and the half-turn
+        about a vertical axis.
         """
         if self.is_plane:
             return Symmetry(motions.plane_tangents, self._invariants)
@@ -130,11 +130,11 @@ class DumbbellPair(Value):
         return motions.drum_invariants(q, half, unit, self.centre_radius)
 
     def section(self, heading: float = 0.0) -> Polyhedron:
-        """Return ``D`` cut down to pairs with a given mean heading, in radians.
+        """Return the section of ``D`` at a given mean heading, in radians.
 
         The equation is ``sin((theta_1 + theta_2)/2 - heading) = 0``: the mean of two directions
-        is given modulo half a turn.  Modulo the symmetry, relative placements in three dimensions
-        remain, each of them once.
+        is defined modulo half a turn.  Modulo the symmetry, the section is three-dimensional and
+        contains every relative placement once.
         """
         mean = SmoothFunction.member(
             formulas.mean_heading(),
@@ -247,7 +247,7 @@ class DumbbellPair(Value):
             Common heading in radians; default that of the corner in the plane.
         clearance : float, optional
             Distance, in mm, left at each of the three contacts; default a tenth of the ball radius.
-            Exact in the plane; in the drum, right to the order of ``1/R^2``.
+            Exact in the plane; in the drum, to within terms of order ``1/R^2``.
         """
         sign = 1 if checks.choice("chirality", chirality, ("R", "L")) == "R" else -1
         gap = (
@@ -264,9 +264,9 @@ class DumbbellPair(Value):
         return self._pair(along * axis + across * normal, theta)
 
     def relative(self, q: Array) -> Array:
-        """Return where B is as seen from A, in the developed plane and in ball radii, ``(4,)``.
+        """Return the placement of B relative to A, in the developed plane, in ball radii, ``(4,)``.
 
-        Its place across and along the axis of A, then cosine and sine of the angle between the
+        Its position across and along the axis of A, then cosine and sine of the angle between the
         axes times half a length.
         """
         flat = q.copy()
@@ -285,7 +285,7 @@ class DumbbellPair(Value):
         rng : Generator
             Source of the random numbers.
         count : int
-            How many.
+            Number of placements.
         heading : float, optional
             Mean heading in radians; default random.
         """
@@ -321,7 +321,7 @@ class DumbbellPair(Value):
         return np.array([*-half, theta, *half, theta])
 
     def mirror(self, q: ArrayLike) -> Array:
-        """Return the image in the vertical plane through the drum's axis."""
+        """Return the mirror image in the vertical plane through the drum's axis."""
         return self.manifold.wrap(self.manifold.points(q) * np.array([-1, 1, -1] * 2))
 
     def swap(self, q: ArrayLike) -> Array:

@@ -1,8 +1,8 @@
-"""Symmetries of a pair of dumbbells: motions of the whole, and relabellings.
+"""Symmetries of a pair of dumbbells: motions of the pair as a whole, and relabellings.
 
-In the developed plane both may be translated and turned together; in the drum they may be
-rolled and shifted together, and a half-turn about a vertical axis brings them back into the
-drum.  Bodies and balls may be relabelled: the two dumbbells, and the two balls of either.
+In the developed plane both dumbbells may be translated and rotated together; in the drum they may
+be rolled and shifted together, and a half-turn about a vertical axis maps the drum to itself.
+Bodies and balls may be relabelled: the two dumbbells, and the two balls of either.
 """
 
 import math
@@ -29,9 +29,9 @@ def drum_tangents(q: Array) -> Array:
 
 
 def plane_invariants(q: Array, half_length: float, unit: float) -> Array:
-    """Return the place of B as seen from A, across and along its axis, and the angle between.
+    """Return the position of B across and along the axis of A, and the angle between the axes.
 
-    Lengths in ``unit``, the angle as cosine and sine times ``half_length / unit``.
+    Lengths are in ``unit``, the angle as cosine and sine times ``half_length / unit``.
     """
     across, along = q[3] - q[0], q[4] - q[1]
     s, c, turn = math.sin(q[2]), math.cos(q[2]), q[5] - q[2]
@@ -49,7 +49,7 @@ def drum_invariants(q: Array, half_length: float, unit: float, centre_radius: fl
 
 
 def relabellings() -> tuple[Element, ...]:
-    """Return the relabellings of dumbbells and balls, a group of order eight, but the identity."""
+    """Return the relabellings of dumbbells and balls, a group of order 8, without the identity."""
     swap = _element(_swap, {"A1": "B1", "A2": "B2", "B1": "A1", "B2": "A2"})
     turn = _element(_turn_first, {"A1": "A2", "A2": "A1", "B1": "B1", "B2": "B2"})
     found = {tuple(sorted(g.names.items())): g for g in (swap, turn)}
@@ -62,14 +62,14 @@ def relabellings() -> tuple[Element, ...]:
 
 
 def ball_relabellings() -> tuple[Element, ...]:
-    """Return the relabellings that keep dumbbell A and dumbbell B apart, but the identity."""
+    """Return the relabellings of balls alone, A and B staying distinct, without the identity."""
     return tuple(g for g in relabellings() if g.names["A1b"].startswith("A"))
 
 
 def half_turn_in_place() -> Element:
     """Return the half-turn of the pair about the vertical axis through the lowest point.
 
-    It carries the drum into itself, labels and all.
+    It maps the drum to itself and preserves all labels.
     """
     return Element(_half_turn, {})
 
@@ -95,7 +95,7 @@ def _product(g: Element, h: Element) -> Element:
 
 
 def _element(apply: Callable[[Array], Array], balls: dict[str, str]) -> Element:
-    """Return an element from what it does to the balls."""
+    """Return the element with a given action on the balls."""
     rods = {a[0].lower(): b[0].lower() for a, b in balls.items()}
     parts = balls | rods
     canonical = {frozenset(_split(name)): name for name in CONTACTS}

@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
 from polycorner.minimisation import Certificate, Verdict, certify, crossing, stationary_on
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
@@ -27,21 +29,21 @@ if TYPE_CHECKING:
 Parameter = Literal["rod_radius", "length"]
 Station = tuple[float, Certificate]  # a value of the parameter, and the corner there
 
-SYMBOLS = {"rod_radius": "t", "length": "l"}  # what the formulas call them
+SYMBOLS = {"rod_radius": "t", "length": "l"}  # their symbols in the formulas
 STATIONS = 33
-LONGEST = 100.0  # length, in ball radii, up to which a critical one is looked for
+LONGEST = 100.0  # largest length, in ball radii, searched for a critical one
 HALVINGS = 40
-BESIDE = 1e-4  # how far, in ball radii, from a critical value it is asked what the corner is
+BESIDE = 1e-4  # distance, in ball radii, from a critical value at which the corner is classified
 
 
 @dataclass(frozen=True)
-class Critical:
+class Critical(Value):
     """A pair at whose corner multipliers vanish.
 
     Attributes
     ----------
     parameter : str
-        What was changed to get there: ``rod_radius`` or ``length``.
+        The size that was varied: ``rod_radius`` or ``length``.
     value : float
         Its critical value, in mm.
     pair : DumbbellPair
@@ -66,13 +68,13 @@ class Critical:
 def critical_rod_radius(pair: DumbbellPair) -> float | None:
     """Return the rod radius, in mm, at which the dyad's corner stops being a minimum.
 
-    It is a minimum for thinner rods, as far as it is in ``D``, and none for thicker ones; the
-    pair's own rod radius does not matter.  In the plane and in every drum the value is
+    With thinner rods it is a minimum wherever it lies in ``D``; with thicker rods it is not one.
+    The pair's own rod radius does not matter.  In the plane and in every drum the value is
     ``2 r sqrt(1 - r^2/l^2) - r`` (:func:`plane_critical_formula`); here it is computed from the
     model.  None if no multiplier changes sign, as for ``l = 2 r``.
 
-    In drums of less than about 2.1 ball radii the point may be a saddle within its face before;
-    ``critical_corner(pair).minimum_below`` tells.
+    In drums of less than about 2.1 ball radii the point may already be a saddle within its face
+    for thinner rods; ``critical_corner(pair).minimum_below`` says whether it is.
 
     Examples
     --------
@@ -85,11 +87,11 @@ def critical_rod_radius(pair: DumbbellPair) -> float | None:
 
 
 def critical_length(pair: DumbbellPair) -> float | None:
-    """Return the length, in mm, down to which the dyad's corner is a minimum.
+    """Return the least length, in mm, at which the dyad's corner is a minimum.
 
-    It is ``2 r^2 / sqrt(4 r^2 - (r + t)^2)``.  None if that is not more than two ball radii (rods
-    up to ``(sqrt(3) - 1) r``, whose corner is a minimum at every length at which it is in ``D``),
-    more than a hundred (rods all but as thick as balls), or too long for the drum.
+    It is ``2 r^2 / sqrt(4 r^2 - (r + t)^2)``.  None if that is at most two ball radii (rods up to
+    ``(sqrt(3) - 1) r``, whose corner is a minimum at every length at which it lies in ``D``), more
+    than a hundred ball radii (rods almost as thick as balls), or too long for the drum.
     """
     found = critical_corner(pair, "length")
     return None if found is None else found.value
@@ -98,15 +100,13 @@ def critical_length(pair: DumbbellPair) -> float | None:
 def critical_corner(
     pair: DumbbellPair, parameter: Parameter = "rod_radius", chirality: Chirality = "R"
 ) -> Critical | None:
-    """Follow the corner as a parameter grows, to the first value at which a multiplier vanishes.
+    """Follow the corner with a growing parameter to the first value where a multiplier vanishes.
 
     The corner is computed at a number of values of ``parameter``, ``"rod_radius"`` or ``"length"``;
     where a multiplier changes sign from one to the next, Newton's method solves the equations of
     the face together with ``lam = 0``.
     """
-    if parameter not in SYMBOLS:
-        msg = f"parameter: expected one of {', '.join(map(repr, SYMBOLS))}; got {parameter!r}"
-        raise ValueError(msg)
+    checks.choice("parameter", parameter, SYMBOLS)
     values = _stations(pair, parameter)
     corners = [_corner(replace(pair, **{parameter: value}), chirality) for value in values]
     for below, above in pairwise(zip(values, corners, strict=True)):
@@ -134,7 +134,7 @@ def _stations(pair: DumbbellPair, parameter: Parameter) -> list[float]:
 
 
 def _regular(found: Certificate) -> bool:
-    """Whether a corner lies in ``D``, and touches nowhere else."""
+    """Whether a corner lies in ``D`` without further contacts."""
     return found.search is None and set(found.active) == set(CORNER)
 
 
@@ -143,8 +143,8 @@ def _between(
 ) -> tuple[float, Array] | None:
     """Return where a multiplier vanishes between two values, and the corner there.
 
-    Between two corners in ``D`` it has to change sign; towards values at which the corner is not
-    in ``D`` it is worth trying.
+    Between two corners in ``D`` it has to change sign; if the corner at one of the two values is
+    not in ``D``, the search is still tried.
     """
     for _ in range(HALVINGS):
         ends = [station for station in (below, above) if _regular(station[1])]
@@ -200,15 +200,13 @@ def plane_critical_formula(unknown: Parameter = "rod_radius") -> "sympy.Expr":
     """
     import sympy
 
-    if unknown not in SYMBOLS:
-        msg = f"unknown: expected one of {', '.join(map(repr, SYMBOLS))}; got {unknown!r}"
-        raise ValueError(msg)
+    checks.choice("unknown", unknown, SYMBOLS)
     length, r, t, s, p = sympy.symbols("l r t s p", positive=True)
     sine, cosine = sympy.symbols("sine cosine", real=True)
     pressing, turning = _corner_balance(length, s, p, sine, cosine)
     across = {sine: s, cosine: p}  # up to a factor: both expressions are homogeneous in the two
     if sympy.expand(pressing.subs(across)) != 0:
-        msg = "the multiplier of a ball-rod contact has not the factor that the derivation needs"
+        msg = "the multiplier of a ball-rod contact lacks the factor that the derivation needs"
         raise AssertionError(msg)
     slope = sympy.expand(turning.subs(across) / p).subs(p**2, 4 * r**2 - s**2)
     (overlap,) = sympy.solve(slope, s)
@@ -225,10 +223,10 @@ def _corner_balance(
     sine: "sympy.Symbol",
     cosine: "sympy.Symbol",
 ) -> "tuple[sympy.Expr, sympy.Expr]":
-    """Return the multiplier of a ball-rod contact and the torque that is left, at the corner.
+    """Return the multiplier of a ball-rod contact and the remaining torque at the corner.
 
-    In axes along the dumbbells, so that the heading only turns the trough: the lateral position of
-    a point is ``cosine x + sine y``.
+    The axes are along the dumbbells, so that the heading only turns the trough: the lateral
+    position of a point is ``cosine x + sine y``.
     """
     import sympy
 
@@ -282,10 +280,10 @@ def mountain_pass(pair: DumbbellPair, chirality: Chirality = "R") -> Certificate
 
 
 def escape_barrier(pair: DumbbellPair, chirality: Chirality = "R") -> float | None:
-    """Return how much energy leads from the corner over the pass; None if it is no minimum.
+    """Return the energy of the pass above the corner; None if the corner is no minimum.
 
     In mm of height, weights of balls counting one (in the plane mm^2, times ``1/rho``).  It is an
-    upper bound for what frees the pair: other ways out are not looked at.
+    upper bound of the energy that frees the pair: other ways out are not examined.
     """
     rest, top = _corner(pair, chirality), mountain_pass(pair, chirality)
     if not rest.is_minimum or top.verdict is Verdict.OUTSIDE:
@@ -294,7 +292,7 @@ def escape_barrier(pair: DumbbellPair, chirality: Chirality = "R") -> float | No
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Value):
     """Stationary points of a pair over its rod radius.
 
     Attributes

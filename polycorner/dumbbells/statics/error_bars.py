@@ -9,6 +9,7 @@ from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
 from polycorner.minimisation import Sensitivity, sensitivity, stationary_on
+from polycorner.values import Value
 
 if TYPE_CHECKING:
     from polycorner.minimisation.sensitivities import Quantity
@@ -19,7 +20,7 @@ PLANE_RATES = {
     "rod_radius": {"t": 1.0},
     "rod_weight": {"w": 1.0},
 }
-# The formulas are written in rho = R - r, so that the radii move it, too.
+# The formulas are written in rho = R - r, which depends on both radii.
 DRUM_RATES = PLANE_RATES | {
     "ball_radius": {"r": 1.0, "rho": -1.0},
     "drum_radius": {"R": 1.0, "rho": 1.0},
@@ -27,8 +28,8 @@ DRUM_RATES = PLANE_RATES | {
 
 
 @dataclass(frozen=True)
-class ErrorBar:
-    """A value with the spread that independent tolerances give it, to first order ([GUM] sec. 5).
+class ErrorBar(Value):
+    """A value with its spread from independent tolerances, to first order ([GUM] sec. 5).
 
     Attributes
     ----------
@@ -37,7 +38,7 @@ class ErrorBar:
     spread : float
         Its standard deviation: the root of the sum of the squared shares.
     shares : mapping from str to float
-        What each parameter contributes: derivative times tolerance, with its sign.
+        Contribution of each parameter: derivative times tolerance, with its sign.
     """
 
     value: float
@@ -53,7 +54,7 @@ class ErrorBar:
 def error_bar(
     found: Sensitivity, quantity: "Quantity", tolerances: Mapping[str, float]
 ) -> ErrorBar:
-    """Return a quantity at a point of rest with the spread that tolerances give it.
+    """Return a quantity at an equilibrium with its spread from tolerances.
 
     Parameters
     ----------
@@ -67,14 +68,12 @@ def error_bar(
     Raises
     ------
     ValueError
-        For a name that is no parameter, a tolerance that is not a number from 0 on, or a quantity
-        without a derivative.
+        For a name that is no parameter, a tolerance that is not a finite number >= 0, or a
+        quantity without a derivative.
     """
     checks.names("tolerances", tolerances, found.rates)
     for name, tolerance in tolerances.items():
-        if not 0 <= float(tolerance) < math.inf:
-            msg = f"tolerances: expected {name} as a number not below 0; got {tolerance!r}"
-            raise ValueError(msg)
+        checks.real(f"tolerances: {name}", tolerance, least=0)
     slopes = dict(zip(found.parameters, found.of(quantity).tolist(), strict=True))
     shares = {name: slopes[name] * float(size) for name, size in tolerances.items()}
     value = float(found.function(quantity).value(found.certificate.point))
@@ -85,11 +84,12 @@ def pair_sensitivity(pair: DumbbellPair, chirality: Chirality = "R") -> Sensitiv
     """Differentiate the three-contact corner of a pair by the pair's own parameters.
 
     The parameters are ``length``, ``ball_radius``, ``rod_radius``, ``rod_weight`` and, in a drum,
-    ``drum_radius``; both dumbbells change together.  The plane is the limit ``1/R = 0``, by which
-    there is no derivative here: headings depend on its square.  The model has no tilt.
+    ``drum_radius``; both dumbbells change together.  The plane is the limit ``1/R = 0``; there is
+    no derivative with respect to ``1/R`` here, as headings depend on its square.  The model has no
+    tilt.
 
-    The corner is the stationary point of its face; ``certificate.verdict`` says whether the pair
-    rests there.
+    The corner is the stationary point of its face; ``certificate.verdict`` says whether it is a
+    minimum.
 
     Raises
     ------
@@ -104,15 +104,15 @@ def pair_sensitivity(pair: DumbbellPair, chirality: Chirality = "R") -> Sensitiv
 def heading_error_bar(
     pair: DumbbellPair, tolerances: Mapping[str, float], chirality: Chirality = "R"
 ) -> ErrorBar:
-    """Return the heading at rest, in degrees, with the spread that measured sizes give it.
+    """Return the heading at the minimum, in degrees, with its spread from measured sizes.
 
     Parameters
     ----------
     pair : DumbbellPair
         The dumbbells as measured.
     tolerances : mapping from str to float
-        Standard deviations of the pair's parameters, in mm: ``{"length": 0.1}``.  What is not named
-        is taken to be exact.  A size is shared by both dumbbells.
+        Standard deviations of the pair's parameters, in mm: ``{"length": 0.1}``.  Parameters that
+        are not named are taken to be exact.  A size is shared by both dumbbells.
     chirality : {"R", "L"}, optional
         Which of the two corners.
 
@@ -126,7 +126,7 @@ def heading_error_bar(
     found = pair_sensitivity(pair, chirality)
     if not found.certificate.is_minimum:
         verdict = found.certificate.verdict.value
-        msg = f"pair: expected one that rests in its corner; the corner is {verdict}"
+        msg = f"pair: expected one whose corner is a minimum; its corner: {verdict}"
         raise ValueError(msg)
     heading = sympy.Symbol("theta1", real=True) * 180 / sympy.pi
     return error_bar(found, heading, tolerances)

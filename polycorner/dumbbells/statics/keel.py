@@ -6,18 +6,18 @@ strip ``|ratio_r| <= mu_r`` in the direction of rolling.  The two cases of [GMBN
 sides; they meet where ``sin epsilon = mu_r / mu_s``.  Three things differ from what is printed:
 
 - The angle with the direction of rolling needs ``|cos| = |F_T . u_r| / |F_T|``.  Without ``|F_T|``
-  the first case never occurs as long as ``mu_r sqrt(1 + mu_s^2) > mu_s^2``, as with the measured
-  0.1 and 0.3, and no dumbbell would roll before it slides.
+  the first case never occurs if ``mu_r sqrt(1 + mu_s^2) > mu_s^2``, as for the measured 0.1 and
+  0.3, and no dumbbell would roll before it slides.
 - Without the absolute value a dumbbell that is pulled against ``u_r`` would be held by ``mu_s``,
   and the region would not have the symmetry ``(phi, theta) -> (-phi, -theta)`` that the paper uses.
-- The region is closed.  Its eastern boundary, the points of the region that are left by arbitrarily
-  small turns of the drum, would be empty with the printed strict inequalities.
+- The region is closed.  Its eastern boundary, the points that arbitrarily small turns of the drum
+  carry out of the region, would be empty with the printed strict inequalities.
 
 All angles are in radians.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -25,16 +25,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells.statics.keel_formulas import force_ratio
 from polycorner.formulas import kernels
 from polycorner.spaces.manifold import Array, reals, scalar
+from polycorner.values import Value
 
-BISECTIONS = 60  # a quarter turn is halved to one unit in the last place
+BISECTIONS = 60  # these bracket an azimuth in a quarter turn to one unit in the last place
 
 
 @dataclass(frozen=True)
-class RestRegion:
+class RestRegion(Value):
     """All ``(phi, theta)`` at which friction holds a dumbbell: ``A`` or ``B`` of [GMBN] app. A.
 
     The dumbbell is short, its length small against the radius of the drum; for the region of one of
@@ -53,25 +55,22 @@ class RestRegion:
     sliding: float
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            number = float(reals(getattr(self, field.name), field.name))
-            object.__setattr__(self, field.name, number)
-        if not abs(self.tilt) < math.pi / 2:
-            msg = f"tilt: expected an angle between -pi/2 and pi/2; got {self.tilt}"
-            raise ValueError(msg)
-        if not 0 < self.rolling <= self.sliding < math.inf:
-            got = f"rolling {self.rolling}, sliding {self.sliding}"
-            msg = f"rolling: expected a positive number, at most that of sliding; got {got}"
-            raise ValueError(msg)
+        quarter = math.pi / 2
+        tilt = checks.real("tilt", self.tilt, above=-quarter, below=quarter, unit="radians")
+        sliding = checks.real("sliding", self.sliding, above=0)
+        rolling = checks.real("rolling", self.rolling, above=0, most=sliding)
+        for name, number in (("tilt", tilt), ("rolling", rolling), ("sliding", sliding)):
+            object.__setattr__(self, name, number)
+        super().__post_init__()
 
     @property
     def limit(self) -> float:
-        """``phi_s``: nothing rests at larger ``|phi|``; nan where nothing rests at all."""
+        """``phi_s``: no dumbbell rests at larger ``|phi|``; nan if none rests anywhere."""
         square = (self.sliding**2 - math.tan(self.tilt) ** 2) / (1 + self.sliding**2)
         return math.asin(math.sqrt(square)) if square >= 0 else math.nan
 
     def margin(self, phi: ArrayLike, theta: ArrayLike) -> Any:
-        """Return by how much the force ratio stays inside disc and strip; at least 0 at rest."""
+        """Return the distance of the force ratio from leaving disc or strip; at least 0 at rest."""
         ratio = force_ratio(phi, theta, self.tilt)
         in_disc = self.sliding - np.hypot(ratio[..., 0], ratio[..., 1])
         margin = np.minimum(in_disc, self.rolling - abs(ratio[..., 0]))
@@ -82,9 +81,9 @@ class RestRegion:
         return self.margin(phi, theta) >= 0
 
     def azimuths(self, theta: ArrayLike) -> tuple[Any, Any]:
-        """Return the least and the largest azimuth of rest for each heading; nan where none is.
+        """Return the least and the largest azimuth of rest for each heading; nan if there is none.
 
-        In between, all azimuths are: ``|phi| <= phi_s``, and
+        All azimuths in between are azimuths of rest, too: ``|phi| <= phi_s`` and
         ``cos(theta) sin(phi) -+ mu_r cos(phi) <= (>=) tan(alpha) sin(theta)`` are each an interval.
         """
         low, high = self._ends(reals(theta, "theta"))
@@ -93,13 +92,13 @@ class RestRegion:
         return scalar(np.where(empty, np.nan, west)), scalar(np.where(empty, np.nan, east))
 
     def eastern_boundary(self, theta: ArrayLike) -> Any:
-        """Return where a turning drum carries a dumbbell at rest out of the region."""
+        """Return the azimuth at which a turning drum carries a dumbbell out of the region."""
         return self.azimuths(theta)[1]
 
     def rolls_back(self, theta: ArrayLike) -> Any:
-        """Return whether at the eastern boundary the dumbbell starts to roll towards the west.
+        """Return whether the dumbbell starts to roll westwards at the eastern boundary.
 
-        Elsewhere it slides, or rolls on down the axis of the drum.
+        Otherwise it slides, or rolls on down the axis of the drum.
         """
         heading = reals(theta, "theta")
         high, found = self._ends(heading)[1], np.isfinite(self.eastern_boundary(heading))
@@ -119,26 +118,26 @@ class RestRegion:
 
 
 @dataclass(frozen=True)
-class Turning:
-    """Where a carried dumbbell of given headings turns round; arrays like the headings.
+class Turning(Value):
+    """Turning points of a carried dumbbell of given headings; arrays like the headings.
 
     Attributes
     ----------
     upper : float or array
         Azimuth at which the drum's turning takes it out of ``A``.
     lower : float or array
-        Where, rolling without inertia, it stops, the pull being down to the dynamic resistance to
-        rolling; nan where it does not.  There it enters ``B``, unless ``B`` is bounded by sliding
-        at that heading: then it stops, and rests, before it.
+        Azimuth at which it stops when rolling without inertia, the pull having fallen to the
+        dynamic rolling resistance; nan if it does not stop.  There it enters ``B``, unless ``B`` is
+        bounded by sliding at that heading: then it stops, and rests, before it.
     coasting : float or array
-        Where it stops when what it has gained above ``lower`` is used up by rolling resistance;
-        nan where it rolls out of ``A`` or does not stop.
+        Azimuth at which it stops once rolling resistance has used up the energy gained above
+        ``lower``; nan if it rolls out of ``A`` or does not stop.
     rolls : bool or array
         Whether it leaves ``A`` by rolling back west.
     climb : float or array
-        Rise in ``eta`` from ``upper`` to ``lower``, in units of the radius ``rho``.  Carried in
-        ``(upper - lower) / omega``, it climbs at the mean speed ``omega rho tan(theta)``, whatever
-        the friction and however far it coasts.
+        Rise in ``eta`` from ``upper`` to ``lower``, in units of the radius ``rho``.  Being carried
+        takes ``(upper - lower) / omega``, so that it climbs at the mean speed
+        ``omega rho tan(theta)``, whatever the friction and however far it coasts.
     """
 
     upper: Any
@@ -149,7 +148,7 @@ class Turning:
 
 
 @dataclass(frozen=True)
-class Keel:
+class Keel(Value):
     """Friction of a dumbbell in a tilted drum, before and after it starts to move.
 
     Parameters
@@ -181,6 +180,7 @@ class Keel:
             got = f"{inner.rolling}, {inner.sliding} above {outer.rolling}, {outer.sliding}"
             msg = f"rolling_dynamic, sliding_dynamic: expected at most the static ones; got {got}"
             raise ValueError(msg)
+        super().__post_init__()
 
     @cached_property
     def onset(self) -> RestRegion:
@@ -189,7 +189,7 @@ class Keel:
 
     @cached_property
     def arrest(self) -> RestRegion:
-        """``B``: it stays at rest even when given a nudge."""
+        """``B``: a dumbbell at rest stays at rest even when nudged."""
         return RestRegion(self.tilt, self.rolling_dynamic, self.sliding_dynamic)
 
     @property
@@ -200,7 +200,7 @@ class Keel:
         return all(a < b for a, b in pairwise(numbers))
 
     def turning(self, theta: ArrayLike) -> Turning:
-        """Return where a dumbbell of heading ``theta`` turns, carried up and rolling back."""
+        """Return the turning points of a dumbbell of heading ``theta``."""
         heading = reals(theta, "theta")
         rolls = np.asarray(self.onset.rolls_back(heading))
         upper = np.asarray(self.onset.eastern_boundary(heading))
@@ -212,7 +212,7 @@ class Keel:
         return Turning(*(scalar(x) for x in (upper, lower, coasting, rolls, climb)))
 
     def _coasting(self, theta: Array, upper: Array, lower: Array) -> Array:
-        """Return where the gain, zero at ``upper`` and largest at ``lower``, is zero again."""
+        """Return where the energy gain, zero at ``upper``, largest at ``lower``, is zero again."""
         west = np.where(np.isfinite(lower), np.asarray(self.onset.azimuths(theta)[0]), np.nan)
         start = self._work(theta, upper)
         west = np.where(self._work(theta, west) < start, np.nan, west)
@@ -232,23 +232,22 @@ class Keel:
 
 
 def rest_margin(phi: ArrayLike, theta: ArrayLike, region: RestRegion, slenderness: float) -> Any:
-    """Return by how much friction holds a dumbbell of finite length; at least 0 at rest.
+    """Return the margin by which friction holds a dumbbell of finite length; at least 0 at rest.
 
-    Two balls press on the drum with their own loads ``N_1, N_2``, the weight wants to turn the
-    heading, and forces ``f_i``, ``|f_i| <= mu_s N_i``, and a rolling torque of at most
-    ``mu_r r (N_1 + N_2)`` have to balance.  The balances along ``u_r`` and of the torques fix the
-    parts of ``f_1`` and ``f_2`` along ``u_r``; they leave ``c_i = sqrt((mu_s N_i)^2 - f_ir^2)`` for
-    the axis, along which only the sum is given: rest is ``|G_s| <= c_1 + c_2`` and
-    ``|G_r| <= mu_r (N_1 + N_2)``.  The margin is the lesser slack over ``N_1 + N_2``.
+    Two balls press on the drum with their own loads ``N_1, N_2``; the torque of the weight on the
+    heading has to be balanced by forces ``f_i``, ``|f_i| <= mu_s N_i``, and a rolling torque of at
+    most ``mu_r r (N_1 + N_2)``.  The balances along ``u_r`` and of the torques determine the
+    components of ``f_1`` and ``f_2`` along ``u_r``; these leave
+    ``c_i = sqrt((mu_s N_i)^2 - f_ir^2)`` along the axis, where only the sum is determined: the
+    dumbbell rests if ``|G_s| <= c_1 + c_2`` and ``|G_r| <= mu_r (N_1 + N_2)``.  The margin is the
+    smaller slack over ``N_1 + N_2``.
 
     ``slenderness`` is ``kappa = l / (2 rho)``, ``0 <= kappa < 1``; at 0 the margin is that of
     ``region``, but for its scale inside the disc.  Loads are those of the weight alone: axial
     friction acts below the axis and moves a share ``r / l`` of itself from ball to ball.  That is
     neglected; it enters in second order and only where sliding bounds the region.
     """
-    if not 0 <= slenderness < 1:
-        msg = f"slenderness: expected l / (2 rho) in 0 <= kappa < 1; got {slenderness}"
-        raise ValueError(msg)
+    checks.real("slenderness", slenderness, least=0, below=1)
     force, loads, couple = _acting(phi, theta, region.tilt, slenderness)
     total = np.where((loads > 0).all(axis=-1), loads.sum(axis=-1), np.nan)
     across = abs(-force[..., :1] / 2 + couple[..., None] * np.array([-1, 1]))
@@ -286,10 +285,10 @@ def _acting(
 
 
 def exact_eastern_boundary(theta: ArrayLike, region: RestRegion, slenderness: float) -> Any:
-    """Return where a dumbbell of finite length is carried out of its region of rest.
+    """Return the azimuth at which a dumbbell of finite length is carried out of its region of rest.
 
-    Bisection between the middle of what ``region`` gives for a short one, where it has to rest
-    (else nan), and the azimuth at which a ball would leave the drum.
+    Found by bisection between the middle of the interval that ``region`` gives for a short one,
+    where it has to rest (else nan), and the azimuth at which a ball would leave the drum.
     """
     heading = reals(theta, "theta")
     inside = np.asarray(sum(region.azimuths(heading)) / 2)
@@ -303,5 +302,5 @@ def exact_eastern_boundary(theta: ArrayLike, region: RestRegion, slenderness: fl
 
 
 def rests(phi: ArrayLike, theta: ArrayLike, region: RestRegion, slenderness: float) -> Any:
-    """Return whether friction can hold a dumbbell of finite length: exactly, for ``kappa``."""
+    """Return whether friction can hold a dumbbell of finite length; exact in ``kappa``."""
     return rest_margin(phi, theta, region, slenderness) >= 0

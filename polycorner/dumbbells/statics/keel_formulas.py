@@ -1,8 +1,9 @@
 """Forces on a dumbbell lying in a tilted drum, derived from the height of the wall.
 
-What gravity does to the dumbbell is the ratio of the force along the wall to the force onto the
-wall, in components along ``u_r = (-cos theta, sin theta)``, the direction of rolling, and along the
-axis ``u_s = (sin theta, cos theta)``, both in the developed plane ``(R phi, eta)`` ([GMBN] app. A).
+The effect of gravity on the dumbbell is described by the ratio of the force along the wall to the
+force onto the wall, in components along ``u_r = (-cos theta, sin theta)``, the direction of
+rolling, and along the axis ``u_s = (sin theta, cos theta)``, both in the developed plane
+``(R phi, eta)`` ([GMBN] app. A).
 
 Of the printed formulas, the curve ``S``, the limit ``phi_s`` and ``|F_N| = cos alpha cos phi`` are
 those derived here.  Two are not.  The angle between force and rolling has the cosine
@@ -47,9 +48,9 @@ class Derivation:
     cosine : sympy.Expr
         Cosine of the angle between ``F_T`` and ``u_r``.
     curve : sympy.Expr
-        Heading of the curve ``S``, on which the force has no part along ``u_r``.
+        Heading of the curve ``S``, on which the force has no component along ``u_r``.
     limit : sympy.Expr
-        ``phi_s``, beyond which friction ``mu`` holds nothing.
+        ``phi_s``, beyond which friction ``mu`` holds no dumbbell.
     gravity, lever : sympy.Expr
         Torque of the weight towards larger headings, and torque of two forces along ``u_r`` equal
         to the loads, pushing against ``u_r``: unit ``m g cos alpha l^2 / (2 rho)``, ``m`` of one
@@ -140,7 +141,7 @@ def rolling_cosine(phi: ArrayLike, theta: ArrayLike, tilt: float) -> Any:
 def s_curve(phi: ArrayLike, tilt: float) -> Any:
     """Return the heading of the line of steepest descent, ``arctan(sin phi / tan alpha)``.
 
-    A dumbbell that lies along it is not made to roll.
+    Gravity does not make a dumbbell that lies along it roll.
     """
     return scalar(np.arctan2(np.sin(reals(phi, "phi")), math.tan(tilt)))
 
@@ -151,12 +152,12 @@ def net_torque(
     """Return the torque towards larger headings on a dumbbell that slides down the slope.
 
     Its balls move as the force points, and friction, ``friction`` times the load on each ball,
-    points against it; the lower ball is pressed harder.  The sum of the weight's torque and of
-    friction's is ``-sin(theta) (cos(phi) cos(theta) + mu sin(phi) cos(angle))`` for a short
+    points against it; the lower ball bears the larger load.  The torques of weight and friction
+    add up to ``-sin(theta) (cos(phi) cos(theta) + mu sin(phi) cos(angle))`` for a short
     dumbbell, in units of ``m g cos(alpha) l^2 / (2 rho)`` with ``m`` of one ball.  Where it has the
     sign of ``theta``, between the curve ``S`` and ``|theta| = pi/2``, headings grow: the hatched
-    region of [GMBN] app. A, which does not say in which motion its torque is taken.  At rest, and
-    in rolling, friction takes up the torque and the heading stays.
+    region of [GMBN] app. A, which does not say to which motion its torque refers.  At rest and
+    while rolling, friction balances the torque and the heading does not change.
 
     ``slenderness`` is ``l / (2 rho)``.
     """

@@ -1,4 +1,4 @@
-"""The dyad's minima: both nested corners and the two dumbbells end to end, each certified."""
+"""The dyad's minima: both nested corners and the two dumbbells end to end, with certificates."""
 
 import math
 from collections.abc import Iterable
@@ -9,13 +9,14 @@ import numpy as np
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.minimisation import Certificate, minimise, stationary_on
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 CORNER = ("A2B1", "A2b", "aB1")
 
 
 @dataclass(frozen=True)
-class DyadMinimum:
-    """One of the three loci the paper names, for one pair.
+class DyadMinimum(Value):
+    """One of the three loci that the paper names, for one pair.
 
     Attributes
     ----------
@@ -24,7 +25,7 @@ class DyadMinimum:
     pair : DumbbellPair
         The model.
     certificate : Certificate
-        What was found there; its verdict may be that it is no minimum.
+        The certificate there; its verdict may be that it is no minimum.
     """
 
     name: str
@@ -77,10 +78,10 @@ class DyadMinimum:
 def dyad_minima(pair: DumbbellPair) -> tuple[DyadMinimum, ...]:
     """Find and certify ``delta_R``, ``delta_L`` and ``G`` of a pair.
 
-    ``delta`` is where the energy is stationary on the face of the three contacts
-    ``A2B1, A2b, aB1``.  Where the descent from a nested start does not come to rest there (thick
-    rods: a multiplier is negative), the point is still found, on its face, and its certificate
-    says that it is no minimum.
+    ``delta`` is the stationary point of the energy on the face of the three contacts
+    ``A2B1, A2b, aB1``.  If the descent from a nested start does not end there (thick rods: a
+    multiplier is negative), the point is still found on its face, and its certificate says that
+    it is no minimum.
     """
     corners = [dyad_corner(pair, chirality) for chirality in ("R", "L")]
     ends = minimise(pair.polyhedron, pair.energy, pair.end_to_end())
@@ -88,7 +89,7 @@ def dyad_minima(pair: DumbbellPair) -> tuple[DyadMinimum, ...]:
 
 
 def dyad_corner(pair: DumbbellPair, chirality: Chirality) -> DyadMinimum:
-    """Return ``delta_R`` or ``delta_L``: the corner of three contacts, whether minimum or not."""
+    """Return ``delta_R`` or ``delta_L``: the corner of three contacts, minimum or not."""
     found = minimise(pair.polyhedron, pair.energy, pair.nested(chirality))
     if set(found.active) != set(CORNER):
         start = pair.nested(chirality, clearance=0.0)

@@ -3,7 +3,7 @@
 A kind of minimum is named by its contacts with positive multipliers:
 
 =============  ====================================================================
-``G``          none: end to end on the lowest line, any distance apart
+``G``          none: end to end on the lowest line, at any distance
 ``delta``      a ball-ball contact and two ball-rod contacts: nested
 ``staggered``  three ball-ball contacts: nested without touching a rod
 ``crossed``    rod on rod: one lies across the other, free to shift along it
@@ -42,9 +42,9 @@ def energy_symmetry(pair: DumbbellPair, *, mirror: bool = False) -> Symmetry:
     """Return the symmetries of both the polyhedron and the energy of a pair.
 
     Shifting the pair along the drum, relabelling the dumbbells and the balls of either, and the
-    half-turn about the vertical axis; rolling the pair is no symmetry of its energy.  With
-    ``mirror`` also the reflection in the vertical plane through the drum's axis, so that right-
-    and left-handed minima count as one.
+    half-turn about the vertical axis; rolling the pair is no symmetry of its energy.  ``mirror``
+    adds the reflection in the vertical plane through the drum's axis, so that right- and
+    left-handed minima count as one.
     """
     unit, half = pair.ball_radius, pair.length / 2
 
@@ -69,7 +69,7 @@ def _shift(q: Array) -> Array:
 
 
 def _with(group: tuple[Element, ...], more: Element) -> tuple[Element, ...]:
-    """Return a group without the identity, enlarged by an involution that keeps names."""
+    """Return a group, without the identity, enlarged by an involution that preserves names."""
 
     def both(element: Element) -> Element:
         return Element(lambda q: more.apply(element.apply(q)), element.names)
@@ -81,9 +81,9 @@ def scattered(pair: DumbbellPair, rng: np.random.Generator, count: int) -> Array
     """Return random placements without overlap anywhere in the drum, ``(count, 6)``.
 
     Independent draws from one distribution.  Headings are uniform, and so is the azimuth of A; with
-    even odds B is near A, within ``l/2 + 2 r`` across and along, or anywhere, its azimuth uniform
-    and within ``l + 2 r`` along.  In the plane azimuths are replaced by lateral positions within
-    ``l + 2 r``.
+    even odds B is near A, within ``l/2 + 2 r`` across and along, or anywhere, with a uniform
+    azimuth and within ``l + 2 r`` along.  In the plane azimuths are replaced by lateral positions
+    within ``l + 2 r``.
     """
     close = int(rng.binomial(count, 0.5))
     near = _placed(pair, rng, close, pair.length / 2 + 2 * pair.ball_radius)
@@ -121,7 +121,7 @@ def pair_minima(
     pair : DumbbellPair
         The dumbbells.
     starts : int, optional
-        How many placements :func:`scattered` draws.
+        Number of placements that :func:`scattered` draws.
     rng : Generator or int, optional
         Source of the placements; default a generator with seed 0.
     mirror : bool, optional
@@ -156,10 +156,10 @@ def crossing_room(pair: DumbbellPair) -> float:
     across it, ``2 w`` wide with ``w^2 = 4 t (rho - t)``, and not above the drum's axis,
     ``2 t <= rho``.  It has to be long enough, ``l >= 2 w``.  Its outer ends are
     ``u = l/2 - sqrt(l^2/4 - w^2)`` short of the balls below when it crosses in the middle; those
-    have to be ``g`` apart along the drum, ``g^2 = 4 r^2 - 4 t rho``.  So it rests in the middle if
-    ``u >= g``, and otherwise ``u + g`` off the middle, with one of its balls beyond the lower ones,
-    if there the lower ball clears the upper rod.  The least difference of the better one is
-    returned; in both the upper balls clear the lower rod, ``4 t rho >= (r + t)^2``.
+    have to be ``g`` apart along the drum, ``g^2 = 4 r^2 - 4 t rho``.  So the equilibrium is at the
+    middle if ``u >= g``, and otherwise ``u + g`` off the middle, with one of its balls beyond the
+    lower ones, provided the lower ball clears the upper rod there.  The smallest clearance of the
+    better one is returned; in both the upper balls clear the lower rod, ``4 t rho >= (r + t)^2``.
     """
     if pair.is_plane:
         return -math.inf
@@ -185,12 +185,12 @@ class MinimaMap(Value):
     kinds : tuple of str
         All kinds found.
     counts : (k, n, m, kinds) array of int
-        How many starts ended in each kind; -1 for a pair that does not fit in its drum or
+        Number of starts that ended in each kind; -1 for a pair that does not fit in its drum or
         was not reached.
     distinct : (k, n, m, kinds) array of int
         Number of minima of that kind, mirror images and relabelled ones counted once.
     lost : (k, n, m) array of int
-        How many starts ended in no minimum.
+        Number of starts that ended in no minimum.
     starts : int
         Number of starts for each pair.
     examples : mapping from str to (DumbbellPair, Certificate)
@@ -215,7 +215,7 @@ class MinimaMap(Value):
 
     @property
     def looked_at(self) -> NDArray[np.bool_]:
-        """Which pairs fit in their drums and were looked at, ``(k, n, m)``."""
+        """Whether a pair fits in its drum and was examined, ``(k, n, m)``."""
         return np.asarray(self.lost >= 0)
 
     def pair(self, i: int, j: int, k: int) -> DumbbellPair | None:
@@ -306,7 +306,7 @@ class _Survey:
                 self.examples[kind] = (count, pair, example)
 
     def result(self, curvatures: Array, rods: Array, lengths: Array) -> MinimaMap:
-        """Return the map; kinds in the order of how many starts ended in them."""
+        """Return the map; kinds in the order of the number of starts that ended in them."""
         kinds = tuple(sorted(self.counts, key=lambda kind: -int(self.counts[kind].sum())))
         counts, distinct = (
             np.array([np.where(self.lost < 0, -1, table[kind]) for kind in kinds], dtype=np.int64)

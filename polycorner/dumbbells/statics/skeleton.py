@@ -17,12 +17,13 @@ from polycorner.skeletons.elements import Corner, Skeleton
 from polycorner.skeletons.orbits import Orbits, orbits
 from polycorner.skeletons.search import BUDGET, skeleton
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 PLACEMENTS = 6
 
 
 @dataclass(frozen=True)
-class PairAtlas:
+class PairAtlas(Value):
     """Corners, edges and faces of ``D`` for a pair, modulo motions of the pair as a whole.
 
     Attributes
@@ -30,7 +31,7 @@ class PairAtlas:
     pair : DumbbellPair
         The dumbbells.
     skeleton : Skeleton
-        In the plane that of ``D``, in the drum that of its section at a mean heading.
+        That of ``D`` in the plane, that of its section at a mean heading in the drum.
     heading : float or None
         That mean heading, in radians; None in the plane.
     """
@@ -41,7 +42,7 @@ class PairAtlas:
 
     @cached_property
     def ordered(self) -> Mapping[str, Orbits]:
-        """Corners, edges and faces up to relabelling of balls; A and B are told apart."""
+        """Corners, edges and faces up to relabelling of balls; A and B remain distinguished."""
         return self._orbits(ball_relabellings())
 
     @cached_property
@@ -49,7 +50,8 @@ class PairAtlas:
         """Corners, edges and faces up to relabelling of the dumbbells and of their balls.
 
         Relabelling the balls of one dumbbell turns the mean heading by a quarter turn; in the drum
-        the relative placement it leads to is then told by its nearest neighbour in the section.
+        the resulting relative placement is then identified with its nearest neighbour in the
+        section.
         """
         return self._orbits(relabellings())
 
@@ -70,12 +72,12 @@ class PairAtlas:
 
     @property
     def components_ordered(self) -> dict[int, int]:
-        """The same for ordered pairs of dumbbells whose balls are alike, headings modulo ``pi``."""
+        """The same for ordered pairs with indistinguishable balls, headings modulo ``pi``."""
         return self._counts(self.ordered)
 
     @property
     def components_unordered(self) -> dict[int, int]:
-        """The same for unordered pairs of dumbbells whose balls are alike."""
+        """The same for unordered pairs with indistinguishable balls."""
         return self._counts(self.unordered)
 
     def _counts(self, grouped: Mapping[str, Orbits]) -> dict[int, int]:
@@ -105,7 +107,7 @@ def pair_atlas(
 ) -> PairAtlas:
     """Compute the atlas of a pair, in the plane or on a section of the drum.
 
-    It starts from nested pairs of both chiralities and from random placements.
+    The search starts from nested pairs of both chiralities and from random placements.
 
     Parameters
     ----------
@@ -138,8 +140,8 @@ def pair_starts(pair: DumbbellPair, rng: np.random.Generator, heading: float = 0
 def long_rod_length(ball_radius: float, rod_radius: float) -> float:
     """Return the length above which the rods are long enough, ``2 sqrt(4 r^2 - (r + t)^2)``.
 
-    At it a ball touches both balls of the other dumbbell and its rod at once: a right triangle
-    with legs ``l/2`` and ``r + t`` and hypotenuse ``2 r``.  Below it the ball touches both balls
-    before it reaches the rod, and nothing ever touches a rod.
+    At this length a ball touches both balls of the other dumbbell and its rod at once: a right
+    triangle with legs ``l/2`` and ``r + t`` and hypotenuse ``2 r``.  Below it the ball touches both
+    balls before it reaches the rod, and no rod is ever touched.
     """
     return 2 * math.sqrt(4 * ball_radius**2 - (ball_radius + rod_radius) ** 2)

@@ -17,6 +17,7 @@ from polycorner.skeletons.elements import Completeness, Edge, Skeleton
 from polycorner.skeletons.orbits import Orbits
 from polycorner.skeletons.search import skeleton
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 # Distance, in ball radii, below which corners are not distinguished reliably, and so the possible
 # error of the position of a change.
@@ -75,8 +76,8 @@ class Signature:
 
 
 @dataclass(frozen=True)
-class PairMap:
-    """The signatures of the atlas over a grid, and where they change along ``l/r``.
+class PairMap(Value):
+    """Signatures of the atlas over a grid, and their changes along ``l/r``.
 
     Attributes
     ----------
@@ -87,15 +88,15 @@ class PairMap:
     table : (n, m) array of int
         Signature at every point of the grid, as position in ``signatures``.
     signatures : tuple of Signature
-        The different ones, as they were met.
+        The distinct ones, in the order in which they were found.
     change_rods : (k,) array
         ``t/r`` of every change.
     change_brackets : (k, 2) array
-        Two ``l/r`` between which it lies.
+        Two values of ``l/r`` that bracket it.
     change_kinds : (k, 2) array of int
         Signatures below and above.
     critical : (n,) array of int
-        Signature exactly at the closed form, -1 where that is less than two ball radii.
+        Signature exactly at the closed form, -1 if that is less than two ball radii.
     """
 
     lengths: Array
@@ -114,19 +115,19 @@ class PairMap:
 
     @property
     def deviations(self) -> Array:
-        """How far the closed form is from the bracket of every change, ``(k,)``; 0 inside it."""
+        """Distance of the closed form from the bracket of every change, ``(k,)``; 0 inside it."""
         exact = np.array([long_rod_length(1.0, t) for t in self.change_rods.tolist()])
         low, high = self.change_brackets[:, 0], self.change_brackets[:, 1]
         return np.asarray(np.maximum(np.maximum(low - exact, exact - high), 0.0))
 
     @property
     def explained(self) -> NDArray[np.bool_]:
-        """Whether every change is where the closed form puts it, ``(k,)``, within ``BLUR``."""
+        """Whether the closed form predicts every change to within ``BLUR``, ``(k,)``."""
         return np.asarray(self.deviations <= BLUR)
 
     @property
     def missed(self) -> Array:
-        """``t/r`` whose closed form lies inside the grid but where no explained change is."""
+        """``t/r`` with the closed form inside the grid but without a change that it explains."""
         inside = (self.closed_form > self.lengths[0]) & (self.closed_form < self.lengths[-1])
         return np.setdiff1d(self.rods[inside], self.change_rods[self.explained])
 
@@ -138,7 +139,7 @@ def pair_map(
     tolerance: float = 1e-4,
     progress: Progress = silent,
 ) -> PairMap:
-    """Map where the atlas of the pair in the plane changes; lengths in ball radii.
+    """Map the changes of the atlas of the pair in the plane; lengths in ball radii.
 
     On a grid the atlas is computed for labelled pairs.  Between neighbours with different
     signatures the change is bisected in ``l/r``; there the atlas is computed up to relabelling
@@ -152,7 +153,7 @@ def pair_map(
         ``t/r``, increasing and strictly between 0 and 1.
     tolerance : float, optional
         Width, in ball radii, to which every change is bracketed.  Below ``BLUR`` corners are not
-        told apart reliably.
+        distinguished reliably.
     progress : callable, optional
         Called as ``progress(done, expected, note)`` after every skeleton.
 
@@ -209,7 +210,7 @@ def pattern_at(length: float, rod_radius: float, *, seed: int = 0) -> Pattern:
     length, rod_radius : float
         In ball radii.
     seed : int, optional
-        For the placements it starts from.
+        Seed of the placements from which the search starts.
 
     Examples
     --------
@@ -267,7 +268,7 @@ class _Survey:
             yield from self._bisected(rod, (middle, high), (kind, above))
 
     def _kind(self, length: float, rod: float, likely: tuple[int, int]) -> int:
-        """Return which signature a point between two has; in full only if it is neither."""
+        """Return the signature of a point between two others; in full only if it is a third."""
         pattern = pattern_at(length, rod)
         for kind in likely:
             if self.signatures[kind].pattern == pattern:

@@ -1,7 +1,7 @@
 """One-dimensional wells that make up a dyad's corner, and their extents.
 
-A certificate labels the directions at the corner; here each of them becomes a well on a line with
-the slope and the stiffness that the heights of the balls give it.
+A certificate labels the directions at the corner; here each of them becomes a well on a line, with
+slope and stiffness from the heights of the balls.
 """
 
 import math
@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_minima
 from polycorner.minimisation import Certificate, Entrapment
@@ -17,18 +18,19 @@ from polycorner.models.wells.escape import mean_escape_time
 from polycorner.models.wells.holding import Escapes, escapes
 from polycorner.models.wells.wells import Well
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 GRAVITY = 9810.0  # mm/s^2
-BALLS = 4  # whose mass moves in every direction
+BALLS = 4  # number of balls whose inertia every direction has
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class Hold(Value):
     """One direction in which a dyad's corner holds it, as a well.
 
-    The coordinate ``s`` is the way in mm that the four balls go in the mean (root mean square, the
-    turning of balls of one dumbbell about its axis left out): in every direction the inertia is
-    that of four balls.
+    The coordinate ``s`` is the root mean square displacement of the four balls in mm, rotation of
+    balls about the dumbbell's axis disregarded: in every direction the inertia is that of four
+    balls.
 
     Attributes
     ----------
@@ -41,8 +43,8 @@ class Hold:
     multiplier : float
         Force in the contact in units of the weight of a ball; 0 along the face.
     slope, stiffness : float
-        ``E = slope s + stiffness s^2 / 2``, in weights of a ball, and of a ball per mm: to second
-        order, but for the curvature of the gap itself.
+        ``E = slope s + stiffness s^2 / 2``, in ball weights and ball weights per mm: to second
+        order, disregarding the curvature of the gap itself.
     """
 
     direction: str
@@ -54,12 +56,12 @@ class Hold:
 
     @property
     def crossover(self) -> float:
-        """Way in mm up to which the slope holds more than the stiffness does; 0 without a slope."""
+        """Distance in mm up to which the slope term exceeds the stiffness term; 0 without slope."""
         return 2 * self.slope / self.stiffness if self.stiffness > 0 else math.inf
 
     @property
     def without_slope(self) -> "Hold":
-        """The half-U hold that is left if the contact presses with no force."""
+        """The half-U hold that remains if the contact carries no force."""
         return replace(self, kind=Entrapment.HALF_U, multiplier=0.0, slope=0.0)
 
     def well(
@@ -76,27 +78,24 @@ class Hold:
 
 
 def dyad_holds(pair: DumbbellPair, chirality: Chirality = "R") -> tuple[Hold, ...]:
-    """Take a dyad's corner apart into directions that inertia does not couple.
+    """Decompose a dyad's corner into directions that inertia does not couple.
 
-    First the contacts: direction ``i`` opens contact ``i`` alone, without momentum along the face.
-    Then the normal modes along the face, stiffest first; the last is free and has no well.
-    Balls slide without friction and have their moment of inertia about the vertical; their spin
-    about the dumbbell's axis does not take part.
+    First come the contacts: direction ``i`` opens contact ``i`` alone, without momentum along the
+    face.  Then follow the normal modes along the face, stiffest first; the last is free and has no
+    well.  Balls slide without friction and have their moment of inertia about the vertical; their
+    spin about the dumbbell's axis is disregarded.
 
     Raises
     ------
     ValueError
-        For a pair in the plane, or one whose corner is no minimum held by three forces.
+        For a pair in the plane, or one whose corner is no minimum with three contact forces.
     """
     if pair.is_plane:
-        msg = "pair: expected one in a drum, where heights differ; got one in the plane"
-        raise ValueError(msg)
-    if chirality not in ("R", "L"):
-        msg = f"chirality: expected 'R' or 'L'; got {chirality!r}"
-        raise ValueError(msg)
+        checks.refuse("pair", "one in a drum, where heights differ", pair)
+    checks.choice("chirality", chirality, ("R", "L"))
     corner = dyad_minima(pair)["RL".index(chirality)].certificate
     if not corner.is_minimum or corner.signature[0] != len(CORNER):
-        msg = f"pair: expected one held by three contacts; its corner is {corner.verdict.value}"
+        msg = f"pair: expected one held by three contacts; its corner: {corner.verdict.value}"
         raise ValueError(msg)
     return _holds(pair, corner)
 
@@ -104,9 +103,8 @@ def dyad_holds(pair: DumbbellPair, chirality: Chirality = "R") -> tuple[Hold, ..
 def _holds(pair: DumbbellPair, corner: Certificate) -> tuple[Hold, ...]:
     gradients, hessian = _derivatives(pair, corner)
     unit = pair.manifold.scale_array
-    scale = (
-        np.sqrt(BALLS / inertia(pair)) / unit
-    )  # steps by which all have the inertia of four balls
+    # in steps of this size every coordinate has the inertia of four balls
+    scale = np.sqrt(BALLS / inertia(pair)) / unit
     slopes, curved = gradients * scale, hessian * np.outer(scale, scale)
     opening = np.linalg.pinv(slopes)
     length = np.linalg.norm(opening, axis=0)
@@ -123,7 +121,7 @@ def _holds(pair: DumbbellPair, corner: Certificate) -> tuple[Hold, ...]:
 
 
 def _modes(corner: Certificate, scale: Array, slopes: Array, curved: Array) -> Iterator[Hold]:
-    """Yield the normal modes along the face, each with the certificate's name that is nearest."""
+    """Yield the normal modes along the face, each under the certificate's nearest name."""
     face = np.linalg.svd(slopes)[2][len(slopes) :].T
     stiff, modes = np.linalg.eigh(face.T @ curved @ face)
     along = [(name, k) for name, k in corner.entrapment.items() if name not in corner.active]
@@ -138,7 +136,7 @@ def _modes(corner: Certificate, scale: Array, slopes: Array, curved: Array) -> I
 
 
 def inertia(pair: DumbbellPair) -> Array:
-    """Return the inertia of the six coordinates in masses of a ball; they are not coupled."""
+    """Return the inertia of the six coordinates in ball masses; the coordinates are uncoupled."""
     turning = 2 * (pair.length**2 / 4 + 2 * pair.ball_radius**2 / 5)
     return np.array([2 * pair.centre_radius**2, 2.0, turning] * 2)
 
@@ -154,17 +152,17 @@ def _derivatives(pair: DumbbellPair, corner: Certificate) -> tuple[Array, Array]
 
 
 @dataclass(frozen=True)
-class Shaking:
+class Shaking(Value):
     """Noise and drag that are the same in every direction.
 
     Attributes
     ----------
     energy : float
-        At which noise and drag balance, ``T``, in weights of a ball times mm.
+        Energy ``T`` at which noise and drag balance, in ball weights times mm.
     drag_rate : float
         Drag over mass, in 1/s.
     restitution : float
-        Between the dumbbells; default 0.
+        Coefficient of restitution between the dumbbells; default 0.
     """
 
     energy: float
@@ -186,7 +184,7 @@ def hold_times(
 ) -> Array:
     """Return mean times in s until noise moves the balls by ``rims`` mm, ``(holds, rims)``.
 
-    They do not depend on the mass of a ball.  Times too long for the grid of
+    The times do not depend on the mass of a ball.  Times too long for the grid of
     :func:`~polycorner.models.wells.escape.mean_escape_time` are nan; the free direction has no
     well.
     """

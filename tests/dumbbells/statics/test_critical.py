@@ -285,14 +285,3 @@ def test_branches_meet_at_the_critical_thickness():
     assert corner.energies[0] == pytest.approx(
         top.energies[0] - escape_barrier(replace(PAIR, rod_radius=2.0))
     )
-
-
-def test_parameters_are_checked():
-    with pytest.raises(
-        ValueError, match="parameter: expected one of 'rod_radius', 'length'; got 't'"
-    ):
-        critical_corner(PAIR, "t")
-    with pytest.raises(
-        ValueError, match="unknown: expected one of 'rod_radius', 'length'; got 'r'"
-    ):
-        plane_critical_formula("r")

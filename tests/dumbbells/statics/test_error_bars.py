@@ -118,15 +118,7 @@ def test_any_quantity_may_have_an_error_bar():
     assert bar.spread == pytest.approx(0.5 * abs(found.energy[k]))
 
 
-def test_refusals():
-    with pytest.raises(ValueError, match=r"tolerances: expected names among length, .*; got width"):
-        heading_error_bar(PAIR, {"width": 0.1})
-    with pytest.raises(ValueError, match="tolerances: expected length as a number not below 0"):
-        heading_error_bar(PAIR, {"length": -0.1})
-    with pytest.raises(ValueError, match=r"pair: expected one that rests in its corner; .* falls"):
-        heading_error_bar(replace(PAIR, rod_radius=2.95), {"length": 0.1})
-    with pytest.raises(ValueError, match="drum_radius"):
-        heading_error_bar(replace(PAIR, drum_radius=math.inf), {"drum_radius": 0.1})
+def test_without_a_corner_there_is_no_derivative():
     with pytest.raises(ValueError, match="does not lie in the polyhedron"):
         pair_sensitivity(replace(PAIR, length=7.0, rod_radius=0.5))
 

@@ -316,29 +316,3 @@ def test_at_heading_zero_length_does_not_matter():
 def test_a_ball_that_would_leave_the_drum_does_not_rest():
     assert math.isnan(rest_margin(1.4, math.pi / 2, KEEL.onset, 0.5))
     assert not rests(1.4, math.pi / 2, KEEL.onset, 0.5)
-
-
-# ---------------------------------------------------------------------------------------- arguments
-
-
-@pytest.mark.parametrize(
-    ("numbers", "message"),
-    [
-        ((2.0, 0.1, 0.3), "tilt: expected an angle between -pi/2 and pi/2; got 2.0"),
-        ((0.1, 0.4, 0.3), "rolling: expected .* at most that of sliding; got rolling 0.4"),
-        ((0.1, 0.0, 0.3), "rolling: expected a positive number"),
-        ((0.1, math.nan, 0.3), "rolling: expected a positive number"),
-    ],
-)
-def test_wrong_coefficients_are_refused(numbers, message):
-    with pytest.raises(ValueError, match=message):
-        RestRegion(*numbers)
-
-
-def test_wrong_kinds_are_refused():
-    with pytest.raises(TypeError, match=r"^sliding: expected real numbers"):
-        RestRegion(0.1, 0.1, "large")
-    with pytest.raises(ValueError, match=r"^rolling_dynamic, sliding_dynamic: expected at most"):
-        Keel(0.1, 0.1, 0.3, 0.2, 0.3)
-    with pytest.raises(ValueError, match=r"^slenderness: expected l / \(2 rho\) in 0 <= kappa < 1"):
-        rests(0.0, 0.0, KEEL.onset, 1.0)

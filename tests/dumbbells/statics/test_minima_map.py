@@ -249,25 +249,3 @@ def test_a_map_can_be_repeated_and_interrupted():
     for kind in cut.kinds:
         one, two = (f.counts[..., f.kinds.index(kind)][cut.looked_at] for f in (whole, cut))
         np.testing.assert_array_equal(one, two)
-
-
-@pytest.mark.parametrize(
-    ("changes", "blamed"),
-    [
-        ({"curvatures": [-0.1]}, "curvatures"),
-        ({"rods": [0.5, 0.2]}, "rods"),
-        ({"lengths": [1.5]}, "lengths"),
-        ({"lengths": []}, "lengths"),
-        ({"rods": [np.nan]}, "rods"),
-        ({"starts": 0}, "starts"),
-    ],
-)
-def test_arguments_are_refused_in_a_sentence(changes, blamed):
-    with pytest.raises(ValueError, match=f"^{blamed}: expected "):
-        minima_map(**(SMALL | changes))
-
-
-@pytest.mark.parametrize("starts", [0, True, 2.5, "many"])
-def test_starts_are_counted_in_whole_numbers(starts):
-    with pytest.raises((TypeError, ValueError), match=r"^starts: expected a whole number"):
-        pair_minima(PAIR, starts=starts)

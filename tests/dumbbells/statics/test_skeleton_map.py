@@ -278,22 +278,3 @@ class TestComparison:
     def test_nothing_is_expected_where_rods_are_always_long_enough(self):
         assert self.made([], rods=(0.8, 0.9)).missed.tolist() == []
         assert self.made([], rods=(0.1, 0.8)).missed.tolist() == [0.1]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "blamed"),
-    [
-        (([3, 2], [0.5]), {}, "lengths"),
-        (([1.9, 3], [0.5]), {}, "lengths"),
-        (([], [0.5]), {}, "lengths"),
-        (([[2, 3]], [0.5]), {}, "lengths"),
-        (([2, 3], [0.0, 0.5]), {}, "rods"),
-        (([2, 3], [0.5, 1.0]), {}, "rods"),
-        (([2, math.nan], [0.5]), {}, "lengths"),
-        (([2, 3], [0.5]), {"tolerance": 0.0}, "tolerance"),
-        (([2, 3], [0.5]), {"tolerance": True}, "tolerance"),
-    ],
-)
-def test_wrong_arguments_are_named(arguments, options, blamed):
-    with pytest.raises((TypeError, ValueError), match=f"^{blamed}: expected "):
-        pair_map(*arguments, **options)

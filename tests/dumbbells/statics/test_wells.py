@@ -187,12 +187,3 @@ def test_simulated_times(hold):
 
 def test_times_out_of_reach_are_not_numbers():
     assert math.isnan(hold_times(HALF_V[:1], [2.0], Shaking(1e-5, 5.0))[0, 0])
-
-
-def test_pairs_without_such_a_corner_are_refused():
-    with pytest.raises(ValueError, match="pair: expected one in a drum"):
-        dyad_holds(replace(PAIR, drum_radius=math.inf))
-    with pytest.raises(ValueError, match="pair: expected one held by three contacts"):
-        dyad_holds(replace(PAIR, rod_radius=2.95))
-    with pytest.raises(ValueError, match="chirality: expected 'R' or 'L'; got 'X'"):
-        dyad_holds(PAIR, "X")

@@ -96,9 +96,7 @@ def test_long_formulas_can_be_broken_before_relations_and_short_ones_not():
 
 
 def test_a_formula_that_cannot_be_shown_is_refused():
-    with pytest.raises(
-        ValueError, match=r"formula: expected TeX that MathML can show; got \\nosuch"
-    ):
+    with pytest.raises(ValueError, match=r"^formula: expected .*nosuch"):
         html(r"$\nosuch{x}$")
 
 

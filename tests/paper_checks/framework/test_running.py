@@ -62,7 +62,7 @@ def test_verdicts_and_errors(done):
     errors = {result.claim.id: result.error for result in found.errors}
     assert errors["A2"] == "ValueError: no such thing"
     assert "ended abruptly" in errors["A3a"]
-    assert errors["B2"] == "TypeError: expected a Finding; got NoneType"
+    assert errors["B2"] == "TypeError: check: expected a Finding; got NoneType"
     assert [line.split(":")[0] for line in problems(found)] == ["A2", "A3a", "B2"]
 
 
@@ -139,17 +139,12 @@ def test_selection():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        ((["D"],), "section: expected one of 2, C; got 'D'"),
-        (((), ["A9"]), "id: expected one such as A1 or S1; got 'A9'"),
-        (((), [""]), "id: expected one such as A1 or S1; got ''"),
-    ],
+    ("arguments", "argument"),
+    [((["D"],), "section"), (((), ["A9"]), "id"), (((), [""]), "id")],
 )
-def test_selection_refuses(arguments, sentence):
-    with pytest.raises(ValueError, match="expected one") as error:
+def test_an_unknown_selection_is_named(arguments, argument):
+    with pytest.raises(ValueError, match=f"^{argument}: expected "):
         select(CLAIMS, *arguments)
-    assert str(error.value) == sentence
 
 
 def test_the_verdicts_are_all_there():
