@@ -16,10 +16,8 @@ from polycorner.models.wells.holding import ladder
 from polycorner.models.wells.wells import Well
 
 FRICTION, RESTITUTION = 0.04, 0.6  # friction in units of depth per rim; restitution of the wall
-START, TIME = (
-    0.9,
-    16.0,
-)  # starting position of the mass, in rims; duration, in rims times sqrt(mass / depth)
+# starting position of the mass, in rims; duration, in rims times sqrt(mass / depth)
+START, TIME = 0.9, 16.0
 WELLS = ladder(1.0, friction=FRICTION, restitution=RESTITUTION)
 COLOURS = ("#0072B2", "#E69F00", "#D55E00")
 SHOWN = 0.62  # position of the mass in the drawing of its well, in rims

@@ -17,10 +17,8 @@ from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
 KEEL = keel_of(style.DRUM)
 TILT = KEEL.tilt
 # Coefficients of rolling and angles epsilon in the paper's captions; its text contradicts them.
-OTHERS = {
-    0.6: (4, 2),
-    1.2: (1, 1.5),
-}  # further coefficients for which the boundary is drawn, with their dashes
+# Further coefficients for which the boundary is drawn, with their dashes.
+OTHERS = {0.6: (4, 2), 1.2: (1, 1.5)}
 DASHED = "#8E5A93"
 CAPTIONS = (("b", "single dumbbells", 0.1, 8.0), ("c", "dyads", 0.2, 20.0))
 
