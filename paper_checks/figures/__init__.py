@@ -1,6 +1,6 @@
 """The paper's figures, regenerated from the model as far as possible without its raw data."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from paper_checks.figures import (
 )
 from paper_checks.figures.figure import Figure
 from polycorner import checks
+from polycorner.progress import Progress, silent
 
 FIGURES: dict[str, Figure] = {
     figure.name: figure
@@ -38,7 +39,7 @@ def write(
     folder: str | PathLike[str],
     names: Iterable[str] | None = None,
     slow: bool = True,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> list[Path]:
     """Draw figures and write each as ``name.png`` (200 dpi) and ``name.svg``.
 
@@ -51,7 +52,7 @@ def write(
     slow : bool, optional
         Whether the default includes figures that take a simulation.
     progress : callable, optional
-        Called with the name of each figure once it is written.
+        Called as ``progress(done, figures, name)`` once a figure is written.
 
     Returns
     -------
@@ -67,18 +68,17 @@ def write(
         names = [names]
     chosen = list(FIGURES) if names is None else list(dict.fromkeys(names))
     checks.names("names", chosen, FIGURES)
+    if names is None and not slow:
+        chosen = [name for name in chosen if not FIGURES[name].slow]
     written = []
-    for name in chosen:
+    for done, name in enumerate(chosen, 1):
         figure = FIGURES[name]
-        if names is None and figure.slow and not slow:
-            continue
         try:
             written += figure.write(Path(folder))
         except Exception as error:
             error.add_note(f"while drawing the figure {name!r}")
             raise
-        if progress is not None:
-            progress(name)
+        progress(done, len(chosen), name)
     return written
 
 

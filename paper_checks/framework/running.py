@@ -4,7 +4,7 @@ import os
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -14,12 +14,11 @@ from multiprocessing import active_children, get_context
 
 from paper_checks.framework.claims import Claim, Finding
 from polycorner import checks
+from polycorner.progress import Progress, silent
 
 # Each process has a core of its own; threads of the linear algebra would compete for it.
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
-# Reports progress: the number of checks done, and the claims being checked.
-Progress = Callable[[int, Sequence[str]], None]
 # Result sent back by a process: the finding or None, the error, seconds.
 Examined = tuple[Finding | None, str, float]
 
@@ -104,7 +103,7 @@ def run(
     claims: Sequence[Claim],
     *,
     workers: int = 2,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     catalogue: str = "paper_checks",
 ) -> Run:
     """Check claims in several processes.
@@ -120,7 +119,8 @@ def run(
     workers : int, optional
         Number of processes.
     progress : callable, optional
-        Called as ``progress(done, ids being checked)`` whenever a check begins or ends.
+        Called as ``progress(done, claims, ids being checked)`` whenever a check begins or ends;
+        see :class:`~polycorner.progress.Progress`.
     catalogue : str, optional
         Module in whose ``CLAIMS`` the processes look up the claims.
     """
@@ -130,7 +130,7 @@ def run(
     lanes = [_Lane(catalogue, number) for number in range(min(workers, len(claims)))]
     try:
         with _single_threads():
-            _check_all(lanes, queue, found, progress)
+            _check_all(lanes, queue, found, len(claims), progress)
     except KeyboardInterrupt:
         for child in set(active_children()) - others:
             child.terminate()
@@ -144,15 +144,19 @@ def run(
 
 
 def _check_all(
-    lanes: "list[_Lane]", queue: "_Queue", found: dict[str, Result], progress: Progress | None
+    lanes: "list[_Lane]",
+    queue: "_Queue",
+    found: dict[str, Result],
+    total: int,
+    progress: Progress,
 ) -> None:
     while True:
         for lane in lanes:
             if lane.future is None and (claim := queue.next(lane.number)) is not None:
                 lane.start(claim)
         busy = [lane for lane in lanes if lane.future is not None]
-        if progress is not None:
-            progress(len(found), [lane.claim.id for lane in busy if lane.claim is not None])
+        ids = [lane.claim.id for lane in busy if lane.claim is not None]
+        progress(len(found), total, ", ".join(ids))
         if not busy:
             return
         wait([lane.future for lane in busy if lane.future is not None], None, FIRST_COMPLETED)

@@ -149,11 +149,7 @@ def _checked(ids: Sequence[str], chosen: Sequence[str], *, slow: bool, workers: 
 
     claims, left_out = select(CLAIMS, chosen, ids, slow=slow)
     with working(f"checking {len(claims)} claims", "claims") as progress:
-
-        def told(done: int, ids: Sequence[str]) -> None:
-            progress(done, len(claims), ", ".join(ids))
-
-        return replace(run(claims, workers=workers, progress=told), slow=left_out)
+        return replace(run(claims, workers=workers, progress=progress), slow=left_out)
 
 
 # ----------------------------------------------------------------------------------------- files
@@ -189,16 +185,8 @@ def _draw(
     if chosen:
         fail(f"--section: expected none beside figures; got {chosen[0]}")
     prepare(out)
-    from paper_checks.figures import FIGURES as KNOWN
     from paper_checks.figures import write
 
-    drawn: list[str] = []
-    total = len(names or [f for f in KNOWN.values() if slow or not f.slow])
     with writing(out), working("drawing", "figures") as progress:
-
-        def told(name: str) -> None:
-            drawn.append(name)
-            progress(len(drawn), total, name)
-
-        written = write(out, names or None, slow=slow, progress=told)
+        written = write(out, names or None, slow=slow, progress=progress)
     deliver([str(path) for path in written], str, lambda: written, as_json=as_json)

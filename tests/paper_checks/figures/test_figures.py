@@ -87,10 +87,12 @@ def test_one_font(name, drawn):
 
 
 def test_files(tmp_path):
-    told = []
-    paths = write(tmp_path / "new", ["tutorial", "coordinates", "tutorial"], progress=told.append)
-    assert told == ["tutorial", "coordinates"]
-    expected = [f"{name}.{ending}" for name in told for ending in ("png", "svg")]
+    told, names = [], ["tutorial", "coordinates"]
+    paths = write(
+        tmp_path / "new", [*names, "tutorial"], progress=lambda *state: told.append(state)
+    )
+    assert told == [(1, 2, "tutorial"), (2, 2, "coordinates")]
+    expected = [f"{name}.{ending}" for name in names for ending in ("png", "svg")]
     assert [path.name for path in paths] == expected
     with Image.open(paths[0]) as image:
         assert image.info["dpi"] == pytest.approx((200, 200), abs=0.1)
