@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import networkx as nx
 import pytest
 
 import polycorner
@@ -85,3 +86,13 @@ def test_minima_is_a_verb_whatever_was_imported_before():
     command = [sys.executable, "-c", VERB]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "2"
+
+
+def test_no_imports_form_a_circle_not_even_for_type_checking():
+    grimp = pytest.importorskip("grimp", reason="grimp comes with the extra lint")
+    graph = grimp.build_graph("polycorner", "paper_checks", exclude_type_checking_imports=False)
+    edges = ((a, b) for a in graph.modules for b in graph.find_modules_directly_imported_by(a))
+    arrows = nx.DiGraph(edges)
+    assert len(arrows) > 200
+    circles = [c for c in nx.strongly_connected_components(arrows) if len(c) > 1]
+    assert not circles

@@ -140,7 +140,7 @@ class Engine:
         from polycorner.motion.engine import entry_point
 
         if not entry_point.advance.overloads:
-            with one_at_a_time("motion"):
+            with one_at_a_time(f"motion-{entry_point.SOURCES[:16]}"):
                 entry_point.advance(*self._records, self.dt, 0)
         return entry_point
 

@@ -38,4 +38,5 @@ def _entry_point(sources: str) -> Any:
     return advance
 
 
-advance = _entry_point(sources_digest(__package__))
+SOURCES = sources_digest(__package__)
+advance = _entry_point(SOURCES)
