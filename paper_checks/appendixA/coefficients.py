@@ -1,4 +1,4 @@
-"""Appendix A: the law of onset and its coefficients, text against captions."""
+"""Appendix A: the law of the onset of motion and its coefficients, text against captions."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,17 +12,17 @@ from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.statics.keel import RestRegion
 from polycorner.spaces.manifold import Array
 
-ROUNDING = 1.0  # degree: what "about 20 degrees" leaves open
+ROUNDING = 1.0  # degree: the uncertainty of "about 20 degrees"
 SAMPLES = 20_000
 
 
 def held(
     ratio: Array, mu_r: float, mu_s: float, *, divided: bool, absolute: bool, force: Array | None
 ) -> Array:
-    """Return where the printed two cases hold a dumbbell.
+    """Return whether the two printed cases hold a dumbbell.
 
     ``ratio`` is ``F_T/|F_N|`` along ``u_r, u_s``; ``force`` is ``|F_T|``, by which the printed
-    cosine is too small unless ``divided``.
+    cosine has to be divided; ``divided`` says whether it is.
     """
     size = np.hypot(ratio[..., 0], ratio[..., 1])
     cosine = ratio[..., 0] / size
@@ -46,7 +46,7 @@ def law_is_one_convex_set(absolute: bool = True, mu_r: float = 0.1, mu_s: float 
     half = int((found != (disc & (ratio[:, 0] <= mu_r))).sum())
     return Finding(
         Verdict.HOLDS_UNDER if wrong == 0 else Verdict.REFUTED,
-        f"of {SAMPLES} forces {wrong} are judged otherwise by disc and strip, and {half} "
+        f"disc and strip decide otherwise for {wrong} of {SAMPLES} forces, and for {half} "
         "otherwise by the disc cut on one side only",
         {"differ_from_strip": float(wrong), "differ_from_one_side": float(half)},
         "$\\vartheta$ is the angle with the line of rolling, from 0 to $\\pi/2$; then the force "
@@ -99,7 +99,7 @@ def captions_agree(
 
 
 def ordering_holds(mu_r: float = 0.1, mu_s: float = 0.3, tilt: float = 7.0) -> Finding:
-    """Check the part of the chain for which the paper gives numbers."""
+    """Check the part of the chain of inequalities for which the paper gives numbers."""
     slope = math.tan(math.radians(tilt))
     low, high = (math.degrees(math.atan(mu)) for mu in (mu_r, mu_s))
     holds = mu_r < slope < mu_s
@@ -139,7 +139,7 @@ def experiments_are_ordered(
 def inequalities_mean(
     places: Sequence[tuple[float, float, str]] = ((0.0, 90.0, "across"), (0.0, 0.0, "along")),
 ) -> Finding:
-    """Check that at these places the ratio along ``u_r`` or ``u_s`` is ``tan(alpha)``."""
+    """Check that at these placements the ratio along ``u_r`` or ``u_s`` is ``tan(alpha)``."""
     import sympy
 
     symbols, (east, north, normal) = frame()

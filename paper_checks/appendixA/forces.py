@@ -1,7 +1,7 @@
 """Appendix A: the forces on a dumbbell in the tilted drum.
 
-Everything is derived from the placement of a point on the wall, independently of the library; what
-is printed enters as the parameter of a check.
+Everything is derived from the position of a point on the wall, independently of the library;
+printed formulas enter as parameters of a check.
 """
 
 import math
@@ -12,7 +12,7 @@ from typing import Any
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 
 TILT = math.radians(7.0)
-STATIC = (0.1, 0.3)  # of rolling and sliding, from the text
+STATIC = (0.1, 0.3)  # coefficients of rolling and sliding, from the text
 COSINE = "cos(alpha)*sin(phi)*cos(theta) - sin(alpha)*sin(theta)"
 SIZE = "sqrt(cos(alpha)**2*sin(phi)**2 + sin(alpha)**2)"
 NAMES = "phi eta theta alpha R mu"
@@ -183,7 +183,7 @@ def limit_is(formula: str = "asin(sqrt((mu**2 - tan(alpha)**2)/(1 + mu**2)))") -
 
 
 def curve_is_flow_line(heading: str = "atan(sin(phi)/tan(alpha))") -> Finding:
-    """Check that on ``S`` the axis is along ``F_T``, so that nothing pulls across it."""
+    """Check that on ``S`` the axis is along ``F_T``, so that there is no pull across it."""
     import sympy
 
     symbols, (east, north, _) = frame()
@@ -218,7 +218,7 @@ CLAIMS = (
         "F4a",
         "A",
         "equation for the limit of rest",
-        "nothing rests beyond $\\varphi_s = \\arcsin\\sqrt{(\\mu_s^2 - "
+        "no dumbbell rests beyond $\\varphi_s = \\arcsin\\sqrt{(\\mu_s^2 - "
         "\\tan^2\\alpha)/(1+\\mu_s^2)}$",
         Means.SYMBOLIC,
         limit_is,

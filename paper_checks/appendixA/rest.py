@@ -1,4 +1,4 @@
-"""Appendix A: the regions of rest, ``A`` before motion and ``B`` after it."""
+"""Appendix A: the regions of rest, ``A`` for the onset of motion and ``B`` for its end."""
 
 import math
 from collections.abc import Callable
@@ -15,9 +15,9 @@ from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
 
-DYNAMIC = (0.06, 0.2)  # of rolling and sliding; the paper gives none
+DYNAMIC = (0.06, 0.2)  # dynamic coefficients of rolling and sliding; the paper gives none
 NUDGE = 1.0  # mm/s
-APART = 1e4  # mm along the drum, between dumbbells that must not meet
+APART = 1e4  # mm along the drum, between dumbbells that are to stay apart
 
 
 def forces(phi: Array, theta: Array) -> tuple[Array, Array]:
@@ -41,7 +41,7 @@ def everywhere(count: int = 721) -> tuple[Array, Array]:
 
 
 def region_is(divided: bool = False, absolute: bool = False) -> Finding:
-    """Compare the printed two cases, with the printed cosine, with where forces can balance."""
+    """Compare the two printed cases, with the printed cosine, with a balance of forces."""
     phi, theta = everywhere()
     ratio, force = forces(phi, theta)
     found = held(ratio, *STATIC, divided=divided, absolute=absolute, force=force)
@@ -64,7 +64,7 @@ def region_is(divided: bool = False, absolute: bool = False) -> Finding:
 
 
 def boundary_belongs(strict: bool = True) -> Finding:
-    """Look for points of ``A`` at heading 0 that every further turn takes out of ``A``.
+    """Look for points of ``A`` at heading 0 that every further turn carries out of ``A``.
 
     There ``|F_T . u_r|/|F_N| = tan(phi)``, which is ``mu_r`` at the last azimuth of rest.
     """
@@ -114,7 +114,7 @@ def arrest_is_inside(dynamic: tuple[float, float] = DYNAMIC, count: int = 200) -
 
 
 def nudged(azimuth: Callable[[Array], Array], headings: Array) -> Trajectory:
-    """Follow dumbbells in the drum at rest, pushed off rolling downhill with 1 mm/s."""
+    """Simulate dumbbells in a drum at rest, pushed so that they roll downhill with 1 mm/s."""
     count = len(headings)
     drum = DumbbellDrum(count=count, spin=0.0)
     phi = azimuth(headings)
@@ -174,7 +174,7 @@ def regions_are_symmetric(absolute: bool = True) -> Finding:
 def length_does_not_matter(headings: float = 30.0, length: float = 16.0) -> Finding:
     """Compare the eastern boundary of ``A`` with the one for a dumbbell of finite length.
 
-    For headings up to ``headings``, in degrees; they count as equal within 0.05 degrees.
+    For headings up to ``headings``, in degrees; boundaries count as equal within 0.05 degrees.
     """
     region = RestRegion(TILT, *STATIC)
     theta = np.radians(np.linspace(-headings, headings, 121))
@@ -205,7 +205,7 @@ CLAIMS = (
         "F9a",
         "A",
         "definition of $A$ and of its eastern boundary",
-        "with the strict inequalities of $A$ some points of $A$ are taken out of it by every turn",
+        "with the strict inequalities of $A$ every turn carries some points of $A$ out of it",
         Means.SYMBOLIC,
         boundary_belongs,
         partial(boundary_belongs, strict=False),
@@ -244,7 +244,7 @@ CLAIMS = (
         "F16",
         "A",
         "dumbbells as points of $N$",
-        "whether a dumbbell of small heading rests depends on place and heading, not on its length",
+        "whether a dumbbell of small heading rests depends on position and heading, not on length",
         Means.NUMERICAL,
         length_does_not_matter,
         partial(length_does_not_matter, 80.0),

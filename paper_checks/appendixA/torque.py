@@ -81,9 +81,9 @@ def lower_ball_presses_more(sign: int = 1) -> Finding:
 
 
 def torque_comes_from_friction(share: float = 1.0, headings: float = 20.0) -> Finding:
-    """Check which share of the torque comes from unequal friction, in a sliding dumbbell.
+    """Check which share of the torque on a sliding dumbbell comes from unequal friction.
 
-    Holds if up to that heading, and where something can rest, it is at least ``share``.
+    Holds if it is at least ``share`` up to that heading, at azimuths where dumbbells can rest.
     """
     phi, theta = samples(0.0, headings)
     whole, weight = (net_torque(phi, theta, 0.0, mu) for mu in (STATIC[1], 0.0))
@@ -92,7 +92,7 @@ def torque_comes_from_friction(share: float = 1.0, headings: float = 20.0) -> Fi
         judged(found >= share, Verdict.CORRECTED),
         f"with $\\mu_s = {STATIC[1]:g}$ the difference in friction of the balls makes at most "
         f"{100 * found:.1f} % of the torque on a sliding dumbbell, for headings up to "
-        f"{headings:g}°; the rest is the weight's, and is there without friction",
+        f"{headings:g}°; the remainder is that of the weight, also without friction",
         {"share": found},
         "the torque is that of the weight along the wall, $-\\partial V/\\partial\\theta$; the "
         "unequal loads and the friction they cause add a few percent",
@@ -100,7 +100,7 @@ def torque_comes_from_friction(share: float = 1.0, headings: float = 20.0) -> Fi
 
 
 def samples(tilt: float, headings: float, least: float = 0.5) -> tuple[Array, Array]:
-    """Return azimuths at which something can rest and headings of both signs, in rad."""
+    """Return azimuths at which dumbbells can rest and headings of both signs, in rad."""
     limit = RestRegion(tilt, *STATIC).limit
     angles = np.radians(np.linspace(least, headings, 40))
     return np.meshgrid(np.linspace(-limit, limit, 81), np.concatenate([-angles, angles]))
@@ -117,7 +117,7 @@ def tilting_changes_torque_by(bound: float = 0.1, headings: float = 20.0) -> Fin
     return Finding(
         judged(keeps and change <= bound),
         f"tilting by 10° changes the torque on a sliding dumbbell by at most {100 * change:.1f} % "
-        f"for headings up to {headings:g}° where something can rest, of which "
+        f"for headings up to {headings:g}° where dumbbells can rest, of which "
         f"{100 * (1 - math.cos(tilt)):.1f} % are the smaller weight; it "
         + ("keeps" if keeps else "does not keep")
         + " its sign",
@@ -126,13 +126,13 @@ def tilting_changes_torque_by(bound: float = 0.1, headings: float = 20.0) -> Fin
 
 
 def beyond_the_curve(phi: Array, theta: Array) -> Array:
-    """Return where the heading is steeper than on ``S``, on its side."""
+    """Return whether the heading is steeper than that of ``S``, with the same sign."""
     curve = s_curve(phi, TILT)
     return np.asarray((np.abs(theta) > np.abs(curve)) & (theta * curve > 0))
 
 
 def thin_sliver(phi: Array, theta: Array) -> Array:
-    """Return where friction of the balls outweighs the weight, for a short sliding dumbbell."""
+    """Return whether friction of the balls outweighs the weight, for a short sliding dumbbell."""
     phi, theta, outward = np.abs(phi), np.abs(theta), phi * theta > 0
     across = math.cos(TILT) * np.sin(phi)
     cosine = across * np.cos(theta) - math.sin(TILT) * np.sin(theta)
@@ -141,7 +141,7 @@ def thin_sliver(phi: Array, theta: Array) -> Array:
 
 
 def torque_grows_in(region: Callable[[Array, Array], Array] = beyond_the_curve) -> Finding:
-    """Compare with where the torque on a sliding dumbbell has the sign of the heading."""
+    """Compare a region with the one in which the torque, in sliding, has the heading's sign."""
     limit = RestRegion(TILT, *STATIC).limit
     phi, theta = np.meshgrid(
         np.linspace(-limit, limit, 240), np.radians(np.linspace(-89.99, 89.99, 3600))
@@ -165,9 +165,9 @@ def torque_grows_in(region: Callable[[Array, Array], Array] = beyond_the_curve) 
 def steep_headings_change(
     direction: int = 1, headings: tuple[float, ...] = (60.0, 65.0, 70.0, 75.0, 80.0, 85.0)
 ) -> Finding:
-    """Let dumbbells of these headings go from the lowest line, without noise, for 30 s.
+    """Simulate dumbbells of these headings from the lowest line, without noise, for 30 s.
 
-    Holds if the heading of most has then grown (``direction = 1``) or fallen (-1) by a degree.
+    Holds if the heading of most has grown (``direction = 1``) or decreased (-1) by a degree.
     """
     path = follow(DRUM, np.radians(headings), 30.0, dt=2e-3)
     start, end = (np.abs(np.degrees(path.q[i, :, 2])) for i in (0, -1))
@@ -176,17 +176,17 @@ def steep_headings_change(
     listed = ", ".join(f"{a:g}° to {b:.1f}°" for a, b in zip(start, end, strict=True))
     return Finding(
         judged((grown if direction > 0 else fallen) > len(headings) / 2),
-        f"in 30 s {grown} of {len(headings)} headings grow and {fallen} fall, from {listed}; the "
-        f"largest on the way is {largest.max():.1f}°",
+        f"in 30 s {grown} of {len(headings)} headings grow and {fallen} decrease, from {listed}; "
+        f"the largest meanwhile is {largest.max():.1f}°",
         {"grown": float(grown), "fallen": float(fallen), "largest": float(largest.max())},
-        "in the model a steep dumbbell turns towards the meridian while it goes down",
+        "in the model a steep dumbbell turns towards the meridian as it descends",
     )
 
 
 def curvature_bound_is(curvature: str = "mean") -> Finding:
-    """Check on catenoids whether a small curvature of that kind makes a surface flat for a rod.
+    """Check on catenoids whether a surface of small curvature is flat on the scale of a rod.
 
-    ``curvature`` is ``mean`` or ``largest``, of the principal ones in size.
+    ``curvature`` is ``mean``, or ``largest`` for the larger principal curvature in size.
     """
     import sympy
 
@@ -220,7 +220,7 @@ CLAIMS = (
         "F11a",
         "A",
         "torque on a dumbbell in a level drum",
-        "the torque takes the heading to 0; at $\\pm\\pi/2$ it vanishes and is repulsive",
+        "the torque drives the heading to 0; at $\\pm\\pi/2$ it vanishes and is repulsive",
         Means.SYMBOLIC,
         torque_vanishes_at,
         partial(torque_vanishes_at, stable=90.0, unstable=0.0),
@@ -268,7 +268,7 @@ CLAIMS = (
         "F12b",
         "A",
         "torque in a tilted drum",
-        "headings that are large grow towards $\\pi/2$",
+        "large headings grow towards $\\pi/2$",
         Means.SIMULATION,
         steep_headings_change,
         partial(steep_headings_change, -1),

@@ -15,7 +15,7 @@ from polycorner.dumbbells.statics.keel import RestRegion
 from polycorner.spaces.manifold import Array
 
 DRUM = DumbbellDrum(sliding=(STATIC[1], DYNAMIC[1]), rolling=(STATIC[0], DYNAMIC[0]))
-STEP = 1e-4  # rad, by which the drum is turned at a time
+STEP = 1e-4  # rad, angle by which the drum is turned in one step
 HEADINGS = (-25.0, -15.0, -5.0, 0.0, 5.0, 15.0, 25.0)
 
 
@@ -26,7 +26,7 @@ def turns() -> tuple[Zigzag, ...]:
 
 
 def carried_until(boundary: str = "A") -> Finding:
-    """Compare azimuths at which motion begins with a boundary: ``A``, ``B`` or ``phi_s``."""
+    """Compare the azimuths of onset with a boundary: that of ``A`` or ``B``, or ``phi_s``."""
     theta = np.radians(HEADINGS)
     inner, outer = RestRegion(TILT, *DYNAMIC), RestRegion(TILT, *STATIC)
     claimed = {
@@ -46,7 +46,7 @@ def carried_until(boundary: str = "A") -> Finding:
 
 
 def stops_are_in(region: str = "B") -> Finding:
-    """Check that a rolling dumbbell comes to rest in ``B``, or in what ``B`` leaves of ``A``."""
+    """Check that a rolling dumbbell comes to rest in ``B``, or in ``A`` outside ``B``."""
     inner, outer = RestRegion(TILT, *DYNAMIC), RestRegion(TILT, *STATIC)
     inside, total, least = 0, 0, math.inf
     for zigzag in turns():
@@ -63,7 +63,7 @@ def stops_are_in(region: str = "B") -> Finding:
 
 
 def stops_on_entering(inertia: bool = False) -> Finding:
-    """Compare stops with the edge of ``B``, or with where what was gained is used up."""
+    """Compare stops with the edge of ``B``, or with the point where the energy gained is spent."""
     theta = np.radians(HEADINGS)
     turning = keel_of(DRUM).turning(theta)
     lower = np.array([z.lower.mean() for z in turns()])
@@ -113,7 +113,7 @@ def measured_points() -> Finding:
 
 
 def carried_to(theta: Array) -> Array:
-    """Return where a heading leaves rest, by small steps of the drum from the middle of rest."""
+    """Return the azimuth of onset, by small turns of the drum from the middle of the region."""
     symbols, (east, north, normal) = frame()
     import sympy
 
@@ -138,7 +138,7 @@ def eastern_boundary(theta: Array) -> Array:
 
 
 def turning_is(azimuth: Callable[[Array], Array] = constant_limit) -> Finding:
-    """Compare with how far the drum carries dumbbells of headings up to 20 degrees."""
+    """Compare with the azimuths to which the drum carries headings up to 20 degrees."""
     theta = np.radians(np.linspace(-20, 20, 9))
     found, claimed, limit = (f(theta) for f in (carried_to, azimuth, constant_limit))
     right = np.abs(found - eastern_boundary(theta)).max() <= STEP

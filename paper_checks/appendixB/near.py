@@ -1,9 +1,9 @@
 """Test polyhedra for the statements of appendix B, and neighbourhoods of their points.
 
-Near a point a polyhedron is a chart away from its local model, the cone that the gradients of its
-active functions cut out as the pieces say. The hyperplanes of these functions divide the space
-into cells, one for each row of signs that occurs; on a cell the stratum is constant, so that one
-point of each cell decides what the strata are near the point.
+Near a point a chart maps a polyhedron to its local model, the cone that the gradients of its active
+functions cut out, piece by piece. The hyperplanes of these functions divide the space into cells,
+one for each sign vector that occurs; on a cell the stratum is constant, so that one point of each
+cell determines the strata near the point.
 """
 
 import math
@@ -30,7 +30,7 @@ Points = Sequence[Sequence[float]]
 
 @dataclass(frozen=True)
 class Example:
-    """A polyhedron, points of it, one at least of every stratum, and whether it is connected."""
+    """A polyhedron, points of it, at least one of every stratum, and whether it is connected."""
 
     name: str
     polyhedron: Polyhedron
@@ -40,17 +40,17 @@ class Example:
 
 @dataclass(frozen=True)
 class Spot:
-    """A point of an example and what is around it.
+    """A point of an example and its neighbourhood.
 
     Attributes
     ----------
     example : Example
-        Where the point is.
+        Example that contains the point.
     stratum : Stratum
-        What the library says about the point.
+        Stratum of the point according to the library.
     cells : tuple of (int, bool)
-        For every cell in the polyhedron around the point, the dimension of the stratum it is in,
-        and whether all active functions vanish on it.
+        For every cell of the polyhedron around the point, the dimension of its stratum, and
+        whether all active functions vanish on it.
     """
 
     example: Example
@@ -59,7 +59,7 @@ class Spot:
 
     @property
     def nearby(self) -> set[int]:
-        """Dimensions of the strata that come arbitrarily near to the point."""
+        """Dimensions of the strata in whose closures the point lies."""
         return {dimension for dimension, _ in self.cells}
 
     @property
@@ -112,7 +112,7 @@ def linear_examples() -> Iterator[Example]:
 
 @cache
 def examples() -> tuple[Example, ...]:
-    """Return linear sets, the region of the figure, and either kind of corner of the pair."""
+    """Return linear sets, the region of the figure, and both kinds of corner of the pair."""
     region = Tutorial()
     sides = region.sides(3).values()
     points = (*region.corners().values(), *(side[1] for side in sides), np.zeros(2))
@@ -150,7 +150,7 @@ def in_one_piece(atlas: Skeleton) -> bool:
 
 @cache
 def spots() -> tuple[Spot, ...]:
-    """Return every point of the examples with what is around it."""
+    """Return every point of the examples with its neighbourhood."""
     return tuple(_spot(example, point) for example in examples() for point in example.points)
 
 
@@ -175,9 +175,9 @@ def _rank(rows: "Array") -> int:
 
 
 def _cells(rows: "Array") -> Iterator[tuple[int, ...]]:
-    """Yield the rows of signs that occur: those of ``a_i d`` for all directions ``d``."""
+    """Yield the sign vectors that occur: those of ``a_i d`` for all directions ``d``."""
     units = rows / np.linalg.norm(rows, axis=1, keepdims=True) if len(rows) else rows
-    # Functions with one hyperplane have one sign, up to the side they are on.
+    # Functions with the same hyperplane have the same sign, up to orientation.
     first = [
         next(j for j in range(i + 1) if np.allclose(abs(units[i] @ units[j]), 1))
         for i in range(len(units))

@@ -27,7 +27,7 @@ def by_count(stratum: Stratum, n: int) -> int:
 
 
 def strata_are_submanifolds(dimension: Callable[[Stratum, int], int] = by_rank) -> Finding:
-    """Check that near each of its points a stratum is the flat on which all active ones vanish."""
+    """Check that near each of its points a stratum is the zero set of all active functions."""
     wrong = []
     for spot in spots():
         own = dimension(spot.stratum, spot.example.polyhedron.dimension)
@@ -50,7 +50,7 @@ def strata_are_submanifolds(dimension: Callable[[Stratum, int], int] = by_rank) 
 
 
 def boundaries_go(down: bool = True) -> Finding:
-    """Check that what comes near to a point lies in strata of at least its own dimension."""
+    """Check that points near a point lie in strata of at least its own dimension."""
     wrong = [s for s in spots() if not _goes(s, down)]
     return Finding(
         Verdict.REFUTED if wrong else Verdict.HOLDS,
@@ -67,12 +67,12 @@ def _goes(spot: Spot, down: bool) -> bool:
 
 
 def connected(_: Iterable[Spot], __: int) -> bool:
-    """Accept every dimension: all examples are connected, which is the paper's hypothesis."""
+    """Accept every dimension: all examples are connected, as the paper's hypothesis requires."""
     return True
 
 
 def convex_and_within(around: Iterable[Spot], r: int) -> bool:
-    """Ask for local convexity, and for a stratum of this dimension or a higher one."""
+    """Require local convexity, and a stratum of this dimension or a higher one."""
     around = tuple(around)
     highest = max(max(spot.nearby) for spot in around)
     return all(spot.is_locally_convex for spot in around) and r <= highest
@@ -82,7 +82,7 @@ Hypothesis = Callable[[Iterable[Spot], int], bool]
 
 
 def boundary_is_all_lower_strata(hypothesis: Hypothesis = connected) -> Finding:
-    """Look for points of lower strata that no point of ``D_r`` comes near to."""
+    """Look for points of lower strata that are not limits of points of ``D_r``."""
     tried, failures = _missed(hypothesis)
     right_tried, right_failures = _missed(convex_and_within)
     numbers = {"tried": tried, "failures": len(failures), "tried_under_condition": right_tried}
@@ -174,7 +174,7 @@ def strata_survive(chart: Map = bend, inverse: Map = unbend) -> Finding:
 
 
 def region_has(claimed: tuple[int, int, int] = (7, 7, 1)) -> Finding:
-    """Count corners, sides and faces by walking along the region of the figure."""
+    """Count corners, sides and faces by tracing the boundary of the region of the figure."""
     atlas = region_atlas()
     found = (len(atlas.corners), len(atlas.edges), len(atlas.faces))
     corners, sides, faces = found
@@ -190,7 +190,7 @@ def region_has(claimed: tuple[int, int, int] = (7, 7, 1)) -> Finding:
 
 
 def region_is_convex_in_charts_only(bends: float = 1.0) -> Finding:
-    """Look at the corners of the region, and at ever shorter chords of its sides.
+    """Examine the corners of the region, and ever shorter chords of its sides.
 
     The curvatures of the sides are multiplied by ``bends``; 0 makes all of them straight.
     """

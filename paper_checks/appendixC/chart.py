@@ -70,7 +70,7 @@ def _compiled() -> tuple[Callable[[Array], Array], ...]:
 
 
 def energy_rise(locus: str, direction: int, step: float) -> float:
-    """Return how much the energy grows when one coordinate changes by ``step`` and no other."""
+    """Return the increase of the energy when a single coordinate changes by ``step``."""
     values, slopes, energy = _compiled()
     here = rests(EXPERIMENT)[locus].point
     goal = values(here).ravel()
@@ -84,7 +84,7 @@ def energy_rise(locus: str, direction: int, step: float) -> float:
 def exponents(locus: str) -> list[float]:
     """Return ``k`` for each coordinate along which the energy grows like the ``k``-th power.
 
-    Gaps are opened, in mm; means are moved, in radians and mm.  Zero where the energy stays.
+    Gaps are opened, in mm; means are moved, in radians and mm.  Zero if the energy is constant.
     """
     found = []
     for direction in range(6):
@@ -155,7 +155,7 @@ def rod_gaps_vanish(constant: str = "r + t") -> Finding:
 
 
 def heading_coordinate(minus_for: str = "L") -> Finding:
-    """Check that ``x5`` vanishes on the paper's own ``delta``: its sign, not its value."""
+    """Check that ``x5`` vanishes on the paper's own ``delta``: its sign only, not its value."""
     a = PRINTED_HEADING.subs(sizes(PLANE))
     values = {}
     for hand, theta in (("L", -a), ("R", a)):
@@ -172,7 +172,7 @@ def heading_coordinate(minus_for: str = "L") -> Finding:
         ""
         if holds
         else "The plus sign is for $\\delta_L$ and the minus sign for $\\delta_R$ (and "
-        "$\\arctan(r/\\ell)$ is to be replaced by the heading at rest).",
+        "$\\arctan(r/\\ell)$ has to be replaced by the heading at the minimum).",
     )
 
 
@@ -206,7 +206,7 @@ def signature_is(claimed: tuple[int, int, int] = (1, 4, 1)) -> Finding:
 
 
 def _slope_along_corner(theta: sympy.Expr) -> float:
-    """Return how the energy changes with the mean heading along the corner, by differences."""
+    """Return the derivative of the energy by the mean heading along the corner, by differences."""
     h, angle = 1e-4, float(theta)
     low, high = (on_corner(EXPERIMENT, angle + d) for d in (-h, h))
     values = sympy.lambdify([EXPERIMENT.manifold.symbols], height(EXPERIMENT))

@@ -43,7 +43,7 @@ def times_to_rest() -> dict[str, sympy.Expr]:
 def ordered(kinds: tuple[str, ...] = KINDS) -> Finding:
     """Check that each kind holds more strongly than the one before.
 
-    At low energies the sequence of widths decreases; a kind with a wall loses energy at it; only
+    At low energies the widths decrease from kind to kind; kinds with a wall lose energy at it; only
     the half-V brings the mass to rest in a finite time.
     """
     width = widths()
@@ -77,10 +77,10 @@ def ordered(kinds: tuple[str, ...] = KINDS) -> Finding:
 
 
 def friction_holds(resistance: sympy.Expr = PULL) -> Finding:
-    """Ask what a constant resistance to motion does to energy and to the places of rest.
+    """Determine the effect of a constant resistance to motion on energy and equilibria.
 
-    Moving from ``a`` to the bottom costs ``resistance`` times ``a``.  At rest it holds the mass
-    wherever the force of the potential is not larger.
+    Moving from ``a`` to the bottom costs ``resistance`` times ``a``.  The mass stays at rest
+    wherever the force of the potential is not larger than the resistance.
     """
     x, a = sympy.symbols("x a", positive=True)
     lost = sympy.integrate(resistance, (x, 0, a))

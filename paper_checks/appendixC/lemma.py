@@ -16,10 +16,11 @@ between, at least ``h/2`` near 0, ``h`` its least eigenvalue at 0.  So, in a sma
 
     f(x) - f(0) >= a/2 (u_1 + ... + u_p) + h/4 |v|^2 >= 0,
 
-with equality only for ``u = 0`` and ``v = 0``.  Where both vanish ``f = f(0)`` by (4), and the same
-holds from there: the minimum is attained along the locus ``x_1 = ... = x_{p+q} = 0`` in ``C``.
+with equality only for ``u = 0`` and ``v = 0``.  Where both vanish, ``f = f(0)`` by (4), and the
+argument applies to every such point: the minimum is attained along the locus
+``x_1 = ... = x_{p+q} = 0`` in ``C``.
 
-Once continuously differentiable, and twice at 0 along ``v``, is all that is used of smoothness.
+Of smoothness, only a continuous first derivative, and a second one at 0 along ``v``, are used.
 """
 
 import math
@@ -70,7 +71,7 @@ class Example:
         )
 
     def hypotheses(self) -> dict[str, bool]:
-        """Return which hypotheses hold."""
+        """Return the hypotheses that hold."""
         p, q, _ = self.split
         slopes, hessian = self.slopes(), self.hessian()
         return {
@@ -88,15 +89,15 @@ class Example:
         return sympy.simplify(here - self.restricted())
 
     def falls(self) -> bool:
-        """Whether ``f < f(0)`` at points of the path as near to 0 as asked for."""
+        """Whether ``f < f(0)`` at points of the path arbitrarily near to 0."""
         change = self.along_path()
         return all(bool(change.subs(S, step) < 0) for step in STEPS)
 
 
 def counterexamples() -> dict[str, Example]:
-    """Return, for each hypothesis, a function that breaks it alone and is not least at 0.
+    """Return, for each hypothesis, a function that violates it alone and has no minimum at 0.
 
-    (4) is broken by a function that is constant where the other variables vanish.  The one that is
+    The function that violates (4) is constant where the other variables vanish.  The one that is
     not smooth is differentiable at 0, ``|f - x1 - x2^2| <= 2 |x2|^{3/2}``, and equals ``x2^2`` for
     ``x1 = 0`` and ``x1`` for ``x2 = 0``.
     """
@@ -115,7 +116,7 @@ def counterexamples() -> dict[str, Example]:
 
 
 def random_example(rng: np.random.Generator, split: Split) -> Example:
-    """Return a random polynomial with whole coefficients that satisfies the hypotheses."""
+    """Return a random polynomial with integer coefficients that satisfies the hypotheses."""
     p, q, r = split
     used = X[: p + q]
     curved = used[p:]
@@ -152,8 +153,8 @@ def _terms(
 def cube(example: Example) -> tuple[Fraction, Fraction, Fraction] | None:
     """Carry out the proof: return ``(half-width, a, h)`` of a cube in which its bounds hold.
 
-    All is exact.  ``h`` is 1 if the Hessian minus the identity is positive semidefinite; the
-    Hessian moves by at most ``q`` times the largest change of an entry.
+    All arithmetic is exact.  ``h`` is 1 if the Hessian minus the identity is positive semidefinite;
+    the Hessian moves by at most ``q`` times the largest change of an entry.
     """
     p, q, _ = example.split
     used = example.variables[: p + q]
@@ -178,7 +179,7 @@ def cube(example: Example) -> tuple[Fraction, Fraction, Fraction] | None:
 
 
 def bound_holds(example: Example, rng: np.random.Generator, points: int) -> bool:
-    """Try the inequality of the proof at random points of its cube, in exact arithmetic."""
+    """Test the inequality of the proof at random points of its cube, in exact arithmetic."""
     found = cube(example)
     if found is None:
         return False

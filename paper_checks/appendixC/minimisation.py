@@ -35,7 +35,7 @@ def carried_out() -> tuple[int, float]:
 
 
 def minimum_lemma(dropped: str = "") -> Finding:
-    """Check the lemma, or what is left of it without one hypothesis."""
+    """Check the lemma, with all hypotheses or without one of them."""
     known = lemma.counterexamples()
     if dropped:
         example = known[dropped]
@@ -43,7 +43,7 @@ def minimum_lemma(dropped: str = "") -> Finding:
         refuted = alone and example.falls()
         return Finding(
             Verdict.REFUTED if refuted else Verdict.HOLDS,
-            f"$f = {sympy.latex(example.f)}$ breaks {dropped} only, and on a path in $C$ towards 0 "
+            f"$f = {sympy.latex(example.f)}$ violates {dropped} only, and on a path in $C$ to 0 "
             f"$f - f(0) = {sympy.latex(example.along_path())}$.",
         )
     done, smallest = carried_out()
@@ -51,7 +51,7 @@ def minimum_lemma(dropped: str = "") -> Finding:
     listed = "; ".join(
         f"{name}: $f = {sympy.latex(known[name].f)}$"
         for name in needed
-        if name != lemma.SMOOTH  # its formula is long; the docstring of the lemma's module has it
+        if name != lemma.SMOOTH  # its formula is long and given in the lemma module
     )
     return Finding(
         Verdict.HOLDS if done == len(SPLITS) else Verdict.REFUTED,
@@ -87,7 +87,7 @@ def locus_of_minima(vanishing: str = "last") -> Finding:
 
 
 def force_on_the_locus(splits: tuple[lemma.Split, ...] = SPLITS) -> Finding:
-    """Check that ``-grad f`` does not vanish on the locus: there it is what it is at 0, by (4)."""
+    """Check that ``-grad f`` does not vanish on the locus, where by (4) it equals that at 0."""
     rng = np.random.default_rng(13)
     still = [s for s in splits if not any(lemma.random_example(rng, s).slopes())]
     pulled = len(splits) - len(still)
@@ -130,7 +130,7 @@ def corner_determinant() -> sympy.Expr:
 
 
 def is_quadrant(corner: str = "Delta") -> Finding:
-    """Ask for the local type of ``D`` at a corner, at several headings in the drum."""
+    """Determine the local type of ``D`` at a corner, at several headings in the drum."""
     pair = EXPERIMENT
     if corner == "Delta":
         found = [
@@ -145,7 +145,7 @@ def is_quadrant(corner: str = "Delta") -> Finding:
     listed = " and ".join(f"{n} contacts of rank {k}" for n, k in ranks)
     return Finding(
         Verdict.HOLDS if types == {"QUADRANT"} else Verdict.REFUTED,
-        f"There are {listed} at every point looked at ({len(found)}, differing in heading): "
+        f"There are {listed} at every point examined ({len(found)}, differing in heading): "
         f"{', '.join(sorted(types)).lower()}. At $\\delta_R$ independent gradients are {proved}; "
         f"in the plane the three gaps of $\\Delta$ have, for all sizes, the Jacobian determinant "
         f"${sympy.latex(sympy.factor(determinant))}$, positive for $t < r$.",

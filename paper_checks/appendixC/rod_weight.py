@@ -9,7 +9,7 @@ from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from paper_checks.section6.experiment import EXPERIMENT, centres
 from polycorner.dumbbells import DumbbellPair
 
-NOTICED = 0.1  # degrees: a change smaller than what the tolerances of the sizes make
+NOTICED = 0.1  # degrees: a change smaller than that due to the tolerances of the sizes
 
 
 def weight_of_rod(pair: DumbbellPair) -> float:
@@ -21,9 +21,9 @@ def weight_of_rod(pair: DumbbellPair) -> float:
 
 
 def heading_with_rods(pair: DumbbellPair, weight: float, outer_share: float) -> float:
-    """Return the heading at rest in the plane, in degrees, of rods that have weight.
+    """Return the heading at the minimum in the plane, in degrees, for rods with weight.
 
-    ``outer_share`` of a rod's weight rests on its outer ball, the remainder on the inner one.
+    The outer ball bears ``outer_share`` of a rod's weight, the inner one the remainder.
     The outer balls lie at ``(d + l sin theta)/2`` either side of the lowest line, the inner ones at
     ``(d - l sin theta)/2``, with ``d = D sin theta - p cos theta``; the energy is half the weighted
     sum of squares, a quadratic form in ``sin theta`` and ``cos theta``.

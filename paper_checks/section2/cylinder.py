@@ -1,8 +1,8 @@
 """The tilted cylinder in space, built from its axis and its radius alone, and a dumbbell on it.
 
-Nothing here is taken from the paper: a point is so far along the axis and so far around it, the
-azimuth being 0 where the cylinder is lowest.  Printed formulas are strings and are read by
-:func:`formula` in the same symbols.
+Nothing here is taken from the paper: a point is given by its position along the axis and its
+azimuth, which is 0 where the cylinder is lowest.  Printed formulas are strings, which
+:func:`formula` parses in the same symbols.
 """
 
 import re
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 # An argument that needs no brackets, as SymPy writes it.
 SINGLE = re.compile(r"\{\\left\((\\?\w+) \\right\)\}")
-# Numbers at which two formulas that differ are shown to differ.
+# Sample values at which differing formulas are shown to differ.
 SAMPLE = {
     "phi": 0.6,
     "eta": 40.0,
@@ -44,7 +44,7 @@ def formula(text: str) -> "sympy.Expr":
 
 
 def vanishes(expression: "sympy.Expr") -> bool:
-    """Return whether an expression is identically zero; a nonzero number somewhere decides soon."""
+    """Return whether an expression is identically zero; a nonzero sample value decides quickly."""
     import sympy
 
     known = {symbols()[name] for name in SAMPLE}

@@ -73,7 +73,7 @@ def metric_is(coefficients: tuple[str, str, str] = ("R**2", "0", "1")) -> Findin
 
 
 def geodesics_are(relation: str = "a*phi + b*eta + c") -> Finding:
-    """Move along the level curves of the relation and look at acceleration and torsion in space."""
+    """Compute acceleration and torsion in space along the level curves of the relation."""
     import sympy
 
     s = symbols()

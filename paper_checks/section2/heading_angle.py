@@ -44,13 +44,13 @@ def heading_has_period(period: str = "pi") -> Finding:
 
 
 def positions_have(coordinates: int = 3) -> Finding:
-    """Differentiate both ball centres by azimuth, altitude and heading; compare rank and place."""
+    """Differentiate both ball centres by azimuth, altitude and heading; compare the rank."""
     import sympy
 
     s = symbols()
     first, second = ball_centres()
     both = first.col_join(second)
-    # scalar products do not change when the drum is rolled, shifted or tilted: look at one place
+    # scalar products do not change when the drum is rolled, shifted or tilted: one place suffices
     place = {s["phi"]: 0, s["eta"]: 0, s["alpha"]: 0}
     along = [both.diff(s[name]).subs(place) for name in ("phi", "eta", "theta")]
     gram = sympy.Matrix(3, 3, lambda i, j: sympy.simplify(along[i].dot(along[j])))

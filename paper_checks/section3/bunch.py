@@ -1,8 +1,8 @@
 """Section 3.2: a bunch of dumbbells at the bottom of the turning drum, as observed.
 
 The model is that of :mod:`paper_checks.section3.singles`; the coefficient of friction between
-dumbbells that touch is 0.3.  Bunches are computed without noise, which would take several times
-as long.
+dumbbells that touch is 0.3.  Bunches are simulated without noise, because noise would take several
+times as long.
 """
 
 import math
@@ -31,11 +31,11 @@ from polycorner.motion.simulation import simulate
 from polycorner.spaces.manifold import Array
 
 PICTURE = (8.0, 2.0, 0.5)  # l, r, t of the paper's picture of a bunch
-LARGER = (16.0, 3.0, 1.5)  # of its dyads
+LARGER = (16.0, 3.0, 1.5)  # l, r, t of its dyads
 OBSERVED_TIME = 1200.0  # s, twenty minutes
-LEAVING = (60, 40)  # dumbbells of the bunch, and how many leave
+LEAVING = (60, 40)  # number of dumbbells of the bunch, and of those that leave
 TOP = 300.0  # mm; the paper does not give the length of its drum
-STARTS, STEP = 2, 4e-3  # number of starts, and s, of the check of those that leave
+STARTS, STEP = 2, 4e-3  # number of starts, and time step in s, of the check on leaving
 APART = 1e4  # mm along the drum, between encounters
 
 
@@ -47,7 +47,7 @@ def bunch(
     top: float = TOP,
     dt: float = 2e-3,
 ) -> BunchRun:
-    """Follow a bunch without noise; ``sizes`` are ``l, r, t``."""
+    """Simulate a bunch without noise; ``sizes`` are ``l, r, t``."""
     length, r, t = sizes
     drum = replace(DRUM, length=length, ball_radius=r, rod_radius=t)
     drum = drum_for_bunch(drum, count=LEAVING[0], top=top)
@@ -60,7 +60,7 @@ def partitions(
     """Check that, from 15 to 30 s, rollers are at smaller positive azimuths than sliders.
 
     A roller has turned by more than 30 degrees about its axis in 10 s; azimuths count as smaller
-    if they are so by a degree or more in each start.  ``apart = False``: that they are not.
+    if the difference is a degree or more in each start.  ``apart = False`` claims the opposite.
     """
     listed, found, lost = [], [], 0.0
     numbers: dict[str, float] = {}
@@ -85,7 +85,7 @@ def partitions(
 
 
 def both_hands_form(least: int = 2, duration: float = 30.0) -> Finding:
-    """Check that right- and left-handed dyads form that were not there at the start."""
+    """Check that new right- and left-handed dyads form."""
     followed = bunch(LARGER, duration)
     first = {pair[:2] for pair in followed.dyads(0)}
     new = [pair for pair in followed.dyads(-1) if pair[:2] not in first]
@@ -93,7 +93,7 @@ def both_hands_form(least: int = 2, duration: float = 30.0) -> Finding:
     return Finding(
         Verdict.HOLDS_UNDER if min(hands.values()) >= least else Verdict.REFUTED,
         f"after {duration:g} s a bunch of {LEAVING[0]} has {hands['R']} right-handed and "
-        f"{hands['L']} left-handed nested pairs that it had not at the start",
+        f"{hands['L']} left-handed nested pairs that were not there at the start",
         {"right": float(hands["R"]), "left": float(hands["L"])},
         f"{LEAVING[0]} dumbbells of {LARGER[0]:g} mm, one start, no noise",
     )
@@ -101,7 +101,7 @@ def both_hands_form(least: int = 2, duration: float = 30.0) -> Finding:
 
 @cache
 def encounters(count: int, duration: float, chatter: float) -> tuple[DumbbellDrum, Array]:
-    """Follow climbing dumbbells with another of heading about 0 above each, ``(T, n, 2, 4)``."""
+    """Simulate climbing dumbbells, each with one of heading about 0 above it, ``(T, n, 2, 4)``."""
     rng = np.random.default_rng(7)
     lower = np.stack(
         [rng.uniform(-6, 6, count), np.zeros(count), rng.uniform(6, 16, count)], axis=-1
@@ -121,7 +121,7 @@ def encounters(count: int, duration: float, chatter: float) -> tuple[DumbbellDru
 def meetings_make_dyads(least: float = 0.1, count: int = 8, chatter: float = 0.3) -> Finding:
     """Let climbing dumbbells meet others of heading about 0 and count the dyads.
 
-    ``least`` share of encounters that are dyads at the end.
+    Holds if a share ``least`` of the encounters are dyads at the end.
     """
     drum, q = encounters(count, 120.0, chatter)
     made = is_dyad(drum, q)
@@ -142,7 +142,7 @@ def meetings_make_dyads(least: float = 0.1, count: int = 8, chatter: float = 0.3
 
 
 def leaves_at(end: str = "top", hand: Chirality = "R", duration: float = 150.0) -> Finding:
-    """Follow a dyad that starts half-way in a drum 60 mm long."""
+    """Simulate a dyad that starts half-way along a drum 60 mm long."""
     path = one_dyad(hand, 12.0 if hand == "R" else -12.0, duration, height=35.0, top=60.0)
     left = [event.time for event in path.of_kind(EventKind.EXIT)]
     low = float(path.q[-1, :, 1].mean())
@@ -158,7 +158,7 @@ def leaves_at(end: str = "top", hand: Chirality = "R", duration: float = 150.0) 
 
 
 def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding:
-    """Check that a left-handed dyad that has come to the bottom is a dyad no longer, or still."""
+    """Check whether a left-handed dyad that has reached the bottom is still a dyad."""
     path = one_dyad("L", -12.0, duration, height=35.0, top=60.0)
     drum = replace(DRUM, count=2)
     still = bool(is_dyad(drum, path.q[-1])) and handedness(drum, path.q[-1]) == -1
@@ -169,7 +169,7 @@ def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding
         f"{duration:g} s after a start at 35 mm the left-handed dyad "
         + ("touches" if touched else "does not touch")
         + " the bottom, has turned to a mean heading of "
-        f"{steep:.0f}° and " + ("is still nested" if still else "is not nested any more"),
+        f"{steep:.0f}° and " + ("is still nested" if still else "is no longer nested"),
         {"heading": steep},
         "alone, a left-handed dyad lies down along the bottom, still nested; others that collide "
         "with it may break it",
@@ -177,7 +177,7 @@ def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding
 
 
 def can_leave_in_time(length: float = 300.0, heading: float = 15.0) -> Finding:
-    """Compare the length of a drum with how far a dyad climbs in twenty minutes."""
+    """Compare the length of a drum with the climb of a dyad in twenty minutes."""
     speed = DRUM.spin * DRUM.centre_radius * math.tan(math.radians(heading))
     reach = speed * OBSERVED_TIME
     angles = (math.degrees(math.atan(3 / 16)), 7.94)
@@ -193,7 +193,7 @@ def can_leave_in_time(length: float = 300.0, heading: float = 15.0) -> Finding:
 
 
 def of_sixty_leave(leaving: int = LEAVING[1], starts: int = STARTS, top: float = TOP) -> Finding:
-    """Follow bunches for the twenty minutes observed."""
+    """Simulate bunches for the twenty minutes of the observation."""
     runs = [bunch(LARGER, OBSERVED_TIME, seed, top, STEP) for seed in range(starts)]
     found = exit_statistics(runs)
     last = [one.census(-1) for one in runs]
@@ -218,8 +218,8 @@ CLAIMS = (
         "B1a",
         "3",
         "observation (i) on a bunch",
-        "a bunch parts into rollers at small, mostly positive azimuths and interlocked sliders at "
-        "larger ones",
+        "a bunch separates into rollers at small, mostly positive azimuths and interlocked sliders "
+        "at larger ones",
         Means.SIMULATION,
         partitions,
         partial(partitions, apart=False),
@@ -229,7 +229,7 @@ CLAIMS = (
         "B1b",
         "3",
         "observation (i) on a bunch, picture of the bunch",
-        "dumbbells of 8 mm do so very soon after the start",
+        "bunches of dumbbells of 8 mm do so very soon after the start",
         Means.SIMULATION,
         partial(partitions, PICTURE, 1),
         partial(partitions, PICTURE, 1, apart=False),

@@ -64,13 +64,13 @@ def comes_apart(
         + ("is" if own else "is not")
         + " its own mirror image",
         {"left": float(left.sum()), "shift": float(paths.shift[-1].min())},
-        "the pair marked NC taken for one side by side, which is its own mirror image: it needs "
+        "the pair marked NC read as one side by side, which is its own mirror image: it needs "
         "noise to slide apart",
     )
 
 
 def heading_gets_its_sign(chatter: float = 0.45, degrees: float = 8.0) -> Finding:
-    """Start dyads with headings of the wrong sign and follow them for 150 s."""
+    """Start dyads with headings of the wrong sign and simulate them for 150 s."""
     starts: Starts = (("R", -degrees), ("R", -degrees / 2), ("L", degrees), ("L", degrees / 2))
     paths = dyads(starts, 150.0, chatter=chatter)
     late = np.degrees(paths.heading[paths.times >= 130.0]).mean(axis=0)
@@ -210,7 +210,7 @@ CLAIMS = (
         "B3b",
         "3",
         "observation (iv) on a bunch",
-        "dyads of any small heading reach the same one",
+        "dyads of any small initial heading reach the same final heading",
         Means.SIMULATION,
         heading_is_common,
         partial(heading_is_common, chatter=STRONG),

@@ -1,8 +1,8 @@
 """Section 3.1: a single dumbbell in the turning drum, as observed.
 
-What was seen in an experiment is compared with the model: dumbbells as rigid axles with dry
+Observations of an experiment are compared with the model: dumbbells as rigid axles with dry
 friction, coefficients of the text (dynamic ones, not given there, 0.06 and 0.2), and, where stated,
-loads that chatter with a relative amplitude ``A``, drawn anew every 0.01 s.
+loads that chatter with a relative amplitude ``A``, drawn independently every 0.01 s.
 """
 
 import math
@@ -30,7 +30,7 @@ START = (15.0, 15.0, -15.0, -15.0, 0.0, 0.0)
 def shaken(
     chatter: float, headings: tuple[float, ...] = START, duration: float = 200.0
 ) -> Trajectory:
-    """Follow dumbbells under noise, from the lowest line."""
+    """Simulate dumbbells under noise, from the lowest line."""
     noise = Noise(chatter=chatter, seed=1)
     return follow(DRUM, np.radians(headings), duration, noise=noise, dt=2e-3)
 
@@ -107,9 +107,9 @@ def fits(rolling: float, degrees: float, tolerance: float) -> bool:
 def width_and_decay(
     chatters: Sequence[float] = (0.0, 0.1, 0.2, 0.3), least: float = 4.0
 ) -> Finding:
-    """Look for noise under which zigzags are wide and headings decay, both as observed.
+    """Search for noise under which zigzags are wide and headings decay, both as observed.
 
-    ``least`` width in degrees; a heading decays if it loses a tenth in a minute.
+    ``least`` is a width in degrees; a heading decays if it loses a tenth in a minute.
     """
     widths, left, found = [], [], []
     for chatter in chatters:
@@ -146,13 +146,13 @@ def heading_decays(chatter: float = NOISY) -> Finding:
         f"with chatter A = {chatter:g} headings of ±15° are {', '.join(f'{h:.1f}°' for h in end)} "
         f"after 200 s; without noise they change by {math.degrees(quiet):.1e}° in 30 s",
         {"largest": float(np.abs(end).max()), "without_noise": math.degrees(quiet)},
-        "noise is needed: friction takes up the torque at rest and in rolling, and only slippage "
-        "lets the heading fall",
+        "noise is needed: friction balances the torque at rest and in rolling, and only slippage "
+        "lets the heading decay",
     )
 
 
 def heading_falls_while_rolling(share: float = 0.6) -> Finding:
-    """Check which share of the loss of heading happens while the azimuth falls."""
+    """Check which share of the loss of heading happens while the azimuth decreases."""
     path = shaken(NOISY)
     turn = np.diff(np.abs(path.q[:, :4, 2]), axis=0)
     falls = np.diff(path.q[:, :4, 0], axis=0) < 0
@@ -160,7 +160,7 @@ def heading_falls_while_rolling(share: float = 0.6) -> Finding:
     return Finding(
         Verdict.HOLDS_UNDER if found >= share else Verdict.REFUTED,
         f"with chatter A = {NOISY:g}, {100 * found:.0f} % of the change of headings happens while "
-        f"the azimuth falls, which is {100 * time:.0f} % of the time (records 0.02 s apart)",
+        f"the azimuth decreases, {100 * time:.0f} % of the time (records 0.02 s apart)",
         {"share": found, "time": time},
         f"most of it: with this noise {100 * (1 - found):.0f} % happen in slips while carried",
     )

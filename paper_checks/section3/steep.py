@@ -1,4 +1,4 @@
-"""Section 3.1: dumbbells of large heading, and drums that are tilted more."""
+"""Section 3.1: dumbbells of large heading, and drums of larger tilt."""
 
 import math
 from dataclasses import replace
@@ -15,13 +15,13 @@ from polycorner.dumbbells.statics.keel import Keel
 from polycorner.dumbbells.statics.keel_formulas import s_curve
 from polycorner.motion.noise import Noise
 
-RAPID = 1.0  # mm/s, what is called a rapid descent: some times the speed of climbing
+RAPID = 1.0  # mm/s, threshold of a rapid descent: several times the speed of climbing
 
 
 def climbs_below(threshold: float = 20.0, reach: float = 80.0) -> Finding:
-    """Find, without noise, the largest heading that climbs, and set it against a formula.
+    """Find, without noise, the largest heading that climbs, and compare it with a formula.
 
-    It is where both limits of ``A`` are reached at once, on the heading of ``S`` less epsilon.
+    At that heading, that of ``S`` less epsilon, both limits of ``A`` are reached at once.
     """
     headings = np.arange(2.0, reach, 2.0)
     path = follow(DRUM, np.radians(headings), 30.0, dt=2e-3)
@@ -37,7 +37,7 @@ def climbs_below(threshold: float = 20.0, reach: float = 80.0) -> Finding:
         {"threshold": float(climbing.max()), "formula": formula},
         "with the coefficients of the text a dumbbell climbs up to $S(\\varphi_s)-\\varepsilon = "
         f"{formula:.1f}°$; above, the drum carries it out of $A$ by sliding instead of rolling, "
-        f"and it goes down. For {threshold:g}° that would need $\\mu_s = "
+        f"and it descends. For {threshold:g}° that would need $\\mu_s = "
         f"{sliding_for(threshold):.3f}$",
     )
 
@@ -49,13 +49,13 @@ def largest_climbing(sliding: float) -> float:
 
 
 def sliding_for(heading: float) -> float:
-    """Return the coefficient of sliding with which headings up to that one climb."""
+    """Return the coefficient of sliding for which headings up to a given one climb."""
     tried = np.arange(0.13, 0.5, 0.001)
     return float(tried[np.argmin([abs(largest_climbing(mu) - heading) for mu in tried])])
 
 
 def descends_above(tilt: float = 10.0, chatter: float = 0.3) -> Finding:
-    """Check that 2 degrees above a tilt every heading goes down fast, and 2 degrees below none."""
+    """Check that every heading descends fast 2 degrees above a tilt, and none 2 degrees below."""
     headings = (-10.0, 0.0, 5.0, 15.0)
     slow, fast = (
         risen(follow(tilted, np.radians(headings), 15.0, noise=noise, dt=2e-3)) / 15.0
@@ -89,7 +89,7 @@ CLAIMS = (
         "O5b",
         "3",
         "after the observations on isolated dumbbells",
-        "this is so for tilts up to 10°; above, every heading descends rapidly",
+        "this holds for tilts up to 10°; above 10° every heading descends rapidly",
         Means.SIMULATION,
         descends_above,
         partial(descends_above, 4.0),

@@ -27,7 +27,7 @@ def highest(path: Trajectory) -> float:
 
 
 def carried_higher(rubbing: float = 0.3, heading: float = 8.0) -> Finding:
-    """Compare how far a dyad and a single dumbbell of its heading are carried, without noise."""
+    """Compare the azimuths to which a dyad and a single dumbbell are carried, without noise."""
     single = float(np.degrees(onset_azimuths(DRUM, [math.radians(heading)]))[0])
     dyad = highest(one_dyad("R", heading, 60.0, rubbing=rubbing))
     more = {mu: highest(one_dyad("R", heading, 60.0, rubbing=mu)) - single for mu in (0.0, 1.0)}
@@ -42,13 +42,13 @@ def carried_higher(rubbing: float = 0.3, heading: float = 8.0) -> Finding:
 
 
 def carried_as_far_as_quoted(rolling: float = 0.2, heading: float = 8.0) -> Finding:
-    """Compare a dyad with a dumbbell of the coefficient of rolling that the caption has for it."""
+    """Compare a dyad with a dumbbell of the coefficient of rolling given in the caption."""
     region = RestRegion(DRUM.tilt, rolling, STATIC[1])
     quoted = math.degrees(region.eastern_boundary(math.radians(heading)))
     dyad = highest(one_dyad("R", heading, 60.0))
     return Finding(
         judged(abs(dyad - quoted) < 0.5),
-        f"with $\\mu_r = {rolling:g}$ something of heading {heading:g}° would be carried to "
+        f"with $\\mu_r = {rolling:g}$ a dumbbell of heading {heading:g}° would be carried to "
         f"{quoted:.2f}°; the model's dyad is carried to {dyad:.2f}°",
         {"quoted": quoted, "dyad": dyad},
         "friction between the two, with the coefficient of their friction on the drum, does not "
@@ -57,7 +57,7 @@ def carried_as_far_as_quoted(rolling: float = 0.2, heading: float = 8.0) -> Find
 
 
 def first_to_move(path: Trajectory) -> dict[str, int]:
-    """Count, of the starts from rest of both, who of the pair moved: lower, upper, or both."""
+    """Count the starts from rest by who of the pair moves first: lower, upper, or both."""
     counts = {"lower": 0, "upper": 0, "both": 0}
     rest = {0: True, 1: True}
     begins: dict[float, list[tuple[int, bool]]] = {}
@@ -84,7 +84,7 @@ def first_is(who: str = "lower", chatters: Sequence[float] = (0.0, 0.1)) -> Find
     )
     return Finding(
         judged(share > 0.5),
-        f"who starts from rest, in 60 s: {listed}",
+        f"first to start from rest, in 60 s: {listed}",
         {"share": share},
         "in the model the upper one presses on the lower, and both start together",
     )

@@ -39,7 +39,7 @@ def energy_is_least_at(azimuth: float = 0.0, heading: float = 0.0) -> Finding:
 
 
 def is_saddle_at(heading: float = 90.0) -> Finding:
-    """Check that the energy in a level drum is stationary there, and falls along the heading."""
+    """Check that the energy in a level drum is stationary, and decreases along the heading."""
     import sympy
 
     (phi, _, theta, alpha, k), height = potential()
@@ -58,7 +58,7 @@ def is_saddle_at(heading: float = 90.0) -> Finding:
 
 
 def noise_leads_to_the_minimum(chatter: float = 1.0) -> Finding:
-    """Shake dumbbells in a level drum that stands still, from 8.6 degrees up the wall."""
+    """Shake dumbbells in a level drum at rest, from 8.6 degrees up the wall."""
     still = replace(LEVEL, spin=0.0)
     headings = np.radians([40.0, -40.0, 20.0, 80.0])
     noise = Noise(chatter=chatter, seed=5)
@@ -70,7 +70,7 @@ def noise_leads_to_the_minimum(chatter: float = 1.0) -> Finding:
         f"and headings 40°, -40°, 20°, 80° are within {phi:.2f}° of the lowest line and "
         f"{theta:.2f}° of its direction",
         {"azimuth": float(phi), "heading": float(theta)},
-        "in a drum that stands still; a turning one keeps a dumbbell at the azimuths of its zigzag",
+        "in a drum at rest; a turning drum keeps a dumbbell at the azimuths of its zigzag",
     )
 
 
@@ -148,7 +148,7 @@ CLAIMS = (
         "O10",
         "4",
         "sustained climbing",
-        "by sticking and rolling in turn a dumbbell of constant positive heading gains energy",
+        "by alternately sticking and rolling a dumbbell of constant positive heading gains energy",
         Means.SIMULATION,
         rises_in_energy,
         partial(rises_in_energy, -10.0),

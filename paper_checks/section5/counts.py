@@ -1,7 +1,7 @@
 """Section 5: numbers of components of the strata, their kinds, and the motions between them.
 
-A point of ``M x M`` is an ordered pair of dumbbells whose balls are alike.  Counts for labelled
-balls, and for dumbbells that are not told apart either, are given beside.
+A point of ``M x M`` is an ordered pair of dumbbells with indistinguishable balls.  Counts for
+labelled balls, and for indistinguishable dumbbells, are given for comparison.
 """
 
 from collections import Counter
@@ -78,7 +78,7 @@ def corners_fall_into(names: tuple[str, ...] = ("Delta_L", "Delta_R", "E_L", "E_
 
 
 def components_are(dimension: int, number: int) -> Finding:
-    """Count components of a stratum in M x M, and test the counts by Euler and by handshake."""
+    """Count components of a stratum in M x M; test the counts by Euler's formula and handshakes."""
     counts = _counts(atlas(PLANE))
     ordered, loose = counts["ordered"], counts["unordered"]
     true = ordered[dimension]
@@ -106,7 +106,7 @@ def components_are(dimension: int, number: int) -> Finding:
 
 
 def _motion(active: tuple[str, ...]) -> str:
-    """Return what the kind of a motion is called here."""
+    """Return the name of a kind of motion."""
     balls = sum(len(name) == 4 for name in active)
     return {0: "slide", 1: "turn", 2: "swing"}[balls]
 
@@ -148,7 +148,7 @@ def half_motions_are(numbers: tuple[int, int] = (3, 4)) -> Finding:
 
 
 def mirror_stays_in_component(motion: str = "swing") -> Finding:
-    """Carry the middle of every edge of a kind to its mirror image and see where that lies."""
+    """Find the components that contain the mirror images of the midpoints of a kind of edge."""
     found = atlas(PLANE)
     corners, edges = found.skeleton.corners, found.skeleton.edges
     home = {k: n for n, orbit in enumerate(found.ordered["edges"]) for k in orbit}
@@ -179,14 +179,14 @@ def mirror_stays_in_component(motion: str = "swing") -> Finding:
         Verdict.HOLDS if kept and not lost else Verdict.REFUTED,
         f"Of {kept + lost} edges with labelled balls of the kind {motion!r} the mirror image of "
         f"{kept} lies in the same component of $D_4$ in $M \\times M$, that of {lost} in another. "
-        "On the way of a swing the dumbbells lie side by side, where the hand is "
+        "During a swing the dumbbells come to lie side by side, where the hand is "
         f"{'not defined' if between is None else between}.",
         {"kept": float(kept), "lost": float(lost)},
     )
 
 
 def single_contacts_have_no_hand(of: str = "points") -> Finding:
-    """Look for the hand at single contacts, and for both hands in every component of D5."""
+    """Determine the hand at single contacts, and search every component of D5 for both hands."""
     found = first_contacts(PLANE)
     hands = [(_component(name), PLANE.chirality(q)) for name, q in found]
     flipped = [PLANE.chirality(PLANE.mirror(q)) for _, q in found]
@@ -215,7 +215,7 @@ def single_contacts_have_no_hand(of: str = "points") -> Finding:
 
 
 def _component(contact: str) -> str:
-    """Return which component of D5 in M x M a contact belongs to."""
+    """Return the component of D5 in M x M to which a contact belongs."""
     if len(contact) == 4:
         return "ball on ball"
     return "ball of A on rod of B" if contact[0] == "A" else "ball of B on rod of A"

@@ -14,7 +14,7 @@ from polycorner.polyhedra import LocalType
 if TYPE_CHECKING:
     import sympy
 
-# Mean headings, in radians, of the sections of the drum that are looked at.
+# Mean headings, in radians, of the sections of the drum that are examined.
 HEADINGS = (0.0, 0.5)
 # Sets of contacts that occur, one of every kind, in the order of growing number; see D3.
 KINDS = (("aB1",), ("A2B1",), ("A2b", "aB1"), ("A2B1", "aB1"), ("A1B1", "A2B2"), DELTA, E_CORNER)
@@ -22,12 +22,12 @@ KINDS = (("aB1",), ("A2B1",), ("A2b", "aB1"), ("A2B1", "aB1"), ("A1B1", "A2B2"),
 
 @cache
 def plane_gradients() -> "dict[tuple[str, ...], sympy.Matrix]":
-    """Return the gradients of the contacts of every kind in the plane, by place and heading of B.
+    """Return the gradients of all kinds of contacts in the plane, by position and heading of B.
 
     A lies along the second axis, ``A1`` at 0; ``B1`` is at ``(x, y)`` and the axis of B makes the
-    angle ``d`` with that of A.  Distances of ball centres are squared and halved.  The places are
-    those where the contacts close: ``p = r + t``, ``p^2 + s^2 = 4 r^2``, ``h > 0`` the distance of
-    a foot from the end of its rod, ``c > 0`` the cosine of the direction from ball to ball.
+    angle ``d`` with that of A.  Distances of ball centres are squared and halved.  At the positions
+    considered the contacts are closed: ``p = r + t``, ``p^2 + s^2 = 4 r^2``, ``h > 0`` the distance
+    of a foot from the end of its rod, ``c > 0`` the cosine of the direction from ball to ball.
     """
     import sympy
 
@@ -66,7 +66,7 @@ def plane_gradients() -> "dict[tuple[str, ...], sympy.Matrix]":
 
 
 def _volumes() -> "dict[tuple[str, ...], sympy.Expr]":
-    """Return the Gram determinant of every kind; of E that of three of its contacts."""
+    """Return the Gram determinant of every kind; for E that of three of its contacts."""
     import sympy
 
     found = {}
@@ -86,7 +86,7 @@ def long_rods(expression: "sympy.Expr") -> "sympy.Expr":
 
 @cache
 def drum_strata() -> dict[int, set[int]]:
-    """Return the dimensions met in the drum by number of contacts: pairs, edges and corners."""
+    """Return the dimensions found in the drum by number of contacts: pairs, edges and corners."""
     met: dict[int, set[int]] = {}
 
     def note(q: Array, expected: int | None = None) -> None:
@@ -132,7 +132,7 @@ def dimensions_are(dimensions: tuple[int, int, int, int] = (6, 5, 4, 3)) -> Find
 
 
 def lowest_dimension_is(lowest: int = 3) -> Finding:
-    """Rigid motions act freely in the plane; in the drum corners never close a fourth condition."""
+    """Rigid motions act freely in the plane; in the drum corners never meet a fourth condition."""
     import sympy
 
     names = sympy.symbols("x1 y1 t1 x2 y2 t2", real=True)
@@ -165,7 +165,7 @@ def lowest_dimension_is(lowest: int = 3) -> Finding:
 
 
 def convex_as(allowed: tuple[LocalType, ...] = (LocalType.QUADRANT, LocalType.CONE)) -> Finding:
-    """Look at the local type of every stratum, and at how the four gradients at E depend."""
+    """Examine the local type of every stratum, and the linear relation of the gradients at E."""
     import sympy
 
     (relation,) = plane_gradients()[E_CORNER].T.nullspace()

@@ -101,7 +101,7 @@ def two_rods_touch(names: tuple[str, ...] = ("aB1", "A2b")) -> Finding:
 
 @cache
 def _proved() -> tuple[bool, bool, tuple[str, ...]]:
-    """Prove in interval arithmetic what the corner Delta of the plane is like."""
+    """Prove properties of the corner Delta of the plane in interval arithmetic."""
     certificate = minimise(PLANE.polyhedron, PLANE.energy, PLANE.nested("R"))
     conditions = prove(certificate).conditions
     told = [
@@ -112,7 +112,7 @@ def _proved() -> tuple[bool, bool, tuple[str, ...]]:
 
 
 def delta_is(names: tuple[str, ...] = DELTA) -> Finding:
-    """Sample around Delta in the drum, and prove it for one pair in the plane, hence for all."""
+    """Sample around Delta in the drum; prove the claim for one pair in the plane, hence for all."""
     points = corner_points(DELTA)
     missed = sum(is_described(DRUM, q, by_contacts(DRUM, names), 4)[0] for q in points)
     independent, apart, active = _proved()

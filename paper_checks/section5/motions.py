@@ -20,7 +20,7 @@ FULL = 360
 
 
 def carried(pair: DumbbellPair, q: Array, names: tuple[str, ...], turn: int) -> Array:
-    """Keep contacts closed while the mean heading turns, the mean place staying where it is.
+    """Keep contacts closed while the mean heading turns and the mean position stays fixed.
 
     Newton's method in steps of five degrees; ``turn`` in degrees.
     """
@@ -38,7 +38,7 @@ def carried(pair: DumbbellPair, q: Array, names: tuple[str, ...], turn: int) -> 
 
 
 def apart(pair: DumbbellPair, p: Array, q: Array) -> float:
-    """Return how far two points of M x M are apart: headings count modulo half a turn."""
+    """Return the distance of two points of M x M, headings modulo half a turn."""
     difference = p - q
     difference[[2, 5]] = [math.remainder(x, math.pi) for x in difference[[2, 5]]]
     return float(abs(difference / pair.manifold.scale_array).max())
@@ -92,7 +92,7 @@ def copies_of_m(turn: int = 180) -> Finding:
 
 
 def free_motions_are(number: int = 3) -> Finding:
-    """Count the motions of a pair that change no distance, at a point with none of them closed."""
+    """Count the motions of a pair that change no distance, at a point without contacts."""
     point = np.array([0.03, -2.0, 0.4, 0.11, 9.0, 0.9])
     flat = point * np.array([122.0, 1, 1] * 2)
 
@@ -132,7 +132,7 @@ def free_motions_are(number: int = 3) -> Finding:
 
 
 def extreme_pair_is_unique(extreme: Callable[..., tuple[int, int]] = max) -> Finding:
-    """Look for the farthest, or nearest, two centres of different dumbbells at all corners."""
+    """Find the farthest, or nearest, two centres of different dumbbells at all corners."""
     import sympy
 
     p, h, length = sympy.symbols("p h l", positive=True)
@@ -169,7 +169,7 @@ def extreme_pair_is_unique(extreme: Callable[..., tuple[int, int]] = max) -> Fin
 
 
 def right_handed_rests_at(sign: int = 1) -> Finding:
-    """Compare the orientation in the plane (phi, eta) with the sign of the heading at rest."""
+    """Compare the orientation in the plane (phi, eta) with the sign of the minimum's heading."""
     hands = {}
     for hand in ("R", "L"):
         q = minimise(DRUM.polyhedron, DRUM.energy, DRUM.nested(hand)).point

@@ -23,7 +23,7 @@ CONTACTS = ("A1B1", "A1B2", "A2B1", "A2B2", "A1b", "A2b", "aB1", "aB2")
 # The contacts of the two kinds of corner, as the paper writes them.
 DELTA = ("A2b", "aB1", "A2B1")
 E_CORNER = ("A2b", "aB1", "A1B1", "A2B2")
-# What may be renamed without changing a pair: the balls of either dumbbell, and the dumbbells.
+# Renamings that leave a pair unchanged: of the balls of either dumbbell, and of the dumbbells.
 BALL_NAMES = (
     {"A1": "A2", "A2": "A1", "B1": "B1", "B2": "B2"},
     {"A1": "A1", "A2": "A2", "B1": "B2", "B2": "B1"},
@@ -41,7 +41,7 @@ def atlas(pair: DumbbellPair = PLANE, heading: float = 0.0) -> PairAtlas:
 
 
 def parts(contact: str) -> tuple[str, str]:
-    """Return what touches: ``A1b`` is the ball ``A1`` and the rod ``b``."""
+    """Return the two parts in contact: ``A1b`` is the ball ``A1`` and the rod ``b``."""
     cut = 2 if contact[1].isdigit() else 1
     return contact[:cut], contact[cut:]
 
@@ -75,8 +75,8 @@ def is_described(
 ) -> tuple[int, float]:
     """Compare ``D`` near a point with the inequalities ``f >= 0``.
 
-    Returns how many of 2000 random points nearby they judge differently from ``D``, and which
-    share of the points lies in ``D``.
+    Returns the number of 2000 random points nearby for which they disagree with ``D``, and the
+    share of the points that lies in ``D``.
     """
     rng = np.random.default_rng(seed)
     near = q + rng.uniform(-0.02, 0.02, (2000, 6)) * pair.manifold.scale_array

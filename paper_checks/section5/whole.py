@@ -15,8 +15,8 @@ from polycorner.dumbbells import DumbbellPair, long_rod_length
 def touching_both_ends(rod: float) -> float:
     """Return the largest ``l/r`` at which a ball can touch both balls of the other dumbbell.
 
-    The ball sits at ``2 r`` from both; its own dumbbell points straight away.  Found by bisection
-    of whether this is allowed, between ``2 r`` and ``4 r``.
+    The ball is at ``2 r`` from both; its own dumbbell points straight away.  Bisection between
+    ``2 r`` and ``4 r`` finds the length up to which this is allowed.
     """
 
     def allowed(length: float) -> bool:
@@ -70,7 +70,7 @@ def _listed(counts: set[tuple[int, ...]]) -> str:
 
 
 def crossed(pair: DumbbellPair, q: Array) -> NDArray[np.bool_]:
-    """Return whether the axes cross in the developed plane, by the sides the ends lie on."""
+    """Return whether the axes cross in the developed plane, from the sides of their ends."""
     a1, a2, b1, b2 = np.moveaxis(pair.developed(q), -2, 0)
 
     def side(p: Array, start: Array, end: Array) -> Array:
@@ -82,7 +82,7 @@ def crossed(pair: DumbbellPair, q: Array) -> NDArray[np.bool_]:
 
 
 def inequalities_suffice(names: tuple[str, ...] = CONTACTS) -> Finding:
-    """Sample pairs that satisfy the inequalities, and look for overlapping rods or balls."""
+    """Sample pairs that satisfy the inequalities, and search for overlapping rods or balls."""
     rng = np.random.default_rng(11)
     reach = PLANE.length + 4 * PLANE.ball_radius
     wrong, crosses, least, judged = 0, 0, np.inf, 0
@@ -135,7 +135,7 @@ def body_is(*, ball: bool = False) -> Finding:
         f"$M \\times M$, each face with one boundary curve: Euler characteristic {euler}, that of "
         "a torus, where the surface of a ball has 2.",
         {"euler": float(euler if euler is not None else -1)},
-        "Locally, as it is said. As a whole the body is a solid torus round the circle of relative "
+        "Locally, as stated. As a whole the body is a solid torus around the circle of relative "
         "headings, and not the compact solid without a hole that a drawing in space suggests.",
     )
 
@@ -154,7 +154,7 @@ CLAIMS: tuple[Claim, ...] = (
         "D14",
         "5",
         "assumption on the length of the rods",
-        "The picture holds as long as no ball can touch both balls of the other dumbbell.",
+        "The description holds as long as no ball can touch both balls of the other dumbbell.",
         Means.NUMERICAL,
         picture_holds_above,
         partial(picture_holds_above, lambda _: 4.0),

@@ -26,7 +26,7 @@ from paper_checks.section6.experiment import (
     proof,
     rests,
 )
-from polycorner import stationary_on
+from polycorner import checks, stationary_on
 from polycorner.dumbbells import (
     DumbbellPair,
     critical_rod_radius,
@@ -38,7 +38,7 @@ LENGTH, BALL, ROD = sympy.symbols("l r t", positive=True)
 PRINTED_HEADING = sympy.atan(BALL / LENGTH)
 TOLERANCES = {"length": 0.1, "ball_radius": 0.05, "rod_radius": 0.05, "drum_radius": 1.0}
 OTHERS = (EXPERIMENT, SHORTER, BUNCH)
-CURVATURE = 1e-3  # degrees by which a drum of 125 mm may differ from the plane
+CURVATURE = 1e-3  # degrees, largest difference between a drum of 125 mm and the plane
 KINDS = ("half-V", "half-U", "U", "free")
 
 
@@ -56,7 +56,7 @@ def half_turn_fixes_the_corner() -> bool:
     theta1)``, and ``c`` can be chosen so that both ``eta`` stay.  It turns every centre by a
     half-turn (checked symbolically), so it keeps gaps and energy, and it exchanges the contacts
     ``A2b`` and ``aB1``.  So it carries the solution of the KKT equations to a solution.  If the
-    image of the enclosure lies in the box in which the solution is the only one, they are the same.
+    image of the enclosure lies in the box in which the solution is unique, both are the same.
     """
     ball = centres(EXPERIMENT)
     p1, e1, t1, p2, e2, t2 = EXPERIMENT.manifold.symbols
@@ -101,7 +101,7 @@ def balanced(azimuths: int = 1, headings: int = -1) -> Finding:
 
 
 def heading_is(formula: sympy.Expr = PRINTED_HEADING) -> Finding:
-    """Hold a formula against proved headings, exactly in the plane and nearly in the drum."""
+    """Compare a formula with proved headings, exactly in the plane and nearly in the drum."""
     degrees = sympy.N(formula.subs(sizes(PLANE)) * DEGREES, 40)
     right = sympy.N(plane_formula().subs(sizes(PLANE)) * DEGREES, 40)
     plane = enclosed(proof(PLANE, "delta_R"), PLANE.manifold.symbols[2] * DEGREES)
@@ -147,7 +147,7 @@ def _closed_form_is_right(pair: DumbbellPair) -> bool:
 
 
 def _when_printed_is_exact() -> str:
-    """Weigh the outer balls alone: they lie lowest at ``(D + l) sin theta = p cos theta``."""
+    """Balance the outer balls alone: they lie lowest at ``(D + l) sin theta = p cos theta``."""
     p = BALL + ROD
     along = LENGTH - sympy.sqrt(4 * BALL**2 - p**2)
     outer = sympy.atan(p / (along + LENGTH))
@@ -212,7 +212,7 @@ def held_by(
     free: int = 1,
     pair: DumbbellPair = EXPERIMENT,
 ) -> Finding:
-    """Count directions by how they are held, and ask when the printed counts would be right."""
+    """Count directions by kind of entrapment, and find when the printed counts would be right."""
     claimed = dict(zip(KINDS, (half_v, half_u, full_u, free), strict=True))
     entry, found = rests(pair)["delta_R"], proof(pair, "delta_R")
     counts = entry.certificate.entrapment_counts
@@ -221,8 +221,7 @@ def held_by(
     proved = found.proved and all(low > 0 for low, _ in presses.values())
     radius = critical_rod_radius(pair)
     if radius is None:
-        msg = f"pair: expected one whose rod contacts open at some rod radius; got {pair}"
-        raise ValueError(msg)
+        checks.refuse("pair", "one whose rod contacts open at some rod radius", pair)
     edge = replace(pair, rod_radius=radius)
     start = edge.nested("R", clearance=0.0)
     at_edge = stationary_on(edge.polyhedron, edge.energy, start, CORNER)
@@ -259,7 +258,7 @@ def does_not_depend_on(coordinate: str = "eta") -> Finding:
 
 
 def _shifted(pair: DumbbellPair, names: list[sympy.Symbol], contact: str) -> float:
-    """Return by how much a gap changes, at most, when coordinates grow by the same amount."""
+    """Return the largest change of a gap when coordinates grow by the same amount."""
     rng = np.random.default_rng(11)
     step = np.array([0.3 if x in names else 0.0 for x in pair.manifold.symbols])
     gap = next(f for f in pair.polyhedron.functions if f.name == contact)

@@ -14,7 +14,7 @@ from polycorner.dumbbells import DumbbellPair
 
 
 def least_at(azimuth: sympy.Expr = sympy.S.Zero, heading: sympy.Expr = sympy.S.Zero) -> Finding:
-    """Check where the energy is least.
+    """Check the claimed minimisers of the energy.
 
     ``E - 4 r`` is a sum of terms ``2 rho (1 - cos phi)`` and ``2 rho cos phi (1 - c)`` with
     ``c = sqrt(1 - (l sin theta / 2 rho)^2)``, none negative where ``cos phi > 0``.
@@ -76,7 +76,7 @@ def gap_of_ends(
         Verdict.HOLDS if holds else Verdict.CORRECTED if known else Verdict.REFUTED,
         f"On the lowest line the axial distances that are allowed form {pieces} intervals, which "
         f"end at {', '.join(f'{x:.9f}' for x in ends)} mm; $\\ell + 2r = {right:g}$ mm. The two "
-        "dumbbells are told apart here: without names there is one component.",
+        "dumbbells are distinguished here: otherwise there is one component.",
         {"components": pieces, "end": abs(ends[0])},
         "" if holds else f"{pieces} components, with $|\\eta_1 - \\eta_2| \\ge \\ell + 2r$.",
     )

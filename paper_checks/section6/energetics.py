@@ -54,23 +54,23 @@ def corners_are_minima(pair: DumbbellPair = EXPERIMENT) -> Finding:
         Verdict.HOLDS,
         f"Interval arithmetic proves both corners to be strict local minima up to a shift along "
         f"the drum: the three contacts {', '.join(CORNER)} are closed and press, the least with "
-        f"multiplier {least:.6f}; all other gaps are open. Both rest {rise:.6f} mm higher than "
+        f"multiplier {least:.6f}; all other gaps are open. Both lie {rise:.6f} mm higher than "
         f"$G$ (difference {abs(energies[0] - energies[1]):.0e} mm).",
         {"least_multiplier": least, "rise": rise},
     )
 
 
-# --------------------------------------------------------------- E7: whether there are other loci
+# ---------------------------------------------------------------------------- E7: other minima
 
 
 @cache
 def fallen(pair: DumbbellPair, starts: int) -> Minima:
-    """Return the minima that random placements fall to, up to shifts and relabelling."""
+    """Return the minima found by descent from random placements, up to shifts and relabelling."""
     return pair_minima(pair, starts=starts, rng=np.random.default_rng(6))
 
 
 def locus_of(pair: DumbbellPair, active: tuple[str, ...], q: np.ndarray) -> str:
-    """Return the paper's name for where a pair rests, or the contacts that hold it."""
+    """Return the paper's name of a minimum, or the contacts that hold the pair there."""
     kinds = sorted(len(name) for name in active)
     if not kinds:
         return "G"
@@ -82,7 +82,7 @@ def only_loci(
     pairs: tuple[DumbbellPair, ...] = (EXPERIMENT, SHORTER, BUNCH),
     starts: int = 1000,
 ) -> Finding:
-    """Let random placements fall; then look at rods far thinner than the experiment's."""
+    """Descend from random placements; then examine rods far thinner than the experiment's."""
     found = {
         pair: {locus_of(pair, c.active, c.point): c for c in fallen(pair, starts)} for pair in pairs
     }
@@ -92,7 +92,7 @@ def only_loci(
         f"$\\ell, r, t = {p.length:g}, {p.ball_radius:g}, {p.rod_radius:g}$: {', '.join(sorted(n))}"
         for p, n in zip(pairs, kinds, strict=True)
     )
-    told = f"{starts} random placements each came to rest in ({listed}); {lost} nowhere."
+    told = f"descents from {starts} random placements each end in ({listed}); {lost} in no minimum."
     numbers = {"starts": float(starts), "lost": float(lost)}
     if any(names != named for names in kinds):
         return Finding(Verdict.REFUTED, told, numbers)
@@ -113,7 +113,7 @@ def only_loci(
         f"rods of {1.2 * level:.3f} mm {crossings or 'no'} crossed ones are found.",
         numbers | {"other_minima_proved": float(len(proofs)), "level_crossing_below": level},
         "$G \\cup \\delta$ is everything for rods as thick as the experiment's (found by random "
-        "search, not proved). With very thin rods one dumbbell can also rest lying across the "
+        "search, not proved). With very thin rods there are minima with one dumbbell across the "
         "other. A level crossing needs $t(R - r - t) \\le \\ell^2/16$, here $t \\le "
         f"{level:.3f}$ mm, and for thicker rods none is found; $D$ then has rod-rod contacts.",
     )
@@ -124,7 +124,7 @@ def only_loci(
 
 @cache
 def resting_places(count: int = 400) -> dict[str, set[tuple[float, ...]]]:
-    """Return where ordered pairs come to rest, up to shifts and with headings modulo ``pi``."""
+    """Return the minima of ordered pairs, up to shifts and with headings modulo ``pi``."""
     pair, rng = EXPERIMENT, np.random.default_rng(8)
     found: dict[str, set[tuple[float, ...]]] = {}
     for start in pair.placements(rng, count):
@@ -140,7 +140,7 @@ def resting_places(count: int = 400) -> dict[str, set[tuple[float, ...]]]:
 
 
 def _shared(places: dict[str, set[tuple[float, ...]]]) -> int:
-    """Return how many places two loci have in common."""
+    """Return the number of minima that two loci have in common."""
     return sum(map(len, places.values())) - len(set().union(*places.values()))
 
 
@@ -159,7 +159,7 @@ def half_lines(components: int = 1, ordered: bool = True) -> Finding:
     listed = ", ".join(f"{name}: {counts[name]}" for name in sorted(counts))
     return Finding(
         Verdict.HOLDS if holds else Verdict.CORRECTED,
-        f"Components found by letting {'ordered' if ordered else 'unordered'} pairs fall: {listed}."
+        f"Components found by descent of {'ordered' if ordered else 'unordered'} pairs: {listed}."
         f" {_shared(places) or 'No'} place is in two of them. Exchanging the dumbbells changes "
         f"$\\eta_2 - \\eta_1$ at $\\delta_R$ by {moved:.4f} mm, so it leads to another point with "
         "the same mean $\\eta$, as it does on $G$.",
@@ -172,13 +172,13 @@ def half_lines(components: int = 1, ordered: bool = True) -> Finding:
     )
 
 
-# ---------------------------------------------------------------- E9: rods of which thickness rest
+# --------------------------------------------------------- E9: rod radii for which it is a minimum
 
 
 def minimum_below(limit: sympy.Expr = BALL, *, least: float = 0.05) -> Finding:
     """Check that the corner is a minimum for every rod thicker than ``least``, up to ``limit``.
 
-    It is proved on an interval of rods by interval arithmetic, and asked just below the limit.
+    It is proved on an interval of rods by interval arithmetic, and checked just below the limit.
     """
     pair = EXPERIMENT
     numbers = sizes(pair)
@@ -199,7 +199,7 @@ def minimum_below(limit: sympy.Expr = BALL, *, least: float = 0.05) -> Finding:
         f"{'disproved' if thick.conditions['multipliers positive'].name == 'FAILED' else 'open'}. "
         f"A multiplier vanishes at $t = {computed:.9f}$ mm, and "
         f"$2r\\sqrt{{1 - r^2/\\ell^2}} - r = {end:.9f}$. "
-        f"Just below the limit asked about, {claimed:.4f} mm, the least one is {pressure:.2e}.",
+        f"Just below the claimed limit, {claimed:.4f} mm, the least one is {pressure:.2e}.",
         {"critical": end, "least_multiplier": pressure},
         ""
         if holds
@@ -211,7 +211,7 @@ def minimum_below(limit: sympy.Expr = BALL, *, least: float = 0.05) -> Finding:
 
 @cache
 def proved_for_rods(pair: DumbbellPair, least: float, most: float) -> Proof:
-    """Return what is proved about the corner for all rod radii of an interval."""
+    """Return the proof about the corner for all rod radii of an interval."""
     corner_there = rests(replace(pair, rod_radius=most))["delta_R"].certificate
     return prove(corner_there, parameters={"t": (least, most)})
 

@@ -1,7 +1,7 @@
 """The paper's dumbbells from their definition, and proofs of their minima.
 
-What is written here is written from [GMBN] sec. 2 and 5, apart from the library's own formulas, so
-that a check may hold one against the other.  Every proof is found once and kept.
+The definitions follow [GMBN] sec. 2 and 5 independently of the library's own formulas, so that a
+check may compare the two.  Every proof is found once and cached.
 """
 
 import math
@@ -35,7 +35,7 @@ def rests(pair: DumbbellPair) -> dict[str, DyadMinimum]:
 
 @cache
 def proof(pair: DumbbellPair, name: str) -> Proof:
-    """Return what interval arithmetic says about one of the loci."""
+    """Return the interval proof about one of the loci."""
     return prove(rests(pair)[name].certificate)
 
 
@@ -52,7 +52,7 @@ def multiplier(found: Proof, contact: str) -> Interval:
 
 
 def has(side: Interval, number: float | Fraction | sympy.Expr) -> bool:
-    """Whether a number lies in an interval; one that is not rational is taken to forty digits."""
+    """Whether a number lies in an interval; irrational numbers are taken to forty digits."""
     if isinstance(number, sympy.Rational):
         value = Fraction(int(number.p), int(number.q))
     elif isinstance(number, sympy.Expr):

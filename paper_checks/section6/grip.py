@@ -1,4 +1,4 @@
-"""Sections 6 and C: the force that holds a dyad in its corner, beside that of friction."""
+"""Sections 6 and C: the force that holds a dyad in its corner, compared with friction."""
 
 from functools import partial
 
@@ -11,7 +11,7 @@ ROLLING = 0.1  # the paper's static coefficient of rolling, appendix A
 
 
 def force_holds_the_pair(locus: str = "delta_R", rolling: float = ROLLING) -> Finding:
-    """Compare gravity's pull on each dumbbell of a dyad with what friction can take.
+    """Compare gravity's pull on each dumbbell of a dyad with the limit of friction.
 
     In a horizontal drum a dumbbell at azimuth ``phi`` is pulled by ``tan phi`` of its load along
     the circumference, ``tan phi cos theta`` of it along the direction of rolling; it starts to roll
@@ -26,13 +26,13 @@ def force_holds_the_pair(locus: str = "delta_R", rolling: float = ROLLING) -> Fi
     held = strongest < rolling
     return Finding(
         (Verdict.HOLDS_UNDER if held else Verdict.HOLDS) if pulled else Verdict.REFUTED,
-        "Proved at the point of rest: gravity pulls either dumbbell in its rolling direction with "
+        "Proved at the minimum: gravity pulls either dumbbell in its rolling direction with "
         f"{float(strongest):.5f} of its load, and the strongest contact presses with {presses:.5f} "
         f"ball weights. Rolling starts at {rolling:g} of the load.",
         {"pull": float(strongest), "rolling": rolling},
         "The force that presses the dumbbells into the corner is not zero, but at the quoted "
         f"$\\mu_r^{{stat}} = {rolling:g}$ either of them would rest there, or a little aside, "
-        "without the other: friction takes the pull. The corner holds a pair that noise or the "
+        "without the other: friction balances the pull. The corner holds a pair that noise or the "
         "rotation keeps moving."
         if held and pulled
         else "",

@@ -1,4 +1,4 @@
-"""Pairs of dumbbells in the drum, followed once and shared between checks."""
+"""Simulations of pairs of dumbbells in the drum, computed once and shared between checks."""
 
 import math
 from dataclasses import replace
@@ -17,9 +17,9 @@ from polycorner.motion.trajectory import Trajectory
 Kind = Literal["end_to_end", "side_by_side"]
 Starts = tuple[tuple[Chirality, float], ...]  # chirality and heading, in degrees
 TWO = replace(DRUM, count=2)
-LASTING, LATE = 300.0, 150.0  # s, of runs for steady headings, and from when means are taken
+LASTING, LATE = 300.0, 150.0  # s, duration of runs for steady headings, and start of the averages
 CLEARANCE = 0.05  # mm, between the dumbbells at the start
-APART = 1e4  # mm along the drum, between pairs that must not meet
+APART = 1e4  # mm along the drum, between pairs that are to stay apart
 
 
 def dyads(
@@ -31,7 +31,7 @@ def dyads(
     length: float = 16.0,
     spin: float = 0.01,
 ) -> DyadPaths:
-    """Follow nested pairs from the lowest line; angles in degrees."""
+    """Simulate nested pairs from the lowest line; angles in degrees."""
     return _dyads(starts, duration, chatter, tilt, length, spin)
 
 
@@ -48,7 +48,7 @@ def _dyads(
 def pairs(
     kind: Kind, count: int, duration: float, *, chatter: float = 0.0, tilt: float = 7.0
 ) -> DyadPaths:
-    """Follow ``count`` pairs that are not nested, on the lowest line, under noise of their own."""
+    """Simulate ``count`` pairs that are not nested, on the lowest line, with independent noise."""
     two = replace(TWO, tilt=math.radians(tilt))
     start = {
         "end_to_end": two.pair.end_to_end(gap=CLEARANCE),
@@ -70,7 +70,7 @@ def one_dyad(
     height: float = 0.0,
     top: float = math.inf,
 ) -> Trajectory:
-    """Follow a nested pair with its events; ``height`` above a bottom, if there is a top."""
+    """Simulate a nested pair with its events; ``height`` above a bottom, if there is a top."""
     closed = math.isfinite(top)
     drum = replace(TWO, rubbing=(rubbing, rubbing), floor=closed, top=top)
     angle = math.radians(heading)

@@ -24,7 +24,7 @@ SAMPLES = 400_000
 
 @cache
 def on_both_rods() -> tuple["Touching", ...]:
-    """Return what the atlases say, in the plane and in the drum at a mean heading."""
+    """Return the results from the atlases, in the plane and in the drum at a mean heading."""
     drum = pair_atlas(EXPERIMENT, heading=math.radians(MEAN_HEADING))
     return touching(pair_atlas(PLANE)), touching(drum)
 
@@ -47,7 +47,7 @@ class Touching:
 
 
 def touching(atlas: PairAtlas) -> Touching:
-    """Collect the edges with both ball-rod contacts and measure how parallel their pairs are."""
+    """Collect the edges with both ball-rod contacts and measure the angles between their axes."""
     skeleton, pair = atlas.skeleton, atlas.pair
     groups = atlas.unordered["edges"]
     chosen = [k for k, edge in enumerate(skeleton.edges) if rests_on_both_rods(edge.active)]
@@ -87,7 +87,7 @@ def touching_set(components: int = 2, of: int = 5) -> Finding:
         {"skewed": skewed, "components": float(found[0].components)},
         "Parallel has to mean equal headings: two chords of the drum with the same heading at "
         "different azimuths are not parallel in space, unless $\\theta = 0$. Components are "
-        "counted for dumbbells without names."
+        "counted for indistinguishable dumbbells."
         if holds
         else "",
     )
@@ -137,7 +137,7 @@ def in_neighbourhood(pair: DumbbellPair, q: Array) -> Array:
 
 
 def handedness(pair: DumbbellPair, q: Array) -> tuple[Array, Array]:
-    """Return by how much the farthest pair of centres is the farthest, and the turn, in ``l^2``."""
+    """Return the lead of the farthest pair of centres, and the vector product, in ``l^2``."""
     a1, a2, b1, b2 = np.moveaxis(pair.developed(q), -2, 0)
     outer = np.stack([b1 - a1, b2 - a1, b1 - a2, b2 - a2])
     inner = outer[::-1]
@@ -176,13 +176,13 @@ def drawn(rng: np.random.Generator) -> Array:
 
 @cache
 def sampled() -> tuple[int, int, float, float]:
-    """Return what random pairs of ``U`` are like.
+    """Return statistics of random pairs of ``U``.
 
     Returns
     -------
     tuple
-        How many lie in ``U``, how many of these in ``D``, and among the latter the least lead of
-        the farthest pair of centres and the least turn.
+        The numbers of pairs in ``U`` and in both ``U`` and ``D``, and for the latter the least lead
+        of the farthest pair of centres and the least vector product.
     """
     pair = EXPERIMENT
     q = drawn(np.random.default_rng(2))

@@ -21,7 +21,7 @@ from polycorner.spaces.manifold import Array
 
 BOTH: Starts = (("R", 8.0), ("L", -8.0))
 FOUR: Starts = (("R", 2.0), ("R", 6.0), ("R", 10.0), ("R", 14.0))
-MILD, STRONG = 0.3, 0.4  # chatter under which right-handed pairs climb, and no longer do
+MILD, STRONG = 0.3, 0.4  # chatter with which right-handed pairs climb, and do not
 
 
 def rates(paths: DyadPaths, after: float = 5.0) -> Array:
@@ -31,7 +31,7 @@ def rates(paths: DyadPaths, after: float = 5.0) -> Array:
 def pairs_go(
     sign: int = 1, *, tilt: float = 0.0, chatter: float = 0.0, duration: float = 40.0
 ) -> Finding:
-    """Check that right-handed pairs climb, left-handed ones descend, and what ``G`` does.
+    """Check that right-handed pairs climb and left-handed ones descend, and the motion of ``G``.
 
     In a level drum pairs in ``G`` have to stay, in a tilted one to descend.
     """
@@ -75,7 +75,7 @@ def stays_at_its_heading(
 
 
 def stays_close_to_the_corner(measure: str = "gaps") -> Finding:
-    """Compare a zigzag with the corner: in the contacts of the pair, or also in its azimuth."""
+    """Compare a zigzag with the corner: in the contacts of the pair, or in its azimuth, too."""
     paths = dyads((("R", 8.0),), 60.0)
     late = paths.times > 15.0
     shift = float(np.abs(paths.shift[late] - paths.shift[0]).max())
@@ -95,7 +95,7 @@ def stays_close_to_the_corner(measure: str = "gaps") -> Finding:
 def sorting_needs_no_chirality(
     image: Sequence[float] = (1, -1, -1), turned: bool = True
 ) -> Finding:
-    """Follow a right-handed pair and its image in a level drum under the same noise.
+    """Simulate a right-handed pair and its image in a level drum under the same noise.
 
     ``image``: signs of ``phi, eta, theta``; ``turned``: headings by half a turn, so that the balls
     keep their numbers and their noise.
@@ -121,7 +121,7 @@ def sorting_needs_no_chirality(
 
 
 def spin_decides_who_climbs(sign: int = 1) -> Finding:
-    """Follow pairs in level drums that turn with ``sign`` times the usual spin."""
+    """Simulate pairs in level drums that turn with ``sign`` times the usual spin."""
     right, left = rates(dyads(BOTH, 30.0, tilt=0.0, spin=0.01 * sign))
     return Finding(
         judged(right > 0 > left),
@@ -144,7 +144,7 @@ def noise_leads_to_the_corner(spin: float = 0.0, chatter: float = 1.0) -> Findin
         f"{start[0]:.0f}° and {start[1]:.0f}° become {end[0]:.2f}° and {end[1]:.2f}° in 100 s, "
         f"the least energy being at {least:.2f}°; the dumbbells shift by up to {shifted:.2f} mm",
         {"first": float(end[0]), "second": float(end[1]), "least": least, "shift": shifted},
-        "in a drum that stands still. In the turning one, noise strong enough to turn a pair "
+        "in a drum at rest. In the turning one, noise strong enough to turn a pair "
         "takes it out of the corner along the rods, towards balls side by side",
     )
 
@@ -240,7 +240,7 @@ CLAIMS = (
         "T6a",
         "7",
         "chiral sorting",
-        "the level turning drum is achiral and sorts by chirality all the same",
+        "the level turning drum is achiral and nevertheless sorts by chirality",
         Means.SIMULATION,
         sorting_needs_no_chirality,
         partial(sorting_needs_no_chirality, (-1, 1, -1), turned=False),
@@ -258,7 +258,7 @@ CLAIMS = (
         "T7",
         "7",
         "pairs in a tilted drum",
-        "near $\\delta_R$ a pair climbs to the top; near $\\delta_L$ and $G$ it goes down",
+        "near $\\delta_R$ a pair climbs to the top; near $\\delta_L$ and $G$ it descends",
         Means.SIMULATION,
         partial(pairs_go, tilt=7.0, chatter=MILD, duration=80.0),
         partial(pairs_go, tilt=7.0, chatter=STRONG, duration=80.0),
@@ -277,7 +277,7 @@ CLAIMS = (
         "T9a",
         "7",
         "pairs in a level drum",
-        "noise takes a pair to the neighbourhood of $\\delta$, if it is small and rotation slow",
+        "weak noise takes a pair to the neighbourhood of $\\delta$ if rotation is slow",
         Means.SIMULATION,
         noise_leads_to_the_corner,
         partial(noise_leads_to_the_corner, 0.01, STRONG),

@@ -35,7 +35,7 @@ def _heading(certificate: Certificate) -> float:
 
 @cache
 def range_of_shares(tilt: float) -> tuple[float, float]:
-    """Return between which shares the corner is a minimum, by bisection."""
+    """Return the shares between which the corner is a minimum, by bisection."""
     found = []
     for outside in (0.4, 0.6):
         inside, beyond = 0.5, outside

@@ -1,4 +1,4 @@
-"""Section 8: corners that hold and corners that part, limits on velocities, and cusps."""
+"""Section 8: entrapment and bifurcation at corners, limits on velocities, and cusps."""
 
 from collections.abc import Callable
 from functools import cache, partial
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from polycorner.spaces.manifold import Array
 
 BOARD = Pinball()
-ASIDE = 1e-3  # how far from a corner balls are let go
+ASIDE = 1e-3  # distance from a corner at which balls are released
 STEP, STEPS = 5e-3, 40
-FOOTING, GRAZING = 1e-9, 2e-5  # how far above a wall a ball slides; how deep a chord of a pin goes
-APART = 0.1  # distance of two balls, after they ran, from which on their ways have parted
+FOOTING, GRAZING = 1e-9, 2e-5  # height above a wall in sliding; depth of a chord of a pin
+APART = 0.1  # final distance of two balls from which on their paths count as separate
 
 CONVEX, CONCAVE = LocalType.QUADRANT, LocalType.UNION
 
@@ -50,26 +50,26 @@ def corners_hold(kind: LocalType = CONVEX) -> Finding:
     return Finding(
         Verdict.HOLDS if held else Verdict.REFUTED,
         f"On a board with pins, wedges and cups the height has a certified minimum at {len(held)} "
-        f"of {len(found)} locally {words} corners; at the others it falls along a side.",
+        f"of {len(found)} locally {words} corners; at the others it decreases along a side.",
         {"corners": len(found), "minima": len(held)},
     )
 
 
 def ways_part(kind: LocalType = CONCAVE) -> Finding:
-    """Let balls go close to a corner, on all its sides, and see whether they stay together."""
+    """Release balls close to a corner, on all its sides, and check whether they stay together."""
     parting = [p for p in corners(kind) if _part(p)]
     free, round_tops = pins_that_part()
     total = len(corners(kind))
     words = "convex" if kind is CONVEX else "concave"
     return Finding(
         Verdict.HOLDS_UNDER if parting else Verdict.REFUTED,
-        f"Balls that are let go {ASIDE:g} around a corner run more than "
+        f"Balls released {ASIDE:g} from a corner move more than "
         f"{APART:g} apart at {len(parting)} of {total} locally {words} corners. They also do at "
         f"the tops of {round_tops} of {free} round pins, which have no corner.",
         {"corners": total, "parting": len(parting), "pins": free, "parting_pins": round_tops},
         correction=(
-            "A locally concave corner is a bifurcation where the energy falls away from it along "
-            "both sides; at one that hangs down the ways stay together. It is not needed for a "
+            "A locally concave corner is a bifurcation if the energy decreases away from it along "
+            "both sides; at one that hangs down the paths stay together. It is not needed for a "
             "bifurcation: the smooth top of a pin is one, too."
         )
         if parting
@@ -79,7 +79,7 @@ def ways_part(kind: LocalType = CONCAVE) -> Finding:
 
 @cache
 def pins_that_part() -> tuple[int, int]:
-    """Return how many pins have no corner near their tops, and at how many of these balls part."""
+    """Return the number of pins without a corner near the top, and of those where balls part."""
     tops = [np.array([x, y + r]) for x, y, r in BOARD.pins]
     free = [p for p in tops if not corners_near(p)]
     return len(free), sum(map(_part, free))
@@ -91,7 +91,7 @@ def corners_near(point: "Array", distance: float = 0.05) -> bool:
 
 
 def _part(place: "Array") -> bool:
-    """Whether balls that are let go around a place of the boundary end up apart."""
+    """Whether balls released around a point of the boundary end up apart."""
     ends = [_run(start) for start in _around(place)]
     return max(float(np.linalg.norm(p - q)) for p in ends for q in ends) > APART
 
@@ -107,7 +107,7 @@ def _around(place: "Array") -> "list[Array]":
 
 
 def _run(start: "Array") -> "Array":
-    """Follow the height downwards, falling freely or sliding along walls, for a while."""
+    """Follow steepest descent of the height, falling freely or sliding along walls."""
     p = start
     for _ in range(STEPS):
         reached = _reached(p)
@@ -119,7 +119,7 @@ def _run(start: "Array") -> "Array":
 
 
 def _reached(p: "Array") -> "Array":
-    """Return where one step may lead: straight down, along walls that are close, or nowhere."""
+    """Return the possible next points: straight down, along walls that are close, or none."""
     D = BOARD.polyhedron
     values, gradients = D.evaluate(p, 1)
     sizes = np.linalg.norm(gradients, axis=1)
@@ -142,7 +142,7 @@ TOWN, FAST, SLOW = (100.0, 200.0), 30.0, 14.0
 
 
 def speed_limits(x: Any, v: Any) -> Any:
-    """Return what a limit of ``FAST`` that is ``SLOW`` in a town allows."""
+    """Return the polyhedron of a speed limit of ``FAST`` that is ``SLOW`` in a town."""
     return AllOf(v, FAST - v, AnyOf(SLOW - v, TOWN[0] - x, x - TOWN[1]))
 
 
@@ -152,7 +152,7 @@ def cusped(x: Any, v: Any) -> Any:
 
 
 def limits_carve_a_polyhedron(limits: Callable[[Any, Any], Any] = speed_limits) -> Finding:
-    """Walk along the set that inequalities in positions and velocities leave in phase space."""
+    """Trace the set that inequalities in positions and velocities define in phase space."""
     D = Polyhedron(PHASES, limits(*PHASES.symbols))
     atlas = skeleton(D, [[0.5, 0.25], [0.5, 10.0], [150.0, 10.0]], extent=1e4)
     types = [corner.local_type for corner in atlas.corners]
@@ -164,7 +164,7 @@ def limits_carve_a_polyhedron(limits: Callable[[Any, Any], Any] = speed_limits) 
         f"A limit of {FAST:g} m/s that is {SLOW:g} m/s between {TOWN[0]:g} and {TOWN[1]:g} m cuts "
         f"out of the plane of $x$ and $v$ a set with {quadrants} locally convex and {unions} "
         f"locally concave corners, and {degenerate} where the derivatives are dependent. To "
-        f"enter the town at {FAST:g} m/s no braking is enough: the way to {SLOW:g} m/s at "
+        f"enter the town at {FAST:g} m/s no braking is enough: slowing to {SLOW:g} m/s at "
         f"{BRAKES:g} m/s² takes {braking():.4g} m.",
         {"convex": quadrants, "concave": unions, "degenerate": degenerate, "braking": braking()},
         correction=(
@@ -189,7 +189,7 @@ BRAKES = 5.0
 
 
 def braking() -> float:
-    """Return the way from ``FAST`` to ``SLOW`` at constant deceleration."""
+    """Return the braking distance from ``FAST`` to ``SLOW`` at constant deceleration."""
     return (FAST**2 - SLOW**2) / (2 * BRAKES)
 
 
@@ -223,7 +223,7 @@ Tool = Literal["lemma", "multipliers"]
 
 
 def stops_at_the_cusp(tool: Tool = "lemma") -> Finding:
-    """Try a tool of appendix C on the energy ``x + b y`` at the tip of ``y^2 <= x^3``."""
+    """Apply a tool of appendix C to the energy ``x + b y`` at the tip of ``y^2 <= x^3``."""
     works, told = lemma_at_the_cusp() if tool == "lemma" else multipliers_at_the_cusp()
     other_works, other = multipliers_at_the_cusp() if tool == "lemma" else lemma_at_the_cusp()
     return Finding(
@@ -232,7 +232,7 @@ def stops_at_the_cusp(tool: Tool = "lemma") -> Finding:
         correction=(
             r"The lemma asks only that $x_1, \ldots, x_p \ge 0$ on $C$, not that $C$ is a "
             r"quadrant; with $p = 1$ and $x_1 = E - E_0 - x_2^2 - \ldots - x_n^2$ it covers every "
-            "place from which $E$ grows at least as fast as the distance. What needs a quadrant, "
+            "point from which $E$ grows at least as fast as the distance. What needs a quadrant, "
             "or at least a polyhedron, is to read off the conditions from multipliers."
         )
         if works
@@ -269,7 +269,7 @@ def y_on_set(x: Any, share: float) -> Any:
 
 
 def multipliers_at_the_cusp() -> tuple[bool, str]:
-    """Whether ``dE`` is a combination of the derivatives of what bounds the set."""
+    """Whether ``dE`` is a combination of the derivatives of the functions that bound the set."""
     plane = Manifold.euclidean("x y")
     x, y = plane.symbols
     D = Polyhedron(plane, {"cusp": x**3 - y**2})
@@ -307,7 +307,7 @@ CLAIMS = (
         "C2",
         "8",
         "on constraints that involve velocities",
-        r"Constraints $f(q, \dot q) \ge 0$, such as a speed limit that depends on the place, carve "
+        r"Constraints $f(q, \dot q) \ge 0$, such as a speed limit that depends on position, carve "
         "polyhedra out of phase space.",
         Means.NUMERICAL,
         limits_carve_a_polyhedron,
