@@ -1,4 +1,4 @@
-"""Atlases: the pair, sphere clusters and a polytope, timed beside a plain walker and Qhull.
+"""Atlases of the pair, sphere clusters and a polytope, timed against a plain walker and Qhull.
 
 With `--nine` also the clusters of nine spheres (minutes for the plain walker).
 """
@@ -34,7 +34,7 @@ def spheres(count: int) -> object:
 
 
 def cross_polytope() -> tuple[Polyhedron, np.ndarray]:
-    """Return the cross-polytope in four dimensions, and its half-spaces as Qhull wants them."""
+    """Return the cross-polytope in four dimensions, and its half-spaces in Qhull's format."""
     space = Manifold.euclidean("x y z w")
     signs = list(product((1, -1), repeat=4))
     facets = [1 - sum(s * x for s, x in zip(row, space.symbols, strict=True)) for row in signs]

@@ -1,7 +1,7 @@
 """Start-up time of the package, its command line and a dyad from the cache.
 
-Every figure is that of fresh interpreters, the different ones in turn.  The import is given as what
-it adds to `import numpy`, and that to a bare interpreter.
+All times are those of fresh interpreters, in interleaved rounds.  The time of the import is given
+beyond that of `import numpy`, and the latter beyond that of a bare interpreter.
 """
 
 import statistics
@@ -35,7 +35,7 @@ def imports(folder: Path) -> Times:
 
 
 def commands(folder: Path) -> Times:
-    """Time the command line as far as it exists; the first run of each is not counted."""
+    """Time the command line as far as it exists; the first run of each command is discarded."""
     if find_spec("polycorner.__main__") is None:
         print("The command line is left out: polycorner has no __main__ yet.")
         return {}

@@ -1,7 +1,7 @@
 """Nine gaps and their 54 derivatives of random pairs: polycorner's kernels against plain C.
 
-Compared are ``gaps.c``, written as one would by hand with branches, and ``gaps_vector.c``, the same
-for eight pairs at once.  Both must agree with polycorner before they are timed.  One thread.
+The references are ``gaps.c``, written by hand with branches, and ``gaps_vector.c``, the same for
+eight pairs at once.  Both must agree with polycorner before they are timed.  One thread.
 """
 
 import ctypes
@@ -43,7 +43,7 @@ def random_pairs(count: int, length: float, generator: np.random.Generator) -> n
 
 
 def compiled_c(source: str, parameters: np.ndarray, folder: Path) -> Routine | None:
-    """Return the routine of a C file, or None, with a sentence, where it cannot be compiled."""
+    """Return the routine of a C file, or None, with a message, if it cannot be compiled."""
     here = Path(__file__).parent
     library = folder / f"{source}.so"
     command = ["gcc", *FLAGS, str(here / source), "-o", str(library), "-lm"]
@@ -84,7 +84,7 @@ def in_cache(routine: Routine, q: np.ndarray, f: np.ndarray, J: np.ndarray) -> N
 
 
 def with_new_arrays(routine: Routine, q: np.ndarray) -> None:
-    """Evaluate into arrays made for this call, as a function that returns them has to."""
+    """Evaluate into arrays allocated for this call, as a function that returns them has to."""
     routine(q, np.empty((len(q), 9)), np.empty((len(q), 9, 6)))
 
 

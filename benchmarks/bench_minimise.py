@@ -1,8 +1,8 @@
-"""Two hundred nested pairs let go in the drum: polycorner's search against other solvers.
+"""Descents from two hundred nested pairs in the drum: polycorner's search against other solvers.
 
-Every solver gets the same start before the next start is taken.  A run counts as right when it ends
-in the certified corner of the start's own chirality, wherever along the drum.  How well the first
-order conditions hold where it stopped is judged by polycorner's certificate.
+Every solver gets the same start before the next start is taken.  A run counts as right if it ends
+in the certified corner of the start's own chirality, wherever along the drum.  The residual of the
+first-order conditions at its end is that of polycorner's certificate.
 """
 
 import statistics
@@ -20,7 +20,7 @@ from polycorner import Certificate, certify, minimise
 from polycorner.dumbbells import DumbbellPair
 
 STARTS, ROUNDS = 200, 2
-SAME = 1e-4  # largest scaled distance from the corner that still counts as being there
+SAME = 1e-4  # largest scaled distance at which a point counts as the corner
 OURS = "polycorner"
 
 Solver = solvers.Solver

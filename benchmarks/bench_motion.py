@@ -27,9 +27,10 @@ from polycorner.motion.simulation import start
 ROUNDS = 5
 DYAD = 2
 COUNTS = {DYAD: 2.0, 15: 0.5, 60: 0.25, 240: 0.1}  # dumbbells: seconds of motion in a round
-HEAPS = {(15, 0.0): 24.0, (60, 0.0): 24.0, (240, 0.0): 12.0, (60, 0.3): 6.0}  # and chatter: seconds
-STARTS, SPACE = 4, 4.0  # of each heap; mm of the drum's length for each dumbbell
-SETTLE = 0.5  # seconds before the clock runs
+# number of dumbbells and chatter: seconds of motion
+PILES = {(15, 0.0): 24.0, (60, 0.0): 24.0, (240, 0.0): 12.0, (60, 0.3): 6.0}
+STARTS, SPACE = 4, 4.0  # number of starts of each pile; mm of the drum's length for each dumbbell
+SETTLE = 0.5  # seconds of motion before the timing starts
 SIZES = {"length": 16.0, "ball_radius": 3.0, "rod_radius": 1.5}
 DRUM = {"drum_radius": 125.0, "drum_length": 600.0}
 OURS = "polycorner"
@@ -43,9 +44,9 @@ Task = Callable[[], object]
 
 
 def ours(count: int, seconds: float) -> Task:
-    """Return the task that moves `count` dumbbells on by `seconds` with polycorner, once settled.
+    """Return the task that advances `count` settled dumbbells by `seconds` with polycorner.
 
-    Static coefficients equal the dynamic ones, for MuJoCo has but one.
+    Static coefficients equal the dynamic ones, as MuJoCo has only one.
     """
     scene = DrumScene(**SIZES, **DRUM, count=count)
     drum = DumbbellDrum(
@@ -65,7 +66,7 @@ def ours(count: int, seconds: float) -> Task:
 
 
 def theirs(count: int, seconds: float, **changes: Any) -> Task:
-    """Return the task that moves `count` dumbbells on by `seconds` in MuJoCo, once settled."""
+    """Return the task that advances `count` settled dumbbells by `seconds` in MuJoCo."""
     drum = MujocoDrum(DrumScene(**SIZES, **DRUM, count=count, **changes))
     drum.set_placements(placements(count))
     drum.step(round(SETTLE / drum.scene.dt))
@@ -121,13 +122,13 @@ def memory(name: str, count: int) -> float:
 
 
 def heaps() -> dict[str, Any]:
-    """Time scattered dumbbells that are carried up and slide down, from four starts: ours alone.
+    """Time polycorner alone on scattered dumbbells, carried up and sliding down, four starts.
 
-    With the experiment's coefficients, at rest on their start, as dense for any number of them;
-    the loads chatter or do not.
+    They have the experiment's coefficients, start at rest and have the same density for any number;
+    with and without chatter of the loads.
     """
     figures: dict[str, Any] = {}
-    for (count, chatter), seconds in HEAPS.items():
+    for (count, chatter), seconds in PILES.items():
         drum = DumbbellDrum(**SIZES, drum_radius=DRUM["drum_radius"], count=count, floor=True)
         taken, efforts, overlap = 0.0, [], 0.0
         for seed in range(STARTS):
@@ -154,7 +155,7 @@ def heaps() -> dict[str, Any]:
 
 
 def creep(**changes: Any) -> float:
-    """Return how fast a dumbbell that the drum carries moves along it, in mm/s; at rest it is 0."""
+    """Return the creep along the drum of a dumbbell carried at rest, in mm/s; exactly it is 0."""
     drum = MujocoDrum(DrumScene(**SIZES, **DRUM, mu_roll=0.2, **changes))
     drum.set_placements([[0.0, 150.0, 0.0]])
     drum.step(500)
@@ -190,7 +191,7 @@ def drift(heading: float, **changes: Any) -> tuple[float, float]:
 
 
 def climb(rows: Any, **changes: Any) -> dict[str, float]:
-    """Return what dumbbells do in 40 s after 20 s, as measured and by the law.
+    """Return measures of the motion of dumbbells in 40 s after 20 s, as simulated and by the law.
 
     Mean speed along the drum, headings, mean azimuth and the median zigzag of the azimuth.
     """
@@ -218,7 +219,7 @@ def climb(rows: Any, **changes: Any) -> dict[str, float]:
 
 
 def law(theta: float, scene: DrumScene) -> tuple[float, float]:
-    """Return where a dumbbell of a given heading rolls steadily in the drum, and how it climbs.
+    """Return the azimuth of steady rolling of a dumbbell in the drum, and its climbing speed.
 
     It rolls where the pull reaches the limit of friction: for sliding and rolling in one cone the
     ellipse ``(f_s / mu_s)^2 + f_r^2 (1 / mu_s^2 + 1 / mu_r^2) = 1``, else ``f_r = mu_r``.  There it
@@ -256,7 +257,7 @@ def swing(azimuth: np.ndarray) -> float:
 
 
 def behaviour() -> dict[str, Any]:
-    """Say what MuJoCo does with a dumbbell at rest, one that rolls, and dyads."""
+    """Print MuJoCo's motion of a dumbbell at rest, one that rolls, and dyads."""
     settings: dict[str, dict[str, Any]] = {
         "impratio 1": {"impratio": 1.0},
         "impratio 10": {"impratio": 10.0},

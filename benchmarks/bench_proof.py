@@ -1,9 +1,9 @@
 """Proofs in ball arithmetic: time per proof, and a campaign that searches for a false one.
 
 The pair of dumbbells is proved at growing precision and for a whole box of sizes at once.  Then
-random problems with exactly known answers, many of them on the edge of being minima, are put to
-the prover, and every theorem it states is checked in rational arithmetic.  ``python
-benchmarks/bench_proof.py 500`` puts 500 problems of each kind instead of 100.
+the prover is given random problems with exactly known answers, many of them borderline minima, and
+every theorem it states is checked in rational arithmetic.  ``python benchmarks/bench_proof.py 500``
+runs 500 problems of each kind instead of 100.
 """
 
 import statistics
@@ -48,7 +48,7 @@ def precisions(c: Certificate) -> dict[str, float]:
 
 
 def sizes(c: Certificate) -> dict[str, Any]:
-    """Return how a whole box of rod radii and lengths is proved."""
+    """Return the proof for a whole box of rod radii and lengths."""
     begun, worked = perf_counter(), process_time()
     p = prove(c, parameters=BOX)
     return {
@@ -61,7 +61,7 @@ def sizes(c: Certificate) -> dict[str, Any]:
 
 
 def outcome(proof: Proof, problem: Any, *, minimum: bool) -> str:
-    """Return one of ``WORDS``; refused is what a certificate did not claim in the first place."""
+    """Return one of ``WORDS``; a problem is refused if its certificate does not claim a minimum."""
     if proof.proved:
         return "proved" if holds(problem, proof) else "FALSE"
     if "failed" in proof.conditions.values():
@@ -70,7 +70,7 @@ def outcome(proof: Proof, problem: Any, *, minimum: bool) -> str:
 
 
 def campaign(each: int) -> dict[str, Counter[str]]:
-    """Return what became of random problems, kind by kind."""
+    """Return the outcomes of random problems, kind by kind."""
     totals = {}
     for number, kind in enumerate(KINDS):
         rng = np.random.default_rng([7, number])

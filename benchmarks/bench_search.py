@@ -1,9 +1,9 @@
 """All minima of the pair in the drum from a thousand starts, and of a pinball board.
 
-A search is its falls, the telling apart of where they end, and the certificates.  Each is timed by
-leaving out what comes after it.  SciPy's SLSQP gets a part of the same starts, with nothing told
-apart and nothing certified; a fall of it counts as right when it ends in a minimum that the search
-found, up to the symmetry.
+A search consists of descents, the identification of equal ends, and the certificates.  Each stage
+is timed by leaving out the later ones.  SciPy's SLSQP gets a part of the same starts, without
+identification and certificates; its descent counts as right if it ends in a minimum that the
+search found, up to the symmetry.
 """
 
 import statistics
@@ -25,7 +25,7 @@ from polycorner.minimisation import Minima, minima
 from polycorner.models import Pinball
 
 STARTS, PART, ROUNDS = 1000, 100, 5
-SAME = 1e-4  # largest scaled distance from a minimum that still counts as being there
+SAME = 1e-4  # largest scaled distance at which a point counts as the minimum
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 
 
@@ -34,7 +34,7 @@ def falls(starts: np.ndarray) -> list[np.ndarray]:
 
 
 def hits(ends: list[np.ndarray], found: Minima) -> int:
-    """Return how many points are minima, G being told by its energy: it has no one place."""
+    """Return the number of points that are minima; G is a continuum, recognised by its energy."""
     symmetry = energy_symmetry(PAIR)
     lowest, *corners = found
     places = [symmetry.invariants(g.apply(c.point)) for c in corners for g in symmetry.group]

@@ -4,7 +4,7 @@ The rounded one is marching cubes on the least gap; the sharp one has mesh edges
 of two contacts.  ``cut`` is the largest gap in the middle of a face, ``volume`` and ``curved`` the
 relative errors of the volume against the curved volume on a grid twice as fine as the finest.
 
-Run: ``python benchmarks/bench_solid.py [CELLS ...]``; the answer is JSON.
+Run: ``python benchmarks/bench_solid.py [CELLS ...]``; the output is JSON.
 """
 
 import json
@@ -50,7 +50,7 @@ def measured(make: Callable[[int], Isosurface], cells: int, exact: float) -> dic
 
 
 def main(cells: list[int]) -> None:
-    sharp(16)  # load what is compiled
+    sharp(16)  # load compiled code
     exact = forbidden_solid(PAIR, 2 * max(cells), period=TURN).curved_volume
     rows = {make.__name__: [measured(make, n, exact) for n in cells] for make in (rounded, sharp)}
     print(json.dumps({"exact": exact, **rows}, indent=2))

@@ -1,8 +1,8 @@
 """Overhead of a parameter study beyond its points, and ten thousand certified headings.
 
-The points of the first part do nothing, or sleep for 20 ms; what a study takes beyond that is its
-overhead, given for each point.  Studies keep their results in a store.  The others submit the
-same calls and collect the results in memory: `map` of the executor itself, joblib, `dask.delayed`.
+The points of the first part do nothing, or sleep for 20 ms; the remaining time of a study is its
+overhead, given per point.  Studies keep their results in a store.  The references submit the same
+calls and collect the results in memory: `map` of the executor itself, joblib, `dask.delayed`.
 """
 
 import multiprocessing

@@ -1,11 +1,11 @@
 """The tilted, turning drum and its dumbbells as an MJCF document, MuJoCo's format ([MuJoCo]).
 
-Units are mm, g and s; MuJoCo knows none, but some of its defaults are lengths, and those are set
+Units are mm, g and s; MuJoCo has no units, but some of its defaults are lengths, and those are set
 here.
 
-The inside of a drum is none of MuJoCo's shapes.  Here it is a ring of boxes whose inner faces are
+MuJoCo has no shape for the inside of a drum.  Here it is a ring of boxes whose inner faces are
 tangent to the drum: a body on a hinge, heavy and servo-driven, so that it turns evenly whatever
-rolls in it.  With ``n`` boxes a ball finds the surface at most ``R (sec(pi/n) - 1)`` too far out
+rolls in it.  With ``n`` boxes the surface at a ball is at most ``R (sec(pi/n) - 1)`` too far out
 and ``pi/n`` too steep or too flat: a micrometre and a quarter of a degree with 720.
 """
 
@@ -21,7 +21,7 @@ from polycorner.spaces.manifold import Array
 
 GRAVITY = 9806.65  # mm/s^2
 TIMES_HEAVIER = 1e5  # inertia of the drum about its axis over that of its content
-SPINNING_FRICTION = 1e-4  # mm; turning on the spot is free in the drum, but MuJoCo wants it > 0
+SPINNING_FRICTION = 1e-4  # mm; spinning on the spot is free in the drum, but MuJoCo requires it > 0
 TOLERANCE = 1e-8  # of the solver, relative to the inertia of the dumbbells
 IMPEDANCE = "0.95 0.99 0.1"  # of contacts; the third number is a length
 
@@ -44,12 +44,12 @@ class DrumScene:
     spin : float
         Angular velocity of the drum in rad/s; positive spin carries towards positive ``phi``.
     count : int
-        How many dumbbells.
+        Number of dumbbells.
     ball_mass : float
         Mass of a ball in g; rods have none.
     mu_slide, mu_roll : float
         Sliding friction and rolling resistance of a ball on the drum, force per load.  MuJoCo
-        does not tell static from dynamic coefficients.
+        does not distinguish static from dynamic coefficients.
     mu_contact : float
         Sliding friction where dumbbells touch.
     drum_length : float
@@ -57,16 +57,16 @@ class DrumScene:
     dt : float
         Time step in s.
     segments : int
-        How many boxes make the drum.
+        Number of boxes that make the drum.
     impratio : float
-        MuJoCo's stiffness of friction relative to that of normal forces; what rests creeps at a
+        MuJoCo's stiffness of friction relative to that of normal forces; bodies at rest creep at a
         speed inversely proportional to it.
     noslip_iterations : int
         Sweeps of MuJoCo's NoSlip solver after each solve.
     rolling : {"cone", "joint"}
-        Where rolling resistance lives: with sliding in the friction cone of the contact, as is
-        usual in MuJoCo, or by itself, as friction of a joint about the dumbbell's own axis; the
-        joint's friction is that of the load on level ground, ``2 m g cos(tilt)``.
+        Model of rolling resistance: with sliding in the friction cone of the contact, as is usual
+        in MuJoCo, or by itself, as friction of a joint about the dumbbell's own axis; the joint's
+        friction is that of the load on level ground, ``2 m g cos(tilt)``.
 
     Raises
     ------
@@ -118,18 +118,18 @@ class DrumScene:
 def mjcf(scene: DrumScene) -> str:
     """Return the scene as an MJCF document, ready for ``mujoco.MjModel.from_xml_string``.
 
-    A dumbbell is a body along its own ``y``; all of them start at the origin, to be placed by
-    whoever moves them.  Friction cones are elliptic.  On the drum they have six dimensions
+    A dumbbell is a body along its own ``y``; all of them start at the origin and have to be placed
+    afterwards.  Friction cones are elliptic.  On the drum they have six dimensions
     (``condim`` 6: normal force, sliding in two directions, spinning, rolling about two axes), or
     three if rolling resistance belongs to a joint; between dumbbells three.  The coefficient of
     rolling is a length, ``mu_roll r``.  Contacts have a time constant of four steps, twice the
-    least that MuJoCo takes: a friction cone of a convex model pushes what slides or rolls away from
-    the surface, and stiffer contacts rattle.
+    least that MuJoCo accepts: the friction cone of a convex model pushes sliding or rolling bodies
+    away from the surface, and stiffer contacts rattle.
 
     Parameters
     ----------
     scene : DrumScene
-        What to write.
+        Scene to write.
     """
     in_drum = not scene.pair.is_plane
     bodies = "\n".join(_dumbbell(scene, k) for k in range(scene.count))
@@ -162,9 +162,9 @@ def _option(scene: DrumScene) -> str:
 
 
 def _default(scene: DrumScene) -> str:
-    """Return kinds of surfaces: the drum's friction rules over the dumbbells', and is the drum's.
+    """Return the classes of surfaces; the drum's friction has priority over the dumbbells'.
 
-    What stands still or turns (type 1) meets dumbbells (type 2) only.
+    Fixed or turning surfaces (type 1) collide with dumbbells (type 2) only.
     """
     friction = _text(scene.mu_slide, SPINNING_FRICTION, scene.mu_roll * scene.ball_radius)
     condim = 6 if scene.rolling == "cone" else 3
@@ -200,7 +200,7 @@ def _drum(scene: DrumScene) -> str:
 
 
 def _servo(scene: DrumScene) -> str:
-    """Return the drive, which makes good within a step what the content takes from the spin."""
+    """Return the drive, which restores the spin within a step against the load of the content."""
     gain = _drum_inertia(scene) / scene.dt
     return (
         '<actuator><general joint="spin" gainprm="0" biastype="affine" '

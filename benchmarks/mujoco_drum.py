@@ -52,7 +52,7 @@ class MujocoDrum:
         _mujoco().mj_step(self.model, self.data, count)
 
     def placements(self) -> Array:
-        """Return where the dumbbells are, ``(count, 4)``; angles lie in ``[-pi, pi]``."""
+        """Return the placements of the dumbbells, ``(count, 4)``; angles lie in ``[-pi, pi]``."""
         _mujoco().mj_kinematics(self.model, self.data)  # poses are otherwise a step behind
         middle = self.data.xpos[-self.scene.count :]
         turns = self.data.xmat[-self.scene.count :].reshape(-1, 3, 3)

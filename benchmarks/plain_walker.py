@@ -1,9 +1,9 @@
-"""Rigid sphere clusters the plain way: NumPy, fixed steps, no derivatives of gaps watched.
+"""Rigid sphere clusters by a plain walk: NumPy, fixed steps, no event detection by derivatives.
 
 Written without the package, after the description in M. Holmes-Cerfon, SIAM Review 58 (2016),
 sec. 2: break a contact, follow the one-dimensional motion in fixed steps with Newton corrections,
-stop at the first contact that closes, keep what is new.  Clusters are told apart by their sorted
-distances.  A contact that only touches is stepped over.
+stop at the first contact that closes, keep new clusters.  Clusters are distinguished by their
+sorted distances.  A contact that touches without closing may be stepped over.
 """
 
 from itertools import combinations

@@ -1,7 +1,7 @@
 """Timing tasks side by side: interleaved rounds, medians, ratios; a table and a JSON file.
 
-Another process that takes the machine for a while slows the tasks of one round alike, so the ratio
-of two tasks is taken round by round, and the median of those ratios is what a reader should keep.
+Other processes slow all tasks of a round alike, so the ratio of two tasks is taken round by round,
+and the median of those ratios is reported.
 """
 
 import json
@@ -26,7 +26,7 @@ Times = dict[str, list[float]]
 
 
 def seconds(task: Callable[[], object]) -> float:
-    """Return how long one call takes, in seconds."""
+    """Return the duration of one call, in seconds."""
     start = perf_counter()
     task()
     return perf_counter() - start
@@ -70,13 +70,13 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
 
 
 def write(name: str, figures: Mapping[str, Any]) -> None:
-    """Write figures, and what they were measured on, to ``benchmarks/results/<name>.json``."""
+    """Write results, and the machine and software, to ``benchmarks/results/<name>.json``."""
     content = {"measured on": machine(), **figures}
     write_atomically(RESULTS / f"{name}.json", json.dumps(content, indent=2) + "\n")
 
 
 def machine() -> dict[str, str]:
-    """Return what a reader needs to place the figures."""
+    """Return a description of the machine and the software versions."""
     from llvmlite import binding
 
     return {
@@ -115,7 +115,7 @@ def peak(code: str) -> float:
 def used() -> float:
     """Return the peak memory of this process in MiB, on Linux.
 
-    `getrusage` would not do: a process inherits the peak of the one that started it.
+    `getrusage` is unsuitable: a process inherits the peak of its parent.
     """
     status = Path("/proc/self/status").read_text()
     line = next(line for line in status.splitlines() if line.startswith("VmHWM"))

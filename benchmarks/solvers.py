@@ -1,7 +1,8 @@
-"""The dyad's minimisation problem for other solvers, each formulated as well as possible.
+"""The dyad's minimisation problem for other solvers, formulated as well as possible for each.
 
-All of them get what polycorner's own search uses: variables in the manifold's scales, gaps in ball
-radii, the energy divided by its size at rest, and functions compiled to machine code.
+All of them get the same formulation as polycorner's own search: variables in the manifold's scales,
+gaps in ball radii, the energy divided by its size at the minimum, and functions compiled to machine
+code.
 Each solver is a callable from a start to the point where it stops.
 """
 
@@ -28,7 +29,7 @@ class Scaled:
     pair : DumbbellPair
         The model.
     rest : (6,) array
-        Where the energy is taken as zero and its size measured.
+        Point at which the energy is taken as zero and its size measured.
     """
 
     def __init__(self, pair: DumbbellPair, rest: np.ndarray) -> None:
@@ -112,8 +113,8 @@ def nlopt_slsqp(pair: DumbbellPair, rest: np.ndarray) -> Solver:
 def casadi_sqp(pair: DumbbellPair, rest: np.ndarray, convexify: str, folder: Path) -> Solver:
     """Return CasADi's SQP method with exact Hessians made convex in the given way.
 
-    Its functions are compiled by gcc where there is one, else run by CasADi's own interpreter;
-    the compiled files stay in the folder until the solver is forgotten.
+    Its functions are compiled by gcc if it is available, else run by CasADi's own interpreter;
+    the compiled files stay in the folder as long as the solver exists.
     """
     import casadi
 

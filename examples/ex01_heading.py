@@ -2,10 +2,10 @@
 The heading of a dyad
 =====================
 
-The heading of a dyad: the paper's curve, the computed ones, and where they agree.
+The heading of a dyad: the paper's curve and the computed ones compared.
 
-The paper gives ``theta_s = +-arctan(r/l)`` for the heading at which a nested pair of dumbbells
-comes to rest.  Here the minimiser is computed for several rod radii and both chiralities, in the
+The paper gives ``theta_s = +-arctan(r/l)`` for the heading of a nested pair of dumbbells in
+equilibrium.  Here the minimiser is computed for several rod radii and both chiralities, in the
 drum and in the plane it develops into, and compared with the closed form of the plane,
 ``tan 2 theta_s = 2 D p / (D^2 + l^2 - p^2)``, ``p = r + t``, ``D = l - sqrt(4 r^2 - p^2)``.
 

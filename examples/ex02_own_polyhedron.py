@@ -2,11 +2,11 @@
 A bead in a wedge
 =================
 
-A polyhedron of one's own: a bead in a curved wedge under gravity, and why it rests there.
+A user-defined polyhedron: a bead in a curved wedge under gravity, and the forces that hold it.
 
-The region is where ``y >= x^2`` (a bowl) and ``y >= 1 - x`` (a ramp).  The bead's height ``y`` is
-least where the two meet on the right of the bowl: a corner with two positive multipliers, which
-holds the bead to first order in both directions.
+The region is given by ``y >= x^2`` (a bowl) and ``y >= 1 - x`` (a ramp).  The bead's height ``y``
+has its minimum where the two meet on the right of the bowl: a corner with two positive
+multipliers, which holds the bead to first order in both directions.
 
 Run it to draw the figure: ``python examples/ex02_own_polyhedron.py [FOLDER]``.
 """

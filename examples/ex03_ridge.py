@@ -1,12 +1,12 @@
 """
-A ridge splits what falls on it
-===============================
+A ridge splits descents
+=======================
 
-A union of two half-planes: its corner is locally concave and splits what falls on it.
+A union of two half-planes: its corner is locally concave and separates descents.
 
 Outside the quadrant ``x < 0, y < 0`` the energy ``(x + 1)^2 + (y + 2)^2`` has two minima, one on
-each side of the corner.  At the corner itself each side shows a way down, so it is no minimum,
-and a descent ends on the side that is lower from where it came.
+each side of the corner.  At the corner itself the energy decreases along each side, so it is no
+minimum, and a descent ends on the side that is downhill from its start.
 
 Run it to draw the figure: ``python examples/ex03_ridge.py [FOLDER]``.
 """
@@ -30,7 +30,7 @@ def main() -> tuple[Certificate, Certificate]:
 
 
 def draw(path: Path) -> Path:
-    """Draw the energy's level lines, where points are let go, and where they come to rest."""
+    """Draw the energy's level lines, the starts of descents, and the minima where they end."""
     from polycorner.pictures import draw_region, save
 
     rests = [minimise(OUTSIDE, ENERGY, start) for start in STARTS]

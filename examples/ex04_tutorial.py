@@ -2,14 +2,14 @@
 A region that is locally convex
 ===============================
 
-A region that is locally convex but not convex: its corners and sides, and two places of rest.
+A region that is locally convex but not convex: its corners and sides, and two minima.
 
-Seven segments and arcs bound the region; three of the arcs bulge into it.  Walking along them
-finds seven corners, seven edges and one face.  At each corner two functions vanish with
-independent gradients, so that in the coordinates they give the region is a quadrant: that is
-local convexity.  Yet a segment between two points of an inward arc leaves the region, however
-near they are, and the height ``y`` is a local minimum at A as well as at B: on a convex region
-a linear energy has no local minimum above the least.
+Seven segments and arcs bound the region; three of the arcs bulge into it.  Tracing them finds
+seven corners, seven edges and one face.  At each corner two functions vanish with independent
+gradients, so that the region is a quadrant in the coordinates they define: that is local
+convexity.  Yet a segment between two points of an inward arc leaves the region, however near they
+are, and the height ``y`` has local minima at both A and B: on a convex region every local minimum
+of a linear energy is global.
 
 Run it to draw the figure: ``python examples/ex04_tutorial.py [FOLDER]``.
 """

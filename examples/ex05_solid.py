@@ -6,9 +6,10 @@ The solid of forbidden relative placements of two dumbbells, with its edges and 
 
 In the plane two dumbbells overlap at a relative placement ``(x, y, delta)`` exactly when it lies in
 a parallelogram with the sides of both, widened by ``r + t``, or in a disc of radius ``2 r`` about
-one of its corners.  So the solid's edges (two contacts) are where discs meet widened sides, for
-every relative heading, and for parallel dumbbells the lines and arcs between its corners: three
-contacts at ``Delta``, four at ``E``.  Edges and corners point inwards: outside is what is allowed.
+one of its corners.  So the solid's edges (two contacts) are the intersections of discs with widened
+sides, for every relative heading, and for parallel dumbbells the lines and arcs between its
+corners: three contacts at ``Delta``, four at ``E``.  Edges and corners point inwards: the allowed
+placements lie outside.
 
 Run it to draw the solid: ``python examples/ex05_solid.py [FOLDER]``, with a GLB beside it.
 """
@@ -57,7 +58,7 @@ def main(resolution: int = 48) -> Result:
 
 
 def edges(count: int = 91) -> list[tuple[str, np.ndarray]]:
-    """Return the edges from a quarter turn to the other: kind of contacts and points."""
+    """Return the edges from one quarter turn to the other: kind of contacts, and points."""
     curves = []
     for headings in (np.linspace(-math.pi / 2, 0, count), np.linspace(0, math.pi / 2, count)):
         a = PAIR.length / 2 * np.stack([0 * headings, 1 + 0 * headings], axis=1)

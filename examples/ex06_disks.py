@@ -2,11 +2,12 @@
 Disks on a torus
 ================
 
-Disks on a torus: every radius at which the space of their configurations changes.
+Disks on a torus: every radius at which their configuration space changes.
 
 Two and three equal disks lie on the square and on the hexagonal torus.  Their largest common
-radius is critical where the contacts carry a stress in equilibrium; the index counts the ways in
-which it can still grow to second order.  Radii are in units of the shortest lattice vector.
+radius is critical where the contacts carry a stress in equilibrium; the index is the dimension of
+the space in which it can still grow to second order.  Radii are in units of the shortest lattice
+vector.
 
 On the hexagonal torus all critical configurations of three disks are isolated.  With their
 labelled copies modulo translations, ``(-1)^index`` adds up to the Euler characteristic of the
@@ -22,7 +23,7 @@ import numpy as np
 
 from polycorner.models.disks.disks import TorusDisks
 
-# How many labelled copies, modulo translations, each configuration of three disks has there.
+# Number of labelled copies, modulo translations, of each configuration of three disks there.
 COPIES = (2, 6, 6)
 
 

@@ -2,13 +2,13 @@
 A ball among pins and cups
 ==========================
 
-A ball on a board with pins, wedges and cups: where it rests, and how it is held there.
+A ball on a board with pins, wedges and cups: its minima, and the entrapment at each of them.
 
-Balls are let go all over the board; each comes to rest at a certified minimum of its height.
-The kind of entrapment in each direction is computed: two half-V in a pocket, half-V and U in a
-cup, half-V and half-U in a cup that is cut in half by a wall at its lowest point, half-V and free
-on a ledge.  Corners of wedges and rims of cups are locally concave: the region is a union there,
-and each piece shows a way down, so that no ball rests on them.
+Balls are released all over the board; each descends to a certified minimum of its height.  The
+kind of entrapment in each direction is computed: two half-V in a pocket, half-V and U in a cup,
+half-V and half-U in a cup that a wall cuts in half at its lowest point, half-V and free on a
+ledge.  Corners of wedges and rims of cups are locally concave: the region is a union there, and
+the height decreases along each piece, so that no ball rests on them.
 
 Run it to draw the figure: ``python examples/ex07_pinball.py [FOLDER]``.
 """
@@ -29,7 +29,7 @@ BALLS = 250
 
 @dataclass(frozen=True)
 class Result:
-    """The atlas, every ball at rest, grouped by what holds it, and a certificate per corner."""
+    """The atlas, the balls at rest grouped by the walls that hold them, a certificate per corner."""
 
     atlas: Skeleton
     rests: dict[str, list[Certificate]]
@@ -41,12 +41,12 @@ class Result:
         return [c for c in self.corners if c.stratum.local_type is LocalType.UNION]
 
     def entrapment(self, name: str) -> str:
-        """Say how the balls of a group are held, as in ``half-V + U``."""
+        """Return the entrapment of the balls of a group, as in ``half-V + U``."""
         return held_as(self.rests[name][0])
 
 
 def main() -> Result:
-    # The circle of a free pin has no corner: a walk is sure to find it if it starts there.
+    # The circle of a free pin has no corner: a search is sure to find it only if it starts there.
     atlas = skeleton(BOARD.polyhedron, [(x, y + radius) for x, y, radius in BOARD.pins])
     rests: dict[str, list[Certificate]] = {}
     for start in BOARD.starts(np.random.default_rng(0), BALLS):
@@ -58,7 +58,7 @@ def main() -> Result:
 
 
 def held_by(rest: Certificate) -> str:
-    """Name what carries the ball: the walls that hold it, but for those that it merely touches."""
+    """Name the walls that hold the ball, except those that it merely touches."""
     touched = (Entrapment.HALF_V, Entrapment.HALF_U)
     return " ".join(name for name, kind in rest.entrapment.items() if kind in touched)
 
@@ -69,7 +69,7 @@ def held_as(rest: Certificate) -> str:
 
 
 def draw(result: Result, path: Path) -> Path:
-    """Draw the board, its corners, and every ball where it rests, coloured by how it is held."""
+    """Draw the board, its corners, and every ball at its minimum, coloured by entrapment."""
     from polycorner.pictures import draw_region, save
 
     balls = [(held_as(rest), rest.point) for group in result.rests.values() for rest in group]

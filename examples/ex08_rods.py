@@ -1,12 +1,12 @@
 """
-How long rods must be
-=====================
+The least length of rods
+========================
 
-How long rods must be for a ball of one dumbbell to reach the rod of the other.
+The least length of rods at which a ball of one dumbbell reaches the rod of the other.
 
-Between two lengths the corners and motions of the pair in the plane change.  Bisecting on what
-they are, with no formula for when, finds the length at which a ball touches both balls of the
-other dumbbell and its rod at once, ``2 sqrt(4 r^2 - (r + t)^2)``.  The atlas of the pair above it
+Between two lengths the corners and motions of the pair in the plane change.  Bisection on the
+atlas, without a formula for the change, finds the length at which a ball touches both balls of the
+other dumbbell and its rod at once, ``2 sqrt(4 r^2 - (r + t)^2)``.  Above it the atlas of the pair
 has the four corners ``Delta_R``, ``Delta_L``, ``E_R``, ``E_L``; below it rods are never touched.
 
 Run it to draw the map over length and rod radius, the atlas and its motions:
@@ -28,7 +28,7 @@ LENGTHS, RODS = np.linspace(2, 5, 5), np.linspace(0.1, 0.9, 4)
 
 @dataclass(frozen=True)
 class Result:
-    """Where the atlas changes with the length, for the rods of one pair, and its atlas."""
+    """Changes of the atlas with the length, for the rods of one pair, and the pair's atlas."""
 
     around: PairMap
     atlas: PairAtlas
@@ -41,7 +41,7 @@ class Result:
 
     @property
     def closed_form(self) -> float:
-        """The length in mm at which it should."""
+        """The length in mm predicted by the closed form."""
         return long_rod_length(PAIR.ball_radius, PAIR.rod_radius)
 
 

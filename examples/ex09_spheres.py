@@ -5,11 +5,11 @@ Six sticky spheres
 Six hard spheres that stick: two rigid clusters, and the motions between them.
 
 A rigid cluster is a corner of the polyhedron of all placements, modulo congruence and relabelling.
-Breaking one contact opens a motion with one degree of freedom, an edge, that goes on until a new
-contact closes; breaking two opens a face.  From a pile of tetrahedra the walk finds the octahedron,
-five motions and thirteen faces, as many as are known ([HGB] table I).  How many ways lead out of a
-cluster follows from its symmetry: contacts that a symmetry exchanges break in the same way, so the
-octahedron, all twelve contacts of which are alike, has one way out.
+Breaking one contact opens a motion with one degree of freedom, an edge, that continues until a new
+contact closes; breaking two opens a face.  From stacked tetrahedra the search finds the octahedron,
+five motions and thirteen faces, as many as are known ([HGB] table I).  The number of motions out of
+a cluster follows from its symmetry: contacts that a symmetry exchanges break in the same way, so
+the octahedron, whose twelve contacts are all equivalent, has a single one.
 
 Run it to draw both figures: ``python examples/ex09_spheres.py [FOLDER]``.
 """

@@ -1,10 +1,10 @@
 """
-How thick rods may be
-=====================
+The critical thickness of rods
+==============================
 
-How thick the rods of a dyad may be, and how well its heading is known.
+The largest thickness of the rods of a dyad, and the error bar of its heading.
 
-A nested pair rests in the corner of three contacts only while its rods are thin enough.  The
+A nested pair has a minimum in the corner of three contacts only if its rods are thin enough.  The
 critical thickness is found in three ways: by Newton's method on the equations of the corner with
 one multiplier set to zero, by bisection on the multiplier of certified corners, and by the closed
 form derived for the plane, ``t = 2 r sqrt(1 - r^2/l^2) - r``, which holds in every drum.  A pair
@@ -39,11 +39,11 @@ TOLERANCES = {"length": 0.1, "ball_radius": 0.05, "rod_radius": 0.05, "drum_radi
 
 @dataclass(frozen=True)
 class Result:
-    """Critical rod radius in three ways, in mm, and what else is found.
+    """Critical rod radius in three ways, in mm, and related quantities.
 
     ``apart`` is how far along the drum, in mm, the centres of a slightly too thick pair end up;
-    ``length`` the critical length for rods of 2.9 mm; ``barrier`` the height in mm, of one ball's
-    weight, over which the pair has to be lifted to fall apart; ``heading`` in degrees.
+    ``length`` the critical length for rods of 2.9 mm; ``barrier`` the energy barrier to falling
+    apart, as a height in mm of one ball's weight; ``heading`` in degrees.
     """
 
     newton: float | None
@@ -82,7 +82,7 @@ def corner(rod: float) -> Certificate:
 
 
 def bisected(low: float = 2.5, high: float = 2.99) -> float:
-    """Return where the multiplier of a ball-rod contact changes sign."""
+    """Return the rod radius at which the multiplier of a ball-rod contact changes sign."""
     while high - low > 1e-12:
         middle = (low + high) / 2
         low, high = (middle, high) if corner(middle).multipliers["A2b"] > 0 else (low, middle)
@@ -90,7 +90,7 @@ def bisected(low: float = 2.5, high: float = 2.99) -> float:
 
 
 def apart(rod: float) -> float:
-    """Return how far along the drum the centres are when the pair has come to rest."""
+    """Return the distance of the centres along the drum at the end of the descent."""
     thick = corner(rod)
     rest = minimise(thick.problem.polyhedron, thick.problem.energy, thick.point)
     return float(rest.point[4] - rest.point[1])

@@ -2,15 +2,15 @@
 The keel of a dumbbell
 ======================
 
-Why a dumbbell climbs a tilted drum like a boat tacking against the wind: the keel effect.
+The keel effect: a dumbbell climbs a tilted drum like a boat tacking against the wind.
 
 A dumbbell rolls more easily than it slides.  Friction holds it while the force along the wall, over
 the force onto the wall, lies in a disc that is cut by a strip.  The turning drum carries it east
-until the force leaves that set; then it rolls back, along its own perpendicular, and with a
-positive heading gains height along the axis with each zigzag.
+until the force leaves that set; then it rolls back, perpendicular to its axis, and with a positive
+heading gains height along the drum with each zigzag.
 
-The formulas of a short dumbbell are compared with the exact condition of rest of one of finite
-length, whose balls have loads of their own; the difference vanishes with the square of the length.
+The formulas of a short dumbbell are compared with the exact condition of rest for one of finite
+length, whose balls have different loads; the difference vanishes with the square of the length.
 
 Run it to draw the figure: ``python examples/ex11_keel.py [FOLDER]``.
 """
@@ -24,7 +24,7 @@ import numpy as np
 
 from polycorner.dumbbells.statics.keel import Keel, Turning, exact_eastern_boundary
 
-# Static coefficients as the paper gives them in the text; it does not give the dynamic ones.
+# Static coefficients from the paper's text; it does not give the dynamic ones.
 KEEL = Keel(math.radians(7), rolling=0.1, sliding=0.3, rolling_dynamic=0.05, sliding_dynamic=0.2)
 LENGTH, CENTRE_RADIUS = 16.0, 122.0  # mm
 TURNS = 0.01  # angular speed of the drum, radians per second

@@ -2,13 +2,13 @@
 A bouncing ball
 ===============
 
-A bouncing ball comes to rest after infinitely many bounces, in a finite time.
+A bouncing ball that comes to rest after infinitely many bounces in finite time.
 
 Dropped from the height 1, the ball lands after ``t = sqrt(2 h / g)`` and comes to rest after
-``t (1 + e) / (1 - e)``.  Time stepping with impulses does not stop for single bounces: those
-that no step can resolve end in rest, which is then rest exactly.  The time of the first impact is
-met to second order in the step; each bounce then adds an error of first order, so that the time of
-rest is met as ``dt log(1 / dt)``.  The energy lost is accounted for to rounding.
+``t (1 + e) / (1 - e)``.  Time stepping with impulses does not stop at single bounces: those shorter
+than a step end in a state of exact rest.  The error of the time of the first impact is of second
+order in the step; each bounce then adds an error of first order, so that the error of the time of
+rest is of order ``dt log(1 / dt)``.  The energy lost is accounted for to rounding.
 
 Run it to draw the figure: ``python examples/ex12_bouncing_ball.py [FOLDER]``.
 """
@@ -67,7 +67,7 @@ def dropped(dt: float, every: int = 3) -> Trajectory:
 
 
 def errors(dt: float) -> tuple[float, float]:
-    """Return by how much the first impact and the rest are too late."""
+    """Return the delays of the first impact and of the state of rest."""
     path = dropped(dt, every=10_000)
     rest = FALL * (1 + RESTITUTION) / (1 - RESTITUTION)
     first = path.of_kind(EventKind.IMPACT)[0].time
@@ -75,7 +75,7 @@ def errors(dt: float) -> tuple[float, float]:
 
 
 def orders() -> tuple[float, float]:
-    """Fit the power of the step; of several steps about as long the worst counts."""
+    """Fit the power of the step; among several steps of similar length the worst counts."""
     steps = STEP * 2.0 ** np.arange(3, -1, -1)
     nearby = 1 + np.arange(6) / 12
     worst = [np.abs([errors(dt * factor) for factor in nearby]).max(axis=0) for dt in steps]

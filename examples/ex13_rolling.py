@@ -2,15 +2,15 @@
 Sliding, rolling, sticking
 ==========================
 
-A ball that is pushed slides, then rolls, then stops; on an incline it stays, rolls or slips.
+Sliding, rolling and sticking of a ball that is pushed, or released on an incline.
 
 Sliding friction acts on the slip ``v - r w`` of the lowest point, rolling resistance on the spin:
-two contacts with sets of their own, known load.  Without resistance the ball ends its slide at
-``5/7`` of its speed, with it a little slower; it rolls with the deceleration ``5/7 mu_r g``, and
+two contacts with separate friction sets and known load.  Without resistance the ball ends its slide
+at ``5/7`` of its speed, with it a little slower; it rolls with the deceleration ``5/7 mu_r g``, and
 stops.  Down an incline it stays while ``tan(angle) <= mu_r`` and rolls without slip while
 ``tan(angle) <= 7/2 mu - 5/2 mu_r``.
 
-On a belt that moves, a block on a spring sticks and slips in turn: static friction is larger than
+On a moving belt, a block on a spring alternately sticks and slips: static friction is larger than
 dynamic friction.
 
 Run it to draw the figure: ``python examples/ex13_rolling.py [FOLDER]``.
@@ -92,7 +92,7 @@ def stopping_time() -> float:
 
 
 def released(slope: float) -> tuple[float, float]:
-    """Return the accelerations of a ball let go on an incline, along it and of its turn."""
+    """Return the accelerations of a ball released on an incline, along it and of its rotation."""
     plane = ball_on_plane(Disc(SLIDING), Disc(ROLLING), angle=math.atan(slope))
     path = simulate(plane, plane.state([0] * 4), 1.0, 1e-2)
     return float(path.v[-1, 0, 0]), float(path.v[-1, 0, 2])
@@ -112,7 +112,7 @@ def stick_slip_period() -> float:
 
 
 def draw(result: Result, path: Path) -> Path:
-    """Draw the speeds of the ball, and the block in its plane of place and velocity."""
+    """Draw the speeds of the ball, and the motion of the block in phase space."""
     from matplotlib.figure import Figure
 
     from polycorner.pictures import save

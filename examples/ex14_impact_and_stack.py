@@ -6,10 +6,10 @@ Several contacts at once: balls in a row, a block that rocks, a stack and a tabl
 
 - Three equal balls: if the last two touch, Newton's law in Moreau's form sends ``(1, 0, 0)`` to
   ``(-1, 2, 2) / 3``; if they are apart, however little, to ``(0, 0, 1)``.  Both conserve momentum
-  and energy: what happens depends on more than rigid bodies know.
-- A block that rocks changes feet: it turns on with ``1 - 3/2 sin(c)^2`` of its angular speed.
-- A table on four legs and a stack of boxes have more contact forces than rest determines.  Forces
-  that balance are found, and nothing moves by a single bit.
+  and energy: the model of rigid bodies does not determine the outcome.
+- A block that rocks changes feet: it rotates on with ``1 - 3/2 sin(c)^2`` of its angular speed.
+- A table on four legs and a stack of boxes have more contact forces than equilibrium determines.
+  Balancing forces are found, and no coordinate changes by a single bit.
 
 Run it to draw the figure: ``python examples/ex14_impact_and_stack.py [FOLDER]``.
 """
@@ -37,7 +37,7 @@ STEP = 2e-4
 
 @dataclass(frozen=True)
 class Result:
-    """Velocities of balls, a block that rocks, and what rests.
+    """Velocities of balls, a rocking block, and bodies at rest.
 
     ``touching`` and ``apart`` are velocities after the impacts; ``kept`` the share of the angular
     speed after the first change of feet and ``housner`` that of the formula; ``moved`` the largest
@@ -77,7 +77,7 @@ def struck(gap: float) -> Array:
 
 
 def rocked() -> Trajectory:
-    """Tilt the block about its left foot and let it go."""
+    """Tilt the block about its left foot and release it."""
     block = box_on_plane(HALF_WIDTH, HALF_HEIGHT, Interval(2.0))
     cos, sin = math.cos(TILT), math.sin(TILT)
     place = [HALF_WIDTH * cos - HALF_HEIGHT * sin, HALF_WIDTH * sin + HALF_HEIGHT * cos, TILT]
@@ -85,7 +85,7 @@ def rocked() -> Trajectory:
 
 
 def kept(path: Trajectory) -> float:
-    """Return the share of the angular speed that is left, from the energy before and after."""
+    """Return the remaining share of the angular speed, from the energy before and after."""
     lost = path.dissipated["impact"]
     first = int(np.argmax(path.q[:, 0, 2] < -0.01))  # well after the first change of feet
     size = math.hypot(HALF_WIDTH, HALF_HEIGHT)
@@ -94,7 +94,7 @@ def kept(path: Trajectory) -> float:
 
 
 def rested(system: System, place: list[float]) -> Trajectory:
-    """Let a system stand for ten seconds."""
+    """Simulate a system at rest for ten seconds."""
     return simulate(system, system.state(place), 10.0, 1e-3)
 
 

@@ -2,15 +2,15 @@
 Three kinds of wells
 ====================
 
-How U, half-U and half-V wells hold a mass, and which of them hold a dyad.
+Escape of a mass from U, half-U and half-V wells, and the wells that hold a dyad.
 
 The paper orders them by strength.  Here masses are shaken by the same noise in wells of the same
-rim and depth.  With little drag and walls that absorb, the order is the paper's: half-V holds
-longer than half-U, and that longer than U.  With elastic walls half-U is the folded U, and half-V
-lets go first; where drag outweighs inertia it does so behind any wall.
+rim and depth.  With little drag and absorbing walls, the order is the paper's: half-V holds longer
+than half-U, and half-U longer than U.  With elastic walls half-U is the folded U, and escape from
+half-V is the fastest; if drag outweighs inertia, it is so with any wall.
 
 Without noise a half-V well brings the mass to its wall in finite time, even against friction, which
-leaves it beside the bottom of the other two.
+stops it beside the bottom of the other two.
 
 The dyad's corner is held by half-V wells in the three directions that open a contact, and by U
 wells in two.  Near the corner the former are the stronger ones; beyond about half a millimetre the

@@ -2,12 +2,12 @@
 A dyad climbs
 =============
 
-Two dumbbells nested in each other climb a tilted drum, or descend: it depends on the hand.
+Nested pairs of dumbbells in a tilted drum: right-handed ones climb, left-handed ones descend.
 
-A single dumbbell begins to roll where the region of rest ends, derived on paper, and climbs at
-``omega rho tan(theta)``.  A nested pair does the same, and cannot lose its heading as easily: a
-right-handed one, whose heading is positive, climbs, and its mirror image descends.  Friction on an
-axle is all that is put in.
+A single dumbbell begins to roll at the boundary of the region of rest, derived on paper, and climbs
+at ``omega rho tan(theta)``.  A nested pair does the same, and does not lose its heading as easily:
+a right-handed one, whose heading is positive, climbs, and its mirror image descends.  The model
+contains nothing but friction on rigid axles.
 
 Run it to draw the figure: ``python examples/ex16_dyad_climbs.py [FOLDER]``.
 """
@@ -29,7 +29,7 @@ DURATION = 30.0  # s
 
 @dataclass(frozen=True)
 class Result:
-    """What single dumbbells and pairs with headings of 8 and -8 degrees do without noise.
+    """Motion of single dumbbells and pairs with headings of 8 and -8 degrees, without noise.
 
     ``zigzags`` of the single ones, ``onsets`` of the formula in rad, ``law`` the speed of a perfect
     keel in mm/s.

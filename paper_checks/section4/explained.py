@@ -148,7 +148,7 @@ CLAIMS = (
         "O10",
         "4",
         "sustained climbing",
-        "by alternately sticking and rolling a dumbbell of constant positive heading gains energy",
+        "by alternately sticking and rolling, a dumbbell of constant positive heading gains energy",
         Means.SIMULATION,
         rises_in_energy,
         partial(rises_in_energy, -10.0),

@@ -1,4 +1,4 @@
-"""Every check runs, comes to the verdict that the documentation records, and can fail."""
+"""Every check runs, reaches the verdict recorded in the documentation, and can fail."""
 
 import math
 import re

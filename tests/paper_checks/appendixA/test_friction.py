@@ -1,4 +1,4 @@
-"""Appendix A: verdicts that are stood by, and its checks against definitions by numbers."""
+"""Appendix A: expected verdicts, and its checks against numerical definitions."""
 
 import math
 

@@ -14,12 +14,12 @@ from polycorner.models import Pinball
 
 
 def generic_regions(planes, n):
-    """Return into how many open parts generic hyperplanes through 0 cut a space (Schläfli)."""
+    """Return the number of open parts into which generic hyperplanes cut a space (Schläfli)."""
     return 2 * sum(comb(planes - 1, i) for i in range(n)) if planes else 1
 
 
 def generic_cells(planes, n):
-    """Return how many cells they make: on every intersection the others are generic again."""
+    """Return their number of cells: on every intersection the others are generic again."""
     on_flats = [
         comb(planes, k) * generic_regions(planes - k, n - k) for k in range(min(planes, n - 1) + 1)
     ]
@@ -66,7 +66,7 @@ def test_a_point_of_the_boundary_that_no_higher_stratum_is_near_is_what_refutes(
     assert polyhedra.boundary_is_all_lower_strata().verdict is Verdict.CORRECTED
 
 
-# -------------------------------------------------------------------------------- balls that run
+# ----------------------------------------------------------------------------------------- balls
 
 
 @pytest.fixture

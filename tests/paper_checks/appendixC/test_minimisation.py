@@ -1,4 +1,4 @@
-"""Appendix C: verdicts that are stood by, and its checks against slower truths."""
+"""Appendix C: expected verdicts, and its checks against independent computations."""
 
 import math
 from dataclasses import replace

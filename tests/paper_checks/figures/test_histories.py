@@ -1,4 +1,4 @@
-"""The simulated histories in the paper's figures zigzag, lose headings and find them."""
+"""The simulated histories in the paper's figures: zigzags, and headings lost and gained."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The report: formulas in MathML, figures inside it, nothing outside it; read by a real browser."""
+"""The report: formulas in MathML, embedded figures, no requests; rendered by a real browser."""
 
 import re
 from html.parser import HTMLParser
@@ -38,7 +38,7 @@ def page():
 
 
 class Reader(HTMLParser):
-    """Collects tags, and insists that they are closed in the order in which they were opened."""
+    """Collects tags, and asserts that they are properly nested."""
 
     def __init__(self, text):
         super().__init__()

@@ -1,4 +1,4 @@
-"""Section 5: verdicts, wrong statements, and corners and contacts by other means."""
+"""Section 5: verdicts, wrong statements, and corners and contacts by independent methods."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Section 6: verdicts that are stood by, and its checks against slower truths."""
+"""Section 6: expected verdicts, and its checks against independent computations."""
 
 import itertools
 import math

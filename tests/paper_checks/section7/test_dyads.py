@@ -1,4 +1,4 @@
-"""Section 7, static claims: verdicts that are stood by, and the checks against slower truths."""
+"""Section 7, static claims: expected verdicts, and the checks against independent computations."""
 
 import math
 
