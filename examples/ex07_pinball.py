@@ -29,7 +29,7 @@ BALLS = 250
 
 @dataclass(frozen=True)
 class Result:
-    """The atlas, the balls at rest grouped by the walls that hold them, a certificate per corner."""
+    """The atlas, the balls at rest grouped by the walls that hold them, and corner certificates."""
 
     atlas: Skeleton
     rests: dict[str, list[Certificate]]
