@@ -121,7 +121,7 @@ def memory(name: str, count: int) -> float:
     return peak(f"import bench_motion; bench_motion.{call}()")
 
 
-def heaps() -> dict[str, Any]:
+def piles() -> dict[str, Any]:
     """Time polycorner alone on scattered dumbbells, carried up and sliding down, four starts.
 
     They have the experiment's coefficients, start at rest and have the same density for any number;
@@ -150,7 +150,7 @@ def heaps() -> dict[str, Any]:
             "overlap, mm": round(overlap, 4),
         }
     keys = list(next(iter(figures.values())))
-    print_table("Heaps", ["", *keys], [[n, *row.values()] for n, row in figures.items()])
+    print_table("Piles", ["", *keys], [[n, *row.values()] for n, row in figures.items()])
     return figures
 
 
@@ -300,7 +300,7 @@ def behaviour() -> dict[str, Any]:
 
 
 def main() -> None:
-    figures: dict[str, Any] = {"gravity": GRAVITY, "dt": 1e-3, "speed": speed(), "heaps": heaps()}
+    figures: dict[str, Any] = {"gravity": GRAVITY, "dt": 1e-3, "speed": speed(), "piles": piles()}
     if find_spec("mujoco") is not None and "--speed" not in sys.argv:
         import mujoco
 

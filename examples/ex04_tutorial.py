@@ -76,7 +76,7 @@ if __name__ == "__main__":
         sides = " and ".join(corner.active)
         print(f"{name}  ({x:+.6f}, {y:+.6f})  {sides}: {corner.local_type.value}")
         if rest.is_minimum:
-            print(f"   the height rests here: {rest.verdict.value}")
+            print(f"   minimum of the height: {rest.verdict.value}")
     depth = REGION.polyhedron.implicit(result.middle)
     print(f"the middle of a short chord of AB is outside the region: f = {depth:.1e}")
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")

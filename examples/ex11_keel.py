@@ -86,6 +86,6 @@ if __name__ == "__main__":
     ):
         back = f"{coasting:5.2f}° ({lower:.2f}°)           {speed:6.3f} mm/s" if rolls else "slides"
         print(f"{heading:6.0f}°  {upper:9.2f}°  {back}")
-    print(f"nothing rests beyond {math.degrees(result.limit):.2f}°")
+    print(f"no dumbbell rests beyond {math.degrees(result.limit):.2f}°")
     print(f"the length changes this by {result.difference:.3f}° at most, order {result.order:.2f}")
     print(f"wrote {draw(Path(sys.argv[1] if len(sys.argv) > 1 else 'out') / 'ex11_keel.png')}")

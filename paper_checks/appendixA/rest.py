@@ -195,7 +195,7 @@ CLAIMS = (
         "F7b",
         "A",
         "definition of $A$",
-        "with the printed cosine, $A$ is where a dumbbell at rest stays at rest",
+        "with the printed cosine, $A$ is the region in which a dumbbell at rest stays at rest",
         Means.NUMERICAL,
         region_is,
         partial(region_is, divided=True, absolute=True),

@@ -92,7 +92,7 @@ def friction_holds(resistance: sympy.Expr = PULL) -> Finding:
         f"wells. At rest, U and half-U keep the mass anywhere up to ${sympy.latex(farthest)}$ from "
         "0, half-V only at 0 as long as $f < s$.",
         {},
-        "Friction $f$ takes energy out of all three, but it also lets a mass rest away from the "
+        "Friction $f$ takes energy out of all three, but also holds a mass at rest away from the "
         "bottom, by up to $f/2k$ in U and half-U; only in half-V with $s > f$ it does not."
         if takes_energy
         else "",

@@ -181,7 +181,7 @@ def _caption() -> str:
         "A point mass m on a line in wells of the same depth D and rim a. (a)–(c) Energy, the "
         f"wall (hatched), and the force at the bottom and at {SHOWN:g} a (arrows): only in the "
         "half-V well does the mass press on the wall where its energy is least. (d)–(f) Motion "
-        f"of a mass that is let go at {START:g} a, with dry friction of {FRICTION:g} D/a and a "
+        f"of a mass released at {START:g} a, with dry friction of {FRICTION:g} D/a and a "
         f"wall that gives back {RESTITUTION:g} of the speed; it is at rest, to within a/1000, "
         f"{words[0]}, {words[1]} and {words[2]} times a√(m/D). The six directions at the corner "
         f"of a dyad, {style.sizes(style.PAIR)}, as its certificate labels them: {held}."

@@ -78,9 +78,9 @@ def _rest_caption() -> str:
         "the right, out of A through its eastern boundary (blue for positive, green for negative "
         f"headings), at φ = {east[0]:.2f}°, {east[1]:.2f}° and {east[2]:.2f}° for θ = −15°, 0°, "
         "15°; arrows lead to where, by its inertia, it stops. Vermilion: S, dumbbells along the "
-        f"flow lines. Beyond |φ| = φs nothing rests: {limits[0]:.2f}°. (b), (c) A for the values "
-        "in the paper's caption on turning points, of single dumbbells and of dyads: they mean "
-        f"μs = {slides[0]:.3f} and {slides[1]:.3f}, φs = {limits[1]:.1f}° and {limits[2]:.1f}°, "
+        f"flow lines. Beyond |φ| = φs no dumbbell rests: {limits[0]:.2f}°. (b), (c) A for the "
+        "values in the paper's caption on turning points, of single dumbbells and of dyads: they "
+        f"mean μs = {slides[0]:.3f} and {slides[1]:.3f}, φs = {limits[1]:.1f}° and {limits[2]:.1f}°, "
         "other than in the text; in (c) μr exceeds tan α, so that on the lowest line every "
         "heading rests. The measured points are not given as numbers."
     )
@@ -162,8 +162,8 @@ def _torque_caption() -> str:
         "ball's load acts against the motion, and the lower ball is pressed harder. That is "
         f"{100 * grown_share(90.0):.2f} % of the plane, between S and |θ| = 90°, at headings of "
         f"more than {least_within(89.99):.1f}°; at |φ| ≤ φs = {limit:.1f}° (grey), beyond which "
-        f"nothing rests, it is {100 * grown_share(limit):.2f} % and begins at "
-        f"{least_within(limit):.1f}°. Elsewhere |θ| falls. Dashed and dotted: the boundary for "
+        f"no dumbbell rests, it is {100 * grown_share(limit):.2f} % and begins at "
+        f"{least_within(limit):.1f}°. Elsewhere |θ| decreases. Dashed and dotted: the boundary for "
         f"friction {others}. (b) A part of (a). The paper does not say in which motion its torque "
         "is taken; a dumbbell that rests or rolls is held by friction and keeps its heading."
     )
@@ -186,7 +186,7 @@ FIGURES = (
     Figure("torque", "Where headings grow", _torque_caption, _torque_alt, draw_torque),
     Figure(
         "rest_regions",
-        "Where dumbbells rest, and the eastern boundary",
+        "Regions of rest and their eastern boundary",
         _rest_caption,
         _rest_alt,
         draw_rest_regions,

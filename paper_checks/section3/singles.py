@@ -127,7 +127,7 @@ def width_and_decay(
         "mean width of slips of more than 1°, and share of a heading of 12° left after 60 s: "
         f"{listed}",
         {f"width_{a:g}": w for a, w in zip(chatters, widths, strict=True)},
-        "in the model noise that turns a dumbbell within minutes also makes it let go early, so "
+        "in the model noise that turns a dumbbell within minutes also makes it slip early, so "
         "that its zigzags are narrower: wide ones keep their heading",
     )
 

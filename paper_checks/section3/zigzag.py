@@ -57,7 +57,7 @@ def carried_as_far_as_quoted(rolling: float = 0.2, heading: float = 8.0) -> Find
 
 
 def first_to_move(path: Trajectory) -> dict[str, int]:
-    """Count the starts from rest by who of the pair moves first: lower, upper, or both."""
+    """Count the starts from rest by which of the pair moves: the lower, the upper, or both."""
     counts = {"lower": 0, "upper": 0, "both": 0}
     rest = {0: True, 1: True}
     begins: dict[float, list[tuple[int, bool]]] = {}

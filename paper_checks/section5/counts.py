@@ -92,7 +92,7 @@ def components_are(dimension: int, number: int) -> Finding:
         Verdict.HOLDS if holds else Verdict.CORRECTED if sound else Verdict.REFUTED,
         f"In $M \\times M$, ordered pairs with balls alike, $D_3$, $D_4$, $D_5$ have "
         f"{ordered[3]}, {ordered[4]}, {ordered[5]} components ({loose[3]}, {loose[4]}, {loose[5]} "
-        f"if the dumbbells are not told apart); {ordered[3]} corners with "
+        f"for indistinguishable dumbbells); {ordered[3]} corners with "
         f"{sum(ends) / len(ends):g} edges on average need {edges:g} edges. The boundary of the "
         f"forbidden body has the Euler characteristic {euler['counted']}; {number} components of "
         f"$D_{dimension}$ would give {euler['printed']}.",
@@ -100,8 +100,8 @@ def components_are(dimension: int, number: int) -> Finding:
         ""
         if holds
         else f"$D_{dimension}$ has {true} components in $M \\times M$, where the caption counts "
-        f"{ordered[5]} of $D_5$; {loose[dimension]} is the number for dumbbells that are not told "
-        f"apart, which leaves {loose[5]} of $D_5$.",
+        f"{ordered[5]} of $D_5$; {loose[dimension]} is the number for indistinguishable "
+        f"dumbbells, which leaves {loose[5]} of $D_5$.",
     )
 
 

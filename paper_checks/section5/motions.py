@@ -188,7 +188,7 @@ def right_handed_rests_at(sign: int = 1) -> Finding:
         + ".",
         hands,
         r"Right-handed means positively oriented by $(\partial_\varphi, \partial_\eta)$: the "
-        "drum is to be looked at from the side where this is anticlockwise, which the definition "
+        "drum is viewed from the side where this is anticlockwise, which the definition "
         "has to say.",
     )
 

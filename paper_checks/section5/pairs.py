@@ -154,7 +154,7 @@ def renamed(contacts: frozenset[str], balls: dict[str, str]) -> frozenset[str]:
 
 
 def kinds(strata: Sequence[frozenset[str]]) -> set[frozenset[frozenset[str]]]:
-    """Return the classes of sets of contacts up to renaming; mirror images fall together."""
+    """Return the classes of sets of contacts up to renaming; mirror images are identified."""
     classes = set()
     for contacts in strata:
         orbit = {contacts}

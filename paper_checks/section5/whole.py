@@ -53,7 +53,7 @@ def picture_holds_above(threshold: Callable[[float], float] = touching_both_ends
     right = counts["above"] == described != counts["below"] and named["above"] == kinds
     return Finding(
         Verdict.HOLDS if right else Verdict.REFUTED,
-        f"For $t/r$ = {rods[0]} and {rods[1]} the lengths looked at are "
+        f"For $t/r$ = {rods[0]} and {rods[1]} the lengths examined are "
         f"{threshold(rods[0]):.4f} and {threshold(rods[1]):.4f} ball radii; one per cent above, "
         f"$D_3, D_4, D_5$ have {_listed(counts['above'])} components, one per cent below "
         f"{_listed(counts['below'])}, {'with' if named['below'] & kinds else 'without'} "

@@ -119,8 +119,8 @@ def heading_is(formula: sympy.Expr = PRINTED_HEADING) -> Finding:
         f"{computed:.10f} in the drum, {middle(plane):.10f} in the plane it develops into, where "
         f"the closed form $\\tan 2\\theta_s = 2Dp/(D^2 + \\ell^2 - p^2)$ gives {float(right):.10f} "
         f"and lies in the enclosure, {_width(plane)} wide, as for {len(OTHERS) - 1} other sizes. "
-        f"Drum and plane differ by {falls:.2f} times less when the radius doubles. Tolerances of "
-        f"the sizes move the heading by {bar.spread:.2f}; the formula is off by "
+        f"The difference of drum and plane shrinks {falls:.2f} times when the radius doubles. "
+        f"Tolerances of the sizes move the heading by {bar.spread:.2f}; the formula is off by "
         f"{claimed - computed:.2f}.",
         {"claimed": claimed, "drum": computed, "plane": middle(plane), "error_bar": bar.spread},
         ""

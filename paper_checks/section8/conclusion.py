@@ -280,7 +280,7 @@ def multipliers_at_the_cusp() -> tuple[bool, str]:
     certificate = certify(D, E, [0.0, 0.0])
     return rest < 1e-9 and certificate.is_minimum, (
         f"The derivative of $x^3 - y^2$ at the tip is {rows.ravel().tolist()}, so that no "
-        f"multiplier makes up $dE$: {rest:.4g} of it is left."
+        f"multiplier balances $dE$: {rest:.4g} of it remains."
     )
 
 

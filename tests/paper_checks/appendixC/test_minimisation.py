@@ -53,7 +53,7 @@ def test_hypotheses_are_read_off_a_function_that_meets_them():
     assert lemma.cube(example) == (Fraction(1, 2), 1, 1)  # |x2| <= 1/2 keeps the slope 1 + x2
     flatter = replace(example, f=x1 + x2**2 / 4)
     assert all(flatter.hypotheses().values())
-    assert lemma.cube(flatter) is None  # it asks for second derivatives of at least 1
+    assert lemma.cube(flatter) is None  # it requires second derivatives of at least 1
     assert lemma.cube(replace(example, f=-x1 + x2**2)) is None
 
 

@@ -265,7 +265,7 @@ def test_the_region_has_seven_corners_and_sides(drawn):
 
 
 def followed(slope, stiffness, wall, dt=2e-4):
-    """Return times and places of a mass let go at 0.9, by small steps."""
+    """Return times and positions of a mass released at 0.9, by small steps."""
     x, v, n = 0.9, 0.0, round(16 / dt)
     places = np.empty(n)
     for k in range(n):

@@ -83,7 +83,7 @@ def test_the_reach_of_a_dyad_is_speed_times_time():
 
 
 def test_more_sliding_friction_lets_steeper_dumbbells_climb():
-    """Set against the region of rest: the last heading at which the drum makes a dumbbell roll."""
+    """Against the region of rest: the last heading at which the drum makes a dumbbell roll."""
     from polycorner.dumbbells.statics.keel import RestRegion
 
     theta = np.radians(np.arange(-60.0, 90.0, 0.05))
