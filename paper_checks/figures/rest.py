@@ -80,7 +80,8 @@ def _rest_caption() -> str:
         "15°; arrows lead to where, by its inertia, it stops. Vermilion: S, dumbbells along the "
         f"flow lines. Beyond |φ| = φs no dumbbell rests: {limits[0]:.2f}°. (b), (c) A for the "
         "values in the paper's caption on turning points, of single dumbbells and of dyads: they "
-        f"mean μs = {slides[0]:.3f} and {slides[1]:.3f}, φs = {limits[1]:.1f}° and {limits[2]:.1f}°, "
+        f"mean μs = {slides[0]:.3f} and {slides[1]:.3f}, "
+        f"φs = {limits[1]:.1f}° and {limits[2]:.1f}°, "
         "other than in the text; in (c) μr exceeds tan α, so that on the lowest line every "
         "heading rests. The measured points are not given as numbers."
     )
