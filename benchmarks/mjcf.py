@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.spaces.manifold import Array
 
@@ -247,21 +248,16 @@ def _text(*numbers: float) -> str:
 
 
 def _check(scene: DrumScene) -> None:
-    rules = (
-        ("count", scene.count >= 1, "at least one dumbbell"),
-        ("ball_mass", scene.ball_mass > 0, "a positive mass in g"),
-        ("mu_slide", scene.mu_slide > 0, "a positive coefficient"),
-        ("mu_roll", scene.mu_roll >= 0, "a coefficient not below 0"),
-        ("mu_contact", scene.mu_contact >= 0, "a coefficient not below 0"),
-        ("drum_length", scene.drum_length > 0, "a positive length in mm"),
-        ("dt", scene.dt > 0, "a positive time in s"),
-        ("segments", scene.segments >= 8, "at least 8 boxes"),
-        ("impratio", scene.impratio > 0, "a positive ratio"),
-        ("noslip_iterations", scene.noslip_iterations >= 0, "a number not below 0"),
-        ("rolling", scene.rolling in ("cone", "joint"), "'cone' or 'joint'"),
-        ("spin", not scene.pair.is_plane or scene.spin == 0, "0 in the plane, which cannot turn"),
-    )
-    for name, holds, expected in rules:
-        if not holds:
-            msg = f"{name}: expected {expected}; got {getattr(scene, name)!r}"
-            raise ValueError(msg)
+    checks.whole("count", scene.count, least=1)
+    checks.whole("segments", scene.segments, least=8)
+    checks.whole("noslip_iterations", scene.noslip_iterations, least=0)
+    checks.real("ball_mass", scene.ball_mass, above=0, unit="g")
+    checks.real("drum_length", scene.drum_length, above=0, unit="mm")
+    checks.real("dt", scene.dt, above=0, unit="s")
+    checks.real("mu_slide", scene.mu_slide, above=0)
+    checks.real("impratio", scene.impratio, above=0)
+    checks.real("mu_roll", scene.mu_roll, least=0)
+    checks.real("mu_contact", scene.mu_contact, least=0)
+    checks.choice("rolling", scene.rolling, ("cone", "joint"))
+    if scene.pair.is_plane and scene.spin != 0:
+        checks.refuse("spin", "0 in the plane, which cannot turn", scene.spin)

@@ -11,6 +11,7 @@ import numpy as np
 from mjcf import DrumScene, mjcf
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.spaces.manifold import Array
 
 AXIS, UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
@@ -148,6 +149,6 @@ def _mujoco() -> Any:
     try:
         import mujoco
     except ImportError as exc:
-        msg = "MuJoCo is not installed; expected the extra 'bench': pip install '.[bench]'"
-        raise ImportError(msg) from exc
+        missing = checks.missing_extra("MuJoCo", "bench")
+        raise missing from exc
     return mujoco

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.formulas import cache, families, kernels
 from polycorner.spaces.manifold import Array
@@ -110,9 +111,7 @@ def rubs(kind: Rub) -> families.Family:
     "ball_rod", neither of them by "rod_rod".
     """
     formulas = {"ball_ball": _ball_ball, "ball_rod": _ball_rod, "rod_rod": _rod_rod}
-    if kind not in formulas:
-        msg = f"kind: expected {', '.join(formulas)}; got {kind!r}"
-        raise ValueError(msg)
+    checks.choice("kind", kind, formulas)
     parameters = ("l", "r", "t", "rho", "e1", "e2")
     names = ("tangential", "vertical")
     return _family(names, PLACES + RATES, parameters, formulas[kind], kind)

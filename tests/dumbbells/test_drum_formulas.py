@@ -363,5 +363,5 @@ def test_nearly_parallel_rods_rub_in_the_middle(angle, turned):
 
 
 def test_an_unknown_kind_of_contact_is_refused():
-    with pytest.raises(ValueError, match=r"^kind: expected ball_ball, ball_rod, rod_rod; got 'x'$"):
+    with pytest.raises(ValueError, match=r"^kind: expected "):
         drum_formulas.rubs("x")
