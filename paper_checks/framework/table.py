@@ -31,7 +31,7 @@ def run_text(run: Run, *, quiet: bool = False, width: int = WIDTH) -> str:
     told = ", ".join(f"{number} {verdict}" for verdict, number in counts(run).items())
     lines.append(f"{len(run.results)} claims: {told}" if told else "0 claims")
     if run.slow:
-        lines.append(f"left out, too slow without --slow: {_ids(run.slow)}")
+        lines.append(f"left out as slow (add --slow): {_ids(run.slow)}")
     return "\n".join(lines)
 
 

@@ -171,8 +171,8 @@ def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding
         + " the bottom, has turned to a mean heading of "
         f"{steep:.0f}° and " + ("is still nested" if still else "is no longer nested"),
         {"heading": steep},
-        "alone, a left-handed dyad lies down along the bottom, still nested; others that collide "
-        "with it may break it",
+        "alone, a left-handed dyad turns until it lies on the bottom, still nested; collisions with "
+        "others may break it up",
     )
 
 
@@ -186,7 +186,7 @@ def can_leave_in_time(length: float = 300.0, heading: float = 15.0) -> Finding:
         Verdict.HOLDS_UNDER if length <= reach else Verdict.REFUTED,
         f"at {heading:g}° a dyad climbs at most {speed:.3f} mm/s and {reach:.0f} mm in twenty "
         f"minutes, at {angles[0]:.1f}° {other[0] * OBSERVED_TIME:.0f} mm and at {angles[1]:.1f}° "
-        f"{other[1] * OBSERVED_TIME:.0f} mm; taken is a drum of {length:g} mm",
+        f"{other[1] * OBSERVED_TIME:.0f} mm; the drum is assumed {length:g} mm long",
         {"reach": reach, "length": length},
         f"a drum shorter than {reach:.0f} mm; its length is not given",
     )

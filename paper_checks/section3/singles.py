@@ -210,7 +210,7 @@ CLAIMS = (
         "O2",
         "3",
         "observation (ii) on isolated dumbbells",
-        "zigzags of being carried up, and of rolling back much faster",
+        "a dumbbell moves in zigzags: it is carried up and rolls back much faster",
         Means.SIMULATION,
         rolls_faster_than_carried,
         partial(rolls_faster_than_carried, 100.0),

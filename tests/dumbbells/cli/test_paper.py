@@ -145,7 +145,7 @@ def test_a_full_disk_costs_neither_the_answer_nor_the_old_report(
 def test_slow_claims_are_left_out_and_said_to_be(capsys, monkeypatch):
     monkeypatch.setattr(paper_checks, "CLAIMS", (A, small_catalogue.CLAIMS[-1]))
     monkeypatch.setattr(running, "run", lambda claims, **_: Run((GOOD,) if claims == (A,) else ()))
-    assert "left out, too slow without --slow: S1" in run(capsys)[1]
+    assert "left out as slow (add --slow): S1" in run(capsys)[1]
     assert "left out" not in run(capsys, "--slow")[1]
     assert "left out" not in run(capsys, "S1")[1]
 
