@@ -171,8 +171,8 @@ def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding
         + " the bottom, has turned to a mean heading of "
         f"{steep:.0f}° and " + ("is still nested" if still else "is no longer nested"),
         {"heading": steep},
-        "alone, a left-handed dyad turns until it lies on the bottom, still nested; collisions with "
-        "others may break it up",
+        "alone, a left-handed dyad turns until it lies on the bottom, still nested; collisions "
+        "with others may break it up",
     )
 
 
