@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Patch, Polygon
 
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import rod_outlines
-from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_room
+from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_clearance
 from polycorner.dumbbells.statics.skeleton import long_rod_length
 from polycorner.minimisation import Certificate
 from polycorner.pictures.style import BODIES
@@ -65,7 +65,7 @@ def draw_kinds(found: MinimaMap) -> Figure:
 
 
 def _draw_panel(axes: Axes, found: MinimaMap, i: int) -> None:
-    colours, layer = [UNSEEN, NONE], np.where(found.looked_at[i], 1, 0)
+    colours, layer = [UNSEEN, NONE], np.where(found.examined[i], 1, 0)
     for kind, colour in NESTED.items():
         colours.append(colour)
         layer[found.has(kind)[i]] = len(colours) - 1
@@ -112,7 +112,7 @@ def _room(length: float, rod: float, curvature: float) -> float:
     drum = length / curvature
     if length < 2 or length >= 2 * (drum - 1):
         return math.nan
-    return crossing_room(DumbbellPair(length, 1.0, rod, drum))
+    return crossing_clearance(DumbbellPair(length, 1.0, rod, drum))
 
 
 def _edges(values: Array) -> Array:

@@ -149,7 +149,7 @@ def kind_of(certificate: Certificate) -> str:
     return NAMES.get(numbers, word + "{}{}{}".format(*numbers))
 
 
-def crossing_room(pair: DumbbellPair) -> float:
+def crossing_clearance(pair: DumbbellPair) -> float:
     """Return the clearance of a level crossing, in mm; negative where there is none.
 
     One dumbbell lies on the lowest line; the rod of the other, ``2 t`` higher, is a level chord
@@ -214,7 +214,7 @@ class MinimaMap(Value):
         return np.asarray(self.counts[..., self.kinds.index(kind)] > 0)
 
     @property
-    def looked_at(self) -> NDArray[np.bool_]:
+    def examined(self) -> NDArray[np.bool_]:
         """Whether a pair fits in its drum and was examined, ``(k, n, m)``."""
         return np.asarray(self.lost >= 0)
 

@@ -44,7 +44,7 @@ def test_colours_tell_what_nests(found):
             same = (abs(colours - to_rgb(colour)) < 1e-6).all(axis=-1)
             np.testing.assert_array_equal(same, found.has(kind)[i])
         grey = (abs(colours - to_rgb("0.75")) < 1e-6).all(axis=-1)
-        np.testing.assert_array_equal(grey, ~found.looked_at[i])
+        np.testing.assert_array_equal(grey, ~found.examined[i])
 
 
 def test_the_legend_names_every_kind_that_was_found_beside_g(found):
@@ -82,7 +82,7 @@ def test_the_upper_rod_of_a_crossing_is_drawn_last(found):
 
 def test_a_map_without_a_pair_that_fits_is_grey_throughout(tmp_path):
     empty = minima_map(curvatures=[1.9], rods=[0.5], lengths=[3], starts=5)
-    assert not empty.looked_at.any()
+    assert not empty.examined.any()
     assert not empty.kinds
     for k, draw in enumerate((draw_minima_map, draw_kinds)):
         path = save(draw(empty), tmp_path / f"{k}.png")

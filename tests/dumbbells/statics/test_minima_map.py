@@ -12,7 +12,7 @@ from strategies import placed_pairs
 from polycorner import Verdict
 from polycorner.dumbbells import DumbbellPair, dyad_minima
 from polycorner.dumbbells.statics.minima_map import (
-    crossing_room,
+    crossing_clearance,
     energy_symmetry,
     kind_of,
     minima_map,
@@ -157,13 +157,13 @@ def test_a_level_crossing_fits_where_a_scan_finds_room(length, rod, curvature):
     drum = length / curvature
     assume(drum > 1.05 and length < 1.99 * (drum - 1))
     pair = DumbbellPair(length, 1.0, rod, drum)
-    room = crossing_room(pair)
+    room = crossing_clearance(pair)
     assume(abs(room) > 1e-3)
     assert (scanned_room(pair) > -1e-6) == (room > 0)
 
 
 def test_nothing_crosses_in_the_plane():
-    assert crossing_room(PLANE) == -math.inf
+    assert crossing_clearance(PLANE) == -math.inf
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_nothing_crosses_in_the_plane():
 def test_long_thin_dumbbells_also_rest_crossed(length, rod, drum):
     """The upper one's rod is ``2 t`` higher all along, so its two balls together are ``4 t``."""
     pair = DumbbellPair(length, 1.0, rod, drum)
-    assert crossing_room(pair) > 0.05
+    assert crossing_clearance(pair) > 0.05
     found = pair_minima(pair, starts=300, mirror=True)
     (crossed,) = (c for c in found if kind_of(c) == "crossed")
     assert crossed.energy == pytest.approx(4 + 4 * rod, rel=1e-12)
@@ -199,7 +199,7 @@ def test_crossing_in_the_middle_and_off_it_are_two_loci_where_balls_are_between(
 
 def test_a_pair_with_no_room_to_cross_level_does_not():
     pair = DumbbellPair(6, 1.0, 0.5, 12)
-    assert crossing_room(pair) < -0.5
+    assert crossing_clearance(pair) < -0.5
     assert kinds(pair_minima(pair, starts=300, mirror=True)) == ["G", "delta"]
 
 
@@ -223,7 +223,7 @@ def test_the_map_counts_every_start_of_every_pair():
     assert found.kinds[0] in ("G", "delta")
     assert set(found.kinds) >= {"G", "delta", "staggered", "crossed"}
     fits = np.array([[True, True], [False, True]])[:, None, :] & np.ones((2, 2, 2), dtype=bool)
-    np.testing.assert_array_equal(found.looked_at, fits)
+    np.testing.assert_array_equal(found.examined, fits)
     total = found.counts.sum(axis=-1) + found.lost
     assert (total[fits] == 60).all()
     assert (found.counts[~fits] == -1).all()
@@ -231,7 +231,7 @@ def test_the_map_counts_every_start_of_every_pair():
     assert found.has("G")[fits].all()
     assert not found.has("nothing of the kind").any()
     for cell in np.argwhere(found.has("crossed")):
-        assert crossing_room(found.pair(*cell)) > 0
+        assert crossing_clearance(found.pair(*cell)) > 0
     assert found.pair(1, 0, 0) is None
     for kind, (pair, certificate) in found.examples.items():
         assert kind_of(certificate) == kind
@@ -245,7 +245,7 @@ def test_a_map_can_be_repeated_and_interrupted():
             raise KeyboardInterrupt
 
     whole, cut = minima_map(**SMALL), minima_map(**SMALL, progress=stop)
-    assert cut.looked_at.sum() == 3
+    assert cut.examined.sum() == 3
     for kind in cut.kinds:
-        one, two = (f.counts[..., f.kinds.index(kind)][cut.looked_at] for f in (whole, cut))
+        one, two = (f.counts[..., f.kinds.index(kind)][cut.examined] for f in (whole, cut))
         np.testing.assert_array_equal(one, two)
