@@ -111,8 +111,8 @@ def test_members_of_a_bunch_are_counted():
     stayed = run.present[-1]
     assert at["in_right"] + at["in_left"] + at["both"] + at["single"] == stayed.sum()
     assert at["reach"] == run.q[-1, stayed, 1].mean()
-    assert at["max_penetration"] == run.max_penetration
-    assert at["missed"] == run.unconverged / run.islands
+    assert at["max_penetration"] == run.trajectory.max_penetration
+    assert at["missed"] == run.trajectory.missed
     assert len(np.unique(found["reach"])) == 4
 
 
@@ -126,7 +126,7 @@ def test_members_of_a_bunch_are_counted():
         ({"rubbing": -0.1}, "rubbing: expected"),
         ({"top": 0.0}, "top: expected"),
         ({"dt": 0.1}, "dt: expected"),
-        ({"duration": math.nan}, "duration: expected"),
+        ({"duration": math.nan}, "t_end: expected"),
     ],
 )
 def test_bunches_name_what_is_wrong(wrong, words):

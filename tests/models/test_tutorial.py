@@ -219,7 +219,7 @@ def test_starts_depend_on_the_generator_alone():
 
 @pytest.mark.parametrize("size", ["1", None, True, 1j, [1.0]])
 def test_the_size_is_a_number(size):
-    with pytest.raises(TypeError, match=r"^size: expected a real number; got "):
+    with pytest.raises(TypeError, match=r"^size: expected a number > 0; got "):
         Tutorial(size)
 
 

@@ -608,7 +608,7 @@ def test_sets_are_values():
         ),
         (
             lambda: from_support(lambda _: 1.0, directions=4),
-            "directions: expected a whole number, at least 5; got 4",
+            "directions: expected a whole number >= 5; got 4",
         ),
         (
             lambda: from_support(lambda u: -u[0]),

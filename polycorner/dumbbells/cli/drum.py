@@ -203,7 +203,9 @@ def _run(
     seconds, dt, folder = values["duration"], values["dt"], Path(checkpoint.folder)
     if checkpoint.resume and not folder.exists():
         remark(f"nothing to resume in {folder}; the run starts from the beginning")
-    every = max(1, round(min(INTERVAL, seconds / FRAMES) / dt)) if seconds < math.inf else None
+    every = None  # until the numbers are checked by the simulation itself
+    if 0 <= seconds < math.inf and 0 < dt < math.inf:
+        every = max(1, round(min(INTERVAL, seconds / FRAMES) / dt))
     with writing(folder), working("simulating", "s") as progress:
         return simulate(
             model,

@@ -82,7 +82,8 @@ def _cut(atlas: PairAtlas, points: Array, period: float) -> list[Array]:
         piece - np.array([0.0, 0.0, period * turns[start]])
         for piece, start in zip(pieces, starts.tolist(), strict=True)
     ]
-    return [piece for piece in shifted if len(piece) > 1]
+    # An edge that begins or ends on the seam leaves a piece without length beyond it.
+    return [piece for piece in shifted if np.ptp(piece, axis=0).max() > SAME]
 
 
 def _on_seam(atlas: PairAtlas, one: Array, other: Array, turns: Array, period: float) -> Array:
