@@ -187,11 +187,16 @@ def _checkpoint(
 
     if out is not None:
         return Checkpoint(out / STATE, resume=resume)
-    from polycorner.formulas.cache import cache_folder
-
     told = repr((model, noise, values["duration"], values["dt"], fingerprint(state.q)))
     name = hashlib.sha256(told.encode()).hexdigest()[:16]
-    return Checkpoint(cache_folder() / f"drum-{name}", resume=resume)
+    return Checkpoint(_cached(f"drum-{name}"), resume=resume)
+
+
+def _cached(name: str) -> Path:
+    """Return a folder in the cache."""
+    from polycorner.formulas.cache import cache_folder
+
+    return cache_folder() / name
 
 
 def _run(

@@ -38,6 +38,14 @@ ANSWER = {
 }
 
 
+@pytest.fixture(autouse=True)
+def unsaved(tmp_path, monkeypatch):
+    """Keep runs without ``--out`` away from those of other tests; the engine stays compiled."""
+    folder = tmp_path / "unsaved"
+    monkeypatch.setattr("polycorner.dumbbells.cli.drum._cached", lambda name: folder / name)
+    return folder
+
+
 def run(capsys, *arguments):
     return commands.run(capsys, "drum", *arguments)
 
