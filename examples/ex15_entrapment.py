@@ -43,7 +43,7 @@ class Result:
 
     ``absorbing`` are simulations and ``expected`` what the backward equation gives for them;
     ``elastic`` are times from that equation behind elastic walls, ``overdamped`` those in the
-    limit of large drag.  ``captures`` are times and places of rest.  ``hold_times`` are in s, one
+    limit of large drag.  ``captures`` are times and final positions.  ``hold_times`` are in s, one
     for each of ``holds`` but the last, which is free.
     """
 

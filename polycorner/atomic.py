@@ -15,9 +15,9 @@ PART = ".part"  # in the name of a file that is still being written
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary name in the same folder, and move it to ``path`` if all goes well.
 
-    The folder is made if need be.  The temporary name has the suffix of ``path``, by which many
-    libraries choose a format.  Content and name are synchronised to the disk, so that the file
-    survives a crash of the machine; after an exception the temporary file is removed.
+    The folder is created if it does not exist.  The temporary name has the suffix of ``path``, by
+    which many libraries choose a format.  Content and name are synchronised to the disk, so that
+    the file survives a crash of the machine; after an exception the temporary file is removed.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ def _last_line(content: bytes, around: tuple[bytes, bytes]) -> "re.Match[bytes] 
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that matter to whoever reads a file."""
+    """Return the versions that matter to the reader of a file."""
     return {
         "polycorner": __version__,
         "numpy": np.__version__,

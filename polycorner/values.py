@@ -38,8 +38,8 @@ class Value:
 def read_only(value: Any) -> Any:
     """Return a read-only view of an array; the same for arrays in tuples and mappings.
 
-    Everything else is returned as it is.  The array that is viewed stays writable for whoever
-    made it, so a caller's own array is to be copied first.
+    Everything else is returned as it is.  The array that is viewed stays writable through
+    its other references, so a caller's own array is to be copied first.
 
     Examples
     --------

@@ -40,7 +40,7 @@ def save_certificate(certificate: Certificate, path: str | os.PathLike[str]) -> 
     ----------
     certificate : Certificate
     path : path
-        The file; its folder is made if need be.
+        The file; its folder is created if it does not exist.
 
     Returns
     -------

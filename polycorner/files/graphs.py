@@ -71,7 +71,7 @@ def save_graph(skeleton: Skeleton, path: str | os.PathLike[str]) -> Path:
     ----------
     skeleton : Skeleton
     path : path
-        The file; its folder is made if need be.
+        The file; its folder is created if it does not exist.
 
     Returns
     -------

@@ -37,7 +37,7 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
     skeleton : Skeleton
         As returned by :func:`~polycorner.skeletons.search.skeleton`.
     path : path
-        The file; its folder is made if need be.
+        The file; its folder is created if it does not exist.
     label : str, optional
         A name of the search, which :func:`load_skeleton` can require.
 

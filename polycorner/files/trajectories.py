@@ -90,7 +90,7 @@ def save_trajectory(
     trajectory : Trajectory
         As returned by :func:`~polycorner.motion.simulation.simulate`.
     path : path
-        The file; its folder is made if need be.
+        The file; its folder is created if it does not exist.
     units : mapping from str to str, optional
         See :func:`trajectory_dataset`.
 

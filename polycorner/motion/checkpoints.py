@@ -49,7 +49,7 @@ class Checkpoint(Value):
     Parameters
     ----------
     folder : path
-        It is made if need be.
+        It is created if it does not exist.
     seconds : float, optional
         Save at the first record after so many seconds of real time; default 30.
     resume : bool, optional

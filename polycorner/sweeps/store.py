@@ -50,7 +50,7 @@ class Store(Table):
     Parameters
     ----------
     path : Path
-        The folder; it is made if need be.
+        The folder; it is created if it does not exist.
     study : Study
 
     Raises
