@@ -13,6 +13,8 @@ from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.polyhedra.description import description
+from polycorner.printing import Printed, Sheet
 from polycorner.spaces.manifold import Array, Manifold, scalar
 from polycorner.values import Value
 
@@ -47,7 +49,7 @@ class AnyOf(_Group):
     """The union of its parts: at least one inequality holds (locally concave corners)."""
 
 
-class Polyhedron(Value):
+class Polyhedron(Printed, Value):
     """A curvilinear polyhedron ``D = {q : f_i(q) >= 0 joined by and/or, h_j(q) = 0}``.
 
     Parameters
@@ -108,6 +110,10 @@ class Polyhedron(Value):
         """Return the coordinates and the names of the functions."""
         equations = f", equations {list(self.equation_names)}" if self.equations else ""
         return f"Polyhedron({list(self.manifold.names)}: {list(self.names)} >= 0{equations})"
+
+    def _sheet(self) -> Sheet:
+        joined = _words(self.tree, self.names)[1:-1] if self.is_union else ""
+        return description(self.manifold.names, self.functions, self.equations, joined)
 
     @property
     def dimension(self) -> int:
@@ -197,6 +203,15 @@ class _Node:
 
     def __init__(self, *, union: bool, children: tuple[Tree, ...]) -> None:
         self.union, self.children = union, children
+
+
+def _words(tree: Tree, names: Sequence[str]) -> str:
+    """Return an and/or tree in words."""
+    if isinstance(tree, int):
+        return names[tree]
+    parts = [_words(child, names) for child in tree.children]
+    word = " or " if tree.union else " and "
+    return parts[0] if len(parts) == 1 else f"({word.join(parts)})"
 
 
 def _branches(tree: Tree) -> bool:

@@ -313,3 +313,25 @@ class TestRefusals:
     def test_symbols_that_are_no_coordinates_are_named(self):
         with pytest.raises(ValueError, match="symbol z "):
             Polyhedron(PLANE, {"wall": x + sp.Symbol("z")})
+
+
+def test_it_prints_its_formulas_and_how_they_are_joined():
+    M = Manifold.euclidean("x y")
+    x, y = M.symbols
+    a = sp.Symbol("a")
+    bowl = SmoothFunction("bowl", y - a * x**2, M, parameters={"a": 2.0})
+    D = Polyhedron(M, AllOf(bowl, AnyOf(x, 1 - y)), equations={"line": x + y - 1})
+    text = str(D)
+    for words in ("Polyhedron in x, y", "with a = 2", "line", "x + y - 1", " or "):
+        assert words in text
+    assert D._repr_html_().count("<tr>") >= 4
+    assert "\n" not in repr(D)
+
+
+def test_long_formulas_are_told_by_their_coordinates():
+    M = Manifold.euclidean("x y")
+    x, y = M.symbols
+    many = Polyhedron(M, [x - k + sp.sin(k * y) for k in range(40)])
+    assert "The first 20 of 40" in str(many)
+    long = sum(sp.sin(k * x) for k in range(1, 40))
+    assert "a function of x, y" in str(Polyhedron(M, {"long": long + y}))
