@@ -84,7 +84,7 @@ if __name__ == "__main__":
             f"{one.climb_rate:+.4f} mm/s (law {math.copysign(result.law, one.heading[0]):+.4f})"
         )
     rates = result.pairs.climb_rates(after=10.0)
-    for (hand, _), rate in zip(result.pairs.starts, rates, strict=True):
-        print(f"pair {hand}: climbs {rate:+.4f} mm/s")
+    for sign, rate in zip(result.pairs.signs, rates, strict=True):
+        print(f"{'right' if sign > 0 else 'left'}-handed pair: climbs {rate:+.4f} mm/s")
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     print(f"wrote {draw(result, folder / 'ex16_dyad_climbs.png')}")
