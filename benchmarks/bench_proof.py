@@ -20,9 +20,9 @@ from polycorner import Certificate, minimise
 from polycorner.dumbbells import DumbbellPair
 from polycorner.proofs import Proof, prove
 
-sys.path.append(str(Path(ROOT, "tests")))
-from minima.exact_kinds import KINDS, departures, programme
-from minima.exact_oracle import holds
+sys.path.append(str(Path(ROOT, "tests", "support")))
+from exact_kinds import KINDS, departures, programme
+from exact_oracle import holds
 
 DIGITS = (30, 100, 1000, 4000)
 ROUNDS = 5
