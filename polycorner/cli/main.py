@@ -1,12 +1,12 @@
 """The command ``polycorner``: subcommands, errors in one line, exit codes.
 
 =====  ====================================================================
-0      an answer, whatever it says
+0      success, whatever the answer
 1      a check of ``polycorner paper`` failed to run
 2      bad input, or a file that cannot be read or written
 70     unexpected error: a defect of the program
 74     standard output cannot be written
-130    interrupted; results so far are kept where the command says so
+130    interrupted; the message says whether results were kept
 141    broken pipe
 =====  ====================================================================
 """
@@ -28,12 +28,12 @@ from polycorner.cli.output import Verbosity, notices
 
 UNEXPECTED, NO_OUTPUT, INTERRUPTED, BROKEN_PIPE = 70, 74, 130, 141
 EXIT_CODES = {
-    0: "an answer, whatever it says",
+    0: "success, whatever the answer",
     1: "a check of polycorner paper failed to run",
     2: "bad input, or a file that cannot be read or written",
     UNEXPECTED: "unexpected error: a defect of the program",
     NO_OUTPUT: "standard output cannot be written",
-    INTERRUPTED: "interrupted; results so far are kept where the command says so",
+    INTERRUPTED: "interrupted; the message says whether results were kept",
     BROKEN_PIPE: "broken pipe",
 }
 COMMANDS = {
