@@ -95,7 +95,7 @@ class BunchRun(Value):
 
     @cached_property
     def exit_kinds(self) -> tuple[str, ...]:
-        """How each dumbbell left, in a ``right`` or ``left`` dyad or ``single``, as :attr:`exits`.
+        """Kind of each exit: in a ``right`` or ``left`` dyad, or ``single``; ordered as :attr:`exits`.
 
         By :func:`polycorner.dumbbells.dynamics.pairs.left_as`.
         """

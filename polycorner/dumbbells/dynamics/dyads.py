@@ -106,7 +106,7 @@ class DyadPaths(Value):
 
     @cached_property
     def shift(self) -> Array:
-        """How far the dumbbells are shifted along their mean axis, ``(T, n)``, in mm."""
+        """Shift of the dumbbells along their mean axis, ``(T, n)``, in mm."""
         apart = self.q[..., 1, :] - self.q[..., 0, :]
         across = self.drum.centre_radius * apart[..., 0]
         along = across * np.sin(self.heading) + apart[..., 1] * np.cos(self.heading)
@@ -119,7 +119,7 @@ class DyadPaths(Value):
 
     @cached_property
     def contacts(self) -> NDArray[np.bool_]:
-        """Which of the nine gaps are closed to within 0.01 mm, ``(T, n, 9)``."""
+        """Mask of the nine gaps that are closed to within 0.01 mm, ``(T, n, 9)``."""
         return gaps(self.drum, self.q) < TOUCH
 
     def strata(self, *, after: float = 0.0) -> dict[str, float]:
@@ -136,7 +136,7 @@ class DyadPaths(Value):
 
     @property
     def lifetimes(self) -> Array:
-        """How long each pair stayed near and kept its chirality, ``(n,)``; inf: to the end.
+        """Time for which each pair stayed close and kept its chirality, ``(n,)``; inf: to the end.
 
         Near means centres closer than ``l + 2 r`` in the developed plane.
         """
@@ -208,7 +208,7 @@ def follow_pairs(
 
 @dataclass(frozen=True)
 class Steady:
-    """What pairs of one length do: means in time, then over those that held.
+    """Behaviour of pairs of one length: means over time, then over the pairs that stayed together.
 
     Headings and azimuth in degrees, ``climb_rate`` in mm/s, ``shift`` in mm; signs are those for
     right-handed pairs (of left-handed ones, mirrored).
@@ -293,7 +293,7 @@ def steady_headings(
     after: float = 150.0,
     hand: Chirality = "R",
 ) -> tuple[Steady, ...]:
-    """Return what pairs of each length do, started with several headings, in degrees, under noise.
+    """Return the behaviour under noise of pairs of each length, from several headings in degrees.
 
     For left-handed pairs the headings are taken negative.
     """

@@ -42,12 +42,12 @@ class Sizes:
 
     @classmethod
     def of(cls, trajectory: "Trajectory") -> "Sizes":
-        """Return those of the dumbbells of a trajectory in the drum."""
+        """Return the lengths of the dumbbells of a trajectory in the drum."""
         return cls.of_drum(drum_of(trajectory))
 
     @classmethod
     def of_drum(cls, drum: DumbbellDrum) -> "Sizes":
-        """Return those of a drum's dumbbells."""
+        """Return the lengths of a drum's dumbbells."""
         return cls(drum.length, drum.ball_radius, drum.centre_radius, drum.rod_radius)
 
     @property

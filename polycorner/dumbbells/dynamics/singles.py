@@ -84,7 +84,7 @@ class Mean:
 
     @classmethod
     def of(cls, values: ArrayLike) -> "Mean":
-        """Return that of the finite entries among ``values``."""
+        """Return the mean of the finite entries among ``values``."""
         array = np.ravel(np.asarray(values, dtype=np.float64))
         array = array[np.isfinite(array)]
         n = len(array)
@@ -171,7 +171,7 @@ def zigzags(trajectory: Trajectory, spin: float) -> tuple[Zigzag, ...]:
 
 
 def _intervals(trajectory: Trajectory, body: int) -> list[tuple[float, float]]:
-    """Return when a body moved, from events, leaving out what goes on when the record ends."""
+    """Return the intervals in which a body moved, from events, without one that is still open."""
     began: float | None = None
     slips = []
     for event in trajectory.events:
@@ -194,7 +194,7 @@ def _merged(slips: list[tuple[float, float]], gap: float) -> list[tuple[float, f
 
 @dataclass(frozen=True)
 class Decay:
-    """How noise turns single dumbbells.
+    """Turning of single dumbbells by noise.
 
     Attributes
     ----------
@@ -226,7 +226,7 @@ def heading_decay(
     correlation_time: float = 0.01,
     dt: float = 1e-3,
 ) -> tuple[Decay, ...]:
-    """Return how headings decay and dumbbells climb for each amplitude of the noise.
+    """Return the decay of headings and the climb rates for each amplitude of the noise.
 
     ``count`` dumbbells with the same start and independent noise.
     """
@@ -241,7 +241,7 @@ def heading_decay(
 
 
 def keel_ratio(drum: DumbbellDrum, heading: float, *, duration: float = 60.0) -> float:
-    """Return how fast a dumbbell climbs over ``omega rho tan(theta)``, that of a perfect keel.
+    """Return the climb rate relative to that of a perfect keel, ``omega rho tan(theta)``.
 
     One without noise, averaged over the second half of the time.
     """
