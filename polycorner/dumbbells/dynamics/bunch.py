@@ -95,7 +95,7 @@ class BunchRun(Value):
 
     @cached_property
     def exit_kinds(self) -> tuple[str, ...]:
-        """Kind of each exit: in a ``right`` or ``left`` dyad, or ``single``; ordered as :attr:`exits`.
+        """Kind of each of the :attr:`exits`: in a ``right`` or ``left`` dyad, or ``single``.
 
         By :func:`polycorner.dumbbells.dynamics.pairs.left_as`.
         """
