@@ -17,6 +17,7 @@ import numpy as np
 
 from polycorner import __version__
 from polycorner.errors import PolycornerError
+from polycorner.formulas.families import Family
 from polycorner.sweeps.grid import Grid
 
 FORMAT = 2
@@ -129,6 +130,9 @@ class _ContentPickler(pickle.Pickler):
             return np.ndarray, (value.shape, value.dtype.str, value.tobytes())
         if isinstance(value, type | FunctionType | BuiltinFunctionType):
             return NotImplemented
+        if isinstance(value, Family):  # SymPy's own pickles depend on what its caches share
+            key = value.key or value.program().digest()
+            return Family, (value.names, value.variables, value.parameters, key)
         reduced = value.__reduce_ex__(5)
         if isinstance(reduced, tuple) and len(reduced) > 2 and isinstance(reduced[2], dict):
             cached = {
