@@ -68,7 +68,8 @@ def draw(result: Result, path: Path) -> Path:
             phi = np.degrees(result.pairs.q[:, k, body, 0])
             below.plot(times, phi, color=colour, linewidth=1.0, alpha=1.0 if body else 0.5)
     for sign in (1, -1):
-        above.plot(times, sign * result.law * times, ":", color="0.5", zorder=0.5)
+        name = "perfect keel, ±ωρ tan θ" if sign > 0 else None
+        above.plot(times, sign * result.law * times, ":", color="0.5", zorder=0.5, label=name)
     above.set(ylabel="axial position η (mm)")
     below.set(ylabel="azimuth φ (degrees)", xlabel="time (s)")
     above.legend()

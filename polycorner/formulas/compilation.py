@@ -36,6 +36,7 @@ if not config.CACHE_DIR:  # what is cached after this import goes to the one cac
     config.CACHE_DIR = str(cache_folder() / "numba")
 
 
+# Numba has no types, so its classes are Any to mypy.
 class Announcement(event.Listener):  # type: ignore[misc]
     """Logs once for each package that its code is compiled, the cache not holding it."""
 

@@ -216,6 +216,7 @@ def _parameters(
 
 def system_solver(system: object) -> Solver:
     """Return the default solver of what has to be a mechanical system."""
+    # mypy refuses an abstract class where `isinstance` takes one.
     return instance("system", system, MechanicalSystem).solver  # type: ignore[type-abstract]
 
 

@@ -256,6 +256,7 @@ class System(MechanicalSystem):
         if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
             places = self.manifold.point(q).copy()
         else:
+            # `points` itself refuses a mapping, which only one body may have.
             places = self.manifold.points(q, "q").copy()  # type: ignore[arg-type]
         speeds = np.zeros(places.shape)
         for name, speed in self.substrate.items():
