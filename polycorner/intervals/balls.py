@@ -3,6 +3,9 @@
 A ball is a midpoint and a radius; an operation on balls returns a ball that contains all its
 results for arguments in the given balls, rounding included ([Johansson]).  No other module
 imports the library behind it, FLINT.
+
+FLINT has one working precision for the whole process, shared by all threads.  What depends on it
+therefore runs inside :func:`precision`, which one thread at a time may enter.
 """
 
 import operator
@@ -10,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache
+from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from polycorner.formulas.programs import Payload
@@ -24,13 +28,25 @@ Matrix: TypeAlias = "arb_mat"
 Truth: TypeAlias = bool | None
 
 
+_TURN = RLock()
+
+
 @contextmanager
 def precision(bits: int) -> Iterator[None]:
-    """Set the working precision to ``bits`` binary digits inside the block."""
+    """Set the working precision to ``bits`` binary digits inside the block.
+
+    Blocks of different threads take turns; a thread may nest its own.  The precision before the
+    block is restored after it, however it ends.
+    """
     from flint import ctx
 
-    with ctx.workprec(bits):
-        yield
+    with _TURN:
+        before = ctx.prec
+        try:
+            ctx.prec = bits
+            yield
+        finally:
+            ctx.prec = before
 
 
 def current_precision() -> int:

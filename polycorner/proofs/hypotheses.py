@@ -30,10 +30,16 @@ MOST_HALVINGS = 8  # of a cell, to decide the signs of inactive functions
 
 
 class Status(StrEnum):
-    """Status of a condition in a proof."""
+    """Status of a condition in a proof.
+
+    It is proved, or failed (proved to be violated), at the point or for all parameters of a cell;
+    or undecided.  Over a box of parameters a condition that is violated on some cells, not on all,
+    failed in part.
+    """
 
     PROVED = "proved"
     FAILED = "failed"
+    PARTLY = "failed in part"
     UNDECIDED = "undecided"
 
 
@@ -186,16 +192,20 @@ def _inactive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     if not others:
         return _membership(d, claim.active, [], [])
     waiting = [(tuple(enclosure.predictor.cell.reach), 0)]
-    result = _undecided("")
+    found: dict[Status, ConditionResult] = {}
     while waiting:
         reach, depth = waiting.pop()
         values = claim.system.formulas.values(enclosure.neighbourhood(reach), others)
         result = _membership(d, claim.active, others, values)
         if result.status is Status.UNDECIDED and reach and depth < MOST_HALVINGS:
             waiting += [(half, depth + 1) for half in _halves(reach)]
-        elif result.status is not Status.PROVED:
-            break
-    return result
+            continue
+        found[result.status] = result
+        if result.status is Status.UNDECIDED:
+            return result
+        if len(found) > 1:
+            return _undecided(f"true on a part of the cell only: {found[Status.FAILED].reason}")
+    return next(iter(found.values()))
 
 
 def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":

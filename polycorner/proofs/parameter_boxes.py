@@ -167,20 +167,23 @@ def undecided_cell(sides: Mapping[str, Interval], undecided: Undecided) -> Param
 
 def summary(cells: Sequence[ParameterCell]) -> dict[str, ConditionResult]:
     """Return the result of each condition over all cells."""
-    found: dict[str, ConditionResult] = {}
-    for name in dict.fromkeys(name for cell in cells for name in cell.conditions):
-        found[name] = ConditionResult(Status.PROVED, f"on all of the {len(cells)} cells")
-        for status in (Status.FAILED, Status.UNDECIDED):
-            some = [cell for cell in cells if cell.conditions.get(name) is status]
-            if some:
-                largest = max(some, key=lambda cell: cell.volume)
-                reason = (
-                    f"on {len(some)} of {len(cells)} cells, the largest with "
-                    f"{shown_box(largest.parameters)}"
-                )
-                found[name] = ConditionResult(status, reason)
-                break
-    return found
+    names = dict.fromkeys(name for cell in cells for name in cell.conditions)
+    return {name: _over_all(cells, name) for name in names}
+
+
+def _over_all(cells: Sequence[ParameterCell], name: str) -> ConditionResult:
+    """Return the result of one condition over all cells."""
+    for status in (Status.FAILED, Status.UNDECIDED):
+        some = [cell for cell in cells if cell.conditions.get(name) is status]
+        if some:
+            largest = max(some, key=lambda cell: cell.volume)
+            reason = (
+                f"on {len(some)} of {len(cells)} cells, the largest with "
+                f"{shown_box(largest.parameters)}"
+            )
+            partly = status is Status.FAILED and len(some) < len(cells)
+            return ConditionResult(Status.PARTLY if partly else status, reason)
+    return ConditionResult(Status.PROVED, f"on all of the {len(cells)} cells")
 
 
 def _bounds(claim: Claim, enclosure: Enclosure) -> dict[str, Interval]:

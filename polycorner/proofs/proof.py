@@ -42,7 +42,8 @@ class Proof(Value, Printed):
         Vector fields along which energy and active functions are constant; the minimum is strict
         modulo their flows.
     conditions : mapping from str to Status
-        ``"proved"``, ``"failed"`` (proved to be violated) or ``"undecided"``.
+        ``"proved"``, ``"failed"`` (proved to be violated) or ``"undecided"``; over a box of
+        parameters also ``"failed in part"``.
     reasons : mapping from str to str
         The reason for each status.
     enclosures : mapping from str to (str, str)
@@ -82,8 +83,23 @@ class Proof(Value, Printed):
         """The proved part of the box of parameters; 1 or 0 without one."""
         if not self.cells:
             return float(self.proved)
-        done = fsum(cell.volume for cell in self.cells if cell.status is Status.PROVED)
-        return 1.0 if self.proved else done / fsum(cell.volume for cell in self.cells)
+        return 1.0 if self.proved else self._share(Status.PROVED)
+
+    @property
+    def failed_fraction(self) -> float:
+        """The part of the box of parameters on which a condition is violated; 1 or 0 without."""
+        if not self.cells:
+            return float(Status.FAILED in self.conditions.values())
+        return self._share(Status.FAILED)
+
+    def _share(self, status: Status) -> float:
+        done = fsum(cell.volume for cell in self.cells if cell.status is status)
+        return done / fsum(cell.volume for cell in self.cells)
+
+    @property
+    def failed(self) -> tuple[ParameterCell, ...]:
+        """The cells on the whole of which a condition is violated."""
+        return tuple(cell for cell in self.cells if cell.status is Status.FAILED)
 
     @property
     def undecided(self) -> tuple[ParameterCell, ...]:
@@ -165,8 +181,10 @@ class Proof(Value, Printed):
     def _parameter_facts(self) -> Iterator[tuple[str, str]]:
         if not self.parameters:
             return
-        share = f"{100 * self.proved_fraction:.6g} % proved in {len(self.cells)} cells"
-        yield "parameters", f"{shown_box(self.parameters)}: {share}"
+        shares = f"{100 * self.proved_fraction:.6g} % proved"
+        if self.failed:
+            shares += f", {100 * self.failed_fraction:.6g} % violated"
+        yield "parameters", f"{shown_box(self.parameters)}: {shares}, {len(self.cells)} cells"
         for cell in self.undecided[:SHOWN_CELLS]:
             yield "undecided", f"{shown_box(cell.parameters)}: {cell.reason}"
         if len(self.undecided) > SHOWN_CELLS:

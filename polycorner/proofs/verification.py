@@ -48,6 +48,7 @@ from polycorner.proofs.hypotheses import (
     without_enclosure,
 )
 from polycorner.proofs.invariance import generators
+from polycorner.proofs.kkt import FIRST_BITS
 from polycorner.proofs.krawczyk import Enclosure, widened
 from polycorner.proofs.parameter_boxes import (
     CELL_BITS,
@@ -97,6 +98,11 @@ def prove(
     Proof
         Its conditions tell what is proved, what is violated and what remains undecided.
 
+    Notes
+    -----
+    The working precision belongs to the process: proofs in several threads take turns, proofs in
+    several processes run side by side.  The result does not depend on either.
+
     Raises
     ------
     TypeError, ValueError
@@ -125,14 +131,15 @@ def prove(
     fields = generators(d.manifold, symmetry.fields if symmetry else ())
     sides, values = check_parameters(problem, parameters)
     functions = (*d.functions, *d.equations, problem.energy)
-    formulas = Formulas(functions, d.manifold)
-    check_unchanged(certificate, formulas)
-    tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS if sides else digits)
-    if not sides:
-        return _one(certificate, tried, digits)
-    moving = Formulas(functions, d.manifold, tuple(sides))
-    check_domain(moving, sides)
-    posed = pose_claim(certificate, tried.face, fields, moving, values)
+    with precision(FIRST_BITS):
+        formulas = Formulas(functions, d.manifold)
+        check_unchanged(certificate, formulas)
+        tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS if sides else digits)
+        if not sides:
+            return _one(certificate, tried, digits)
+        moving = Formulas(functions, d.manifold, tuple(sides))
+        check_domain(moving, sides)
+        posed = pose_claim(certificate, tried.face, fields, moving, values)
     if isinstance(posed, Undecided):
         cells: tuple[ParameterCell, ...] = (undecided_cell(sides, posed),)
     else:
@@ -222,6 +229,9 @@ def _many(
     symmetry: tuple[str, ...] = ()
     if not isinstance(posed, Undecided):
         found, symmetry = _refused(found, posed), tuple(map(str, posed.claim.fields))
+        if posed.refused and posed.refused.status is Status.FAILED:
+            # Seen at the certificate's parameters only.
+            found[SYMMETRIC] = replace(posed.refused, status=Status.PARTLY)
     active = tuple(certificate.problem.polyhedron.names[i] for i in tried.face)
     proved = [cell.bounds for cell in cells if cell.status is Status.PROVED]
     hulls = {

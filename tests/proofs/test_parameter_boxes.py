@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, certify, minimise
 from polycorner.dumbbells import DumbbellPair
+from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.proofs import prove
-from polycorner.proofs.hypotheses import INACTIVE, POSITIVE, UNIQUE
+from polycorner.proofs.hypotheses import INACTIVE, POSITIVE, SYMMETRIC, UNIQUE
 
 M = Manifold.euclidean("x y")
 x, y = M.symbols
@@ -82,7 +83,7 @@ def test_where_a_multiplier_changes_sign_both_sides_are_decided():
     c = problem({"wall": x}, a * x + x**2 + y**2, [0, 0], a=1.0)
     p = prove(c, parameters={"a": (-1.0, 1.0)}, max_cells=60)
     assert not p.proved
-    assert p.conditions[POSITIVE] == "failed"
+    assert p.conditions[POSITIVE] == "failed in part"
     for cell in p.cells:
         low, up = cell.parameters["a"]
         wanted = "proved" if low > 0 else "failed" if up < 0 else "undecided"
@@ -95,8 +96,79 @@ def test_where_a_multiplier_changes_sign_both_sides_are_decided():
 def test_where_a_gap_closes_the_rest_is_proved():
     c = problem({"wall": x, "lid": a - y}, x + y**2, [0, 0], a=1.0)
     p = prove(c, parameters={"a": (-0.5, 1.0)}, max_cells=60)
-    assert p.conditions[INACTIVE] == "failed"
+    assert p.conditions[INACTIVE] == "failed in part"
     assert p.proved_fraction == pytest.approx(2 / 3, abs=0.01)
+    assert p.failed_fraction == pytest.approx(1 / 3, abs=0.01)
+
+
+numbers = st.integers(-8, 8).map(lambda k: k / 4)
+
+
+@st.composite
+def linear_conditions(draw):
+    """Three linear forms in ``a``, ``b``: a multiplier, a gap and a curvature; all hold at 0."""
+    return [(draw(st.integers(1, 8)) / 4, draw(numbers), draw(numbers)) for _ in range(3)]
+
+
+@settings(max_examples=6)
+@given(linear_conditions(), st.booleans(), st.integers(0, 2**32))
+def test_cells_are_proved_or_failed_where_linear_conditions_say_so(forms, both, seed):
+    """A multiplier, a gap and a curvature that are linear in the parameters: the truth is known."""
+    multiplier, gap, curvature = (c0 + c1 * a + c2 * b for c0, c1, c2 in forms)
+    energy = multiplier * x + x**2 + (y - 1) ** 2 * curvature
+    c = problem({"wall": x, "other": y - 1 + gap}, energy, [0, 1], a=0.0, b=0.0)
+    box = dict.fromkeys({str(s) for f in (energy, gap) for s in f.free_symbols}, (-1.0, 2.0))
+    box = {name: side for name, side in box.items() if name in ("a", "b" if both else "a")}
+    if not box:
+        return
+    p = prove(c, parameters=box, max_cells=80)
+    assert covers_exactly(p.cells, box)
+    shares = p.proved_fraction, p.failed_fraction, sum(cell.volume for cell in p.undecided)
+    assert shares[0] + shares[1] + shares[2] / 3.0 ** len(box) == pytest.approx(1)
+    rng = np.random.default_rng(seed)
+    for cell in p.cells:
+        truths = {_all_hold(forms, point) for point in _points(cell.parameters, rng)}
+        assert cell.status == "undecided" or truths == {cell.status == "proved"}
+    for name, status in p.conditions.items():
+        everywhere = {cell.conditions[name] for cell in p.cells}
+        assert everywhere == {status} or status in ("failed in part", "undecided")
+        assert (status == "failed in part") == ("failed" in everywhere and len(everywhere) > 1)
+    if len(box) == 1:  # halving leaves at most one cell in 2^10 for each of the three ends
+        truth = np.mean([_all_hold(forms, (t, 0.0)) for t in np.linspace(-1, 2, 3001)[:-1] + 5e-4])
+        assert abs(p.proved_fraction - truth) < 0.01
+
+
+def _points(sides, rng):
+    """Return points inside a cell and near its corners, as pairs ``(a, b)``."""
+    for r in (*rng.uniform(size=(6, 2)), *np.array([[0, 0], [1, 0], [0, 1], [1, 1]])):
+        inner = 1e-9 + (1 - 2e-9) * r
+        ends = [sides.get(name, (0.0, 0.0)) for name in ("a", "b")]
+        yield tuple(low + t * (up - low) for t, (low, up) in zip(inner, ends, strict=True))
+
+
+def _all_hold(forms, point):
+    return all(c0 + c1 * point[0] + c2 * point[1] > 0 for c0, c1, c2 in forms)
+
+
+def test_a_wall_that_is_out_of_the_way_for_two_thirds_is_proved_on_these():
+    c = problem({"wall": x - a}, (x - 1) ** 2 + y**2, [1, 0], a=0.0)
+    p = prove(c, parameters={"a": (-1.0, 2.0)}, max_cells=60)
+    assert p.proved_fraction == pytest.approx(2 / 3, abs=0.01)
+    assert p.failed_fraction == pytest.approx(1 / 3, abs=0.01)
+    assert p.conditions[INACTIVE] == "failed in part"
+    assert "violated" in str(p)
+    q = prove(c, parameters={"a": (1.25, 2.0)})
+    assert q.conditions[INACTIVE] == "failed"
+    assert q.failed_fraction == 1.0
+    assert q.failed == q.cells
+
+
+def test_a_symmetry_that_holds_for_one_parameter_failed_in_part():
+    along = Symmetry(fields=[{"y": 1}])  # of the wall for a = 0 only
+    c = problem({"wall": x - a * y}, x - a * y + y**2, [0, 0], a=0.25)
+    assert prove(c, symmetry=along).conditions[SYMMETRIC] == "failed"
+    p = prove(c, parameters={"a": (-0.5, 0.5)}, symmetry=along, max_cells=9)
+    assert p.conditions[SYMMETRIC] == "failed in part"
 
 
 def test_a_fold_leaves_its_end_undecided():
