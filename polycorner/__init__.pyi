@@ -1,4 +1,4 @@
-from .errors import PolycornerError, SolverError
+from .errors import NonsmoothWarning, PolycornerError, SolverError
 from .formulas import SmoothFunction
 from .minimisation import (
     Certificate,
@@ -27,6 +27,7 @@ __all__ = [
     "Friction",
     "Manifold",
     "Minima",
+    "NonsmoothWarning",
     "PolycornerError",
     "Polyhedron",
     "Proof",

@@ -2,7 +2,8 @@
 
 Wrong use raises ``ValueError`` or ``TypeError`` at once; a numerical outcome is a
 :class:`~polycorner.minimisation.verdicts.Verdict`.  The exceptions here are for the rest: a
-numerical back end that fails.
+numerical back end that fails.  A formula that the library can only partly judge is announced by a
+warning when it is given.
 """
 
 from collections.abc import Iterable
@@ -14,6 +15,10 @@ class PolycornerError(Exception):
 
 class SolverError(PolycornerError):
     """A numerical back end stopped with an error of its own (chained as ``__cause__``)."""
+
+
+class NonsmoothWarning(UserWarning):
+    """A formula was given whose derivatives may jump: across a kink nothing is certified."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

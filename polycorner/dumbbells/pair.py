@@ -16,7 +16,8 @@ from polycorner import checks
 from polycorner.dumbbells import formulas
 from polycorner.dumbbells import symmetries as motions
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.polyhedra.groups import AllOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value

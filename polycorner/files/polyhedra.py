@@ -7,7 +7,8 @@ from polycorner.container import number, read_number
 from polycorner.files.formulas import formula_text, read_formula, symbols
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
+from polycorner.polyhedra.groups import AllOf, AnyOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
 
 Entries = dict[str, Any]

@@ -3,10 +3,11 @@
 import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from polycorner.formulas.expressions import kinks
 from polycorner.formulas.programs import Program
 from polycorner.formulas.translate import compile_expressions
 from polycorner.values import Value
@@ -66,6 +67,9 @@ class Family(Value):
         once the kernels are on disk; without one, it is computed from the expressions.
     unit : str
         Unit of the functions' values, such as ``"mm"``; ``""`` if none is stated.
+    kinks : mapping from str to tuple of str
+        The subexpressions across which derivatives of each function may jump.  A model that writes
+        its formulas on branches which fit together leaves it empty.
     """
 
     names: tuple[str, ...]
@@ -74,6 +78,7 @@ class Family(Value):
     formulas: "Callable[[], tuple[Expressions, Expressions]]"
     key: str = ""
     unit: str = ""
+    kinks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -91,7 +96,9 @@ class Family(Value):
         _check_new("definitions", tuple(definitions or ()), variables + parameters)
         given = {name: _sympified(name, e) for name, e in expressions.items()}
         known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
-        family = cls(tuple(given), variables, parameters, Written(known, given), unit=unit)
+        found = {name: kinks([e, *known.values()]) for name, e in given.items()}
+        written = Written(known, given)
+        family = cls(tuple(given), variables, parameters, written, unit=unit, kinks=found)
         return replace(family, key=family.program().digest())
 
     def program(self) -> Program:

@@ -1,5 +1,6 @@
 """Smooth functions on a manifold: one SymPy expression gives value, gradient and Hessian."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -7,13 +8,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.expressions import announce, check_periodic
 from polycorner.formulas.families import Family
 from polycorner.spaces.manifold import Array, Manifold, finite, reals, scalar
 from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
+
+
+def _words(argument: str, names: Sequence[str] | None) -> tuple[str, ...]:
+    if names is None:
+        return ()
+    if isinstance(names, str) or not isinstance(names, Sequence):
+        checks.refuse(argument, "a sequence of coordinate names", names, TypeError)
+    return tuple(names)
 
 
 class SmoothFunction(Value):
@@ -41,7 +52,13 @@ class SmoothFunction(Value):
     Raises
     ------
     ValueError
-        If a symbol is neither coordinate nor parameter, or a function has no compiled form.
+        If a symbol is neither coordinate nor parameter, a function has no compiled form, or the
+        expression is not periodic in a coordinate that is a circle.
+
+    Warns
+    -----
+    NonsmoothWarning
+        If derivatives may jump: the expression contains ``Abs``, ``Min``, ``Max`` or ``Piecewise``.
 
     Examples
     --------
@@ -64,13 +81,16 @@ class SmoothFunction(Value):
         definitions: "Mapping[str, sympy.Expr] | None" = None,
         unit: str = "",
     ) -> None:
-        if not isinstance(manifold, Manifold):
-            msg = f"manifold: expected a Manifold; got {type(manifold).__name__}"
-            raise TypeError(msg)
+        checks.instance("manifold", manifold, Manifold)
+        checks.instance("name", name, str)
+        for argument, given in (("parameters", parameters), ("definitions", definitions)):
+            checks.mapping(argument, {} if given is None else given)
         values = {str(symbol): value for symbol, value in (parameters or {}).items()}
-        formal = tuple(variables or manifold.names)
+        formal = _words("variables", variables) or manifold.names
+        bound = _words("reads", reads) or formal
         family = Family.of({name: expression}, formal, values, definitions, unit=unit)
-        self._bind(family, name, manifold, tuple(reads or formal), tuple(values.values()))
+        self._bind(family, name, manifold, bound, tuple(values.values()))
+        check_function(self)
 
     @classmethod
     def member(
@@ -138,6 +158,11 @@ class SmoothFunction(Value):
         return self.family.unit
 
     @property
+    def kinks(self) -> tuple[str, ...]:
+        """The parts of the expression across which derivatives may jump, as text."""
+        return self.family.kinks.get(self.member_name, ())
+
+    @property
     def expression(self) -> "sympy.Expr":
         """The SymPy expression in coordinates and parameter symbols."""
         import sympy
@@ -166,3 +191,17 @@ class SmoothFunction(Value):
     def hessian(self, q: ArrayLike) -> Array:
         """Return the second partial derivatives ``(..., n, n)``."""
         return self._bundle.evaluate(self.manifold.points(q), 2)[2][..., 0, :, :]
+
+
+def check_function(function: SmoothFunction) -> None:
+    """Warn of kinks, and raise ValueError for a function that is not periodic on a circle."""
+    announce(function.name, function.kinks)
+    if any(map(math.isfinite, (function.manifold.periods[i] for i in function.reads))):
+        family = function.family
+        check_periodic(
+            function.name,
+            family.expression(function.member_name),
+            function.manifold,
+            dict(zip(family.variables, function.reads, strict=True)),
+            dict(zip(family.parameters, function.parameters, strict=True)),
+        )

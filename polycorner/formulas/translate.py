@@ -1,5 +1,6 @@
 """SymPy expressions as straight-line programs."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property, partial, reduce
@@ -10,6 +11,7 @@ from polycorner.formulas.programs import Graph, Program
 if TYPE_CHECKING:
     import sympy
 
+LARGEST_POWER = 2**16  # up to which a power is a chain of multiplications
 UNARY = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
 
 
@@ -70,12 +72,22 @@ class _Translator:
         if kind in {"Symbol", "Dummy"}:
             return self._symbol(str(e))
         if getattr(e, "is_Rational", False) or getattr(e, "is_Float", False):
-            return self.graph.const(_exact(e))
+            return self._number(e)
         rule = self._rules.get(kind)
         if rule is None:
             msg = f"{self.subject}: the function {kind} has no compiled form; got {e}"
             raise ValueError(msg)
         return rule(e)
+
+    def _number(self, e: "sympy.Basic") -> int:
+        exact = _exact(e)
+        if exact and not 0 < _size(exact) < math.inf:
+            msg = (
+                f"{self.subject}: expected numbers that double precision can hold, between "
+                f"4.9e-324 and 1.8e308 in size; got {e.evalf(6)}"
+            )
+            raise ValueError(msg)
+        return self.graph.const(exact)
 
     def _symbol(self, name: str) -> int:
         if name not in self.names:
@@ -135,7 +147,7 @@ class _Translator:
         base, exponent = e.args
         if type(base).__name__ == "Exp1":
             return self.graph.unary("exp", self.translate(exponent))
-        if exponent.is_Rational:
+        if exponent.is_Rational and abs(exponent) <= LARGEST_POWER:
             return self.graph.power(self.translate(base), _exact(exponent))
         return self.graph.node("pow", self.translate(base), self.translate(exponent))
 
@@ -164,6 +176,13 @@ class _Translator:
         for value, condition in reversed(cases):
             result = self.graph.select(self.translate(condition), self.translate(value), result)
         return result
+
+
+def _size(number: Fraction) -> float:
+    try:
+        return abs(float(number))
+    except OverflowError:
+        return math.inf
 
 
 def _exact(number: "sympy.Basic") -> Fraction:

@@ -14,6 +14,7 @@ from polycorner.minimisation.conditions import (
     find_multipliers,
 )
 from polycorner.minimisation.problem import Problem
+from polycorner.minimisation.smoothness import obstacle
 from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.cones import Rows, inward_direction, null_space, rank
 from polycorner.polyhedra.polyhedron import Piece
@@ -97,6 +98,8 @@ class Analysis(Value):
         Its largest relative change there; infinite where a direction could not be followed.
     local : Local
         The derivatives all this was computed from.
+    obstacle : str
+        Why the functions are not twice differentiable at the point; empty if they are.
     """
 
     verdict: Verdict
@@ -112,6 +115,7 @@ class Analysis(Value):
     flat_verified: bool
     flat_change: float
     local: Local
+    obstacle: str = ""
 
     @property
     def signature(self) -> tuple[int, int, int]:
@@ -178,9 +182,21 @@ def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float)
     local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
     pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
     if not pieces or not np.isfinite(values[-1]):
-        return replace(_analyse_piece(local, frozenset()), verdict=Verdict.OUTSIDE)
+        return _without_conditions(local, Verdict.OUTSIDE, "")
+    reason = obstacle(problem, q, gradients, hessians, frozenset().union(*pieces))
+    if reason:
+        return _without_conditions(local, Verdict.NOT_SMOOTH, reason)
     analyses = [_analyse_piece(local, piece) for piece in pieces]
     return min(analyses, key=lambda a: DECISIVE.index(a.verdict))
+
+
+def _without_conditions(local: Local, verdict: Verdict, reason: str) -> Analysis:
+    """Return the analysis of a point at which the conditions cannot be applied."""
+    known = (np.where(np.isfinite(x), x, 0.0) for x in (local.gradients, local.hessians))
+    gradients, hessians = known
+    finite = replace(local, gradients=gradients, hessians=hessians)
+    found = _analyse_piece(finite, frozenset())
+    return replace(found, verdict=verdict, obstacle=reason, local=local)
 
 
 def _analyse_piece(local: Local, piece: Piece) -> Analysis:

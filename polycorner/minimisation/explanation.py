@@ -44,7 +44,9 @@ def explanation(
         Unit of the inequalities.
     """
     lines = [_headline(verdict, search), _position(a, stratum, unit)]
-    if a.verdict is not Verdict.OUTSIDE:
+    if a.obstacle:
+        lines.append(f"The conditions of first and second order do not apply: {a.obstacle}.")
+    elif a.verdict is not Verdict.OUTSIDE:
         lines += _first_order(a, unit)
         lines += _dependence(a)
         if a.stationary:
@@ -93,7 +95,7 @@ def _missed(a: Analysis, unit: str | None) -> str:
         worst = m + int(off.argmax())
         violated = f"the equation {d.equation_names[worst - m]}"
     else:
-        worst = int(abs(away[:m] - short).argmin())
+        worst = int(np.flatnonzero(away[:m] == short)[0])
         violated = f"the inequality {d.names[worst]}"
     text = (
         f"The largest violation is that of {violated}: its function is "

@@ -67,6 +67,7 @@ def residuals_at(problem: Problem, q: Array, multipliers: Mapping[str, float]) -
     away = distances(values[:-1], gradients[:-1])
     short = -d.implicit_of(away[:m]) if m else 0.0
     reference = max(abs(gradients[-1]).max(), abs(hessians[-1]).max()) or 1.0
+    pull, reference = (np.full(1, np.nan), 1.0) if not np.isfinite(reference) else (pull, reference)
     return Residuals(
         infeasibility=float(max(0.0, short, abs(away[m:]).max(initial=0.0))),
         stationarity=float(abs(pull).max() / reference),

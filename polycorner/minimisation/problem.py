@@ -61,9 +61,13 @@ class Problem(Value):
         return self.polyhedron.manifold.scale_array
 
     @cached_property
+    def functions(self) -> tuple[SmoothFunction, ...]:
+        """The function of every row."""
+        return (*self.polyhedron.functions, *self.polyhedron.equations, self.energy)
+
+    @cached_property
     def _bundle(self) -> Bundle:
-        d = self.polyhedron
-        return Bundle(d.manifold, (*d.functions, *d.equations, self.energy))
+        return Bundle(self.polyhedron.manifold, self.functions)
 
     def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
         """Return values ``(M,)``, scaled gradients ``(M, n)`` and scaled Hessians ``(M, n, n)``."""
@@ -77,9 +81,8 @@ class Problem(Value):
     @cached_property
     def parameter_values(self) -> dict[str, frozenset[float]]:
         """The values of every parameter of the functions, by name."""
-        d = self.polyhedron
         found: dict[str, frozenset[float]] = {}
-        for f in (*d.functions, *d.equations, self.energy):
+        for f in self.functions:
             for name, value in zip(f.family.parameters, f.parameters, strict=True):
                 found[name] = found.get(name, frozenset()) | {value}
         return found

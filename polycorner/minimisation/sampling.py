@@ -1,7 +1,7 @@
 """Start points of a multi-start search, given or sampled from a box."""
 
 from collections.abc import Sequence
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ def start_points(
 ) -> Array:
     """Return the start points ``(k, n)``, given or sampled, after checking them."""
     manifold = problem.polyhedron.manifold
-    if isinstance(starts, Integral):
+    if isinstance(starts, Real):
         count = checks.whole("starts", starts, least=1)
         return _sampled(problem, count, *_bounds(problem, box), checks.generator("rng", rng))
     if box is not None:

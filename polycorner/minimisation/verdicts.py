@@ -13,6 +13,7 @@ class Verdict(Enum):
     SADDLE = "not a minimum: stationary, but the energy decreases to second order"
     NO_MULTIPLIER = "undecided: no multipliers exist, and no direction points inward (a cusp)"
     UNDECIDED = "undecided: stationary, but the second order vanishes in a feasible direction"
+    NOT_SMOOTH = "undecided: a derivative that the conditions need jumps there or is not finite"
     OUTSIDE = "the point does not lie in the polyhedron"
     INFEASIBLE = "no point of the polyhedron was reached from the start"
     UNBOUNDED = "the energy decreases without end: unbounded below, or no minimum is attained"

@@ -16,7 +16,8 @@ import numpy as np
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
-from polycorner.polyhedra.polyhedron import AllOf, AnyOf, Polyhedron
+from polycorner.polyhedra.groups import AllOf, AnyOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold, finite, reals
 from polycorner.values import Value
 

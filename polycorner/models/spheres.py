@@ -19,7 +19,8 @@ from polycorner import checks
 from polycorner.formulas import cache
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.polyhedra.groups import AllOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Relabelling, Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value

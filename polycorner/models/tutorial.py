@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
-from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.polyhedra.groups import AllOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from polycorner.checks import mapping, names, real, refuse
+from polycorner.checks import instance, mapping, names, real, refuse
 from polycorner.formulas.families import Family
 from polycorner.motion.bodies import PairContacts
 from polycorner.motion.convex_sets import ConvexSet
@@ -23,18 +23,20 @@ PAIR = (1, 2)  # numbers of the two bodies of a pair in names of coordinates
 
 def velocities(manifold: Manifold) -> "Symbols":
     """Return the velocities as real SymPy symbols: ``x_dot`` for the coordinate ``x``."""
-    return _symbols(dotted(name) for name in manifold.names)
+    return _symbols(dotted(name) for name in instance("manifold", manifold, Manifold).names)
 
 
 def pair_coordinates(manifold: Manifold) -> "tuple[Symbols, Symbols]":
     """Return the coordinates of two bodies: of the coordinate ``x`` the symbols ``x1``, ``x2``."""
-    one, two = (_symbols(f"{name}{k}" for name in manifold.names) for k in PAIR)
+    given = instance("manifold", manifold, Manifold).names
+    one, two = (_symbols(f"{name}{k}" for name in given) for k in PAIR)
     return one, two
 
 
 def pair_velocities(manifold: Manifold) -> "tuple[Symbols, Symbols]":
     """Return the velocities of two bodies: for the coordinate ``x`` ``x1_dot`` and ``x2_dot``."""
-    one, two = (_symbols(dotted(f"{name}{k}") for name in manifold.names) for k in PAIR)
+    given = instance("manifold", manifold, Manifold).names
+    one, two = (_symbols(dotted(f"{name}{k}") for name in given) for k in PAIR)
     return one, two
 
 

@@ -1,4 +1,5 @@
-from .polyhedron import AllOf, AnyOf, Polyhedron
+from .groups import AllOf, AnyOf
+from .polyhedron import Polyhedron
 from .strata import LocalType, Stratum, stratum_at
 from .symmetry import Element, Symmetry
 

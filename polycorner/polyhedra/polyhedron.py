@@ -4,49 +4,26 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Union
+from typing import Any, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
-from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.description import description
+from polycorner.polyhedra.groups import AnyOf, Part, collect
 from polycorner.printing import Printed, Sheet
 from polycorner.spaces.manifold import Array, Manifold, scalar
 from polycorner.values import Value
 
-if TYPE_CHECKING:
-    import sympy
-
-Part = Union["AllOf", "AnyOf", SmoothFunction, "sympy.Expr"]
 # A model's remark on a point.
 Annotation = Callable[[Array], str | None]
 # A piece of the set: the positions of the functions that must all be at least zero.
 Piece = frozenset[int]
 
 MAX_SELECTIONS = 256
-
-
-class _Group(Value):
-    """Parts joined by one word; an immutable value."""
-
-    def __init__(self, *parts: Part) -> None:
-        self.parts = parts
-
-    def __repr__(self) -> str:
-        """Return the group as it would be written."""
-        return f"{type(self).__name__}({', '.join(map(repr, self.parts))})"
-
-
-class AllOf(_Group):
-    """The intersection of its parts: every inequality holds."""
-
-
-class AnyOf(_Group):
-    """The union of its parts: at least one inequality holds (locally concave corners)."""
 
 
 class Polyhedron(Printed, Value):
@@ -59,6 +36,7 @@ class Polyhedron(Printed, Value):
     parts : AllOf, AnyOf, SmoothFunction, SymPy expression, sequence or mapping
         The inequalities ``f >= 0``.  A sequence means all of them; a mapping gives names.
         Expressions without a name are called ``f1``, ``f2``, ..., or after the group's name.
+        ``Min`` and ``Max`` (and ``c - Abs(u)``) that stand outermost in an expression are groups.
     equations : the same kinds, optional
         Functions ``h = 0`` (sections), called ``h1``, ``h2``, ... without a name.
     annotations : mapping from str to callable, optional
@@ -68,7 +46,12 @@ class Polyhedron(Printed, Value):
     ------
     TypeError, ValueError
         For parts that are no functions, repeated names, functions on another manifold, symbols
-        that are no coordinates, or nothing at all.
+        that are no coordinates or not periodic on a circle, or nothing at all.
+
+    Warns
+    -----
+    NonsmoothWarning
+        For an expression with ``Abs``, ``Min``, ``Max`` or ``Piecewise`` inside.
 
     Examples
     --------
@@ -90,8 +73,8 @@ class Polyhedron(Printed, Value):
         checks.instance("manifold", manifold, Manifold)
         self.manifold = manifold
         self.annotations = dict(annotations or {})
-        tree, functions = _collect(manifold, "parts", parts, "f")
-        flat, sections = _collect(manifold, "equations", equations, "h")
+        tree, functions = collect(manifold, "parts", parts, "f")
+        flat, sections = collect(manifold, "equations", equations, "h")
         if any(isinstance(node, AnyOf) for node in _groups(flat)):
             msg = "equations: expected functions that all vanish; got an AnyOf"
             raise ValueError(msg)
@@ -282,64 +265,3 @@ def _check_distinct(names: Sequence[str]) -> None:
     if repeated:
         msg = f"parts: expected distinct names; got {', '.join(repeated)} more than once"
         raise ValueError(msg)
-
-
-def _collect(
-    manifold: Manifold, argument: str, parts: Any, letter: str
-) -> tuple[Any, list[SmoothFunction]]:
-    """Return the tree with every expression made a function, and its functions in order."""
-    named = parts.items() if isinstance(parts, Mapping) else None
-    if named is None and not isinstance(parts, Sequence):
-        parts = [parts]
-    items = list(named) if named is not None else [("", part) for part in parts]
-    plain: dict[str, Any] = {}
-    functions: list[SmoothFunction] = []
-    tree = AllOf(*[_named(manifold, argument, name, part, plain, letter) for name, part in items])
-    family = Family.of(plain, manifold.names) if plain else None
-    finished = _finished(tree, family, manifold, functions)
-    return finished, functions
-
-
-class _Plain:
-    """An expression waiting for the family that all plain expressions share."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-
-def _named(
-    manifold: Manifold, argument: str, name: str, part: Any, plain: dict[str, Any], letter: str
-) -> Any:
-    if isinstance(part, AllOf | AnyOf):
-        if isinstance(part, AnyOf) and not part.parts:
-            msg = f"{argument}: an AnyOf of nothing is empty; give it at least one part"
-            raise ValueError(msg)
-        inner = [_named(manifold, argument, "", p, plain, name or letter) for p in part.parts]
-        return type(part)(*inner)
-    if isinstance(part, SmoothFunction):
-        if part.manifold != manifold:
-            msg = (
-                f"{argument}: {part.name} lives on the coordinates "
-                f"{', '.join(part.manifold.names)}; expected {', '.join(manifold.names)}"
-            )
-            raise ValueError(msg)
-        return part.renamed(name) if name else part
-    if not isinstance(name, str):
-        msg = f"{argument}: expected names to be strings; got {name!r}"
-        raise TypeError(msg)
-    label = name or f"{letter}{len(plain) + 1}"
-    plain[label] = part
-    return _Plain(label)
-
-
-def _finished(
-    part: Any, family: Family | None, manifold: Manifold, functions: list[SmoothFunction]
-) -> Any:
-    if isinstance(part, AllOf | AnyOf):
-        return type(part)(*[_finished(p, family, manifold, functions) for p in part.parts])
-    if isinstance(part, _Plain):
-        assert family is not None
-        part = SmoothFunction.member(family, part.name, manifold)
-    if all(part is not f for f in functions):
-        functions.append(part)
-    return part

@@ -26,6 +26,7 @@ class LocalType(Enum):
     QUADRANT = "independent active gradients: locally a quadrant"
     CONE = "dependent active gradients: locally a convex cone, not a quadrant as it is written"
     UNION = "several branches meet: locally a union of convex cones"
+    NOT_SMOOTH = "an active function has no finite gradient there: the tip of a root, say"
     DEGENERATE = "the active gradients leave no inward direction: possibly a cusp, not a corner"
 
 
@@ -40,11 +41,11 @@ class Stratum(Printed, Value):
     pieces : tuple of tuple of str
         The polyhedron near the point as a union: each piece is where its functions are >= 0.
     rank : int
-        Rank of the gradients of active functions and equations.
+        Rank of the gradients of active functions and equations, as far as they are finite.
     dimension : int
         Dimension of the face, ``n - rank``.
     local_type : LocalType
-        Interior, quadrant, cone, union, degenerate, or outside.
+        Interior, quadrant, cone, union, degenerate, not smooth, or outside.
     annotations : mapping from str to str or None
         The model's remarks on the point, such as ``{"chirality": "R"}``.
     """
@@ -109,6 +110,7 @@ def stratum_at(
     >>> stratum_at(Polyhedron(M, {"floor": y, "wall": x}), [0.0, 0.0]).dimension
     0
     """
+    checks.instance("polyhedron", polyhedron, Polyhedron)
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     point = polyhedron.manifold.point(q)
@@ -117,13 +119,15 @@ def stratum_at(
     active = sorted(set().union(*pieces))
     m, n = len(polyhedron.functions), polyhedron.dimension
     jacobian = gradients[[*active, *range(m, len(values))]]
-    r = rank(jacobian, rank_tolerance)
+    known = np.isfinite(jacobian).all(axis=1)
+    r = rank(jacobian[known], rank_tolerance)
+    kind = _local_type(pieces, gradients, m, rank_tolerance) if known.all() else None
     return Stratum(
         active=tuple(polyhedron.names[i] for i in active),
         pieces=tuple(tuple(polyhedron.names[i] for i in sorted(piece)) for piece in pieces),
         rank=r,
         dimension=n - r,
-        local_type=_local_type(pieces, gradients, m, rank_tolerance),
+        local_type=kind or LocalType.NOT_SMOOTH,
         annotations={name: label(point) for name, label in polyhedron.annotations.items()},
     )
 
@@ -135,10 +139,19 @@ def evaluated(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array]:
 
 
 def distances(values: Array, gradients: Array) -> Array:
-    """Return signed distances ``f / |grad f|``, infinite where the gradient alone vanishes."""
+    """Return signed distances ``f / |grad f|``.
+
+    Infinite where ``f`` is not zero and its gradient vanishes or is not finite; NaN where ``f`` is
+    not finite.
+    """
     sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
     far = np.where(values == 0, 0.0, np.copysign(np.inf, values))
-    return np.asarray(np.divide(values, sizes, out=far, where=sizes > 0))
+    far[~np.isfinite(values)] = np.nan
+    return np.asarray(
+        np.divide(
+            values, sizes, out=far, where=(sizes > 0) & np.isfinite(sizes) & np.isfinite(values)
+        )
+    )
 
 
 def local_pieces(

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import sympy
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction
 from polycorner.dumbbells import DumbbellPair
@@ -13,9 +14,12 @@ from polycorner.models import Pinball, SphereCluster, TorusDisks, Tutorial
 
 M = Manifold(("x", "turn"), (math.inf, math.tau), (2.0, 0.1), ("m", "rad"))
 X, T = M.symbols
-BALL = SmoothFunction("ball", X**2 + T, M, unit="m^2")
+BALL = SmoothFunction("ball", X**2 + sympy.sin(T), M, unit="m^2")
 OWN = Polyhedron(
-    M, AllOf(AnyOf(BALL, AllOf(X - 0.1, 2 - X)), BALL, T / 3), {"flat": X * T}, annotations={}
+    M,
+    AllOf(AnyOf(BALL, AllOf(X - 0.1, 2 - X)), BALL, sympy.cos(T) / 3),
+    {"flat": X * sympy.cos(2 * T)},
+    annotations={},
 )
 PAIR = DumbbellPair(16, 3, 1.5, 125)
 POLYHEDRA = [

@@ -316,3 +316,9 @@ REFUSED = [
 @pytest.mark.parametrize(("call", "kind", "argument"), REFUSED)
 def test_wrong_arguments_are_named(call, kind, argument):
     refused(argument, call, kind)
+
+
+@pytest.mark.parametrize("starts", [2.5, -1.0, math.nan])
+def test_a_number_of_starts_is_whole(starts):
+    with pytest.raises(TypeError, match="starts: expected a whole number >= 1; got"):
+        minima(D, E, starts=starts)

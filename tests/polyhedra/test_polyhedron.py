@@ -201,7 +201,7 @@ class TestNames:
         [
             ([SmoothFunction("f", x, PLANE), SmoothFunction("f", y, PLANE)], (), "f"),
             ({"a": x}, {"a": y}, "a"),
-            ({"f2": x, "": y}, (), "f2"),
+            ({"f1": x, "": y}, (), "f1"),
             ([FUNCTIONS[0]], {"right": y}, "right"),
             ([FUNCTIONS[0]], [FUNCTIONS[0]], "right"),
         ],

@@ -269,3 +269,8 @@ class TestAnswers:
     def test_the_point_is_one_point(self, q):
         with pytest.raises(ValueError, match=r"^q: "):
             stratum_at(CUBE, q)
+
+
+def test_a_list_is_no_polyhedron():
+    with pytest.raises(TypeError, match="polyhedron: expected a Polyhedron; got list"):
+        stratum_at([x], [0.0, 0.0, 0.0])

@@ -327,7 +327,8 @@ def minimiser_heading(drum: DumbbellDrum, *, azimuth: float = 0.0) -> float:
     import sympy
 
     from polycorner.minimisation import minimise
-    from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+    from polycorner.polyhedra.groups import AllOf
+    from polycorner.polyhedra.polyhedron import Polyhedron
 
     pair = replace(drum, count=2).pair
     start = pair.nested("R")

@@ -18,7 +18,8 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.disks.configurations import SAME, CriticalConfiguration, coincide
 from polycorner.models.disks.critical import CriticalSearch
 from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrapped
-from polycorner.polyhedra.polyhedron import AllOf, Polyhedron
+from polycorner.polyhedra.groups import AllOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array, Manifold, scalar
 from polycorner.values import Value
