@@ -248,7 +248,7 @@ def nested_union(rng: np.random.Generator) -> Case:
 
 
 def energy_kink(rng: np.random.Generator) -> Case:
-    """A kink of either sign on either side of 0, or in it."""
+    """Bend the energy in a kink of either sign, on either side of 0 or in it."""
     s, pull = _small(rng, 4) * int(rng.integers(-1, 2)), _sign(rng)
     bent = U1**2 + U2**2 + pull * Max(0, U1 - s)
     if s > 0:
