@@ -1,0 +1,60 @@
+"""One problem in a process of its own, so that a crash or an endless computation ends there.
+
+A task is a generator of facts (dictionaries), yielded as they become known: what it has yielded
+before it is stopped is kept.
+"""
+
+import multiprocessing
+import signal
+import traceback
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from time import perf_counter
+from typing import Any
+
+Facts = dict[str, Any]
+Task = Callable[..., Iterator[Facts]]
+
+
+def staged(task: Task, *arguments: object, seconds: float) -> Facts:
+    """Run a task in a child process for at most the given time and return its facts.
+
+    An exception is under ``"crash"`` with its traceback; a task that was stopped has
+    ``"stopped"``, the time it had.
+    """
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    child = context.Process(target=_run, args=(there, task, arguments), daemon=True)
+    child.start()
+    there.close()
+    facts: Facts = {}
+    end = perf_counter() + seconds
+    while (message := _receive(here, end - perf_counter())) is not None:
+        facts |= message
+    finished = facts.pop("finished", False)
+    if not finished:
+        alive = child.is_alive() and perf_counter() >= end
+        facts |= {"stopped": seconds} if alive else {"crash": "the process ended"}
+        child.kill()
+    child.join()
+    here.close()
+    return facts
+
+
+def _receive(connection: Connection, seconds: float) -> Facts | None:
+    try:
+        message: Facts | None = connection.recv() if connection.poll(max(seconds, 0.0)) else None
+    except EOFError:
+        return None
+    return message
+
+
+def _run(connection: Connection, task: Task, arguments: tuple[object, ...]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        for facts in task(*arguments):
+            connection.send(facts)
+    except Exception as error:  # whatever it is, it is the result
+        first = f"{type(error).__name__}: {error}"
+        connection.send({"crash": first, "traceback": traceback.format_exc()})
+    connection.send({"finished": True})
