@@ -72,18 +72,44 @@ class Judge:
 
     def confirmed(self, q: Array, p: Array) -> float:
         """Return how much lower ``p`` is than ``q`` beyond the margin, or 0 if it is not."""
-        with mpmath.workdps(30):
-            try:
-                before, after = (self._digits([mpmath.mpf(x) for x in z]) for z in (q, p))
-                gain = mpmath.re(before[0]) - mpmath.re(after[0])
-                g = after[1 : 1 + len(self.inequalities)]
-                h = after[1 + len(self.inequalities) :]
-                worst = max([0, *(-mpmath.re(v) for v in g), *(abs(v) for v in h)])
-            except (ArithmeticError, ValueError, TypeError):
-                return 0.0
+        before, after = self._exactly(q), self._exactly(p)
+        if before is None or after is None:
+            return 0.0
+        gain, worst = before[0] - after[0], after[1]
         slope = self._slope(q)
         margin = 1e-11 * (1 + abs(before[0])) + slope * 1e-12 * (1 + np.abs(q).max())
         return float(gain) if worst <= FEASIBLE and gain > margin + 1e3 * worst else 0.0
+
+    def _exactly(self, q: Array) -> tuple[mpmath.mpf, mpmath.mpf] | None:
+        """Return energy and violation with 30 digits, or None where they are not real."""
+        with mpmath.workdps(30):
+            try:
+                parts = [mpmath.mpmathify(v) for v in self._digits([mpmath.mpf(x) for x in q])]
+            except (ArithmeticError, ValueError, TypeError):
+                return None
+            if any(mpmath.im(v) != 0 or not mpmath.isfinite(v) for v in parts):
+                return None
+            energy, *others = map(mpmath.re, parts)
+            m = len(self.inequalities)
+            return energy, max([mpmath.mpf(0), *(-v for v in others[:m]), *map(abs, others[m:])])
+
+    def as_low(self, q: Array) -> tuple[float, ...] | None:
+        """Return a point nearby on an axis or a diagonal with the very same energy, if any is."""
+        q = np.asarray(q, float)
+        rays = [*np.eye(len(q)), *(a + b for a in np.eye(len(q)) for b in np.eye(len(q)))]
+        for ray in [*rays, *(-r for r in rays)]:
+            ends = [self.carried(q + length * ray) for length in (0.1, 0.05)]
+            if all(self._same(q, p) for p in ends):
+                return tuple(map(float, ends[0]))
+        return None
+
+    def _same(self, q: Array, p: Array) -> bool:
+        before, after = self._exactly(q), self._exactly(p)
+        if before is None or after is None or np.abs(p - q).max() < NEAR:
+            return False
+        return bool(
+            after[1] <= FEASIBLE and abs(before[0] - after[0]) <= 1e-26 * (1 + abs(before[0]))
+        )
 
     def _slope(self, q: Array) -> float:
         return float(np.nan_to_num(np.abs(_jacobian(lambda z: self.values(z)[0], q)).max()))
@@ -190,6 +216,12 @@ class Judge:
             if self.violation(p) <= FEASIBLE:
                 return p
         return None
+
+    def reachable(self, q: Array, generator: np.random.Generator) -> bool:
+        """Whether feasible points exist and the violation decreases clearly from ``q``."""
+        if not self.less_violated_nearby(q, generator):
+            return False
+        return self.feasible_point(q, generator) is not None
 
     def less_violated_nearby(self, q: Array, generator: np.random.Generator) -> bool:
         """Whether points within 1e-2 of ``q`` violate the constraints clearly less."""
