@@ -3,7 +3,7 @@
 PYTEST := .venv/bin/python -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad paper test cores thorough lint format types imports docs links bench constraints clean
+.PHONY: help env env-pip dyad paper test cores thorough lint format types imports docs links bench trials constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -76,6 +76,10 @@ links: .venv/.dev ## external links of the documentation (needs the network)
 bench: .venv/.bench ## side-by-side runs against other tools
 	@set -e; for file in $(wildcard benchmarks/bench_*.py); do \
 	    echo "$$file"; .venv/bin/python "$$file"; done
+
+trials: .venv/.dev ## correctness on problems that strangers bring, about an hour
+	@set -e; for trial in hock_schittkowski random_formulas adversarial; do \
+	    .venv/bin/python -m benchmarks.trials.run_$$trial; done
 
 # ---------------------------------------------------------------------------------------- upkeep
 

@@ -1,10 +1,13 @@
 """The problems of the trials, and what judges the answers to them."""
 
+import numpy as np
 import pytest
 import sympy
 from sympy import pi, sqrt
 
 from benchmarks.trials.hock_schittkowski import problems
+from benchmarks.trials.judge import Judge
+from benchmarks.trials.stages import staged
 from polycorner import minimise
 
 # Solutions in the book, rounded to seven digits or eight decimals where it gives no closed form.
@@ -14,7 +17,6 @@ PUBLISHED = {
     "HS56": (2.4, 1.2, 1.2, *[sympy.asin(sqrt(sympy.Rational(k, 7))) for k in (4, 2, 2)], pi / 2),
     "HS63": (3.512118, 0.2169882, 3.552174),
     "HS68": (0.06785874, 3.6461717, 0.00026617, 0.8948622),
-    "HS70": (12.27695, 4.631788, 0.3128625, 2.029290),
     "HS71": (1, 4.742999, 3.821150, 1.379408),
     "HS84": (4.537431, 2.4, 60, 9.3, 7),
     "HS87": (107.8119, 196.3186, 373.8307, 420, 21.30713, 0.1532920),
@@ -57,3 +59,77 @@ class TestHockSchittkowski:
         assert float(problem.energy.subs(dict(zip(problem.symbols, found.point, strict=True)))) == (
             pytest.approx(problem.best, rel=1e-8)
         )
+
+
+x, y = sympy.symbols("x y", real=True)
+
+
+def refuted(energy, inequalities=(), equations=(), at=(0.0, 0.0)):
+    judge = Judge((x, y), energy, list(inequalities), list(equations))
+    return next(judge.lower_points(np.array(at), np.random.default_rng(0)), None) is not None
+
+
+class TestJudge:
+    @pytest.mark.parametrize(
+        ("energy", "inequalities", "equations"),
+        [
+            ((x + 1) ** 2 + y, [x**2, y], []),
+            (-(x**4) + y**2, [], []),
+            (x * sympy.Abs(x) + y**2, [], []),
+            ((y - x**2) * (y - 2 * x**2), [], []),
+            (x * y, [x + y], []),
+            (x, [], [x - y**3]),
+            (-x, [sympy.Max(-x, y)], []),
+        ],
+    )
+    def test_it_refutes_what_is_no_minimum(self, energy, inequalities, equations):
+        assert refuted(energy, inequalities, equations)
+
+    @pytest.mark.parametrize(
+        ("energy", "inequalities", "equations"),
+        [
+            (x**4 + y**2, [], []),
+            (x * y, [x, y], []),
+            (sympy.Abs(x) + y**2, [], []),
+            (x**2 - y, [], [y - x**2]),
+            (x, [sympy.Max(x, y), x + y], [x - y**2]),
+        ],
+    )
+    def test_it_does_not_refute_minima(self, energy, inequalities, equations):
+        assert not refuted(energy, inequalities, equations)
+
+    def test_a_minimum_with_a_lower_valley_behind_a_barrier_is_not_refuted(self):
+        assert not refuted(x**2 * (x - 1) ** 2 - x**3 / 100 + y**2, at=(0.0, 0.0))
+
+    def test_it_finds_points_that_are_just_as_low(self):
+        origin = np.zeros(2)
+        assert Judge((x, y), (x - y) ** 2, [], []).as_low(origin) is not None
+        assert Judge((x, y), x**4 + y**6, [], []).as_low(origin) is None
+
+
+def facts_then(end):
+    yield {"before": 1}
+    end()
+    yield {"after": 2}
+
+
+def raise_division():
+    return 1 // 0
+
+
+def wait():
+    while True:
+        pass
+
+
+class TestStages:
+    def test_a_task_that_ends_returns_everything(self):
+        assert staged(facts_then, list, seconds=30) == {"before": 1, "after": 2}
+
+    def test_what_was_known_before_a_crash_is_kept(self):
+        facts = staged(facts_then, raise_division, seconds=30)
+        assert facts["before"] == 1
+        assert facts["crash"].startswith("ZeroDivisionError")
+
+    def test_what_was_known_before_the_time_was_over_is_kept(self):
+        assert staged(facts_then, wait, seconds=0.5) == {"before": 1, "stopped": 0.5}
