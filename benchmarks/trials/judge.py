@@ -19,9 +19,12 @@ import sympy
 from scipy.optimize import OptimizeWarning, minimize
 
 Array = np.ndarray
+Parts = tuple[mpmath.mpf, list[mpmath.mpf], list[mpmath.mpf]]  # energy, inequalities, equations
 RADII = (1e-3, 1e-2, 3e-2, 1e-1)
+TINY = (1e-9, 1e-7, 1e-5)  # for what is claimed to be no minimum, beside poles
 NEAR = 1e-2  # at which a lower point refutes without looking at the way to it
 FEASIBLE = 1e-9
+EXACT = 1e-24  # violation of a point that counts, with 30 digits
 SAME = 1e-6  # relative difference at which two energies count as the same
 STEPS = 12  # on the way to a lower point
 
@@ -72,16 +75,46 @@ class Judge:
 
     def confirmed(self, q: Array, p: Array) -> float:
         """Return how much lower ``p`` is than ``q`` beyond the margin, or 0 if it is not."""
-        before, after = self._exactly(q), self._exactly(p)
+        before, after = self._exactly(q), self._exactly(self._polished(p))
         if before is None or after is None:
             return 0.0
         gain, worst = before[0] - after[0], after[1]
         slope = self._slope(q)
         margin = 1e-11 * (1 + abs(before[0])) + slope * 1e-12 * (1 + np.abs(q).max())
-        return float(gain) if worst <= FEASIBLE and gain > margin + 1e3 * worst else 0.0
+        return float(gain) if worst <= EXACT and gain > margin else 0.0
 
-    def _exactly(self, q: Array) -> tuple[mpmath.mpf, mpmath.mpf] | None:
+    def _polished(self, p: Array) -> list[mpmath.mpf]:
+        """Return ``p`` moved onto the set by Newton's method with 30 digits, as far as it goes.
+
+        Where gradients vanish it does not go far, and nothing is concluded from such a point.
+        """
+        with mpmath.workdps(30):
+            point = [mpmath.mpf(x) for x in p]
+            for _ in range(10):
+                here = self._parts(point)
+                if here is None or _worst(here) <= EXACT:
+                    break
+                c = [*(g for g in here[1] if g < 0), *here[2]]
+                size = max(map(abs, c))
+                near = np.array([float(x) for x in point])
+                rows = [i for i, g in enumerate(here[1]) if g < 0]
+                J = _jacobian(lambda z, rows=rows: self._chosen(z, rows), near)
+                if not np.isfinite(J).all():
+                    break
+                step = np.linalg.lstsq(J, np.array([float(v / size) for v in c]), rcond=1e-6)[0]
+                point = [x - size * mpmath.mpf(float(s)) for x, s in zip(point, step, strict=True)]
+        return point
+
+    def _chosen(self, z: Array, rows: list[int]) -> Array:
+        _, g, h = self.values(z)
+        return np.concatenate([g[rows], h])
+
+    def _exactly(self, q: Sequence[Any]) -> tuple[mpmath.mpf, mpmath.mpf] | None:
         """Return energy and violation with 30 digits, or None where they are not real."""
+        parts = self._parts(q)
+        return None if parts is None else (parts[0], _worst(parts))
+
+    def _parts(self, q: Sequence[Any]) -> Parts | None:
         with mpmath.workdps(30):
             try:
                 parts = [mpmath.mpmathify(v) for v in self._digits([mpmath.mpf(x) for x in q])]
@@ -91,7 +124,7 @@ class Judge:
                 return None
             energy, *others = map(mpmath.re, parts)
             m = len(self.inequalities)
-            return energy, max([mpmath.mpf(0), *(-v for v in others[:m]), *map(abs, others[m:])])
+            return energy, others[:m], others[m:]
 
     def as_low(self, q: Array) -> tuple[float, ...] | None:
         """Return a point nearby on an axis or a diagonal with the very same energy, if any is."""
@@ -104,12 +137,10 @@ class Judge:
         return None
 
     def _same(self, q: Array, p: Array) -> bool:
-        before, after = self._exactly(q), self._exactly(p)
+        before, after = self._exactly(q), self._exactly(self._polished(p))
         if before is None or after is None or np.abs(p - q).max() < NEAR:
             return False
-        return bool(
-            after[1] <= FEASIBLE and abs(before[0] - after[0]) <= 1e-26 * (1 + abs(before[0]))
-        )
+        return bool(after[1] <= EXACT and abs(before[0] - after[0]) <= 1e-26 * (1 + abs(before[0])))
 
     def _slope(self, q: Array) -> float:
         return float(np.nan_to_num(np.abs(_jacobian(lambda z: self.values(z)[0], q)).max()))
@@ -138,12 +169,16 @@ class Judge:
         return functions
 
     def lower_points(
-        self, q: Array, generator: np.random.Generator, directions: int = 150
+        self,
+        q: Array,
+        generator: np.random.Generator,
+        radii: Sequence[float] = RADII,
+        directions: int = 150,
     ) -> Iterator[Lower]:
         """Yield confirmed lower points that refute ``q`` as a local minimum, nearest first."""
         q = np.asarray(q, float)
         size = np.maximum(1.0, abs(q))
-        for radius in RADII:
+        for radius in radii:
             candidates = [*self._sampled(q, radius * size, generator, directions)]
             candidates += self._descended(q, radius * size, generator)
             best = min(candidates, key=lambda c: c[0], default=None)
@@ -244,6 +279,10 @@ class Judge:
         _, g, h = self.values(q)
         total = float(np.sum(np.minimum(g, 0) ** 2) + np.sum(h**2))
         return total if np.isfinite(total) else np.inf
+
+
+def _worst(parts: Parts) -> mpmath.mpf:
+    return max([mpmath.mpf(0), *(-g for g in parts[1]), *map(abs, parts[2])])
 
 
 def _real(value: Any) -> float:

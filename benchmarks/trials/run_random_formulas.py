@@ -23,7 +23,7 @@ import numpy as np
 import polycorner
 from benchmarks.side_by_side import print_table, write
 from benchmarks.trials import random_formulas
-from benchmarks.trials.judge import FEASIBLE, Judge
+from benchmarks.trials.judge import FEASIBLE, RADII, TINY, Judge
 from benchmarks.trials.random_formulas import Problem
 from benchmarks.trials.stages import Facts, staged
 from polycorner import (
@@ -100,7 +100,12 @@ def judged(judge: Judge, certificate: Certificate, verdict: Verdict) -> tuple[st
         return "wrong", f"{name}: violation {outside:.1e} only"
     if verdict is Verdict.INFEASIBLE and judge.reachable(q, generator):
         return "wrong", f"{name}: feasible points exist, and the violation decreases"
-    if verdict in NOT_MINIMA and next(judge.lower_points(q, generator), None) is None:
+    defined = np.isfinite(judge.values(q)[0])
+    if (
+        verdict in NOT_MINIMA
+        and defined
+        and not any(judge.lower_points(q, generator, (*TINY, *RADII)))
+    ):
         return "doubted", f"{name}: nothing lower was found nearby"
     return "declined", name
 
