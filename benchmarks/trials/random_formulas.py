@@ -2,7 +2,7 @@
 
 Formulas are trees of sums, products, quotients, powers, roots, exponentials, logarithms, circular
 functions, ``Abs``, ``Max``, ``Min`` and ``Piecewise``, in one to four variables on lines and
-circles.  A fifth of the problems is degenerate by construction: vanishing gradients, repeated and
+circles.  A quarter of the problems is degenerate by construction: vanishing gradients, repeated and
 redundant contacts, flat energies, starts on singular points.
 """
 
@@ -93,7 +93,7 @@ def problem(seed: int, number: int) -> Problem:
     circles = tuple(bool(g.random() < 0.2) for _ in range(n))
     x = tuple(sympy.symbols(list("xyzw"[:n]), real=True))
     start = tuple(float(v) for v in g.integers(-8, 9, n) / 4)
-    make = _degenerate if g.random() < 0.2 and not any(circles) else _generic
+    make = _degenerate if g.random() < 0.35 and not any(circles) else _generic
     energy, inequalities, equations, special = make(g, x, circles, start)
     name = f"{seed}/{number}"
     return Problem(name, x, circles, energy, inequalities, equations, start, special)

@@ -128,7 +128,11 @@ def main() -> None:
     columns = ["", "class", "verdict", "energy", "best known", "SLSQP", "proof", "s"]
     print_table("Hock-Schittkowski", columns, [row(name, facts) for name, facts in results.items()])
     counts = Counter(facts["class"] for facts in results.values())
-    proofs = Counter(facts["proof"] for facts in results.values() if "proof" in facts)
+    proofs = Counter(
+        "FALSE" if facts["class"] == "wrong" and facts["proof"] == "proved" else facts["proof"]
+        for facts in results.values()
+        if "proof" in facts
+    )
     print({name: counts[name] for name in CLASSES}, "proofs", dict(proofs))
     if not sys.argv[1:]:
         write("hock_schittkowski", {"counts": counts, "proofs": proofs, "problems": results})

@@ -41,7 +41,7 @@ SECONDS = 60.0
 SEED = 1
 WORST = ("crash", "wrong", "stopped", "doubted", "right", "declined")
 PACKAGE = str(Path(polycorner.__file__).parent)
-NOT_MINIMA = (Verdict.NOT_STATIONARY, Verdict.SADDLE)
+NOT_MINIMA = (Verdict.NOT_STATIONARY, Verdict.SADDLE, Verdict.UNBOUNDED)
 
 
 class RefusedError(Exception):
@@ -193,9 +193,20 @@ def main() -> None:
     rows = [[c, counts[c], *(table[w]["claims"].get(c, 0) for w in table)] for c in WORST]
     print_table("random formulas", ["", "problems", *table], rows)
     print({what: table[what]["proofs"] for what in table}, "false proofs", false)
-    if len(sys.argv) == 1:
-        shown = {"counts": counts, "claims": table, "false proofs": false, "problems": results}
-        write("random_formulas", shown)
+    why = {what: declined(what, results) for what in table}
+    for what, reasons in why.items():
+        print(f"{what} declined: {dict(reasons)}")
+    shown = {"counts": counts, "claims": table, "declined": why, "false proofs": false}
+    write("random_formulas", {**shown, "problems": results})
+
+
+def declined(what: str, results: dict[str, Facts]) -> Counter[str]:
+    """Return how often each verdict was given instead of a minimum; a refusal is "in words"."""
+    names = {verdict.name for verdict in Verdict}
+    given = (facts[what] for facts in results.values() if what in facts)
+    return Counter(
+        reason if reason in names else "in words" for c, reason in given if c == "declined"
+    )
 
 
 def _warm() -> None:
