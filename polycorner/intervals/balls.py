@@ -130,6 +130,30 @@ def dot(u: "Sequence[Any]", v: "Sequence[Any]") -> Ball:
     return sum((a * b for a, b in zip(u, v, strict=True)), ball(0))
 
 
+def integer_relation(numbers: "Sequence[Ball]") -> list[int] | None:
+    """Return small whole numbers with which the sum of some balls may vanish.
+
+    The first of them is not zero.  It is found by lattice reduction ([LLL]) and proves nothing.
+    None where it is as long as one for random numbers known to this accuracy would be.
+    """
+    from flint import fmpz_mat
+
+    radius = max(exact(x.rad()) for x in numbers)
+    bits = min(current_precision(), _bits(1 / radius) if radius else current_precision())
+    scaled = [round(exact(x.mid()) * 2**bits) for x in numbers]
+    n = len(numbers)
+    rows = [[*(int(i == j) for j in range(n)), scaled[i]] for i in range(n)]
+    for row in fmpz_mat(rows).lll().tolist():
+        found = [int(entry) for entry in row[:n]]
+        if found[0]:
+            return found if sum(m.bit_length() for m in found) <= bits // 2 else None
+    return None
+
+
+def _bits(number: Fraction) -> int:
+    return max(0, number.numerator.bit_length() - number.denominator.bit_length())
+
+
 # ------------------------------------------------------------------------------- bounds of a ball
 
 

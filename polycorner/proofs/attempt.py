@@ -1,7 +1,8 @@
 """Attempts at a proof: enclosures of the KKT points of the faces of a certificate."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import ceil
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,13 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.minimisation import Certificate, Entrapment
 from polycorner.proofs.claims import Posed, faces, pose_claim
+from polycorner.proofs.hypotheses import (
+    INACTIVE,
+    ConditionResult,
+    Status,
+    check_hypotheses,
+    without_enclosure,
+)
 from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import SUBJECT, newton
 from polycorner.proofs.krawczyk import Enclosure, enclose
@@ -19,21 +27,28 @@ if TYPE_CHECKING:
 BITS_PER_DIGIT = 3.3220
 GUARD_BITS = 64
 NEARBY = 1e-3  # distance of the exact solution from a certificate's point, in scale units
+MOST_FACES = 8  # on which a proof is tried
+MOST_DOUBLINGS = 3  # of the precision, until every condition is decided
+MOST_SINGULAR = 1  # of the precision, where the equations seem to be singular
+PROVED = 3  # the rank of an attempt at which nothing is left open
+FAR = f"{SUBJECT} near the point"
 LEAST_SIZE = 1e-10  # size in units below which digits are relative to the unit
 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """Claim and enclosure for one face.
+    """Claim, enclosure and conditions for one face.
 
     Attributes
     ----------
     face : tuple of int
-        The active functions.
+        The rows held: active functions, then equations.
     posed : Posed or Undecided
         The claim that the face carries a minimum, or why it could not be posed.
     enclosure : Enclosure or Undecided
         Its KKT point enclosed, or why not.
+    found : mapping from str to ConditionResult
+        The conditions.
     bits : int
         Working precision in binary digits.
     """
@@ -41,26 +56,60 @@ class Attempt:
     face: tuple[int, ...]
     posed: Posed | Undecided
     enclosure: Enclosure | Undecided
+    found: Mapping[str, ConditionResult]
     bits: int
+
+    @property
+    def open(self) -> bool:
+        """Whether a condition is undecided."""
+        return any(result.status is Status.UNDECIDED for result in self.found.values())
+
+    @property
+    def rank(self) -> int:
+        """How much is known: nothing, a point, a point of the set, a minimum."""
+        if isinstance(self.enclosure, Undecided):
+            return 0
+        if all(result.status is Status.PROVED for result in self.found.values()):
+            return 3
+        return 2 if self.found[INACTIVE].status is Status.PROVED else 1
 
 
 def attempt(
     certificate: Certificate, fields: Sequence[Generator], formulas: Formulas, digits: int
 ) -> Attempt:
-    """Enclose the KKT point of a face that carries the energy.
+    """Prove a minimum on one of the faces that may carry the energy's gradient.
 
-    With dependent gradients there may be several such faces; preferred is the first at whose point
-    the signs of all other functions are decided.
+    Where none is proved, the first at whose point most is known is returned.  Functions that are
+    active within the certificate's tolerance but violated at the KKT point of a face join it for
+    another attempt.
     """
-    first: Attempt | None = None
-    for face in faces(certificate):
-        result, decided = _on_face(certificate, face, fields, formulas, digits)
-        if decided:
-            return result
-        if first is None or isinstance(first.enclosure, Undecided):
-            first = result
-    assert first is not None
-    return first
+    best: Attempt | None = None
+    tried: set[tuple[int, ...]] = set()
+    waiting = faces(certificate)
+    while len(tried) < MOST_FACES and (face := next(waiting, None)) is not None:
+        if face in tried:
+            continue
+        tried.add(face)
+        result = _on_face(certificate, face, fields, formulas, digits)
+        if best is None or result.rank > best.rank:
+            best = result
+        if result.rank == PROVED:
+            break
+        missed = _missed(certificate, result, formulas)
+        if missed:
+            waiting = chain([tuple(sorted((*face, *missed)))], waiting)
+    assert best is not None
+    return best
+
+
+def _missed(certificate: Certificate, result: Attempt, formulas: Formulas) -> list[int]:
+    """Return the active functions that are violated at the KKT point of a face."""
+    others = [i for i in certificate.analysis.active if i not in result.face]
+    if isinstance(result.enclosure, Undecided) or not others:
+        return []
+    with precision(result.bits):
+        values = formulas.values(result.enclosure.neighbourhood(), others)
+    return [i for i, value in zip(others, values, strict=True) if value < 0]
 
 
 def _on_face(
@@ -69,28 +118,36 @@ def _on_face(
     fields: Sequence[Generator],
     formulas: Formulas,
     digits: int,
-) -> tuple[Attempt, bool]:
-    """Enclose the KKT point of a face; return also whether all other signs are decided.
+) -> Attempt:
+    """Enclose the KKT point of a face and check it, with more and more bits until all is decided.
 
-    Functions that are active within the certificate's tolerance but violated at the KKT point join
-    the face for another attempt.
+    Their number is doubled at most ``MOST_DOUBLINGS`` times.
     """
-    active = certificate.analysis.active
-    while True:
-        posed = pose_claim(certificate, face, fields, formulas)
-        if isinstance(posed, Undecided):
-            return Attempt(face, posed, posed, bits_for(digits)), False
-        enclosure, bits = _enclosed(certificate, posed, digits)
-        result = Attempt(face, posed, enclosure, bits)
-        if isinstance(enclosure, Undecided):
-            return result, False
-        others = [i for i in active if i not in face]
+    bits = bits_for(digits)
+    posed = pose_claim(certificate, face, fields, formulas)
+    if isinstance(posed, Undecided):
+        return Attempt(face, posed, posed, without_enclosure(posed), bits)
+    best: Attempt | None = None
+    for doublings in range(MOST_DOUBLINGS + 1):
+        enclosure = _enclosed(certificate, posed, bits)
         with precision(bits):
-            values = formulas.values(enclosure.neighbourhood(), others)
-        missed = [i for i, value in zip(others, values, strict=True) if value < 0]
-        if not missed:
-            return result, all(value > 0 for value in values)
-        face = tuple(sorted((*face, *missed)))
+            result = Attempt(face, posed, enclosure, _checked(posed, enclosure), bits)
+            if best is None or result.rank >= best.rank:
+                best = result
+            if isinstance(enclosure, Undecided):
+                if doublings >= MOST_SINGULAR or enclosure.name != SUBJECT:
+                    break
+            elif not result.open and _sharp(enclosure, digits):
+                break
+        bits = 2 * bits + GUARD_BITS
+    assert best is not None
+    return best
+
+
+def _checked(posed: Posed, enclosure: Enclosure | Undecided) -> Mapping[str, ConditionResult]:
+    if isinstance(enclosure, Undecided):
+        return without_enclosure(enclosure, symmetric=bool(posed.claim.fields))
+    return check_hypotheses(posed.claim, enclosure)
 
 
 def bits_for(digits: int) -> int:
@@ -98,28 +155,20 @@ def bits_for(digits: int) -> int:
     return ceil(digits * BITS_PER_DIGIT) + GUARD_BITS
 
 
-def _enclosed(
-    certificate: Certificate, posed: Posed, digits: int
-) -> tuple[Enclosure | Undecided, int]:
-    """Enclose the solution, with a higher precision if the first is not sufficient."""
+def _enclosed(certificate: Certificate, posed: Posed, bits: int) -> Enclosure | Undecided:
+    """Enclose the solution near the certificate's point."""
     system = posed.claim.system
-    bits = bits_for(digits)
-    for last in (False, True):
-        centre = newton(system, posed.start, bits=bits)
-        if isinstance(centre, Undecided):
-            return _explained(certificate, centre), bits
-        away = _distance(certificate, centre)
-        if not away <= NEARBY:
-            reason = f"the nearest solution found is {away:.1e} scale units from the point"
-            return Undecided(SUBJECT, reason), bits
-        with precision(bits):
-            found = enclose(system, centre, bits=bits)
-            if isinstance(found, Enclosure) and (last or _sharp(found, digits)):
-                return found, bits
-        if last:
-            break
-        bits = 2 * bits + GUARD_BITS
-    return _explained(certificate, found) if isinstance(found, Undecided) else found, bits
+    centre = newton(system, posed.start, bits=bits)
+    if isinstance(centre, Undecided):
+        return _explained(certificate, centre)
+    away = _distance(certificate, centre)
+    if not away <= NEARBY:
+        return Undecided(
+            FAR, f"the nearest solution found is {away:.1e} scale units from the point"
+        )
+    with precision(bits):
+        found = enclose(system, centre, bits=bits)
+    return _explained(certificate, found) if isinstance(found, Undecided) else found
 
 
 def _distance(certificate: Certificate, z: "list[Ball]") -> float:

@@ -11,7 +11,7 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate
-from polycorner.polyhedra.cones import Rows, unit_rows
+from polycorner.polyhedra.cones import Rows, independent_rows, unit_rows
 from polycorner.proofs.hypotheses import Claim, ConditionResult, Status
 from polycorner.proofs.invariance import (
     Generator,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
     from polycorner.spaces.manifold import Array
 
-MOST_SUBSETS, MOST_FACES = 1000, 8  # examined where gradients are dependent
+MOST_SUBSETS = 1000  # of one size that are examined
 DEPENDENT = 1e-6  # sine of the angle up to which a field depends on the others
 
 
@@ -50,30 +50,50 @@ class Posed:
 
 
 def faces(certificate: Certificate) -> Iterator[tuple[int, ...]]:
-    """Return sets of active functions that may carry the energy's gradient, likeliest first.
+    """Return sets of rows that may carry the energy's gradient, likeliest first.
 
-    Where gradients are independent there is one: the functions whose multipliers are not zero.
-    Where they are dependent, every independent set with positive multipliers is one, and the
-    functions outside it are then treated as inactive.
+    A minimum on a larger set is one on any part of it that contains the point, so that functions
+    outside a face need only hold at the point.  Tried are, where gradients are independent, the
+    functions whose multipliers are not zero; where they are dependent, every independent set with
+    positive multipliers; then all sets of active functions, the largest first.
     """
-    analysis = certificate.analysis
+    for sections in _sections(certificate):
+        for contacts in _contacts(certificate, sections):
+            yield (*contacts, *sections)
+
+
+def _sections(certificate: Certificate) -> Iterator[tuple[int, ...]]:
+    """Return sets of equations: independent ones first, then all of them."""
+    analysis, m = certificate.analysis, certificate.problem.inequalities
+    gradients = analysis.gradients[len(analysis.active) :]
+    every = tuple(range(m, m + len(gradients)))
+    chosen = independent_rows(unit_rows(gradients), certificate.rank_tolerance) if every else []
+    if len(chosen) < len(every):
+        yield tuple(m + i for i in sorted(chosen))
+    yield every
+
+
+def _contacts(certificate: Certificate, sections: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    analysis, m = certificate.analysis, certificate.problem.inequalities
     active, k = analysis.active, len(analysis.active)
-    small = analysis.local.small
+    small, slope = analysis.local.small, analysis.local.gradients[-1]
+    units = unit_rows(analysis.gradients)
+    held = [k + row - m for row in sections]
     if analysis.independent:
         values = analysis.multipliers.values[:k]
         yield tuple(i for i, value in zip(active, values, strict=True) if abs(value) > small)
-        return
-    slope, units = analysis.local.gradients[-1], unit_rows(analysis.gradients)
-    found = 0
-    sections = range(k, len(units))
-    for size in range(min(k, units.shape[1]), -1, -1):
-        for chosen in islice(combinations(range(k), size), MOST_SUBSETS):
-            rows = Rows(units[[*chosen, *sections]], certificate.rank_tolerance)
-            if rows.independent and _carries(rows, size, slope, small) and found < MOST_FACES:
-                found += 1
+    else:
+        for chosen in _subsets(range(k), units.shape[1]):
+            rows = Rows(units[[*chosen, *held]], certificate.rank_tolerance)
+            if rows.independent and _carries(rows, len(chosen), slope, small):
                 yield tuple(active[i] for i in chosen)
-    if not found:
-        yield tuple(active[i] for i in analysis.strong_positions)
+    yield from _subsets(active, units.shape[1] - len(held))
+
+
+def _subsets(rows: Sequence[int], most: int) -> Iterator[tuple[int, ...]]:
+    """Return subsets of at most ``most`` rows, the largest first."""
+    for size in range(min(len(rows), most), -1, -1):
+        yield from islice(combinations(rows, size), MOST_SUBSETS)
 
 
 def _carries(rows: Rows, size: int, slope: "Array", small: float) -> bool:
@@ -91,9 +111,7 @@ def pose_claim(
     parameters: Sequence[float] = (),
 ) -> Posed | Undecided:
     """Pose the KKT system of a face at a certificate's point, with gauges for its symmetries."""
-    problem = certificate.problem
-    m = problem.inequalities
-    rows = (*face, *range(m, problem.rows - 1))
+    problem, rows = certificate.problem, face
     point = tuple(certificate.point.tolist())
     with precision(FIRST_BITS):
         box = Box([ball(x) for x in (*point, *parameters)])
@@ -107,7 +125,7 @@ def pose_claim(
         system = System(formulas, rows, gauges, point, _units(certificate, rows, gauges))
         multipliers = _multipliers(certificate, rows)
         start = [ball(x) for x in (*point, *multipliers, *[0.0] * len(gauges))]
-    return Posed(Claim(problem, system, face, fields), start, refused)
+    return Posed(Claim(problem, system, fields), start, refused)
 
 
 def _units(

@@ -5,61 +5,76 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from polycorner.intervals.balls import matrix
+from polycorner.intervals.balls import ball, matrix
 
 if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball, Matrix
-    from polycorner.spaces.manifold import Array
+    from polycorner.intervals.balls import Ball
 
 Rows: TypeAlias = "Sequence[Sequence[Ball]]"
 
 
 def tangent_form(curvature: Rows, rows: Rows, scales: Sequence[float]) -> "list[list[Ball]] | None":
-    """Return a symmetric form restricted to the null space of ``rows``, nearly diagonal.
+    """Return a symmetric form restricted to the null space of ``rows``, in scaled coordinates.
 
-    In scaled coordinates, with ``C`` the rows and ``Z``, ``R`` floating-point approximations of an
-    orthonormal basis of their null space and of their pseudoinverse, the columns of
-    ``Z - R (C R)^-1 C Z`` are annihilated by ``C``, for every ``C`` in the enclosure.  The basis is
-    then turned into approximate eigenvectors.  None where the inverse cannot be enclosed.
+    The basis is turned into approximate eigenvectors, so that the form is nearly diagonal.  None
+    where the null space could not be enclosed.
     """
-    n, m = len(scales), len(rows)
-    if m >= n:
-        return []
-    hessian = matrix([_scaled(row, scales, s) for row, s in zip(curvature, scales, strict=True)])
-    basis: Matrix | None = matrix(np.eye(n).tolist())
-    if m:
-        basis = _null_space([_scaled(row, scales, 1.0) for row in rows])
+    basis = tangents([_scaled(row, scales, 1.0) for row in rows], len(scales))
     if basis is None:
         return None
-    form = basis.transpose() * hessian * basis
-    middle = _floats(form)
-    if not np.isfinite(middle).all():
-        return None
-    turn = matrix(np.linalg.eigh((middle + middle.T) / 2)[1].tolist())
-    return list((turn.transpose() * form * turn).tolist())
+    hessian = [_scaled(row, scales, s) for row, s in zip(curvature, scales, strict=True)]
+    if not basis:
+        return []
+    across = matrix(basis)
+    form = across * matrix(hessian) * across.transpose()
+    middle = np.array([[float(x.mid()) for x in row] for row in form.tolist()])
+    if np.isfinite(middle).all():
+        turn = matrix(np.linalg.eigh((middle + middle.T) / 2)[1].tolist())
+        form = turn.transpose() * form * turn
+    return list(form.tolist())
 
 
 def _scaled(row: "Sequence[Ball]", scales: Sequence[float], factor: float) -> "list[Ball]":
     return [x * s * factor for x, s in zip(row, scales, strict=True)]
 
 
-def _floats(rows: "Matrix") -> "Array":
-    return np.array([[float(x.mid()) for x in row] for row in rows.tolist()])
+def tangents(rows: Rows, n: int) -> "list[list[Ball]] | None":
+    """Return a basis of the vectors that independent rows annihilate, for all rows enclosed.
 
-
-def _null_space(rows: "list[list[Ball]]") -> "Matrix | None":
-    middle = _floats(matrix(rows))
-    sizes = np.linalg.norm(middle, axis=1)
-    if not np.isfinite(middle).all() or not sizes.all():
-        return None
-    units = middle / sizes[:, None]
-    held = matrix([[x / s for x in row] for row, s in zip(rows, sizes.tolist(), strict=True)])
-    null = matrix(np.linalg.svd(units)[2][len(rows) :].T.tolist())
-    pseudo = matrix(np.linalg.pinv(units).tolist())
-    try:
-        return null - pseudo * (held * pseudo).solve(held * null)
-    except ZeroDivisionError:
-        return None
+    Gauss-Jordan elimination, pivots being the largest entries of the longest row that is left:
+    with ``[I N]`` the reduced rows, the columns of ``[-N; I]`` are the basis.
+    """
+    left = [list(row) for row in rows]
+    columns: list[int] = []
+    for k in range(len(left)):
+        largest = [
+            (float(abs(row[j]).mid()), i, j)
+            for i, row in enumerate(left[k:], k)
+            for j in range(n)
+            if j not in columns
+        ]
+        if not largest:
+            return None
+        _, i, j = max(largest)
+        if left[i][j].contains(0):
+            return None
+        left[k], left[i] = left[i], left[k]
+        pivot = left[k][j]
+        left[k] = [x / pivot for x in left[k]]
+        left[k][j] = ball(1)
+        for other in range(len(left)):
+            factor = left[other][j]
+            if other != k:
+                left[other] = [x - factor * y for x, y in zip(left[other], left[k], strict=True)]
+                left[other][j] = ball(0)
+        columns.append(j)
+    basis = []
+    for free in (j for j in range(n) if j not in columns):
+        vector = [ball(int(j == free)) for j in range(n)]
+        for row, j in zip(left, columns, strict=True):
+            vector[j] = -row[free]
+        basis.append(vector)
+    return basis
 
 
 def pivots(form: Rows) -> "list[Ball]":

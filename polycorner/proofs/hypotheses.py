@@ -3,14 +3,15 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import bounds, decimals, dot, matrix
 from polycorner.intervals.enclosures import Undecided
 from polycorner.minimisation import Problem
-from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.proofs.definite import pivots, tangent_form
+from polycorner.proofs.exact import ExactPoint, implied, recognised
 from polycorner.proofs.invariance import Generator, annihilated, slope_bounds
 from polycorner.proofs.kkt import System
 from polycorner.proofs.krawczyk import Enclosure
@@ -73,22 +74,63 @@ class Claim:
         The polyhedron and the energy.
     system : System
         The KKT equations of the face.
-    active : tuple of int
-        Rows of the active inequalities.
     fields : tuple of Generator
         One for every gauge of the system.
     """
 
     problem: Problem
     system: System
-    active: tuple[int, ...]
     fields: tuple[Generator, ...]
+
+    @property
+    def active(self) -> tuple[int, ...]:
+        """Rows of the active inequalities."""
+        return tuple(i for i in self.system.held if i < self.problem.inequalities)
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Rows of the inequalities and equations that the system does not hold."""
+        return tuple(i for i in range(self.problem.rows - 1) if i not in self.system.held)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the active inequalities, then of the equations."""
+        return self.named(self.system.held)
+
+    def named(self, rows: Sequence[int]) -> tuple[str, ...]:
+        """Return the names of some rows."""
         d = self.problem.polyhedron
-        return (*(d.names[i] for i in self.active), *d.equation_names)
+        names = (*d.names, *d.equation_names)
+        return tuple(names[i] for i in rows)
+
+    def implied(self, row: int) -> bool:
+        """Whether a function vanishes wherever those of the system do."""
+        if row not in self._implied:
+            self._implied[row] = implied(self.system.formulas, self.system.held, row)
+        return self._implied[row]
+
+    @cached_property
+    def _implied(self) -> dict[int, bool]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A claim and the enclosure of its solution, with the zeros that algebra shows there."""
+
+    claim: Claim
+    enclosure: Enclosure
+
+    @cached_property
+    def exactly(self) -> ExactPoint | None:
+        """The solution, where it is recognised."""
+        return recognised(self.enclosure)
+
+    def vanishes(self, row: int) -> bool:
+        """Whether a function that is defined at the solution is shown to be 0 there."""
+        formulas = self.claim.system.formulas
+        known = self.exactly is not None and self.exactly.vanishes(formulas, row)
+        return known or self.claim.implied(row)
 
 
 def without_enclosure(
@@ -115,9 +157,10 @@ def check_hypotheses(claim: Claim, enclosure: Enclosure) -> dict[str, ConditionR
     }
     if claim.fields:
         found[SYMMETRIC] = _symmetric(claim, enclosure)
+    solved = Solved(claim, enclosure)
     return found | {
-        POSITIVE: _positive(claim, enclosure),
-        INACTIVE: _inactive(claim, enclosure),
+        POSITIVE: _positive(solved),
+        INACTIVE: _inactive(solved),
         CURVED: _curved(claim, enclosure),
     }
 
@@ -170,14 +213,17 @@ def _regular(rows: "list[list[Ball | Undecided]]") -> bool:
 # ------------------------------------------------------------------------------------- first order
 
 
-def _positive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
-    n = claim.system.dimension
-    pairs = list(zip(claim.names, enclosure.solution[n:], strict=False))[: len(claim.active)]
+def _positive(solved: Solved) -> ConditionResult:
+    claim, n = solved.claim, solved.claim.system.dimension
+    values = solved.enclosure.solution[n:]
+    pairs = list(zip(claim.names, values, strict=False))[: len(claim.active)]
     for name, value in pairs:
         if value < 0:
             return _failed(f"the multiplier of {name} lies in {shown(value)}")
-    for name, value in pairs:
+    for k, (name, value) in enumerate(pairs):
         if not value > 0:
+            if solved.exactly and not solved.exactly.unknowns[n + k]:
+                return _undecided(f"{name} is weakly active: its multiplier is exactly 0")
             reason = f"{name} is weakly active, or the box too wide: its multiplier lies in "
             return _undecided(reason + shown(value))
     if not pairs:
@@ -186,17 +232,16 @@ def _positive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
     return _proved(f"the smallest is that of {name}, in {shown(value)}")
 
 
-def _inactive(claim: Claim, enclosure: Enclosure) -> ConditionResult:
-    d = claim.problem.polyhedron
-    others = [i for i in range(len(d.functions)) if i not in claim.active]
-    if not others:
-        return _membership(d, claim.active, [], [])
+def _inactive(solved: Solved) -> ConditionResult:
+    claim, enclosure = solved.claim, solved.enclosure
+    if not claim.others:
+        return _membership(solved, [])
     waiting = [(tuple(enclosure.predictor.cell.reach), 0)]
     found: dict[Status, ConditionResult] = {}
     while waiting:
         reach, depth = waiting.pop()
-        values = claim.system.formulas.values(enclosure.neighbourhood(reach), others)
-        result = _membership(d, claim.active, others, values)
+        values = claim.system.formulas.values(enclosure.neighbourhood(reach), claim.others)
+        result = _membership(solved, values)
         if result.status is Status.UNDECIDED and reach and depth < MOST_HALVINGS:
             waiting += [(half, depth + 1) for half in _halves(reach)]
             continue
@@ -216,52 +261,88 @@ def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":
         yield (*reach[:widest], side.mid().union(end), *reach[widest + 1 :])
 
 
-def _membership(
-    d: Polyhedron, active: tuple[int, ...], others: "Sequence[int]", values: "Sequence[Ball]"
-) -> ConditionResult:
-    """Decide whether the active functions alone describe the set near the solution."""
-    signs: list[int | None] = [0] * len(d.functions)
-    for i, value in zip(others, values, strict=True):
-        signs[i] = 1 if value > 0 else -1 if value < 0 else None
-    agrees = _face_alone(d, signs, active)
-    listed = dict(zip((d.names[i] for i in others), values, strict=True))
+def _membership(solved: Solved, values: "Sequence[Ball]") -> ConditionResult:
+    """Decide whether the point is in the set, and the set in that of the functions held.
+
+    A sign of None is open; a function shown to be exactly 0 may be of any sign nearby.
+    """
+    claim = solved.claim
+    d = claim.problem.polyhedron
+    listed = dict(zip(claim.others, values, strict=True))
+    signs = {i: _sign(solved, i, value) for i, value in listed.items()}
+    agrees = _face_holds(claim, signs)
     if agrees is None:
-        unknown = [name for name, v in listed.items() if not (v > 0 or v < 0)]
-        name = unknown[0]
+        row = next((i for i, sign in signs.items() if sign is None), None)
+        if row is None:
+            zeros = claim.named([i for i, sign in signs.items() if sign == 0])
+            return _undecided(f"the tree has branches of {', '.join(zeros)}, which are 0 there")
         reason = (
-            f"{name} may vanish there without being needed (redundant, or weakly active), or the "
-            f"box is too wide: it lies in {shown(listed[name])}"
+            f"{claim.named([row])[0]} may vanish there without being needed (redundant, or weakly "
+            f"active), or the box is too wide: it lies in {shown(listed[row])}"
         )
         return _undecided(reason)
     if not agrees:
-        below = {name: v for name, v in listed.items() if v < 0 or d.is_union}
-        name, value = min(below.items(), key=lambda item: abs(float(item[1].mid())))
-        reason = f"{name} lies in {shown(value)}"
+        below = {i: v for i, v in listed.items() if v < 0 or (d.is_union and signs[i])}
+        below = below or {i: v for i, v in listed.items() if signs[i]}
+        row, value = min(below.items(), key=lambda item: abs(float(item[1].mid())))
+        reason = f"{claim.named([row])[0]} lies in {shown(value)}"
         if d.is_union:
-            held = ", ".join(d.names[i] for i in active) or "nothing"
+            held = ", ".join(d.names[i] for i in claim.active) or "nothing"
             reason = f"the tree requires more, or less, than {held} alone there: {reason}"
         return _failed(reason)
+    return _proved(_why_inside(claim, listed, signs))
+
+
+def _sign(solved: Solved, row: int, value: "Ball") -> int | None:
+    if value > 0 or value < 0:
+        return 1 if value > 0 else -1
+    return 0 if value.is_finite() and solved.vanishes(row) else None
+
+
+def _why_inside(claim: Claim, listed: "dict[int, Ball]", signs: dict[int, int | None]) -> str:
     if not listed:
-        return _proved("every inequality is active")
-    name, least = min(listed.items(), key=lambda item: abs(float(item[1].mid())))
-    return _proved(f"the nearest to 0 is {name}, in {shown(least)}")
+        return "every inequality is active"
+    parts = []
+    zeros = claim.named([i for i, sign in signs.items() if sign == 0])
+    if zeros:
+        parts.append(f"{', '.join(zeros)}: exactly 0 there, and not needed for a minimum")
+    away = [i for i, sign in signs.items() if sign]
+    if away:
+        nearest = min(away, key=lambda i: abs(float(listed[i].mid())))
+        parts.append(
+            f"the nearest to 0 is {claim.named([nearest])[0]}, in {shown(listed[nearest])}"
+        )
+    return "; ".join(parts)
 
 
-def _face_alone(d: Polyhedron, signs: "list[int | None]", active: tuple[int, ...]) -> bool | None:
-    unknown = [i for i, sign in enumerate(signs) if sign is None]
+def _face_holds(claim: Claim, signs: dict[int, int | None]) -> bool | None:
+    """Whether every branch of the tree near the point asks for all active functions, and one is."""
+    d, m = claim.problem.polyhedron, claim.problem.inequalities
+    dropped = [sign for i, sign in signs.items() if i >= m]
+    if any(dropped):
+        return False  # an equation that does not hold
+    all_signs = [signs.get(i, 0) for i in range(m)]
+    unknown = [i for i, sign in enumerate(all_signs) if sign is None]
     if not d.is_union:
-        if -1 in signs:
+        if -1 in all_signs:
             return False
-        return None if unknown else True
-    if len(unknown) > MOST_UNKNOWN:
+        return None if unknown or None in dropped else True
+    if len(unknown) > MOST_UNKNOWN or None in dropped:
         return None
     answers = set()
     for guess in product((-1, 0, 1), repeat=len(unknown)):
-        tried = [0 if sign is None else sign for sign in signs]
+        tried = [0 if sign is None else sign for sign in all_signs]
         for i, sign in zip(unknown, guess, strict=True):
             tried[i] = sign
-        answers.add(d.signs_to_pieces(tried) == [frozenset(active)])
+        answers.add(_pieces_hold(d.signs_to_pieces(tried), frozenset(claim.active)))
     return answers.pop() if len(answers) == 1 else None
+
+
+def _pieces_hold(pieces: Sequence[frozenset[int]], active: frozenset[int]) -> bool | None:
+    """Whether every piece asks for all active functions; None where others may imply them."""
+    if all(piece >= active for piece in pieces):
+        return bool(pieces)
+    return False if any(piece < active for piece in pieces) else None
 
 
 # ------------------------------------------------------------------------------------ second order

@@ -6,8 +6,8 @@ is derived by forward differentiation along ``xi`` in exact rational arithmetic,
 polynomials in the nodes of the functions' own graph.  What cancels there cancels for all arguments;
 an identity that this algebra does not recognise counts as not shown.
 
-The polynomials have no fixed set of variables, as differentiation adds nodes; they are therefore
-kept as mappings from monomials to coefficients.
+The polynomials have no fixed set of variables, as differentiation adds nodes
+(:mod:`~polycorner.proofs.polynomials`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,21 +22,13 @@ from polycorner.intervals.balls import dot
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided, write
 from polycorner.intervals.tapes import Box, arguments, needed
 from polycorner.polyhedra.symmetry import vector_field
+from polycorner.proofs.polynomials import Polynomial, TooLargeError, product, total
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
     import sympy
 
     from polycorner.intervals.balls import Ball
-
-# A sum of products of nodes: exponents are repetitions, and 1 is the empty product.
-Polynomial = dict[tuple[int, ...], Fraction]
-
-MOST_TERMS = 20_000  # products of terms up to which polynomials are multiplied
-
-
-class _TooLargeError(Exception):
-    """A polynomial exceeds ``MOST_TERMS``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +163,7 @@ class _Slopes:
         """Whether the slope of a node is identically zero; False if that is not recognised."""
         try:
             return not self.slope(output)
-        except _TooLargeError:
+        except TooLargeError:
             return False
 
     def written(self, a: int) -> Polynomial:
@@ -188,8 +180,8 @@ class _Slopes:
             return {(a,): Fraction(1)}
         parts = [self.written(child) for child in arguments(self.graph, a)]
         if op == "mul":
-            return _product(*parts)
-        return _sum(parts, op)
+            return product(*parts)
+        return total(parts, op)
 
     def slope(self, a: int) -> Polynomial:
         """Return the derivative of a node along the field."""
@@ -207,15 +199,15 @@ class _Slopes:
         if not any(slopes):
             return {}
         if op in {"add", "sub", "neg"}:
-            return _sum(slopes, op)
+            return total(slopes, op)
         if op in _DERIVATIVES:
             twin, sign = _DERIVATIVES[op]
             known = a if twin == op else self.graph.unary(twin, children[0])
-            return _product(slopes[0], _product({(): sign}, self.written(known)))
+            return product(slopes[0], product({(): sign}, self.written(known)))
         if op in {"mul", "div", "atan2", "log"}:
             return self._rational_slope(op, a, children, slopes)
-        parts = [_product(slope, _opaque(a, k)) for k, slope in enumerate(slopes)]
-        return parts[0] if len(parts) == 1 else _sum(parts, "add")
+        parts = [product(slope, _opaque(a, k)) for k, slope in enumerate(slopes)]
+        return parts[0] if len(parts) == 1 else total(parts, "add")
 
     def _rational_slope(
         self, op: str, a: int, children: list[int], slopes: list[Polynomial]
@@ -224,13 +216,13 @@ class _Slopes:
         if op == "log":
             return _quotient(slopes[0], self.written(children[0]), a)
         u, v = (self.written(child) for child in children)
-        first, second = _product(slopes[0], v), _product(u, slopes[1])
+        first, second = product(slopes[0], v), product(u, slopes[1])
         if op == "mul":
-            return _sum([first, second], "add")
-        bottom = _product(v, v)
+            return total([first, second], "add")
+        bottom = product(v, v)
         if op == "atan2":
-            bottom = _sum([bottom, _product(u, u)], "add")
-        return _quotient(_sum([first, second], "sub"), bottom, a)
+            bottom = total([bottom, product(u, u)], "add")
+        return _quotient(total([first, second], "sub"), bottom, a)
 
 
 # Functions whose derivative is, up to sign, a function of the same argument.
@@ -249,30 +241,9 @@ def _quotient(top: Polynomial, bottom: Polynomial, a: int) -> Polynomial:
         ratios = {top[monomial] / bottom[monomial] for monomial in top}
         if len(ratios) == 1:
             return {(): ratios.pop()}
-    return _product(top, _opaque(a, 0)) if top else {}
+    return product(top, _opaque(a, 0)) if top else {}
 
 
 def _opaque(a: int, position: int) -> Polynomial:
     """Return the partial derivative of a node by an argument as a symbol of its own."""
     return {(-1 - 3 * a - position,): Fraction(1)}
-
-
-def _sum(parts: list[Polynomial], op: str) -> Polynomial:
-    total = dict(parts[0])
-    if op == "neg":
-        return {monomial: -weight for monomial, weight in total.items()}
-    sign = 1 if op == "add" else -1
-    for monomial, weight in parts[1].items():
-        total[monomial] = total.get(monomial, Fraction(0)) + sign * weight
-    return {monomial: weight for monomial, weight in total.items() if weight}
-
-
-def _product(u: Polynomial, v: Polynomial) -> Polynomial:
-    if len(u) * len(v) > MOST_TERMS:
-        raise _TooLargeError
-    total: Polynomial = {}
-    for first, a in u.items():
-        for second, b in v.items():
-            monomial = tuple(sorted(first + second))
-            total[monomial] = total.get(monomial, Fraction(0)) + a * b
-    return {monomial: weight for monomial, weight in total.items() if weight}

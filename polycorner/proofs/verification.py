@@ -2,16 +2,19 @@
 
 Theorem ([NW] thm 12.6; existence by [Krawczyk]).  Let ``q*`` be a point where
 
-1. ``f_i = 0`` for the active inequalities ``A``, ``h_j = 0`` for the equations, and
+1. ``f_i = 0`` for active inequalities ``A``, ``h_j = 0`` for equations ``B``, and
    ``dE = sum lam_i df_i + sum mu_j dh_j``;
 2. ``lam_i > 0`` for every ``i`` in ``A``;
-3. the gradients of the active functions and equations are independent;
-4. near ``q*`` the set is ``{f_i >= 0 for i in A, h = 0}``: every other inequality is positive
-   there or, in a tree with unions, does not change the value of the tree;
+3. the gradients of these functions and equations are independent;
+4. ``q*`` is in the set and near ``q*`` the set is part of ``{f_i >= 0 for i in A, h_j = 0 for j in
+   B}``: every other inequality is positive there or exactly 0, every other equation holds
+   exactly and, in a tree with unions, every branch that holds near ``q*`` asks for all of ``A``;
 5. the Hessian of ``E - sum lam_i f_i - sum mu_j h_j`` is positive definite on the vectors that
    all these gradients annihilate.
 
-Then ``q*`` is a strict local minimum of ``E`` on the set.
+Then ``q*`` is a strict local minimum of ``E`` on the larger set, hence on the set.  Redundant and
+weakly active contacts and dependent equations are those that ``A`` and ``B`` leave out; that they
+are exactly 0 is shown by algebra (:mod:`~polycorner.proofs.exact`).
 
 Modulo symmetry.  Let vector fields ``xi_k`` annihilate ``E``, the active functions and the
 equations identically, and let ``n_k`` be normals with the matrix ``n_k xi_l`` regular.  Then 1 is
@@ -44,8 +47,6 @@ from polycorner.proofs.hypotheses import (
     SYMMETRIC,
     ConditionResult,
     Status,
-    check_hypotheses,
-    without_enclosure,
 )
 from polycorner.proofs.invariance import generators
 from polycorner.proofs.kkt import FIRST_BITS
@@ -152,16 +153,14 @@ def prove(
 def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
     """Return the proof for the parameters of the problem."""
     d = certificate.problem.polyhedron
-    active = tuple(d.names[i] for i in tried.face)
+    active = _active_names(certificate, tried)
     posed, enclosure = tried.posed, tried.enclosure
     if isinstance(posed, Undecided):
-        return _proof(certificate, digits, active, (), without_enclosure(posed))
-    symmetry = tuple(map(str, posed.claim.fields))
+        return _proof(certificate, digits, active, (), tried.found)
+    symmetry, found = tuple(map(str, posed.claim.fields)), _refused(tried.found, posed)
     if isinstance(enclosure, Undecided):
-        found = without_enclosure(enclosure, symmetric=bool(posed.claim.fields))
-        return _proof(certificate, digits, active, symmetry, _refused(found, posed))
+        return _proof(certificate, digits, active, symmetry, found)
     with precision(tried.bits):
-        found = _refused(check_hypotheses(posed.claim, enclosure), posed)
         values = [bounds(x) for x in enclosure.solution]
         energy = bounds(enclosure.linear.energy)
     named = _named(posed, values)
@@ -193,9 +192,14 @@ def _named(posed: Posed, unknowns: list[Bounds]) -> dict[str, Bounds]:
     return dict(zip(names, unknowns, strict=False))
 
 
-def _refused(found: dict[str, ConditionResult], posed: Posed) -> dict[str, ConditionResult]:
+def _active_names(certificate: Certificate, tried: Attempt) -> tuple[str, ...]:
+    names = certificate.problem.polyhedron.names
+    return tuple(names[i] for i in tried.face if i < len(names))
+
+
+def _refused(found: Mapping[str, ConditionResult], posed: Posed) -> dict[str, ConditionResult]:
     """Add the result for a declared symmetry that does not hold, if there is one."""
-    return found if posed.refused is None else found | {SYMMETRIC: posed.refused}
+    return dict(found) | ({} if posed.refused is None else {SYMMETRIC: posed.refused})
 
 
 def _proof(
@@ -232,7 +236,7 @@ def _many(
         if posed.refused and posed.refused.status is Status.FAILED:
             # Seen at the certificate's parameters only.
             found[SYMMETRIC] = replace(posed.refused, status=Status.PARTLY)
-    active = tuple(certificate.problem.polyhedron.names[i] for i in tried.face)
+    active = _active_names(certificate, tried)
     proved = [cell.bounds for cell in cells if cell.status is Status.PROVED]
     hulls = {
         name: (Fraction(min(b[name][0] for b in proved)), Fraction(max(b[name][1] for b in proved)))

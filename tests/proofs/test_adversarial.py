@@ -9,6 +9,8 @@ from benchmarks.trials.adversarial import CASES, problems, trial
 from polycorner import certify
 from polycorner.proofs import prove
 
+pytestmark = pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
+
 DIGITS = 60  # more than the forty of the numbers that decide
 MANY = max(2, settings().max_examples // 100)  # of each kind
 

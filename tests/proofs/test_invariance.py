@@ -20,6 +20,7 @@ from polycorner.proofs.invariance import (
     translations,
 )
 
+pytestmark = pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
 M = Manifold.euclidean("x y z")
 x, y, z = M.symbols
 AT = (0.75, 0.5, -0.375)

@@ -66,7 +66,7 @@ def test_no_false_theorem_in_hundreds_of_problems_or_thousands():
     assert sure["minima proved"] >= LEAST_PROVED * sure["minima"] > 0
     for kind in ("saddle", "pulling contact", "faint curvature", "faint multiplier"):
         assert totals[kind]["refuted"] > MANY / 20
-    assert totals["weak contact"]["proved"] == 0
+    assert totals["weak contact"]["proved"] > MANY / 20
 
 
 def test_minima_found_by_a_search_are_proved():
