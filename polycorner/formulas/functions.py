@@ -109,6 +109,14 @@ class SmoothFunction(Value):
         cls._bind(function, family, name, manifold, reads, tuple(parameters), label)
         return function
 
+    @classmethod
+    def quantity(cls, name: str, expression: "sympy.Expr", manifold: Manifold) -> "SmoothFunction":
+        """Return a quantity to be read off near a point; unlike others it need not be periodic.
+
+        An angle is such a quantity: a function on the line that is wound on the circle.
+        """
+        return cls.member(Family.of({name: expression}, manifold.names), name, manifold)
+
     def _bind(
         self,
         family: Family,

@@ -112,9 +112,9 @@ class Sensitivity(Value, Printed):
         if isinstance(quantity, str):
             checks.choice("quantity", quantity, manifold.names)
             symbol = manifold.symbols[manifold.names.index(quantity)]
-            return SmoothFunction(quantity, symbol, manifold)
+            return SmoothFunction.quantity(quantity, symbol, manifold)
         if not isinstance(quantity, SmoothFunction):
-            return SmoothFunction("quantity", quantity, manifold)
+            return SmoothFunction.quantity("quantity", quantity, manifold)
         if quantity.manifold != manifold:
             msg = f"quantity: expected a function on {', '.join(manifold.names)}; got {quantity!r}"
             raise ValueError(msg)

@@ -7,7 +7,6 @@ from fractions import Fraction
 from math import fsum
 from typing import TYPE_CHECKING, Any
 
-from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.balls import between, bounds, decimals, precision
 from polycorner.intervals.enclosures import Formulas
@@ -129,9 +128,7 @@ class Proof(Value, Printed):
         manifold = self.certificate.problem.polyhedron.manifold
         f = expression
         if not isinstance(f, SmoothFunction):
-            # In the chart of the proof an angle is a number: the expression need not be periodic.
-            family = Family.of({"expression": f}, manifold.names)
-            f = SmoothFunction.member(family, "expression", manifold)
+            f = SmoothFunction.quantity("expression", f, manifold)
         formulas = Formulas([f], manifold)
         proved = [cell for cell in self.cells if cell.status is Status.PROVED]
         regions: list[Any] = [self.region] if self.region else []
