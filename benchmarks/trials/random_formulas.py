@@ -20,6 +20,9 @@ from polycorner import AllOf, AnyOf, Manifold, Polyhedron
 
 Expr = sympy.Expr
 Generator = np.random.Generator
+Point = tuple[float, ...]
+# Energy, inequalities, equations, start, special point.
+Posed = tuple[Expr, tuple[Any, ...], tuple[Expr, ...], Point, Point]
 
 
 @dataclass(frozen=True)
@@ -50,8 +53,8 @@ class Problem:
     energy: Expr
     inequalities: tuple[Any, ...]
     equations: tuple[Expr, ...]
-    start: tuple[float, ...]
-    special: tuple[float, ...]
+    start: Point
+    special: Point
 
     @cached_property
     def manifold(self) -> Manifold:
@@ -94,21 +97,18 @@ def problem(seed: int, number: int) -> Problem:
     x = tuple(sympy.symbols(list("xyzw"[:n]), real=True))
     start = tuple(float(v) for v in g.integers(-8, 9, n) / 4)
     make = _degenerate if g.random() < 0.35 and not any(circles) else _generic
-    energy, inequalities, equations, special = make(g, x, circles, start)
-    name = f"{seed}/{number}"
-    return Problem(name, x, circles, energy, inequalities, equations, start, special)
+    return Problem(f"{seed}/{number}", x, circles, *make(g, x, circles, start))
 
 
 # ------------------------------------------------------------------------------------ generic ones
 
 
-def _generic(
-    g: Generator, x: tuple[Any, ...], circles: tuple[bool, ...], start: tuple[float, ...]
-) -> tuple[Expr, tuple[Any, ...], tuple[Expr, ...], tuple[float, ...]]:
+def _generic(g: Generator, x: tuple[Any, ...], circles: tuple[bool, ...], start: Point) -> Posed:
     leaves = _Leaves(g, x, circles)
     energy = leaves.tree(3)
     if g.random() < 0.6:
         energy += sum((xi - Rational(int(g.integers(-4, 5)), 4)) ** 2 for xi in leaves.lines)
+    start = _inside(energy, x, start, g.spawn(1)[0])
     inequalities = [_constraint(leaves, start) for _ in range(g.integers(0, 5))]
     if g.random() < 0.3:
         size = int(g.integers(1, 4))
@@ -121,10 +121,10 @@ def _generic(
     if not inequalities and not equations:
         inequalities = [4 - x[0] ** 2 if not circles[0] else cos(x[0]) + Rational(1, 2)]
     special = start if g.random() < 0.5 else tuple(float(v) for v in g.integers(-1, 2, len(x)))
-    return energy, tuple(inequalities), equations, special
+    return energy, tuple(inequalities), equations, start, special
 
 
-def _constraint(leaves: "_Leaves", start: tuple[float, ...]) -> Expr:
+def _constraint(leaves: "_Leaves", start: Point) -> Expr:
     g, x = leaves.generator, leaves.symbols
     slack = Rational(int(g.integers(0, 5)), 2) if g.random() < 0.75 else -Rational(1, 2)
     kind = g.random()
@@ -142,11 +142,28 @@ def _constraint(leaves: "_Leaves", start: tuple[float, ...]) -> Expr:
     return _through(leaves.tree(2), x, start, slack)
 
 
-def _through(form: Expr, x: tuple[Any, ...], start: tuple[float, ...], value: Expr) -> Expr:
+def _through(form: Expr, x: tuple[Any, ...], start: Point, value: Expr) -> Expr:
     """Return the form plus a constant, with about the given value at the start."""
-    here = complex(sympy.N(form.subs(dict(zip(x, map(sympy.Rational, start), strict=True)))))
-    usable = math.isfinite(here.real) and abs(here) < 1e4 and abs(here.imag) < 1e-12
-    return form - (Rational(round(here.real * 4), 4) if usable else 0) + value
+    here = _value(form, x, start)
+    return form - (Rational(round(here * 4), 4) if abs(here) < 1e4 else 0) + value
+
+
+def _value(form: Expr, x: tuple[Any, ...], q: Point) -> float:
+    """Return a value, or nan where it is not real."""
+    try:
+        here = complex(sympy.N(form.subs(dict(zip(x, map(sympy.Rational, q), strict=True)))))
+    except (ValueError, TypeError):  # a comparison of numbers that are not real
+        return math.nan
+    return here.real if abs(here.imag) < 1e-12 else math.nan
+
+
+def _inside(energy: Expr, x: tuple[Any, ...], start: Point, g: Generator) -> Point:
+    """Return a start in the energy's domain, if one is found."""
+    for _ in range(20):
+        if math.isfinite(_value(energy, x, start)):
+            break
+        start = tuple(float(v) for v in g.integers(-8, 9, len(x)) / 4)
+    return start
 
 
 class _Leaves:
@@ -223,10 +240,8 @@ _WEIGHTS = np.repeat(
 # --------------------------------------------------------------------------------- degenerate ones
 
 
-def _degenerate(
-    g: Generator, x: tuple[Any, ...], circles: tuple[bool, ...], start: tuple[float, ...]
-) -> tuple[Expr, tuple[Any, ...], tuple[Expr, ...], tuple[float, ...]]:
-    del circles, start
+def _degenerate(g: Generator, x: tuple[Any, ...], circles: tuple[bool, ...], start: Point) -> Posed:
+    del circles
     point = tuple(float(v) for v in g.integers(-1, 2, len(x)))
     u = [xi - int(p) for xi, p in zip(x, point, strict=True)]
     energy = sum(_flat_term(g, u) for _ in range(g.integers(1, 4)))
@@ -239,7 +254,7 @@ def _degenerate(
     equations = (_touching(g, u),) if len(x) > 1 and g.random() < 0.15 else ()
     if not walls and not equations:
         walls = [9 - sum(ui**2 for ui in u)]
-    return energy, tuple(walls), equations, point
+    return energy, tuple(walls), equations, start, point
 
 
 def _flat_term(g: Generator, u: list[Expr]) -> Expr:
