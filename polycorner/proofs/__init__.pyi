@@ -1,6 +1,6 @@
-from .hypotheses import Status
 from .parameter_boxes import ParameterCell
 from .proof import Proof
+from .statements import Status
 from .verification import prove
 
 __all__ = [

@@ -10,16 +10,11 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.minimisation import Certificate, Entrapment
 from polycorner.proofs.claims import Posed, faces, pose_claim
-from polycorner.proofs.hypotheses import (
-    INACTIVE,
-    ConditionResult,
-    Status,
-    check_hypotheses,
-    without_enclosure,
-)
+from polycorner.proofs.hypotheses import INACTIVE, check_hypotheses, without_enclosure
 from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import SUBJECT, newton
 from polycorner.proofs.krawczyk import Enclosure, enclose
+from polycorner.proofs.statements import ConditionResult, Status
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball

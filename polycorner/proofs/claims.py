@@ -12,7 +12,6 @@ from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate
 from polycorner.polyhedra.cones import Rows, independent_rows, unit_rows
-from polycorner.proofs.hypotheses import Claim, ConditionResult, Status
 from polycorner.proofs.invariance import (
     Generator,
     annihilated,
@@ -21,6 +20,7 @@ from polycorner.proofs.invariance import (
     translations,
 )
 from polycorner.proofs.kkt import FIRST_BITS, System
+from polycorner.proofs.statements import Claim, ConditionResult, Status
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball

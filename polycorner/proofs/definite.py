@@ -1,6 +1,7 @@
 """Positive definiteness of a form on a tangent space, for all matrices in an enclosure."""
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -8,7 +9,10 @@ import numpy as np
 from polycorner.intervals.balls import ball, matrix
 
 if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
+    from polycorner.intervals.balls import Ball, Matrix
+    from polycorner.spaces.manifold import Array
+
+SHARPNESS = (3.0, 30.0, 300.0)  # with which least eigenvalues are smoothed, relative to the form
 
 Rows: TypeAlias = "Sequence[Sequence[Ball]]"
 
@@ -22,12 +26,74 @@ def tangent_form(curvature: Rows, rows: Rows, scales: Sequence[float]) -> "list[
     basis = tangents([_scaled(row, scales, 1.0) for row in rows], len(scales))
     if basis is None:
         return None
-    hessian = [_scaled(row, scales, s) for row, s in zip(curvature, scales, strict=True)]
+    return _turned(_restricted(curvature, basis, scales)) if basis else []
+
+
+def positive_on_cone(curvature: Rows, rows: Rows, slopes: Rows, scales: Sequence[float]) -> bool:
+    """Whether a form is shown to be positive on ``{d != 0 : rows d = 0, slopes d >= 0}``.
+
+    With ``G`` the slopes, it is if ``H - G^T N G`` is positive definite on the null space of the
+    rows for a symmetric ``N`` without negative entries; for independent slopes, of which there are
+    at most four, this is also necessary ([Diananda]).
+    """
+    basis = tangents([_scaled(row, scales, 1.0) for row in rows], len(scales))
     if not basis:
-        return []
+        return basis is not None
+    form = _restricted(curvature, basis, scales)
+    across = matrix([_scaled(row, scales, 1.0) for row in slopes]) * matrix(basis).transpose()
+    weights = _weights(_middle(form), _middle(across))
+    if weights is None:
+        return False
+    shifted = form - across.transpose() * matrix(weights.tolist()) * across
+    found = pivots(_turned(shifted))
+    return len(found) == len(basis) and all(pivot > 0 for pivot in found)
+
+
+def _weights(form: "Array", slopes: "Array") -> "Array | None":
+    """Return ``N`` for which the least eigenvalue of ``H - G^T N G`` is large, in doubles.
+
+    The least eigenvalue is smoothed, more sharply in each round.
+    """
+    from scipy.optimize import minimize
+
+    sizes = np.linalg.norm(slopes, axis=1)
+    if not (np.isfinite(form).all() and np.isfinite(sizes).all() and sizes.all()):
+        return None
+    size = abs(form).max() or 1.0
+    units, pairs = slopes / sizes[:, None], list(combinations(range(len(slopes)), 2))
+    if not pairs:
+        return None
+    bends = np.array(
+        [np.outer(units[i], units[j]) + np.outer(units[j], units[i]) for i, j in pairs]
+    )
+
+    def smoothed(nu: "Array", sharpness: float) -> "tuple[float, Array]":
+        values, vectors = np.linalg.eigh(form / size - np.tensordot(nu, bends, 1))
+        shares = np.exp(-sharpness * (values - values[0]))
+        slope = np.einsum("ai,kab,bi,i->k", vectors, bends, vectors, shares / shares.sum())
+        return float(-values[0] + np.log(shares.sum()) / sharpness), slope
+
+    nu = np.zeros(len(pairs))
+    for sharpness in SHARPNESS:
+        nu = minimize(smoothed, nu, (sharpness,), jac=True, bounds=[(0, None)] * len(nu)).x
+    weights = np.zeros((len(slopes), len(slopes)))
+    for (i, j), share in zip(pairs, nu, strict=True):
+        weights[i, j] = weights[j, i] = max(0.0, share) * size / (sizes[i] * sizes[j])
+    return weights
+
+
+def _restricted(curvature: Rows, basis: Rows, scales: Sequence[float]) -> "Matrix":
+    hessian = matrix([_scaled(row, scales, s) for row, s in zip(curvature, scales, strict=True)])
     across = matrix(basis)
-    form = across * matrix(hessian) * across.transpose()
-    middle = np.array([[float(x.mid()) for x in row] for row in form.tolist()])
+    return across * hessian * across.transpose()
+
+
+def _middle(form: "Matrix") -> "Array":
+    return np.array([[float(x.mid()) for x in row] for row in form.tolist()])
+
+
+def _turned(form: "Matrix") -> "list[list[Ball]]":
+    middle = _middle(form)
     if np.isfinite(middle).all():
         turn = matrix(np.linalg.eigh((middle + middle.T) / 2)[1].tolist())
         form = turn.transpose() * form * turn

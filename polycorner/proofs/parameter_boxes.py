@@ -20,15 +20,10 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Undecided
 from polycorner.progress import Progress, silent
-from polycorner.proofs.hypotheses import (
-    Claim,
-    ConditionResult,
-    Status,
-    check_hypotheses,
-    without_enclosure,
-)
+from polycorner.proofs.hypotheses import check_hypotheses, without_enclosure
 from polycorner.proofs.kkt import newton
 from polycorner.proofs.krawczyk import Cell, Enclosure, enclose
+from polycorner.proofs.statements import Claim, ConditionResult, Status
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball

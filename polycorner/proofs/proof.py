@@ -14,8 +14,8 @@ from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate
 from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.proofs.attempt import bits_for
-from polycorner.proofs.hypotheses import Status
 from polycorner.proofs.parameter_boxes import Interval, ParameterCell, shown_box
+from polycorner.proofs.statements import Status
 from polycorner.values import Value
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ Theorem ([NW] thm 12.6; existence by [Krawczyk]).  Let ``q*`` be a point where
    B}``: every other inequality is positive there or exactly 0, every other equation holds
    exactly and, in a tree with unions, every branch that holds near ``q*`` asks for all of ``A``;
 5. the Hessian of ``E - sum lam_i f_i - sum mu_j h_j`` is positive definite on the vectors that
-   all these gradients annihilate.
+   all these gradients annihilate; or, in a set without unions, positive on those of them along
+   which no inequality that is exactly 0 decreases, the critical cone.
 
 Then ``q*`` is a strict local minimum of ``E`` on the larger set, hence on the set.  Redundant and
 weakly active contacts and dependent equations are those that ``A`` and ``B`` leave out; that they
@@ -43,11 +44,7 @@ from polycorner.progress import Progress, silent
 from polycorner.proofs.arguments import check_domain, check_parameters, check_unchanged
 from polycorner.proofs.attempt import Attempt, attempt
 from polycorner.proofs.claims import Posed, pose_claim
-from polycorner.proofs.hypotheses import (
-    SYMMETRIC,
-    ConditionResult,
-    Status,
-)
+from polycorner.proofs.hypotheses import SYMMETRIC
 from polycorner.proofs.invariance import generators
 from polycorner.proofs.kkt import FIRST_BITS
 from polycorner.proofs.krawczyk import Enclosure, widened
@@ -60,6 +57,7 @@ from polycorner.proofs.parameter_boxes import (
     undecided_cell,
 )
 from polycorner.proofs.proof import DOUBLE_DIGITS, Bounds, Proof
+from polycorner.proofs.statements import ConditionResult, Status
 
 MOST_DIGITS, MOST_CELLS = 10_000, 10_000_000
 BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
