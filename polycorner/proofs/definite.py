@@ -40,13 +40,19 @@ def positive_on_cone(curvature: Rows, rows: Rows, slopes: Rows, scales: Sequence
     if not basis:
         return basis is not None
     form = _restricted(curvature, basis, scales)
+    if _definite(form):
+        return True
     across = matrix([_scaled(row, scales, 1.0) for row in slopes]) * matrix(basis).transpose()
     weights = _weights(_middle(form), _middle(across))
     if weights is None:
         return False
     shifted = form - across.transpose() * matrix(weights.tolist()) * across
-    found = pivots(_turned(shifted))
-    return len(found) == len(basis) and all(pivot > 0 for pivot in found)
+    return _definite(shifted)
+
+
+def _definite(form: "Matrix") -> bool:
+    found = pivots(_turned(form))
+    return len(found) == form.nrows() and all(pivot > 0 for pivot in found)
 
 
 def _weights(form: "Array", slopes: "Array") -> "Array | None":

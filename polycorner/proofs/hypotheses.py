@@ -107,15 +107,18 @@ def _positive(solved: Solved) -> ConditionResult:
         if value < 0:
             return failed(f"the multiplier of {name} lies in {shown(value)}")
     for k, (name, value) in enumerate(pairs):
-        if not value > 0:
-            if solved.exactly and not solved.exactly.unknowns[n + k]:
-                return undecided(f"{name} is weakly active: its multiplier is exactly 0")
+        if not value > 0 and k not in solved.weak:
             reason = f"{name} is weakly active, or the box too wide: its multiplier lies in "
             return undecided(reason + shown(value))
     if not pairs:
         return proved("no inequality is active")
-    name, value = min(pairs, key=lambda pair: float(pair[1].lower()))
-    return proved(f"the smallest is that of {name}, in {shown(value)}")
+    weak = ", ".join(pairs[k][0] for k in solved.weak)
+    parts = [f"exactly 0 for {weak}"] if weak else []
+    strong = [pair for k, pair in enumerate(pairs) if k not in solved.weak]
+    if strong:
+        name, value = min(strong, key=lambda pair: float(pair[1].lower()))
+        parts.append(f"the smallest is that of {name}, in {shown(value)}")
+    return proved("; ".join(parts))
 
 
 # ------------------------------------------------------------------------------------ second order
@@ -126,23 +129,24 @@ def _curved(solved: Solved) -> ConditionResult:
     form = tangent_form(linear.curvature, linear.rows, scales)
     if form is None:
         return undecided("the tangent space of the face could not be enclosed")
+    found = pivots(form)
+    positive = len(found) == len(form) and all(pivot > 0 for pivot in found)
+    if solved.weak or not positive:
+        outside = [] if positive else _outside(solved)
+        if solved.weak or outside:
+            return _curved_on_cone(solved, outside)
     if not form:
         return proved("the face is a point: no tangent direction is left")
-    found = pivots(form)
-    last = found[-1]
-    if len(found) == len(form) and last > 0:
+    if positive:
         least = min(found, key=lambda pivot: float(pivot.lower()))
         return proved(f"the smallest of {len(form)} pivots lies in {shown(least)}")
-    weak = _weak(solved)
-    if weak:
-        return _curved_on_cone(solved, weak)
-    if last < 0:
-        return failed(f"a pivot lies in {shown(last)}, in scaled coordinates")
+    if found[-1] < 0:
+        return failed(f"a pivot lies in {shown(found[-1])}, in scaled coordinates")
     reason = "flat in a direction that is no declared symmetry, or the box is too wide: "
-    return undecided(f"{reason}a pivot lies in {shown(last)}")
+    return undecided(f"{reason}a pivot lies in {shown(found[-1])}")
 
 
-def _weak(solved: Solved) -> list[int]:
+def _outside(solved: Solved) -> list[int]:
     """Return the inequalities outside the face that are exactly 0 at the solution.
 
     None in a union, where a branch may not ask for them; modulo a symmetry, along which they may
@@ -157,14 +161,21 @@ def _weak(solved: Solved) -> list[int]:
     return [i for i, value in zip(rows, values, strict=True) if sign(solved, i, value) == 0]
 
 
-def _curved_on_cone(solved: Solved, weak: list[int]) -> ConditionResult:
-    """Decide positivity on the critical cone, in which the weak contacts do not close."""
+def _curved_on_cone(solved: Solved, outside: list[int]) -> ConditionResult:
+    """Decide positivity on the critical cone, along which weakly active functions do not decrease.
+
+    These are the functions held whose multipliers are 0, and those ``outside`` the face.
+    """
     claim, linear = solved.claim, solved.enclosure.linear
-    names, box = ", ".join(claim.named(weak)), solved.enclosure.neighbourhood()
-    forms = claim.system.formulas.smooth(box, weak)
-    if isinstance(forms, Undecided):
-        return undecided(str(forms))
-    slopes = [row[: claim.system.dimension] for row in forms.evaluate(box, 1)[1]]
-    if positive_on_cone(linear.curvature, linear.rows, slopes, claim.system.scales):
-        return proved(f"positive in all directions in which {names} do not decrease")
-    return undecided(f"not positive in all directions, and not shown to be where {names} increase")
+    scales, box = claim.system.scales, solved.enclosure.neighbourhood()
+    slopes = [linear.rows[k] for k in solved.weak]
+    if outside:
+        forms = claim.system.formulas.smooth(box, outside)
+        if isinstance(forms, Undecided):
+            return undecided(str(forms))
+        slopes += [row[: len(scales)] for row in forms.evaluate(box, 1)[1]]
+    strong = [row for k, row in enumerate(linear.rows) if k not in solved.weak]
+    weak = claim.named([claim.active[k] for k in solved.weak] + outside)
+    if positive_on_cone(linear.curvature, strong, slopes, scales):
+        return proved(f"positive in all directions in which {', '.join(weak)} do not decrease")
+    return undecided(f"not shown to be positive where {', '.join(weak)} do not decrease")

@@ -189,14 +189,19 @@ def newton(
     bits: int,
     steps: int = MOST_STEPS,
 ) -> "list[Ball] | Undecided":
-    """Return an approximate solution near ``z``, correct to nearly ``bits`` binary digits."""
+    """Return an approximate solution near ``z``, correct to nearly ``bits`` binary digits.
+
+    Precision is doubled as steps converge, and where they do not: the equations may be singular to
+    a few digits only.
+    """
     working = min(bits, FIRST_BITS)
     while True:
         with precision(working):
             found = _settled(system, z, p, ball(2) ** (-working // 2), steps)
-        if isinstance(found, Undecided) or working >= bits:
+        if working >= bits:
             return found
-        z, working = found, min(2 * working, bits)
+        z = z if isinstance(found, Undecided) else found
+        working = min(2 * working, bits)
 
 
 def _settled(

@@ -116,6 +116,17 @@ class Solved:
         """The solution, where it is recognised."""
         return recognised(self.enclosure)
 
+    @cached_property
+    def weak(self) -> tuple[int, ...]:
+        """Positions of the inequalities held whose multipliers are shown to be 0."""
+        n, k = self.claim.system.dimension, len(self.claim.active)
+        values = self.enclosure.solution[n : n + k]
+        open_ones = [i for i, value in enumerate(values) if value.contains(0)]
+        if not open_ones or self.exactly is None:
+            return ()
+        unknowns = self.exactly.unknowns[n:]
+        return tuple(i for i in open_ones if not unknowns[i])
+
     def vanishes(self, row: int) -> bool:
         """Whether a function that is defined at the solution is shown to be 0 there."""
         formulas = self.claim.system.formulas

@@ -4,14 +4,15 @@ Theorem ([NW] thm 12.6; existence by [Krawczyk]).  Let ``q*`` be a point where
 
 1. ``f_i = 0`` for active inequalities ``A``, ``h_j = 0`` for equations ``B``, and
    ``dE = sum lam_i df_i + sum mu_j dh_j``;
-2. ``lam_i > 0`` for every ``i`` in ``A``;
+2. ``lam_i > 0`` for every ``i`` in ``A``, or exactly 0: then ``i`` is weakly active;
 3. the gradients of these functions and equations are independent;
 4. ``q*`` is in the set and near ``q*`` the set is part of ``{f_i >= 0 for i in A, h_j = 0 for j in
    B}``: every other inequality is positive there or exactly 0, every other equation holds
    exactly and, in a tree with unions, every branch that holds near ``q*`` asks for all of ``A``;
 5. the Hessian of ``E - sum lam_i f_i - sum mu_j h_j`` is positive definite on the vectors that
-   all these gradients annihilate; or, in a set without unions, positive on those of them along
-   which no inequality that is exactly 0 decreases, the critical cone.
+   all these gradients annihilate; or it is positive on the critical cone, the vectors that those
+   of strong functions and equations annihilate and along which no weakly active function
+   decreases: those of ``A``, and in a set without unions or symmetries all that are exactly 0.
 
 Then ``q*`` is a strict local minimum of ``E`` on the larger set, hence on the set.  Redundant and
 weakly active contacts and dependent equations are those that ``A`` and ``B`` leave out; that they

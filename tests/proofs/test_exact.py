@@ -159,6 +159,7 @@ def test_forms_on_a_cone_are_positive_where_the_exact_minimum_says_so(n, seed):
         (x**2 + 4 * x * y + y**2 + z**2, True),
         (x**2 - sp.Rational(21, 10) * x * y + y**2 + z**2, False),
         (x**2 + y**2 + 3 * x * y + z**2 + 3 * y * z - x * z, True),
+        ((x + y) ** 2 + z**2, True),
         (x * y + z**2, False),
         (y**2 - x**2 + z**2, False),
     ],
