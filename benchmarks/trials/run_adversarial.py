@@ -24,7 +24,7 @@ from polycorner import certify, minimise, prove
 from polycorner.minimisation import Verdict
 from polycorner.proofs import Proof
 
-SECONDS = 60.0
+SECONDS = 30.0
 SEED = 2
 STRICT = (Verdict.STRICT_MINIMUM, Verdict.WEAK_MINIMUM)
 COLUMNS = (

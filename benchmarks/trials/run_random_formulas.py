@@ -37,7 +37,7 @@ from polycorner import (
 )
 from polycorner.minimisation import Verdict
 
-SECONDS = 60.0
+SECONDS = 30.0
 SEED = 1
 WORST = ("crash", "wrong", "stopped", "doubted", "right", "declined")
 PACKAGE = str(Path(polycorner.__file__).parent)

@@ -4,7 +4,9 @@ A task is a generator of facts (dictionaries), yielded as they become known: wha
 before it is stopped is kept.
 """
 
+import math
 import multiprocessing
+import resource
 import signal
 import traceback
 from collections.abc import Callable, Iterator
@@ -14,28 +16,29 @@ from typing import Any
 
 Facts = dict[str, Any]
 Task = Callable[..., Iterator[Facts]]
+PATIENCE = 20  # times the processor time, for a busy machine
 
 
 def staged(task: Task, *arguments: object, seconds: float) -> Facts:
-    """Run a task in a child process for at most the given time and return its facts.
+    """Run a task in a child process for at most the given processor time and return its facts.
 
     An exception is under ``"crash"`` with its traceback; a task that was stopped has
     ``"stopped"``, the time it had.
     """
     context = multiprocessing.get_context("fork")
     here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_run, args=(there, task, arguments), daemon=True)
+    child = context.Process(target=_run, args=(there, seconds, task, arguments), daemon=True)
     child.start()
     there.close()
     facts: Facts = {}
-    end = perf_counter() + seconds
+    end = perf_counter() + PATIENCE * seconds
     while (message := _receive(here, end - perf_counter())) is not None:
         facts |= message
-    finished = facts.pop("finished", False)
-    if not finished:
-        alive = child.is_alive() and perf_counter() >= end
-        facts |= {"stopped": seconds} if alive else {"crash": "the process ended"}
+    if not facts.pop("finished", False):
         child.kill()
+        child.join()
+        killed = child.exitcode in {-signal.SIGXCPU, -signal.SIGKILL}
+        facts |= {"stopped": seconds} if killed else {"crash": f"exit code {child.exitcode}"}
     child.join()
     here.close()
     return facts
@@ -49,8 +52,10 @@ def _receive(connection: Connection, seconds: float) -> Facts | None:
     return message
 
 
-def _run(connection: Connection, task: Task, arguments: tuple[object, ...]) -> None:
+def _run(connection: Connection, seconds: float, task: Task, arguments: tuple[object, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
     try:
         for facts in task(*arguments):
             connection.send(facts)
