@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.polishing import SETTLED, Endpoint
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.slsqp import slsqp
@@ -43,8 +44,9 @@ def minimise(
     energy : SmoothFunction or sympy.Expr
         The energy ``E``, on the same manifold.
     start : (n,) array or mapping from coordinate names
-        Where to start.  A start outside ``D`` is first projected onto ``D`` by repeated
-        linearisation; if that fails the verdict is ``INFEASIBLE``.
+        Where to start.  A start outside ``D`` is first projected onto ``D``, by repeated
+        linearisation or, where that fails, by least squares of the violation.  The verdict is
+        ``INFEASIBLE`` where these end at a stationary point of the violation.
     method : {"newton", "slsqp", "scp"}, optional
         ``"newton"`` (default) descends inside ``D`` by an active-set method, every iterate
         feasible and lower than the last and never through a wall, then solves the KKT equations
@@ -161,6 +163,8 @@ def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> 
         if end.failure is not Verdict.INFEASIBLE:
             break
         end = descent(problem, piece, q, limit)
+    if end.failure is Verdict.INFEASIBLE:
+        end = _descend_from_outside(problem, (first, *others), q, descent, limit)
     if not d.is_union:
         return end
     spent = end.iterations
@@ -172,6 +176,21 @@ def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> 
             break
         end, spent = lower, spent + lower.iterations
     return Endpoint(end.point, spent, end.failure)
+
+
+def _descend_from_outside(
+    problem: Problem, pieces: tuple[Piece, ...], q: Array, descent: Descent, limit: int
+) -> Endpoint:
+    """Descend from a point of least violation; INFEASIBLE is said where that is stationary."""
+    ends = []
+    for piece in pieces:
+        found = approach(problem, piece, q)
+        if found.feasible:
+            return descent(problem, piece, found.point, limit)
+        ends.append(found)
+    empty = all(end.stationary for end in ends)
+    failure = Verdict.INFEASIBLE if empty else Verdict.NOT_CONVERGED
+    return Endpoint(ends[0].point, 0, failure)
 
 
 def _lower_branch(problem: Problem, end: Endpoint, descent: Descent, limit: int) -> Endpoint | None:

@@ -45,7 +45,9 @@ def polished(
     if not np.isfinite(q).all():
         q = start
     values, gradients = problem.evaluate(q, 1)
-    if abs(q / problem.scales).max() > FAR and _violated(problem, piece, q, 1e-6) == frozenset():
+    lower = values[-1] < problem.energy.value(start)
+    far = abs(q / problem.scales).max() > FAR
+    if far and lower and _violated(problem, piece, q, 1e-6) == frozenset():
         return Endpoint(start, iterations, Verdict.UNBOUNDED)
     if np.isfinite(values).all() and np.isfinite(gradients).all():
         point = _on_face(problem, piece, q, _carrying(problem, piece, values, gradients))

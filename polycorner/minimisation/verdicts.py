@@ -15,7 +15,9 @@ class Verdict(Enum):
     UNDECIDED = "undecided: stationary, but the second order vanishes in a feasible direction"
     NOT_SMOOTH = "undecided: a derivative that the conditions need jumps there or is not finite"
     OUTSIDE = "the point does not lie in the polyhedron"
-    INFEASIBLE = "no point of the polyhedron was reached from the start"
+    INFEASIBLE = (
+        "no point of the polyhedron was reached: no step lowers the violation to first order"
+    )
     UNBOUNDED = "the energy decreases without end: unbounded below, or no minimum is attained"
     NOT_CONVERGED = "the search stopped before it reached a stationary point"
 

@@ -1,0 +1,112 @@
+"""Feasible points from starts outside, as least squares of the violation.
+
+Where repeated linearisation (the compiled projection) finds no point of a piece
+``{f_i >= 0, h_j = 0}``, the violation
+
+    ``phi(q) = |v(q)|^2 / 2``,   ``v = (max(0, -f_i) / |df_i|, h_j / |dh_j|)``,
+
+with the lengths of the gradients at the start, is minimised by a trust-region method of
+Gauss-Newton type, which is globally convergent to stationary points of ``phi`` ([NW] thm. 10.3):
+``phi`` is continuously differentiable, with ``d phi = v . dv``, although ``v`` is not.  Either
+``phi`` tends to zero, or the limit is a stationary point with ``phi > 0``, from which no direction
+lowers the violation to first order: this is the evidence that there is no feasible point nearby.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from polycorner.minimisation.problem import Problem
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.spaces.manifold import Array
+
+EVALUATIONS = 400  # limit of each least-squares minimisation
+STATIONARY = 1e-6  # slope of the violation, relative to its size, that counts as zero
+MOVES = (1e-2, 1.0)  # lengths of random steps off a stationary point, in scale units
+
+
+@dataclass(frozen=True, eq=False)
+class Approach:
+    """The end of a search for a feasible point.
+
+    Attributes
+    ----------
+    point : (n,) array
+        A feasible point, or the point of least violation that was found.
+    feasible : bool
+        Whether the point is feasible.
+    stationary : bool
+        Whether the violation, if any, has a stationary point there.
+    """
+
+    point: Array
+    feasible: bool
+    stationary: bool
+
+
+def approach(problem: Problem, piece: Piece, q: Array) -> Approach:
+    """Search a feasible point of a piece at which the energy is finite, from outside.
+
+    A stationary point of the violation may be a saddle of it; random steps of several lengths lead
+    away from such a point, and the lowest end counts.
+    """
+    rows = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
+    violation = _Violation(problem, rows, q)
+    if not np.isfinite(violation.residuals(q / problem.scales)).all():
+        return Approach(q, feasible=False, stationary=False)
+    rng = np.random.default_rng(0)
+    u, size = violation.least(q / problem.scales)
+    for move in (*MOVES, 0.0):
+        reached, point = problem.restore(piece, u * problem.scales)
+        if reached and np.isfinite(problem.energy.value(point)):
+            return Approach(point, feasible=True, stationary=False)
+        if move == 0.0:
+            break
+        other, less = violation.least(u + move * rng.standard_normal(u.size))
+        if less < size:
+            u, size = other, less
+    return Approach(u * problem.scales, feasible=False, stationary=violation.is_stationary(u))
+
+
+class _Violation:
+    """The vector ``v`` of scaled violations and its Jacobian, in scaled coordinates."""
+
+    def __init__(self, problem: Problem, rows: list[int], start: Array) -> None:
+        self.problem, self.rows = problem, rows
+        self.signed = np.array([i < problem.inequalities for i in rows])
+        values, gradients = problem.evaluate(start, 1)
+        sizes = np.linalg.norm(gradients[rows], axis=1)
+        self.weights = np.where(np.isfinite(sizes) & (sizes > 0), 1 / np.where(sizes, sizes, 1), 1)
+        self.domain = bool(np.isfinite(values[-1]))  # the energy's, to be kept
+
+    def residuals(self, u: Array) -> Array:
+        (values,) = self.problem.evaluate(u * self.problem.scales, 0)
+        v: Array = values[self.rows] * self.weights
+        if self.domain and not np.isfinite(values[-1]):
+            v = v + np.nan
+        return np.where(self.signed, np.minimum(v, 0), v)
+
+    def jacobian(self, u: Array) -> Array:
+        values, gradients = self.problem.evaluate(u * self.problem.scales, 1)
+        violated = ~self.signed | (values[self.rows] < 0)
+        rows: Array = gradients[self.rows] * (self.weights * violated)[:, None]
+        return rows
+
+    def least(self, u: Array) -> tuple[Array, float]:
+        """Minimise the violation from ``u``; return the end and the size of the violation."""
+        from scipy.optimize import least_squares
+
+        if not np.isfinite(self.residuals(u)).all() or not np.isfinite(self.jacobian(u)).all():
+            return u, np.inf
+        least: Any = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
+        with np.errstate(all="ignore"):
+            end = least_squares(
+                self.residuals, u, self.jacobian, x_scale="jac", max_nfev=EVALUATIONS, **least
+            )
+        return end.x, float(np.sqrt(2 * end.cost))
+
+    def is_stationary(self, u: Array) -> bool:
+        v, rows = self.residuals(u), self.jacobian(u)
+        slope = float(abs(v @ rows).max(initial=0.0))
+        return bool(slope <= STATIONARY * float(np.linalg.norm(v)))
