@@ -1,9 +1,10 @@
 """Proofs in ball arithmetic: time per proof, and a campaign that searches for a false one.
 
-The pair of dumbbells is proved at growing precision and for a whole box of sizes at once.  Then
-the prover is given random problems with exactly known answers, many of them borderline minima, and
-every theorem it states is checked in rational arithmetic.  ``python benchmarks/bench_proof.py 500``
-runs 500 problems of each kind instead of 100.
+The pair of dumbbells is proved at growing precision and for a whole box of sizes at once.  How many
+minima with multipliers of 1e-8 to 1e-30 and contacts at angles of 1e-2 to 1e-12 are proved is
+counted.  Then the prover is given random problems with exactly known answers, many of them
+borderline minima, and every theorem it states is checked in rational arithmetic.  ``python
+benchmarks/bench_proof.py 500`` runs 500 problems of each kind instead of 100.
 """
 
 import statistics
@@ -23,11 +24,13 @@ from polycorner.proofs import Proof, prove
 sys.path.append(str(Path(ROOT, "tests", "support")))
 from exact_kinds import KINDS, departures, programme
 from exact_oracle import holds
+from faint_minima import regular
 
 DIGITS = (30, 100, 1000, 4000)
 ROUNDS = 5
 BOX = {"t": (1.2, 1.8), "l": (14.0, 18.0)}
 EACH = 100
+FAINT = 171
 WORDS = ("proved", "refuted", "undecided", "refused", "FALSE")
 
 
@@ -60,6 +63,18 @@ def sizes(c: Certificate) -> dict[str, Any]:
     }
 
 
+def faint(count: int) -> dict[str, Any]:
+    """Return how many regular minima are proved whose numbers floating point takes for zero."""
+    rng = np.random.default_rng(1)
+    proved = 0
+    for k in range(count):
+        weights = [10.0 ** -rng.uniform(8, 30) if k % 2 else 1.0, 1.0]
+        rng.shuffle(weights)
+        angle = 10.0 ** -rng.uniform(2, 12) if k % 3 else 0.75
+        proved += prove(regular(angle, *weights, float(rng.integers(-2, 3)) / 4)).proved
+    return {f"faint minima proved, of {count}": proved}
+
+
 def outcome(proof: Proof, problem: Any, *, minimum: bool) -> str:
     """Return one of ``WORDS``; a problem is refused if its certificate does not claim a minimum."""
     if proof.proved:
@@ -87,7 +102,7 @@ def campaign(each: int) -> dict[str, Counter[str]]:
 def main() -> None:
     each = int(sys.argv[1]) if len(sys.argv) > 1 else EACH
     c = corner()
-    figures: dict[str, Any] = {**precisions(c), **sizes(c)}
+    figures: dict[str, Any] = {**precisions(c), **sizes(c), **faint(FAINT)}
     print_table("the corner of three contacts", ["", "figure"], list(map(list, figures.items())))
     totals = campaign(each)
     rows = [[kind, *(found[word] for word in WORDS)] for kind, found in totals.items()]

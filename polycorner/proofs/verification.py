@@ -103,6 +103,9 @@ def prove(
     The working precision belongs to the process: proofs in several threads take turns, proofs in
     several processes run side by side.  The result does not depend on either.
 
+    Without parameters, the precision is doubled up to three times while a condition is undecided:
+    from the digits asked for and 64 binary digits more to about ten times as many.
+
     Raises
     ------
     TypeError, ValueError

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, certify, minimise
@@ -110,7 +110,7 @@ def linear_conditions(draw):
     return [(draw(st.integers(1, 8)) / 4, draw(numbers), draw(numbers)) for _ in range(3)]
 
 
-@settings(max_examples=6)
+@settings(max_examples=4, phases=[Phase.explicit, Phase.generate])
 @given(linear_conditions(), st.booleans(), st.integers(0, 2**32))
 def test_cells_are_proved_or_failed_where_linear_conditions_say_so(forms, both, seed):
     """A multiplier, a gap and a curvature that are linear in the parameters: the truth is known."""
@@ -121,7 +121,7 @@ def test_cells_are_proved_or_failed_where_linear_conditions_say_so(forms, both, 
     box = {name: side for name, side in box.items() if name in ("a", "b" if both else "a")}
     if not box:
         return
-    p = prove(c, parameters=box, max_cells=80)
+    p = prove(c, parameters=box, max_cells=50)
     assert covers_exactly(p.cells, box)
     shares = p.proved_fraction, p.failed_fraction, sum(cell.volume for cell in p.undecided)
     assert shares[0] + shares[1] + shares[2] / 3.0 ** len(box) == pytest.approx(1)
@@ -147,7 +147,9 @@ def _points(sides, rng):
 
 
 def _all_hold(forms, point):
-    return all(c0 + c1 * point[0] + c2 * point[1] > 0 for c0, c1, c2 in forms)
+    """Whether all forms are positive, exactly: cells may be as narrow as neighbouring doubles."""
+    u, v = map(Fraction, point)
+    return all(Fraction(c0) + Fraction(c1) * u + Fraction(c2) * v > 0 for c0, c1, c2 in forms)
 
 
 def test_a_wall_that_is_out_of_the_way_for_two_thirds_is_proved_on_these():
@@ -163,6 +165,14 @@ def test_a_wall_that_is_out_of_the_way_for_two_thirds_is_proved_on_these():
     assert q.failed == q.cells
 
 
+def test_a_contact_that_repeats_another_is_left_out_for_all_parameters():
+    parts = {"wall": x - a, "twice": 2 * x - 2 * a, "scaled": (x - a) * (1 + b**2)}
+    c = problem(parts, b * x + y**2, [1, 0], a=1.0, b=1.0)
+    p = prove(c, parameters={"a": (-1.0, 2.0), "b": (0.5, 2.0)})
+    assert p.proved, str(p)
+    assert len(p.active) == 1
+
+
 def test_a_symmetry_that_holds_for_one_parameter_failed_in_part():
     along = Symmetry(fields=[{"y": 1}])  # of the wall for a = 0 only
     c = problem({"wall": x - a * y}, x - a * y + y**2, [0, 0], a=0.25)
@@ -173,7 +183,7 @@ def test_a_symmetry_that_holds_for_one_parameter_failed_in_part():
 
 def test_a_fold_leaves_its_end_undecided():
     c = problem({"far": x + 50}, x**3 / 3 - a * x + y**2, [1, 0], a=1.0)
-    p = prove(c, parameters={"a": (-0.25, 1.0)}, max_cells=80)
+    p = prove(c, parameters={"a": (-0.25, 1.0)}, max_cells=50)
     assert p.conditions[UNIQUE] == "undecided"
     assert 0.6 < p.proved_fraction <= 0.8
     for cell in p.cells:

@@ -4,10 +4,11 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
+from faint_minima import regular
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from polycorner import AnyOf, Manifold, Polyhedron, SmoothFunction, certify
+from polycorner import AnyOf, Manifold, Polyhedron, certify
 from polycorner.proofs import prove
 from polycorner.proofs.hypotheses import INACTIVE, POSITIVE
 
@@ -35,24 +36,6 @@ def holds_point(proof, point):
 
 
 # ----------------------------------------------------------------- small multipliers, small angles
-
-# Two walls at a small angle, curved, with small multipliers, and a bowl along their common edge.
-ANGLE, FIRST, SECOND, BEND = letters = sp.symbols("angle first second bend", real=True)
-WALLS = x + BEND * z**2, x + ANGLE * y + BEND * y * z
-ENERGY = FIRST * WALLS[0] + SECOND * WALLS[1] + z**2
-
-
-def regular(angle, first, second, bend):
-    """Return the certificate of a regular minimum at 0."""
-    values = {s.name: v for s, v in zip(letters, (angle, first, second, bend), strict=True)}
-
-    def function(name, e):
-        used = {s.name: values[s.name] for s in letters if s in e.free_symbols}
-        return SmoothFunction(name, e, M3, parameters=used)
-
-    walls = [function(name, e) for name, e in zip("fg", WALLS, strict=True)]
-    return certify(Polyhedron(M3, walls), function("energy", ENERGY), [0, 0, 0])
-
 
 small = st.tuples(st.integers(1, 9), st.integers(0, 30)).map(lambda t: t[0] * 10.0 ** -t[1])
 angles = st.tuples(st.integers(1, 9), st.integers(2, 12)).map(lambda t: t[0] * 10.0 ** -t[1])
