@@ -26,6 +26,7 @@ NEAR = 1e-2  # at which a lower point refutes without looking at the way to it
 FEASIBLE = 1e-9
 EXACT = 1e-24  # violation of a point that counts, with 30 digits
 SAME = 1e-6  # relative difference at which two energies count as the same
+CLEARLY = 1 - 1e-5  # factor of a violation that has decreased
 STEPS = 12  # on the way to a lower point
 
 
@@ -253,32 +254,36 @@ class Judge:
         return None
 
     def reachable(self, q: Array, generator: np.random.Generator) -> bool:
-        """Whether feasible points exist and the violation decreases clearly from ``q``."""
+        """Whether feasible points exist and all violations decrease together from ``q``.
+
+        At a point where they do not, some weighted sum of them is stationary.
+        """
         if not self.less_violated_nearby(q, generator):
             return False
         return self.feasible_point(q, generator) is not None
 
     def less_violated_nearby(self, q: Array, generator: np.random.Generator) -> bool:
-        """Whether points within 1e-2 of ``q`` violate the constraints clearly less."""
+        """Whether every violation is clearly less at a point within 1e-2 of ``q``, and none new."""
         q = np.asarray(q, float)
         size = 1e-2 * np.maximum(1.0, abs(q))
-        here = self._infeasibility(q)
+        here = self._each_violation(q)
         c, J = self._violated(q), _jacobian(self._violations(q), q)
         rays = [size * generator.normal(size=len(q)) for _ in range(300)]
         if np.isfinite(c).all() and np.isfinite(J).all():
-            steepest = [-(c @ J), -(c @ J) * size**2, -np.linalg.lstsq(J, c, rcond=1e-10)[0]]
-            lengths = [max(np.abs(step / size).max(), 1e-300) for step in steepest]
-            rays += [
-                step / length * 0.3**k
-                for step, length in zip(steepest, lengths, strict=True)
-                for k in range(8)
-            ]
-        return min(self._infeasibility(q + ray) for ray in rays) < 0.999 * here
+            norms = np.maximum(np.linalg.norm(J, axis=1), 1e-300)
+            unit = J / norms[:, None]
+            steps = [-(c @ J), -((c / norms) @ unit), -np.linalg.lstsq(J, c, rcond=1e-10)[0]]
+            steps.append(-np.linalg.lstsq(J, norms * np.sign(c), rcond=1e-10)[0])
+            lengths = [max(np.abs(step / size).max(), 1e-300) for step in steps]
+            pairs = zip(steps, lengths, strict=True)
+            rays += [step / length * 0.3**k for step, length in pairs for k in range(8)]
+        around = (self._each_violation(q + ray) for ray in rays)
+        return any(np.all(there <= CLEARLY * here) for there in around)
 
-    def _infeasibility(self, q: Array) -> float:
+    def _each_violation(self, q: Array) -> Array:
         _, g, h = self.values(q)
-        total = float(np.sum(np.minimum(g, 0) ** 2) + np.sum(h**2))
-        return total if np.isfinite(total) else np.inf
+        each = np.concatenate([np.maximum(-g, 0), abs(h)])
+        return np.where(np.isfinite(each), each, np.inf)
 
 
 def _worst(parts: Parts) -> mpmath.mpf:

@@ -103,6 +103,19 @@ class TestJudge:
     def test_a_minimum_with_a_lower_valley_behind_a_barrier_is_not_refuted(self):
         assert not refuted(x**2 * (x - 1) ** 2 - x**3 / 100 + y**2, at=(0.0, 0.0))
 
+    @pytest.mark.parametrize(
+        ("inequalities", "equations", "at", "reachable"),
+        [
+            ([x - 51], [], (0.0, 0.0), True),
+            ([x**2 - 1, y], [x - y], (0.3, -0.2), True),
+            ([3 * x + 7, x**2 - 16, 12 - x], [], (-3.2, 0.0), False),
+            ([x**2 + y**2 - 1, -(x**2) - y**2 - 1], [], (0.5, 0.0), False),
+        ],
+    )
+    def test_it_tells_where_all_violations_decrease(self, inequalities, equations, at, reachable):
+        judge = Judge((x, y), x, inequalities, equations)
+        assert judge.reachable(np.array(at), np.random.default_rng(0)) is reachable
+
     def test_it_finds_points_that_are_just_as_low(self):
         origin = np.zeros(2)
         assert Judge((x, y), (x - y) ** 2, [], []).as_low(origin) is not None
