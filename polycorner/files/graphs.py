@@ -126,7 +126,6 @@ def _edge(k: int, edge: Edge) -> dict[str, Any]:
         "length": float(edge.length),
         "from_kind": edge.kinds[0].name.lower(),
         "to_kind": edge.kinds[1].name.lower(),
-        "branches": int(edge.branches),
     }
 
 

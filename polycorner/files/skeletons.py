@@ -67,7 +67,7 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
         "crossings": [[_flag(p.start), _flag(p.stop)] for p in explorer.crossings],
         "starts": [[count, start.tolist()] for count, start in explorer.starts],
         "pending": list(explorer.pending),
-        "tried": [[edge, sorted(face)] for edge, face in sorted(explorer.tried, key=_order)],
+        "tried": sorted(map(_flag, explorer.tried), key=str),
         "notes": explorer.notes,
         "lost": bool(explorer.registry.lost),
         "random": _listed(explorer.rng.bit_generator.state),
@@ -130,7 +130,8 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> E
     quotient = Quotient(polyhedron, symmetry, float(content["tolerance"]), extent)
     explorer = Explorer(quotient, [], _generator(content["random"]))
     for corner in content["corners"]:
-        explorer.registry.restore(_points(corner["point"], n, 1))
+        active = frozenset(map(polyhedron.names.index, corner["active"]))
+        explorer.registry.restore(_points(corner["point"], n, 1), active)
     for record, corner in zip(explorer.records, content["corners"], strict=True):
         record.edges.update(dict(corner["edges"]))
     explorer.curves += [_read_curve(entry, n) for entry in content["edges"]]
@@ -139,7 +140,7 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> E
     ]
     explorer.starts.extend((count, _points(start, n, 1)) for count, start in content["starts"])
     explorer.pending.extend((corner, ray) for corner, ray in content["pending"])
-    explorer.tried.update((edge, frozenset(face)) for edge, face in content["tried"])
+    explorer.tried.update(map(_read_flag, content["tried"]))
     for sentence in content["notes"]:
         explorer.registry.note(sentence)
     explorer.registry.lost = bool(content["lost"])
@@ -200,7 +201,6 @@ def _curve(curve: Curve) -> dict[str, Any]:
         "stop": curve.stop,
         "relabelled": changed,
         "length": float(curve.length),
-        "branches": int(curve.branches),
         "points": curve.points.tolist(),
     }
 
@@ -215,7 +215,6 @@ def _read_curve(entry: dict[str, Any], n: int) -> Curve:
         stop=_pair(entry["stop"]),
         relabelled=entry["relabelled"],
         length=float(entry["length"]),
-        branches=entry["branches"],
     )
 
 
@@ -230,10 +229,6 @@ def _flag(flag: Flag) -> list[Any]:
 def _read_flag(written: list[Any]) -> Flag:
     kind, record, names = written
     return kind, tuple(record) if isinstance(record, list) else record, frozenset(names)
-
-
-def _order(crossing: tuple[int, frozenset[int]]) -> tuple[int, list[int]]:
-    return crossing[0], sorted(crossing[1])
 
 
 # -------------------------------------------------------------------------------- random generators

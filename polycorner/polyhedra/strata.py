@@ -115,6 +115,18 @@ def stratum_at(
     check_tolerance("rank_tolerance", rank_tolerance)
     point = polyhedron.manifold.point(q)
     values, gradients = evaluated(polyhedron, point)
+    return stratum_of(polyhedron, point, values, gradients, tolerance, rank_tolerance)
+
+
+def stratum_of(
+    polyhedron: Polyhedron,
+    point: Array,
+    values: Array,
+    gradients: Array,
+    tolerance: float,
+    rank_tolerance: float = RANK_TOLERANCE,
+) -> Stratum:
+    """Classify a point by values and scaled gradients there; see :func:`stratum_at`."""
     pieces = local_pieces(polyhedron, values, gradients, tolerance)
     active = sorted(set().union(*pieces))
     m, n = len(polyhedron.functions), polyhedron.dimension

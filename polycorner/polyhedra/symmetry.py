@@ -100,13 +100,15 @@ class Symmetry(Value):
         vectors = [[f.value(q) for f in field] for field in self._compiled[manifold]]
         return np.array(vectors).reshape(-1, manifold.dimension) / manifold.scale_array
 
+    def displacement(self, manifold: Manifold, p: Array, q: Array) -> Array:
+        """Return the displacement from one continuous orbit to another, by the invariants."""
+        if self.invariants is None:
+            return manifold.difference(p, q) / manifold.scale_array
+        return self.invariants(p) - self.invariants(q)
+
     def separation(self, manifold: Manifold, p: Array, q: Array) -> float:
         """Return how far the continuous orbits of two points are apart, in scale units."""
-        if self.invariants is None:
-            apart = manifold.difference(p, q) / manifold.scale_array
-        else:
-            apart = self.invariants(p) - self.invariants(q)
-        return float(abs(apart).max())
+        return float(abs(self.displacement(manifold, p, q)).max())
 
     def relabellings(
         self, manifold: Manifold, p: Array, q: Array, tolerance: float

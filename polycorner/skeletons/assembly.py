@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from polycorner.polyhedra.strata import stratum_at
+from polycorner.polyhedra.strata import stratum_of
 from polycorner.polyhedra.symmetry import renamed
 from polycorner.skeletons.elements import Completeness, Corner, Edge, Face, Skeleton
 from polycorner.skeletons.explorer import Explorer
@@ -30,7 +30,6 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
             kinds=curve.kinds,
             polyline=curve.points,
             length=curve.length,
-            branches=curve.branches,
         )
         for curve in explorer.curves
     )
@@ -49,12 +48,12 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
 
 def _whole(explorer: Explorer) -> bool:
     """Whether faces and Euler characteristic can be trusted everywhere."""
-    if explorer.symmetry.relabels or any(curve.branches for curve in explorer.curves):
+    if explorer.symmetry.relabels:
         return False
     for record in explorer.records:
         figure = record.figure
         flags = [(i, sector.active) for sector in figure.sectors for i in sector.rays]
-        if (figure.singular and figure.full > 2) or max(Counter(flags).values(), default=0) > 1:
+        if max(Counter(flags).values(), default=0) > 1:
             return False
     return True
 
@@ -67,8 +66,12 @@ def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
     ends = [record.edges.get(representative) for representative in record.orbit]
     return Corner(
         point=explorer.manifold.wrap(record.point.q),
-        stratum=stratum_at(
-            explorer.polyhedron, record.point.q, tolerance=explorer.quotient.tolerance
+        stratum=stratum_of(
+            explorer.polyhedron,
+            record.point.q,
+            record.point.values,
+            record.point.gradients,
+            explorer.quotient.tolerance,
         ),
         singular=record.figure.singular,
         edges=tuple(end for end in ends if end is not None),
@@ -117,10 +120,12 @@ def _groups(sets: "UnionFind", flags: Iterable[Flag]) -> list[list[Flag]]:
 
 def _flags(explorer: Explorer) -> Iterator[Flag]:
     for k, record in enumerate(explorer.records):
-        for sector in record.figure.sectors:
+        for s, sector in enumerate(record.figure.sectors):
             names = explorer.registry.names(sector.active)
             for i in sector.rays:
                 yield ("half", (k, i), names)
+            if not sector.rays:
+                yield ("apex", (k, s), names)
     for k, curve in enumerate(explorer.curves):
         if curve.start is None:
             for face in explorer.faces_beside(k):
@@ -151,6 +156,8 @@ def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tupl
     changes = [p for p in record.stabiliser if any(a != b for a, b in p.items())]
     images = [[alike.get(renamed(names, p), []) for names in active] for p in changes]
     for sector in record.figure.sectors:
+        if not sector.rays:
+            continue
         face = explorer.registry.names(sector.active)
         first, last = sector.rays
         yield ("half", (k, first), face), ("half", (k, last), face)
@@ -167,13 +174,15 @@ def _ends(explorer: Explorer, flags: Iterable[Flag]) -> Iterator[Flag]:
         if flag[0] == "curve":
             if explorer.curves[flag[1]].kinds[0] is not End.CLOSED:
                 yield flag
-        elif _edge_of(explorer, flag) < 0:
+        elif flag[0] == "half" and _edge_of(explorer, flag) < 0:
             yield flag
 
 
 def _edge_of(explorer: Explorer, flag: Flag) -> int:
     if flag[0] == "curve":
         return int(flag[1])
+    if flag[0] == "apex":
+        return -1
     k, i = flag[1]
     record = explorer.records[k]
     found: int = record.edges.get(record.orbit[i], -1)
@@ -198,6 +207,7 @@ def _components(
     if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
         inside = UnionFind()
         for flag in flags:
-            inside.union(("edge", _edge_of(explorer, flag)), surface[flag])
+            if flag[0] != "apex":
+                inside.union(("edge", _edge_of(explorer, flag)), surface[flag])
         counts[fixed + 3] = len({inside[surface[flag]] for flag in flags})
     return counts

@@ -38,7 +38,7 @@ class Corner(Value):
     stratum : Stratum
         Active functions, rank, dimension and local type there.
     singular : bool
-        Whether the rank falls short and second-order terms alone isolate the point.
+        Whether the rank falls short: curves cross, touch or have a cusp, or a surface an apex.
     edges : tuple of int
         Edges that leave it, as positions in ``Skeleton.edges``, once for every end.
     """
@@ -85,8 +85,6 @@ class Edge(Value):
         Points along it, in coordinates that are not wrapped.
     length : float
         Length of the polyline in scale units, orthogonal to the symmetry.
-    branches : int
-        How often it meets other curves on the same functions.
     """
 
     active: tuple[str, ...]
@@ -94,7 +92,6 @@ class Edge(Value):
     kinds: tuple[End, End]
     polyline: Array
     length: float
-    branches: int
 
     @property
     def is_closed(self) -> bool:
@@ -116,7 +113,7 @@ class Face:
     active : tuple of str
         Functions that vanish on it.
     boundary : tuple of tuple of int
-        Its boundary curves, each as the positions of its edges.
+        Its boundary curves, each as the positions of its edges; none for an apex.
     closed : bool
         Whether every boundary curve closes: no end at infinity, and no corner where the face
         could not be followed.
@@ -151,8 +148,7 @@ class Skeleton(Printed, Value):
         Numbers of connected components by dimension: corners, edges, faces, and the interior
         where it comes next.
     whole : bool
-        Whether faces were assembled everywhere and edges meet in corners only: not at singular
-        corners beyond the plane, where edges cross, where a face lies on both sides of an edge,
+        Whether faces were assembled everywhere: not where a face lies on both sides of an edge,
         or modulo relabellings.
     state : object
         The state of the search, for :func:`resume`.

@@ -2,8 +2,8 @@
 
 import copy
 import math
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -12,11 +12,13 @@ from time import monotonic
 import numpy as np
 
 from polycorner import checks
-from polycorner.progress import Progress
+from polycorner.progress import Progress, silent
 from polycorner.skeletons.elements import Completeness
 from polycorner.skeletons.flags import Crossing, Flag
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
+from polycorner.skeletons.links import Link, singular_figure
+from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.singularities import singular_point, singular_points
 from polycorner.skeletons.tracing import Curve, EdgeEnd, EdgeTracer
 from polycorner.skeletons.vertex_figures import Ray, faces_beside
 from polycorner.skeletons.walks import End, follow
@@ -25,11 +27,10 @@ from polycorner.values import Value
 
 # Random directions of a descent.
 DIRECTIONS = 6
+# Points of a face from which its singular points are sought.
+TRIES = 4
 # The first walks of a descent end after this part of the extent.
 SHORT = 20
-
-# An edge by position, and the functions of a face beside it.
-Beside = tuple[int, frozenset[int]]
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class SearchState(Value):
     pending : tuple of EdgeEnd
         Ends of edges to trace.
     tried : frozenset
-        Faces beside edges that were crossed.
+        Faces beside edges and apexes that were crossed.
     notes : tuple of str
         What a user should know.
     lost : bool
@@ -92,7 +93,7 @@ class SearchState(Value):
     crossings: tuple[Crossing, ...]
     starts: tuple[tuple[int, Array], ...]
     pending: tuple[EdgeEnd, ...]
-    tried: frozenset[Beside]
+    tried: frozenset[Flag]
     notes: tuple[str, ...]
     lost: bool
     rng: np.random.Generator
@@ -104,12 +105,13 @@ class Explorer(EdgeTracer):
     def __init__(
         self, quotient: Quotient, starts: Iterable[Array], rng: np.random.Generator
     ) -> None:
-        super().__init__(quotient)
+        super().__init__(quotient, partial(singular_figure, _searched))
         self.rng = rng
         self.starts: deque[tuple[int, Array]] = deque(enumerate(starts))
         self.crossings: list[Crossing] = []
-        self.tried: set[Beside] = set()
+        self.tried: set[Flag] = set()
         self._beside: dict[int, Mapping[frozenset[int], Ray]] = {}
+        self._sought: Counter[frozenset[int]] = Counter()  # singular points, by face
         self._finished = 0  # edges beside which every face was crossed
 
     @classmethod
@@ -181,11 +183,11 @@ class Explorer(EdgeTracer):
                 self.starts.popleft()
                 descents -= 1
             else:
-                beside = next(self._uncrossed(), None)
-                if beside is None:
+                way = next(self._uncrossed(), None)
+                if way is None:
                     return
-                yield len(self.tried) < crossings, partial(self._cross, *beside)
-                self.tried.add(beside)
+                yield len(self.tried) < crossings, partial(self._cross, *way)
+                self.tried.add(way[0])
 
     # ------------------------------------------------------------------------------------- descents
 
@@ -206,17 +208,36 @@ class Explorer(EdgeTracer):
         undirected = self._undirected(point, active)
         free = self._free(point, active.difference(undirected))
         if free > 0 and undirected:
-            self._note_undirected(point, undirected)
-            return False
+            return self._singular(point, active, undirected)
         if free == 0 or (free == 1 and not self._on_curve(point, active)):
             self.corner(point)
             return True
         if free == 1:
             return self._edge_at(point, active) is not None
-        met = False
+        met = self._find_singular(point, active)
         for there, found in islice(self._straight(point, active), 2 if both else 1):
             met |= self._descend_from(there, found, both=False)
         return met
+
+    def _singular(
+        self, point: EvaluatedPoint, active: frozenset[int], undirected: list[int]
+    ) -> bool:
+        """Record the singular corner at a point where gradients have no direction, if it is one."""
+        reach = VICINITY * self.quotient.tolerance
+        corner = singular_point(self.quotient, point.q, sorted(active), reach)
+        if corner is None or corner.active() is None:
+            self._note_undirected(point, undirected)
+            return False
+        self.corner(corner)
+        return True
+
+    def _find_singular(self, point: EvaluatedPoint, face: frozenset[int]) -> bool:
+        """Record the singular corners that a point of a face leads to; return whether any."""
+        self._sought[face] += 1
+        if isinstance(self.polyhedron, Link) or self._sought[face] > TRIES:
+            return False
+        corners = [self.corner(found) for found in singular_points(point, face)]
+        return any(corner is not None for corner in corners)
 
     def _straight(
         self, point: EvaluatedPoint, active: frozenset[int]
@@ -239,15 +260,22 @@ class Explorer(EdgeTracer):
 
     # ------------------------------------------------------------------------------------ crossings
 
-    def _uncrossed(self) -> Iterator[tuple[int, frozenset[int]]]:
-        """Yield edges and faces beside them that were not crossed yet."""
+    def _uncrossed(self) -> Iterator[tuple[Flag, HeldPoint, Array]]:
+        """Yield ways into faces that were not crossed yet: from edges, then from apexes."""
         if self.symmetry.relabels:
             return
         while self._finished < len(self.curves):
-            for face in self.faces_beside(self._finished):
-                if (self._finished, face) not in self.tried:
-                    yield self._finished, face
+            for face, ray in self.faces_beside(self._finished).items():
+                flag = self.flag(self._finished, face)
+                if flag not in self.tried:
+                    yield flag, ray.sample, ray.direction
             self._finished += 1
+        for k, record in enumerate(self.records):
+            for i, sector in enumerate(record.figure.sectors):
+                flag = ("apex", (k, i), self.registry.names(sector.active))
+                if not sector.rays and sector.sample is not None and flag not in self.tried:
+                    way = self.manifold.difference(sector.sample.q, record.point.q) / self.scales
+                    yield flag, sector.sample, way
 
     def faces_beside(self, k: int) -> Mapping[frozenset[int], Ray]:
         """Return the two-dimensional faces that meet an edge, and a ray into each."""
@@ -266,22 +294,25 @@ class Explorer(EdgeTracer):
                 return point
         return self.quotient.at(curve.middle)
 
-    def _cross(self, k: int, face: frozenset[int]) -> None:
-        """Walk straight across a face from the middle of an edge and record the edge at the end."""
-        ray = self.faces_beside(k)[face]
-        walk = follow(ray.sample, ray.direction, passive=face)
+    def _cross(self, start: Flag, sample: HeldPoint, direction: Array) -> None:
+        """Walk straight across a face and record the edge at the end; look for its apexes."""
+        face = sample.active() or frozenset()
+        walk = follow(sample, direction, passive=face)
+        middle = self.quotient.at(walk.points[len(walk.points) // 2])
+        self._find_singular(middle, face)
         active = walk.last.active() if walk.end is End.CORNER else None
         if active is None or not active > face:
             return
         undirected = self._undirected(walk.last, active)
         if undirected:
-            self._note_undirected(walk.last, undirected)
+            self._singular(walk.last, active, undirected)
             return
         if self._free(walk.last, active) != 1 or not self._on_curve(walk.last, active):
             return
         edge = self._edge_at(walk.last, active)
         if edge is not None:
-            self.crossings.append(Crossing(self.flag(k, face), self._flag_of(edge, face)))
+            names = self.registry.names(face)
+            self.crossings.append(Crossing(start, self._flag_of(edge, names)))
 
     def flag(self, k: int, face: frozenset[int]) -> Flag:
         """Return the flag of an edge and a face beside it."""
@@ -289,8 +320,16 @@ class Explorer(EdgeTracer):
         names = self.registry.names(face)
         return ("half", start, names) if start is not None else ("curve", k, names)
 
-    def _flag_of(self, edge: tuple[str, EdgeEnd | int], face: frozenset[int]) -> Flag:
-        return (edge[0], edge[1], self.registry.names(face))
+    @staticmethod
+    def _flag_of(edge: tuple[str, EdgeEnd | int], names: frozenset[str]) -> Flag:
+        return (edge[0], edge[1], names)
+
+
+def _searched(quotient: Quotient, starts: Sequence[Array]) -> Explorer:
+    """Return a finished search, with directions of its own."""
+    explorer = Explorer(quotient, starts, np.random.default_rng(0))
+    explorer.run(Budget(), silent)
+    return explorer
 
 
 def _copied(record: CornerRecord) -> CornerRecord:

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-# An edge (its end at a corner, or its position) and the names of a face beside it.
+# An edge (its end at a corner, or its position) or an apex (its corner and sector), and the names
+# of a face beside it.
 Flag = tuple[str, Any, frozenset[str]]
 
 

@@ -72,6 +72,11 @@ class EvaluatedPoint:
         """Signed distances ``f / |grad f|`` in scale units."""
         return distances(self.values, self.gradients)
 
+    @property
+    def sizes(self) -> Array:
+        """Lengths of the scaled gradients."""
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", self.gradients, self.gradients)))
+
     def active(self) -> frozenset[int] | None:
         """Return the functions that vanish and matter here; None outside the polyhedron."""
         quotient = self.quotient
@@ -123,6 +128,8 @@ class HeldPoint(EvaluatedPoint):
     condition : float
         Smallest diagonal entry of the triangular factor of the unit gradients: zero where they
         are dependent.
+    volume : float
+        Volume of the parallelepiped of the held gradients and the orbit.
     """
 
     def __init__(self, quotient: Quotient, q: Array, kept: Sequence[int]) -> None:
@@ -143,11 +150,14 @@ class HeldPoint(EvaluatedPoint):
         sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
         total = float(self.values.sum() + sizes.sum())
         self.finite, self.condition = math.isfinite(total) and bool((sizes > 0).all()), 0.0
+        self.volume = 0.0
         if self.finite:
             self._target = np.zeros(len(rows))
             self._target[: len(held)] = -self.values[held] / sizes[: len(held)]
             self._normal, self._factor = np.linalg.qr((rows / sizes[:, None]).T)
-            self.condition = float(abs(np.diagonal(self._factor)).min(initial=1.0))
+            diagonal = abs(np.diagonal(self._factor))
+            self.condition = float(diagonal.min(initial=1.0))
+            self.volume = float(diagonal.prod() * sizes.prod())
 
     def tangent(self, v: Array) -> Array:
         """Return the unit vector nearest to ``v`` along which the held functions stay zero."""

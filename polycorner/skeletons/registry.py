@@ -4,14 +4,16 @@ With relabellings only one corner of each orbit is kept, and of its rays one of 
 the relabellings that leave the corner in record stands for all of them.
 """
 
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.points import EvaluatedPoint, Quotient, projected
-from polycorner.skeletons.vertex_figures import Ray, VertexFigure, vertex_figure
+from polycorner.skeletons.singularities import SingularPoint
+from polycorner.skeletons.vertex_figures import Ray, VertexFigure, corner_rank, vertex_figure
 from polycorner.spaces.manifold import Array
 
 # Distances in scale units: of points that are one corner, of points compared, and of functions from
@@ -21,6 +23,8 @@ NEAR = 1e-4
 SLACK = 1e-10
 
 Names = frozenset[str]
+# Rays and sectors at a singular corner, from its active functions and their rank.
+SingularFigure = Callable[[EvaluatedPoint, frozenset[int], int], VertexFigure]
 
 
 @dataclass
@@ -42,7 +46,8 @@ class CornerRecord:
 class CornerRegistry:
     """The corners found so far, and notes for the user."""
 
-    def __init__(self, quotient: Quotient) -> None:
+    def __init__(self, quotient: Quotient, singular: SingularFigure) -> None:
+        self.singular_figure = singular
         self.quotient, self.symmetry = quotient, quotient.symmetry
         self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
         self.records: list[CornerRecord] = []
@@ -100,7 +105,7 @@ class CornerRegistry:
         if exact is None:
             return point
         away = exact.distances
-        if abs(away[sorted(active)]).max() > SLACK:
+        if abs(away[sorted(active)]).max(initial=0.0) > SLACK:
             self.note(
                 f"{self.written(active)} meet within the tolerance but not in one "
                 f"point: corners closer together than it count as one"
@@ -118,19 +123,16 @@ class CornerRegistry:
         key = self.symmetry.key
         return np.zeros(1) if key is None else np.asarray(key(q))
 
-    def restore(self, q: Array) -> None:
+    def restore(self, q: Array, active: frozenset[int]) -> None:
         """Add a corner at the point of a saved one."""
-        point = self.quotient.at(q)
-        self._add(point, point.active() or frozenset(), self._key(q))
+        self._add(self.quotient.at(q), active, self._key(q))
 
     def _add(
         self, point: EvaluatedPoint, active: frozenset[int], key: Array
     ) -> tuple[int, list[Relabelling]]:
-        figure = vertex_figure(point, active)
+        point, figure = self.figure(point, active)
         for sentence in figure.notes:
             self.note(sentence, lost=True)
-        if figure.singular and figure.full > 2:
-            self.note(f"faces at the singular corner {self.written(active)} are not assembled")
         stabiliser = self.symmetry.relabellings(self.manifold, point.q, point.q, SAME)
         record = CornerRecord(point, active, figure, key, stabiliser, [])
         for i, ray in enumerate(figure.rays):
@@ -138,6 +140,16 @@ class CornerRegistry:
             record.orbit.append(i if twin is None else record.orbit[twin[0]])
         self.records.append(record)
         return len(self.records) - 1, list(stabiliser)
+
+    def figure(
+        self, point: EvaluatedPoint, active: frozenset[int]
+    ) -> tuple[EvaluatedPoint, VertexFigure]:
+        """Return the point, with rounding removed where it is singular, and its figure."""
+        rank, full = corner_rank(point, active)
+        if rank == full:
+            return point, vertex_figure(point, active)
+        point = SingularPoint(self.quotient, point.q, sorted(active))
+        return point, self.singular_figure(point, active, corner_rank(point, active)[0])
 
     def match(
         self,
@@ -157,12 +169,22 @@ class CornerRegistry:
             return possible[0]
         for i, p in possible:
             other = record.figure.rays[i]
-            near = 0.2 * other.distance
+            near = 0.2 * self._room(record.figure, i)
             if sample is not None and p in self.symmetry.relabellings(
                 self.manifold, sample, other.sample.q, near
             ):
                 return i, p
         return None
+
+    def _room(self, figure: VertexFigure, i: int) -> float:
+        """Return how far a ray's sample is from those of rays with the same functions."""
+        ray = figure.rays[i]
+        others = (
+            self.symmetry.separation(self.manifold, ray.sample.q, other.sample.q)
+            for k, other in enumerate(figure.rays)
+            if k != i and other.active == ray.active
+        )
+        return min(ray.distance, *others, math.inf)
 
 
 def written_point(q: Array) -> str:

@@ -5,7 +5,27 @@ from typing import TypeVar
 
 import numpy as np
 
+from polycorner.spaces.manifold import Array
+
 Point = TypeVar("Point")
+
+
+def may_vanish(
+    values: tuple[Array, Array], slopes: tuple[Array, Array], reach: Array, h: float
+) -> list[int]:
+    """Return which functions, with values and slopes at both ends of a step, may vanish in it.
+
+    Those that end negative; and one that falls first and rises then, if the cubic through values
+    and slopes comes near zero, or if slopes kept up over the step (``reach``) would let it.
+    """
+    (f0, f1), (slope0, slope1) = values, slopes
+    turns = (slope0 < 0) & (slope1 >= 0)
+    near = f0 + f1 < reach
+    return [
+        int(k)
+        for k in np.flatnonzero((f1 < 0) | turns)
+        if f1[k] < 0 or near[k] or dips(f0[k], f1[k], slope0[k], slope1[k], h)
+    ]
 
 
 def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:

@@ -12,14 +12,21 @@ from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
-from polycorner.skeletons.registry import SAME, CornerRecord, CornerRegistry, written_point
+from polycorner.skeletons.registry import (
+    SAME,
+    CornerRecord,
+    CornerRegistry,
+    SingularFigure,
+    written_point,
+)
+from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.vertex_figures import Ray
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-# Steps of the ternary search on an arc.
-ARC_SEARCH = 40
+# Most steps along an edge to a point near its end.
+INWARD = 60
 
 EdgeEnd = tuple[int, int]
 
@@ -38,7 +45,6 @@ class Curve(Value):
     stop: EdgeEnd | None
     relabelled: Relabelling
     length: float
-    branches: int
 
     def __post_init__(self) -> None:
         if len(self.points) < 2:
@@ -55,12 +61,12 @@ class Curve(Value):
 class EdgeTracer:
     """Corners and edges that were found, and ends of edges still to trace."""
 
-    def __init__(self, quotient: Quotient) -> None:
+    def __init__(self, quotient: Quotient, singular: SingularFigure) -> None:
         self.quotient = quotient
         self.polyhedron, self.symmetry = quotient.polyhedron, quotient.symmetry
         self.manifold = self.polyhedron.manifold
         self.scales = self.manifold.scale_array
-        self.registry = CornerRegistry(quotient)
+        self.registry = CornerRegistry(quotient, singular)
         self.curves: list[Curve] = []
         self.pending: deque[EdgeEnd] = deque()
 
@@ -99,7 +105,7 @@ class EdgeTracer:
         stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
         curve = Curve(
             points, ray.active, (End.CORNER, walk.end), end, stop, carried,
-            walk.length + ray.distance, walk.branches,
+            walk.length + ray.distance,
         )  # fmt: skip
         self.curves.append(curve)
         number = len(self.curves) - 1
@@ -115,11 +121,6 @@ class EdgeTracer:
             if kind not in (End.CORNER, End.CLOSED):
                 lost = kind is End.SINGULAR
                 self.registry.note(f"the edge {label} {kind.value}", lost=lost)
-        if curve.branches:
-            self.registry.note(
-                f"the edge {label} meets other curves on the same functions: not followed",
-                lost=True,
-            )
 
     def _arrive(self, walk: Walk, ray: Ray) -> tuple[EdgeEnd | None, Relabelling]:
         """Return the end of the edge at the corner where a walk ended."""
@@ -130,12 +131,7 @@ class EdgeTracer:
         record = self.records[k]
         rays = record.figure.rays
         distance = rays[0].distance if rays else 1e-3
-        back = projected(
-            self.quotient,
-            walk.last.q - distance * self.scales * walk.tangent,
-            walk.last.kept,
-            distance,
-        )
+        back = self._before(walk, distance, singular=record.figure.singular)
         sample = None if back is None else back.q
         match = self.registry.match(record, sample, ray, carried, range(len(rays)))
         if match is None:
@@ -147,6 +143,28 @@ class EdgeTracer:
             return None, {}
         return (k, match[0]), match[1]
 
+    def _before(self, walk: Walk, distance: float, *, singular: bool) -> HeldPoint | None:
+        """Return the point of a walk at a distance before its end."""
+        away = np.linalg.norm((walk.points - walk.last.q) / self.scales, axis=1)
+        beyond = np.flatnonzero(away > distance)
+        if not singular or not len(beyond):
+            guess = walk.last.q - distance * self.scales * walk.tangent
+            return projected(self.quotient, guess, walk.last.kept, distance)
+        point: HeldPoint | None = HeldPoint(
+            self.quotient, walk.points[int(beyond[-1])], walk.last.kept
+        )
+        for _ in range(INWARD):
+            if point is None:
+                return None
+            way = (walk.last.q - point.q) / self.scales
+            length = float(np.linalg.norm(way))
+            # By less than half of the way, so that no step leads to another branch.
+            step = min(length - distance, 0.4 * length) * point.tangent(way)
+            if np.linalg.norm(step) < 1e-6 * distance:
+                break
+            point = projected(self.quotient, point.q + self.scales * step, point.kept, length)
+        return point
+
     def _edge_at(
         self, point: EvaluatedPoint, active: frozenset[int]
     ) -> tuple[str, EdgeEnd | int] | None:
@@ -155,6 +173,9 @@ class EdgeTracer:
         None where there is none, or where it cannot be followed; the notes say so.
         """
         here = HeldPoint(self.quotient, point.q, point.basis(active))
+        for k, curve in enumerate(self.curves):
+            if curve.active == active and self.lies_on(here.q, curve):
+                return ("curve", k) if curve.start is None else ("half", curve.start)
         t = self._along(here)
         walks = []
         for way in (t, -t):
@@ -185,7 +206,7 @@ class EdgeTracer:
             kinds = (walks[1].end, forth.end)
         curve = Curve(
             points, active, kinds, None, None, {},
-            sum(w.length for w in walks), sum(w.branches for w in walks),
+            sum(w.length for w in walks),
         )  # fmt: skip
         self.curves.append(curve)
         self._remark(curve)
@@ -212,20 +233,19 @@ class EdgeTracer:
         return any(self._on_arc(q, curve, k) for k in beside)
 
     def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
-        """Whether a point lies on the arc over chord ``k``, by ternary search."""
+        """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
         start, end = curve.points[k], curve.points[k + 1]
         kept = self.quotient.at(start).basis(curve.active)
+        along = self.symmetry.displacement(self.manifold, end, start)
 
-        def apart(s: float) -> float:
+        def passed(s: float) -> tuple[float, Array]:
             at = projected(self.quotient, start + s * (end - start), kept, np.inf)
             p = start if at is None else at.q
-            return self.symmetry.separation(self.manifold, q, p)
+            return float(self.symmetry.displacement(self.manifold, p, q) @ along), p
 
-        low, high = 0.0, 1.0
-        for _ in range(ARC_SEARCH):
-            left, right = (2 * low + high) / 3, (low + 2 * high) / 3
-            low, high = (low, right) if apart(left) < apart(right) else (left, high)
-        return apart((low + high) / 2) < SAME
+        if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
+            return min(self.symmetry.separation(self.manifold, q, p) for p in (start, end)) < SAME
+        return self.symmetry.separation(self.manifold, q, sign_change(passed)[1]) < SAME
 
     def _undirected(self, point: EvaluatedPoint, active: frozenset[int]) -> list[int]:
         """Return the active functions and equations whose gradients have no direction."""

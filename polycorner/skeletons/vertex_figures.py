@@ -3,9 +3,9 @@
 At a regular corner, where the active gradients have full rank in the quotient by the symmetry,
 edges leave along lines on which all but one dimension of the gradients vanishes: the extreme rays
 of the tangent cone where the polyhedron is locally an intersection, lines of the arrangement
-that stay in the set where it is a union.  At a singular corner, where the rank falls short and
-second-order terms alone make the point isolated, breaking one contact leaves the null directions
-of the others.  Every candidate is tested: a point a little way along it must lie in the polyhedron,
+that stay in the set where it is a union.  At a singular corner, where the rank falls short,
+breaking one contact leaves the null directions of the others; its figure is that of its link.
+Every candidate is tested: a point a little way along it must lie in the polyhedron,
 and the functions that vanish there are the edge's active set.
 """
 
@@ -49,10 +49,21 @@ class Ray:
 
 @dataclass(frozen=True)
 class Sector:
-    """A two-dimensional face at a corner, between two rays (by position)."""
+    """A two-dimensional face at a corner.
 
-    rays: tuple[int, int]
+    Attributes
+    ----------
+    rays : tuple of int
+        The two rays that bound it, by position; none where it goes all around an apex.
+    active : frozenset of int
+        Functions that vanish on it.
+    sample : HeldPoint, optional
+        A point of it near a singular corner.
+    """
+
+    rays: tuple[int, ...]
     active: frozenset[int]
+    sample: HeldPoint | None = None
 
 
 @dataclass(frozen=True)
@@ -79,17 +90,22 @@ class VertexFigure:
         return self.rank < self.full
 
 
+def corner_rank(point: EvaluatedPoint, active: frozenset[int]) -> tuple[int, int]:
+    """Return the rank of the active gradients in the quotient, and the quotient's dimension."""
+    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    slopes = unit_rows(point.gradients[sorted(active)]) @ frame
+    return rank(slopes, RANK_TOLERANCE), int(frame.shape[1])
+
+
 def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
-    """Return the rays and sectors at a corner with the given active functions."""
+    """Return the rays and sectors at a regular corner with the given active functions."""
     frame = null_space(point.matrix([]), RANK_TOLERANCE)
     rows = sorted(active)
     slopes = unit_rows(point.gradients[rows]) @ frame
     full = frame.shape[1]
-    r = rank(slopes, RANK_TOLERANCE)
     notes: list[str] = []
-    found = _singular(point, rows, slopes, notes) if r < full else _regular(point, rows, slopes)
     rays: list[Ray] = []
-    for y, tight in found:
+    for y, tight in _regular(point, rows, slopes):
         known = len(rays)
         for base in _bases(rows, slopes, tight):
             covered = [x for x in rays if x.direction @ (frame @ y) > 1 - FLAT]
@@ -97,16 +113,13 @@ def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure
                 ray = _tested(point, active, frame @ y, base)
                 if ray is not None and all(x.active != ray.active for x in covered):
                     rays.append(ray)
-        if len(rows) == full == r and len(rays) == known:
+        if len(rows) == full and len(rays) == known:
             notes.append(
                 f"an edge out of the corner {_names(point, rows)} is shorter than "
                 f"{SAMPLES[-1]:g} scale units: not followed"
             )
-    if r == full:
-        sectors = _sectors(point, rows, slopes, [x.direction @ frame for x in rays])
-    else:
-        sectors = _cusps(point, frame, rays) if full == 2 else ()
-    return VertexFigure(r, full, tuple(rays), sectors, tuple(notes))
+    sectors = _sectors(point, rows, slopes, [x.direction @ frame for x in rays])
+    return VertexFigure(full, full, tuple(rays), sectors, tuple(notes))
 
 
 Candidate = tuple[Array, frozenset[int]]
@@ -163,14 +176,16 @@ def _rank_of(rows: list[int], slopes: Array, some: frozenset[int]) -> int:
     return rank(slopes[[rows.index(i) for i in sorted(some)]], RANK_TOLERANCE)
 
 
-def _singular(
-    point: EvaluatedPoint, rows: list[int], slopes: Array, notes: list[str]
+def singular_rays(
+    point: EvaluatedPoint, active: frozenset[int], notes: list[str]
 ) -> Iterator[Candidate]:
     """Yield the null directions that breaking one contact leaves, to second order if need be.
 
     Where the others still have a null plane and one relation ``sum w_i a_i = 0``, their common
     zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
     """
+    rows = sorted(active)
+    slopes = unit_rows(point.gradients[rows]) @ null_space(point.matrix([]), RANK_TOLERANCE)
     if not _isolated(point, rows, slopes):
         notes.append(
             f"{_names(point, rows)}: rank too low, and second order does not show an isolated point"
@@ -297,30 +312,12 @@ def _sectors(
     return tuple(sectors)
 
 
-def _cusps(point: EvaluatedPoint, frame: Array, rays: list[Ray]) -> tuple[Sector, ...]:
-    """Return the sectors at a singular corner of the plane, by points between the samples."""
-    quotient = point.quotient
-    scales = quotient.polyhedron.manifold.scale_array
-    away = [(ray.sample.q - point.q) / scales @ frame for ray in rays]
-    turn = [math.atan2(y[1], y[0]) % math.tau for y in away]
-    ordered = sorted(range(len(rays)), key=turn.__getitem__)
-    sectors = []
-    for i, j in zip(ordered, [*ordered[1:], *ordered[:1]], strict=True):
-        gap = (turn[j] - turn[i]) % math.tau
-        angle = turn[i] + gap / 2
-        y = np.linalg.norm(away[i]) * np.array([math.cos(angle), math.sin(angle)])
-        inner = quotient.at(point.q + scales * (frame @ y)).active()
-        if inner is not None and not inner:
-            sectors.append(Sector((i, j), inner))
-    return tuple(sectors)
-
-
 def _arcs(rays: list[Array], members: list[int]) -> Iterator[tuple[int, int, Array]]:
     """Yield neighbours by angle in the plane of some rays, and the direction halfway."""
-    first, other = rays[members[0]], rays[members[1]]
-    if abs(first @ other) > 1 - FLAT:
-        other = rays[members[2]]
-    axis = other - (other @ first) * first
+    first = rays[members[0]]
+    axis = max(
+        (y - (y @ first) * first for y in map(rays.__getitem__, members)), key=np.linalg.norm
+    )
     axis = axis / np.linalg.norm(axis)
     angles = {k: math.atan2(rays[k] @ axis, rays[k] @ first) % math.tau for k in members}
     ordered = sorted(members, key=angles.__getitem__)

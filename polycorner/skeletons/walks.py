@@ -9,11 +9,18 @@ again between two points, or just touches, is not missed.
 import math
 from dataclasses import dataclass
 from enum import Enum
+from operator import attrgetter
 
 import numpy as np
 
 from polycorner.skeletons.points import HeldPoint, projected
-from polycorner.skeletons.sign_changes import dips, sign_change
+from polycorner.skeletons.sign_changes import may_vanish, sign_change
+from polycorner.skeletons.singularities import (
+    SingularPoint,
+    dependent_between,
+    part_of_way,
+    singular_point,
+)
 from polycorner.spaces.manifold import Array
 
 # Steps in scale units.
@@ -24,8 +31,12 @@ SHORTEST_STEP = 1e-7
 # relative to the step.
 TURN = 0.25
 STRAY = 0.01
-# Step below which a change of orientation means that curves cross, not that the walk jumped.
+# Step below which a change of orientation ends a walk: it did not jump to another curve.
 FLIP = 1e-3
+# Ratio of the volumes of the held gradients at two points that lets one look for a singular point.
+COLLAPSE = 0.5
+# Distance in scale units of a tip from where a walk stops.
+TIP = 1e-2
 # Distance in scale units from zero at which a passive function shows that the curve is lost.
 DRIFT = 1e-6
 
@@ -56,8 +67,6 @@ class Walk:
         Reason for the end.
     length : float
         In scale units.
-    branches : int
-        Number of crossings with other curves of the same functions.
     """
 
     points: Array
@@ -65,7 +74,6 @@ class Walk:
     tangent: Array
     end: End
     length: float
-    branches: int
 
 
 def follow(
@@ -118,8 +126,9 @@ class _Follower:
         self.union = quotient.polyhedron.is_union
         negative = self.union & (start.values[self.watched] < 0)
         self.signs = np.where(negative, -1.0, 1.0)
-        self.points, self.length, self.branches = [start.q], 0.0, 0
+        self.points, self.length = [start.q], 0.0
         self.side = start.orientation(self.t)
+        self.expected: SingularPoint | None = None
 
     def run(self) -> Walk:
         """Step to the first event."""
@@ -127,11 +136,13 @@ class _Follower:
         while True:
             taken = self._step(h)
             if isinstance(taken, End):
-                return self._walk(taken)
+                return self._stopped(taken)
             point, t, h = taken
-            met = self._event(point, t)
-            if met is not None:
-                self._move(*met)
+            # Singular points first: other functions may vanish there as well.
+            met = [e for e in (self._dependent(point), self._event(point, t)) if e is not None]
+            if met:
+                here = self.point
+                self._move(*min(met, key=lambda e: round(part_of_way(here, point, e[0].q), 6)))
                 return self._walk(End.CORNER)
             back = self._return(point) if self.home else None
             if back is not None:
@@ -159,13 +170,12 @@ class _Follower:
 
     def _walk(self, end: End) -> Walk:
         points = np.array(self.points)
-        return Walk(points, self.point, self.t, end, self.length, self.branches)
+        return Walk(points, self.point, self.t, end, self.length)
 
     def _move(self, point: HeldPoint, t: Array) -> None:
-        side = point.orientation(t)
-        self.branches += side * self.side < 0
         self.length += float(np.linalg.norm((point.q - self.point.q) / self.scales))
-        self.point, self.t, self.side = point, t, side
+        self.point, self.t = point, t
+        self.side = point.orientation(t)
         self.points.append(point.q)
 
     def _step(self, h: float) -> tuple[HeldPoint, Array, float] | End:
@@ -182,11 +192,43 @@ class _Follower:
                 off = (point.q - self.point.q) / self.scales - h * self.t
                 # A larger deviation than the turn explains: another curve of the same functions.
                 strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + STRAY)
-                flipped = point.orientation(t) * self.side < 0 and h > FLIP
+                flipped = point.orientation(t) * self.side < 0
+                if flipped and self._dependent(point) is not None:
+                    return point, t, h
+                if flipped and h < FLIP:
+                    return End.SINGULAR
                 if turn < TURN and not strayed and not flipped:
                     return point, t, h
             h /= 2
         return End.CHART if blocked else End.SINGULAR
+
+    # --------------------------------------------------------------------------- singular points
+
+    def _stopped(self, end: End) -> Walk:
+        """Return the walk where no step is possible: a tip where one is found within reach."""
+        tip = singular_point(self.quotient, self.point.q, self.point.kept, TIP)
+        if tip is None or tip.active() is None:
+            return self._walk(end)
+        self._move(tip, self.t)
+        return self._walk(End.CORNER)
+
+    def _dependent(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
+        """Return a point of this step where the held gradients become dependent, and the tangent.
+
+        Looked for where their volume falls or rises much, or their orientation changes; what is
+        found beyond the step is kept for the next.
+        """
+        ends = [self.point, point]
+        if len(self.points) == 1:
+            ends.insert(1, self._between(point, 0.5))
+        volume = attrgetter("volume")
+        low, high = min(ends, key=volume), max(ends, key=volume)
+        flipped = point.orientation(self.t) * self.side < 0
+        if low.volume < COLLAPSE * high.volume or flipped:
+            reach = 2 * self._chord(point)
+            self.expected = singular_point(self.quotient, low.q, self.point.kept, reach)
+        found = dependent_between(self.point, point, self.expected)
+        return None if found is None else (found, self.t)
 
     # ------------------------------------------------------------------------------------ events
 
@@ -227,33 +269,17 @@ class _Follower:
         return not active <= held
 
     def _suspects(self, point: HeldPoint, t: Array) -> list[tuple[int, float]]:
-        """Return functions that change sign or may dip to zero in this step.
-
-        One that falls first and rises then may, if the cubic through values and slopes does, or
-        if the slopes at both ends, kept up, would let it.
-        """
+        """Return functions that change sign or may dip to zero in this step, and their signs."""
         here, there, rows = self.point, point, self.watched
         f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
         slope0 = self.signs * (here.gradients[rows] @ self.t)
         slope1 = self.signs * (there.gradients[rows] @ t)
-        turns = (slope0 < 0) & (slope1 >= 0)
-        crosses = f1 < 0
-        chord = self._chord(point)
-        reach = np.maximum(self._sizes(here), self._sizes(there)) * chord
-        near = f0 + f1 < reach
-        return [
-            (int(rows[k]), float(self.signs[k]))
-            for k in np.flatnonzero(crosses | turns)
-            if crosses[k] or near[k] or dips(f0[k], f1[k], slope0[k], slope1[k], chord)
-        ]
+        reach = np.maximum(here.sizes[rows], there.sizes[rows]) * self._chord(point)
+        found = may_vanish((f0, f1), (slope0, slope1), reach, self._chord(point))
+        return [(int(rows[k]), float(self.signs[k])) for k in found]
 
     def _chord(self, point: HeldPoint) -> float:
         return float(np.linalg.norm((point.q - self.point.q) / self.scales))
-
-    def _sizes(self, point: HeldPoint) -> Array:
-        """Return the lengths of the watched functions' gradients."""
-        rows = point.gradients[self.watched]
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", rows, rows)))
 
     def _closing(
         self, point: HeldPoint, j: int, sign: float
@@ -319,7 +345,5 @@ class _Follower:
 
     def _from_home(self, q: Array) -> Array:
         """Return the displacement from the start's orbit, by the invariants."""
-        manifold, invariants = self.quotient.polyhedron.manifold, self.quotient.symmetry.invariants
-        if invariants is None:
-            return manifold.difference(q, self.start.q) / self.scales
-        return invariants(q) - invariants(self.start.q)
+        quotient = self.quotient
+        return quotient.symmetry.displacement(quotient.polyhedron.manifold, q, self.start.q)

@@ -37,26 +37,31 @@ def check_edges(atlas):
         assert edge.length > 0
 
 
+def check_quarters(atlas, centre):
+    check_edges(atlas)
+    assert counts(atlas) == (5, 6, 2)
+    assert atlas.complete is Completeness.EXHAUSTED
+    assert atlas.notes == ()
+    assert atlas.euler_characteristic == 1
+    (crossing,) = [corner for corner in atlas.corners if corner.active == ("saddle",)]
+    np.testing.assert_allclose(crossing.point, centre, atol=1e-9)
+    assert crossing.singular
+    assert len(crossing.edges) == 4
+
+
 class TestSelfCrossing:
     @pytest.mark.parametrize("angle", [0.0, math.pi / 4, 0.3, 1.0, math.pi / 2])
     @pytest.mark.parametrize("centre", [(0.0, 0.0), (0.1, -0.2), (1e-9, 0.0)])
-    def test_no_edge_is_a_point(self, angle, centre):
-        """The rim meets the lines in four corners; the crossing is no edge, and it is noted."""
+    def test_the_crossing_is_a_corner_of_four_edges(self, angle, centre):
+        """The rim meets the lines in four more corners."""
         out = 0.5 * np.array([math.cos(angle + 0.5), math.sin(angle + 0.5)])
-        atlas = skeleton(quarters(angle, centre), [centre + out, centre - out])
-        check_edges(atlas)
-        assert len([k for k in atlas.corners if set(k.active) == {"saddle", "disc"}]) == 4
-        assert atlas.notes
-        assert atlas.complete is Completeness.GAPS
-        assert atlas.euler_characteristic is None
+        atlas = skeleton(quarters(angle, centre), [centre + out])
+        check_quarters(atlas, centre)
 
     @pytest.mark.parametrize("away", [0.0, 1e-17, 1e-15, 1e-12, 1e-9])
     @pytest.mark.parametrize("direction", [(1, 0), (0, -1), (1, 1), (-3, -1)])
     def test_a_start_may_lie_at_the_crossing(self, away, direction):
-        atlas = skeleton(quarters(0.0), [away * np.array(direction)])
-        check_edges(atlas)
-        assert {k.active for k in atlas.corners} <= {("saddle", "disc"), ("saddle",)}
-        assert atlas.notes
+        check_quarters(skeleton(quarters(0.0), [away * np.array(direction)]), (0, 0))
 
     @pytest.mark.parametrize("power", [2, 3])
     def test_a_function_without_gradient_all_along_its_zeros_is_no_edge(self, power):
@@ -102,12 +107,9 @@ class TestRounding:
         assert atlas.complete is Completeness.EXHAUSTED
 
     @pytest.mark.parametrize("seed", range(8))
-    def test_a_crossing_breaks_nothing(self, seed, monkeypatch):
+    def test_crossings(self, seed, monkeypatch):
         Disturbed(seed).install(monkeypatch)
-        atlas = skeleton(quarters(0.0), [[0.5, 0.2], [-0.5, -0.3]])
-        check_edges(atlas)
-        assert len(atlas.corners) in (4, 5)
-        assert atlas.complete is Completeness.GAPS
+        check_quarters(skeleton(quarters(0.0), [[0.5, 0.2]]), (0, 0))
 
     @pytest.mark.parametrize("seed", range(4))
     def test_orbits_whose_directions_depend_on_each_other(self, seed, monkeypatch):

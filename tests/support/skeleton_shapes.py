@@ -145,7 +145,8 @@ def check_incidence(atlas):
                 ends[end, k] += 1
                 corner = atlas.corners[end]
                 assert abs(M.difference(point, corner.point)).max() < 1e-6
-                assert set(edge.active) < set(corner.active)
+                assert set(edge.active) <= set(corner.active)
+                assert corner.singular or edge.active != corner.active
     for k, corner in enumerate(atlas.corners):
         assert Counter(corner.edges) == Counter({e: n for (c, e), n in ends.items() if c == k})
     for face in atlas.faces:

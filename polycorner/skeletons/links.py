@@ -1,0 +1,192 @@
+"""Links of singular corners: what the polyhedron looks like on a small sphere about them.
+
+Near a point an algebraic set is a cone over its link, its intersection with a sphere that is
+small enough ([Mil] sec. 2): the corners of the link are the edges at the point, its edges the
+two-dimensional faces there, and a closed edge without a corner is a face around an apex.
+The link is a polyhedron of one dimension less, so its own skeleton is searched for; two radii must
+agree.  This holds whatever the order of contact: for crossings, cusps and apexes alike.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, combinations, islice
+
+import numpy as np
+
+from polycorner.formulas.bundles import Bundle
+from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
+from polycorner.skeletons.tracing import EdgeTracer
+from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure, singular_rays
+from polycorner.skeletons.walks import End
+from polycorner.spaces.manifold import Array, Manifold
+
+# Radii in scale units, of which two in succession must agree.
+RADII = (1e-2, 3e-3, 3e-4, 3e-5)
+# Length of walks in a link, in radii.
+EXTENT = 30.0
+# Random points of a link of a curve or a surface, and sets of functions to hold there.
+POINTS = 16
+MAX_SETS = 40
+# Largest dimension of a quotient in which links are sampled.
+SAMPLED = 3
+
+Search = Callable[[Quotient, Sequence[Array]], EdgeTracer]
+
+
+class _Sliced(Bundle):
+    """A bundle's functions, and those that vanish on a slice across an orbit and on a sphere."""
+
+    def __init__(self, ambient: Bundle, centre: Array, scales: Array, across: Array) -> None:
+        self.ambient, self.centre, self.scales, self.across = ambient, centre, scales, across
+
+    def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
+        """Return values and derivatives at one point ``(n,)``."""
+        u, n = (q - self.centre) / self.scales, len(q)
+        values = np.append(self.across @ u, (u @ u - 1) / 2)
+        slopes = np.vstack([self.across, u]) / self.scales
+        bends = np.zeros((len(values), n, n))
+        bends[-1] = np.diag(self.scales**-2)
+        found = self.ambient.evaluate(q, order)
+        return tuple(
+            np.concatenate([part, more])
+            for part, more in zip(found, (values, slopes, bends), strict=False)
+        )
+
+
+class Link(Polyhedron):
+    """A polyhedron's intersection with a sphere about a point, orthogonal to the orbit there.
+
+    Its scales are the radius, so that walks and tolerances shrink with it.
+    """
+
+    def __init__(self, point: EvaluatedPoint, radius: float) -> None:
+        base = point.quotient.polyhedron
+        self.__setstate__(base.__getstate__())
+        manifold = base.manifold
+        scales = radius * manifold.scale_array
+        self.manifold = Manifold(manifold.names, scales=tuple(scales.tolist()))
+        across = unit_rows(point.orbit)
+        extra = [f"slice {k}" for k in range(len(across))]
+        self.equation_names = (*base.equation_names, *extra, "sphere")
+        self._sliced = _Sliced(base.bundle, point.q, scales, across)
+
+    @property
+    def bundle(self) -> Bundle:
+        """Inequalities first, equations after them, the sphere's last."""
+        return self._sliced
+
+
+def singular_figure(
+    search: Search, point: EvaluatedPoint, active: frozenset[int], rank: int
+) -> VertexFigure:
+    """Return the rays and sectors at a singular corner.
+
+    Parameters
+    ----------
+    search : callable
+        From a quotient and starts to a finished search for its skeleton.
+    point : EvaluatedPoint
+        The corner.
+    active : set of int
+        Functions that vanish there.
+    rank : int
+        Rank of their gradients in the quotient.
+    """
+    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    full = int(frame.shape[1])
+    before = None
+    for radius in RADII:
+        notes: list[str] = []
+        found = _link(search, point, active, frame, radius, notes)
+        figure = VertexFigure(rank, full, *found, tuple(notes))
+        if before is not None and _signature(before) == _signature(figure):
+            return figure
+        before = figure
+    assert before is not None
+    names = point.quotient.polyhedron.names
+    note = (
+        f"at the singular corner {', '.join(names[i] for i in sorted(active))} "
+        f"small spheres of different radii meet different edges"
+    )
+    return VertexFigure(rank, full, before.rays, before.sectors, (*before.notes, note))
+
+
+def _signature(figure: VertexFigure) -> tuple[Counter[object], Counter[object], bool]:
+    rays = [ray.active for ray in figure.rays]
+    sectors = [
+        (s.active, frozenset(Counter(rays[i] for i in s.rays).items())) for s in figure.sectors
+    ]
+    return Counter(rays), Counter(sectors), not figure.notes
+
+
+def _link(
+    search: Search,
+    point: EvaluatedPoint,
+    active: frozenset[int],
+    frame: Array,
+    radius: float,
+    notes: list[str],
+) -> tuple[tuple[Ray, ...], tuple[Sector, ...]]:
+    """Return rays and sectors from the link of one radius."""
+    quotient = point.quotient
+    link = Quotient(Link(point, radius), Symmetry(), quotient.tolerance, EXTENT)
+    found = search(link, list(_starts(point, link, active, frame, radius, notes)))
+    names = ", ".join(quotient.polyhedron.names[i] for i in sorted(active))
+    if found.registry.lost:
+        notes += [f"near the singular corner {names}: {note}" for note in found.notes]
+    scales = quotient.polyhedron.manifold.scale_array
+    rays: list[Ray] = []
+    position: dict[int, int] = {}
+    for k, record in enumerate(found.records):
+        there = record.point
+        kept = quotient.at(there.q).basis(record.active)
+        sample = projected(quotient, there.q, kept, 0.1 * radius)
+        if sample is None or not sample.is_curve:
+            notes.append(f"an edge out of the singular corner {names} has dependent gradients")
+            continue
+        position[k] = len(rays)
+        way = (sample.q - point.q) / scales
+        rays.append(Ray(way / np.linalg.norm(way), record.active, sample, radius))
+    sectors = []
+    for curve in found.curves:
+        ends = [None if end is None else position.get(end[0]) for end in (curve.start, curve.stop)]
+        middle = HeldPoint(quotient, curve.middle, quotient.at(curve.middle).basis(curve.active))
+        if curve.kinds[0] is End.CLOSED:
+            sectors.append(Sector((), curve.active, middle))
+        elif ends[0] is None or ends[1] is None:
+            notes.append(f"a face at the singular corner {names} could not be followed around it")
+        else:
+            sectors.append(Sector((ends[0], ends[1]), curve.active, middle))
+    return tuple(rays), tuple(sectors)
+
+
+def _starts(
+    point: EvaluatedPoint,
+    link: Quotient,
+    active: frozenset[int],
+    frame: Array,
+    radius: float,
+    notes: list[str],
+) -> Iterator[Array]:
+    """Yield points of the link: on its corners, edges and faces where its dimension is small."""
+    scales = radius * point.quotient.polyhedron.manifold.scale_array
+    full = frame.shape[1]
+    if full > SAMPLED:
+        ways = [(frame @ y, [tight]) for y, tight in singular_rays(point, active, notes)]
+    else:
+        sizes = range(min(full, len(active) + 1))
+        subsets = chain.from_iterable(combinations(sorted(active), k) for k in sizes)
+        sets = [frozenset(some) for some in islice(subsets, MAX_SETS)]
+        random = np.random.default_rng(0).standard_normal((POINTS, full))
+        ways = [(frame @ y, sets) for y in unit_rows(random)]
+    for way, sets in ways:
+        for kept in sets:
+            start = projected(
+                link, point.q + scales * way, link.at(point.q + scales * way).basis(kept), 2.0
+            )
+            if start is not None and start.active() is not None:
+                yield start.q

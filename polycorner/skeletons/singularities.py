@@ -1,0 +1,200 @@
+"""Points of a face where the gradients of the functions that it holds become dependent.
+
+There curves cross or have cusps, and surfaces have apexes.  The point ``q`` and the relation ``mu``
+solve together
+
+    F(q) = 0,   DF(q)' mu = 0,   |mu| = 1,
+
+one equation more than there are unknowns: for most functions no point does.  The method of Gauss
+and Newton converges quadratically where two curves cross at an angle, and linearly at cusps and
+contacts, where it is extrapolated ([Gov] sec. 4.1).
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from polycorner.polyhedra.cones import unit_rows
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
+from polycorner.spaces.manifold import Array
+
+STEPS = 60
+# Distance from the chord of a step, relative to it, of a point on it, and how exactly it is placed.
+ASIDE = 0.2
+SAME = 1e-6
+# Steps after which they must have halved, and size of a step at which they stop.
+PATIENCE = 6
+STILL = 1e-14
+# Functions beside those of a face that may touch it.
+NEAREST = 4
+# Values and weighted sums of unit gradients that count as zero; a weighted sum is of the order of
+# the square root of the rounding error where the set has a cusp.
+ZERO = 1e-13
+DEPENDENT = 1e-7
+# Length of a gradient, relative to second derivatives in scale units, up to which it vanishes.
+NO_DIRECTION = 1e-6
+# Distance in scale units of points that a singular point is compared with, and how much less
+# independent its gradients must be.
+BESIDE = 1e-3
+SUNK = 1e-2
+# Range of the ratio of two steps in which convergence counts as linear.
+LINEAR = (0.2, 0.9)
+
+
+class SingularPoint(HeldPoint):
+    """A point where the gradients of held functions and equations are dependent.
+
+    Their values, and gradients that vanish but for rounding, are exactly zero.
+    """
+
+    def __init__(self, quotient: Quotient, q: Array, kept: list[int]) -> None:
+        super().__init__(quotient, q, kept)
+        held = [*kept, *range(quotient.count, len(self.values))]
+        self.values = self.values.copy()
+        self.values[held] = 0.0
+        sizes = np.linalg.norm(self.gradients, axis=1)
+        bends = _second(quotient, q)[2]
+        flat = [i for i in held if not sizes[i] > NO_DIRECTION * np.linalg.norm(bends[i])]
+        self.gradients = self.gradients.copy()
+        self.gradients[flat] = 0.0
+
+    def tangent(self, v: Array) -> Array:
+        """Return the direction itself: there is no tangent space."""
+        return np.asarray(v)
+
+    def orientation(self, t: Array) -> float:
+        """Return zero: held gradients and any direction are dependent."""
+        return 0.0 * float(t[0])
+
+
+def _second(quotient: Quotient, q: Array) -> tuple[Array, Array, Array]:
+    """Return values and scaled first and second derivatives of all functions and equations."""
+    scales = quotient.polyhedron.manifold.scale_array
+    values, gradients, hessians = quotient.polyhedron.bundle.evaluate(q, 2)
+    return values, gradients * scales, hessians * np.outer(scales, scales)
+
+
+def singular_point(
+    quotient: Quotient, q: Array, kept: list[int], reach: float
+) -> SingularPoint | None:
+    """Return the point near ``q`` where the held functions vanish with dependent gradients.
+
+    None if there is none within ``reach`` scale units that is isolated.
+    """
+    held = [*kept, *range(quotient.count, len(quotient.at(q).values))]
+    found = _solved(quotient, q, held, reach) if held else None
+    if found is None or not _sinks(quotient, found[0], held):
+        return None
+    at, way = found
+    scales = quotient.polyhedron.manifold.scale_array
+    for start in (at + BESIDE * scales * way, at - BESIDE * scales * way):
+        other = _solved(quotient, start, held, 2 * BESIDE)
+        if other is not None and np.linalg.norm((other[0] - at) / scales) > BESIDE / 10:
+            return None  # dependent all along a curve
+    return SingularPoint(quotient, at, kept)
+
+
+def _solved(
+    quotient: Quotient, q: Array, held: list[int], reach: float
+) -> tuple[Array, Array] | None:
+    """Return a solution of the equations, and the unit direction that changes them least."""
+    scales = quotient.polyhedron.manifold.scale_array
+    start = q
+    last: Array = np.zeros(len(q))
+    mu: Array = np.zeros(0)
+    sizes: Array = np.zeros(0)
+    limit = np.inf
+    for k in range(STEPS):
+        values, gradients, hessians = (part[held] for part in _second(quotient, q))
+        if not (np.isfinite(gradients).all() and np.isfinite(hessians).all()):
+            return None
+        if not len(mu):
+            sizes = np.linalg.norm(gradients, axis=1) + np.linalg.norm(hessians, axis=(1, 2))
+            sizes[sizes == 0] = 1.0
+            mu = np.linalg.svd(gradients / sizes[:, None])[0][:, -1]
+        orbit = unit_rows(quotient.symmetry.directions(quotient.polyhedron.manifold, q))
+        matrix, missed = _system(
+            values / sizes, gradients / sizes[:, None], hessians / sizes[:, None, None], mu, orbit
+        )
+        full: Array = -np.asarray(np.linalg.lstsq(matrix, missed, rcond=1e-12)[0], np.float64)
+        step, size = full[: len(q)], float(np.linalg.norm(full[: len(q)]))
+        m = len(held)
+        if abs(missed[:m]).max() < ZERO and max(abs(missed[m:]).max(), size) < DEPENDENT:
+            return q + scales * step, _least(matrix[:, : len(q)], orbit)
+        ratio = float(step @ last) / max(float(last @ last), 1e-300)
+        linear = LINEAR[0] < ratio < LINEAR[1] and size * np.linalg.norm(last) < 1.01 * step @ last
+        last = np.zeros(len(q)) if linear else step
+        q = q + scales * step * (1 / (1 - ratio) if linear else 1.0)
+        mu = np.asarray(mu + full[len(step) :])
+        mu /= np.linalg.norm(mu)
+        if np.linalg.norm((q - start) / scales) > reach or not STILL < size <= limit:
+            return None
+        if k % PATIENCE == PATIENCE - 1:
+            limit = size / 2
+    return None
+
+
+def part_of_way(start: HeldPoint, end: HeldPoint, q: Array) -> float:
+    """Return the part of the way from start to end at which ``q`` lies beside the chord."""
+    scales = start.quotient.polyhedron.manifold.scale_array
+    chord = (end.q - start.q) / scales
+    return float((q - start.q) / scales @ chord / (chord @ chord))
+
+
+def dependent_between(
+    start: HeldPoint, end: HeldPoint, found: SingularPoint | None
+) -> SingularPoint | None:
+    """Return a point if it lies in the polyhedron, and on a step from start to end."""
+    if found is None or not 0 < part_of_way(start, end, found.q) <= 1 + SAME:
+        return None
+    scales = start.quotient.polyhedron.manifold.scale_array
+    chord, away = ((q - start.q) / scales for q in (end.q, found.q))
+    aside = np.linalg.norm(away - part_of_way(start, end, found.q) * chord)
+    return found if aside < ASIDE * np.linalg.norm(chord) and found.active() is not None else None
+
+
+def _system(
+    values: Array, gradients: Array, hessians: Array, mu: Array, orbit: Array
+) -> tuple[Array, Array]:
+    """Return the Jacobian of the equations, across the orbit, and their values."""
+    k, n = gradients.shape
+    across = np.eye(n) - np.linalg.pinv(orbit) @ orbit if len(orbit) else np.eye(n)
+    matrix = np.zeros((k + n + 1, n + k))
+    matrix[:k, :n] = gradients @ across
+    matrix[k : k + n, :n] = across @ np.einsum("i,ijk->jk", mu, hessians) @ across
+    matrix[k : k + n, n:] = across @ gradients.T
+    matrix[-1, n:] = mu
+    return matrix, np.concatenate([values, across @ gradients.T @ mu, [0.0]])
+
+
+def _least(matrix: Array, orbit: Array) -> Array:
+    """Return the unit vector orthogonal to the orbit that the matrix shortens most."""
+    return np.asarray(np.linalg.svd(np.vstack([matrix, orbit]))[2][-1])
+
+
+def _sinks(quotient: Quotient, q: Array, held: list[int]) -> bool:
+    """Whether the gradients are more dependent at a point than beside it, along some axis."""
+    beside = BESIDE * np.diag(quotient.polyhedron.manifold.scale_array)
+    around = [quotient.at(p).gradients[held] for p in (*(q + beside), *(q - beside))]
+    sizes = np.nanmax(np.linalg.norm(around, axis=2), axis=0)
+    sizes[sizes == 0] = 1.0
+
+    def independence(rows: Array) -> float:
+        units = rows / sizes[:, None]
+        return float(np.linalg.svd(units)[1][-1]) if np.isfinite(units).all() else 0.0
+
+    return independence(quotient.at(q).gradients[held]) < SUNK * max(map(independence, around))
+
+
+def singular_points(point: EvaluatedPoint, active: frozenset[int]) -> Iterator[SingularPoint]:
+    """Yield points of the polyhedron near a point of a face where gradients become dependent.
+
+    Those of the functions that vanish on the face, or of these and another of the nearest.
+    """
+    quotient, near = point.quotient, np.argsort(abs(point.distances[: point.quotient.count]))
+    others = [int(j) for j in near if j not in active][:NEAREST]
+    for held in (active, *(active | {j} for j in others)):
+        found = singular_point(quotient, point.q, sorted(held), quotient.extent)
+        there = None if found is None else found.active()
+        if found is not None and there is not None and there >= held:
+            yield found
