@@ -19,6 +19,8 @@ from polycorner.intervals.balls import ball, between, bounds, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 
+pytestmark = pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
+
 DIGITS = 50
 M1, M2 = Manifold.euclidean("x"), Manifold.euclidean("x y")
 x, y = M2.symbols
