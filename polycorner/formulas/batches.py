@@ -1,4 +1,4 @@
-"""Entry points of a kernel as LLVM functions: one point, one packed block, a batch in lanes."""
+"""Entry points of a kernel as LLVM functions: one point, rows of points, a batch in lanes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,20 +7,17 @@ import numpy as np
 from llvmlite import ir
 
 from polycorner.formulas import emit
-from polycorner.formulas.programs import Program
+from polycorner.formulas.programs import Polynomial, Program
 
 POINTER, VOID = ir.PointerType(emit.F64), ir.VoidType()
 
 
-def emit_functions(module: ir.Module, program: Program, order: int, name: str) -> None:
-    """Add ``name_point``, ``name_packed`` and ``name_batch`` to a module."""
-    k, levels = program.variables, program.derivatives(order)
-    sizes = [len(level) for level in levels]
-    point = ir.Function(module, ir.FunctionType(VOID, [POINTER] * 5), f"{name}_point")
-    builder = ir.IRBuilder(point.append_basic_block())
-    _emit_body(builder, program, levels, point.args, lanes=1)
-    builder.ret_void()
-
+def emit_points(
+    module: ir.Module, program: Program | Polynomial, order: int, name: str
+) -> ir.Function:
+    """Add ``name_point``, ``name_packed`` and ``name_rows`` to a module."""
+    point = _emit_point(module, program, order, f"{name}_point")
+    k, sizes = program.variables, _sizes(program, order)
     packed = ir.Function(module, ir.FunctionType(VOID, [POINTER] * 2), f"{name}_packed")
     builder = ir.IRBuilder(packed.append_basic_block())
     block, parameters = packed.args
@@ -28,8 +25,112 @@ def emit_functions(module: ir.Module, program: Program, order: int, name: str) -
     missing = [ir.Constant(POINTER, None)] * (3 - len(starts))
     builder.call(point, [block, parameters, *starts, *missing])
     builder.ret_void()
+    _emit_rows(module, program, sizes, point, f"{name}_rows")
+    return point
 
-    _emit_batch(module, program, levels, point, f"{name}_batch")
+
+def emit_lanes(module: ir.Module, program: Program, order: int, name: str) -> None:
+    """Add ``name_batch`` to a module: many points in lanes, with the same parameters."""
+    point = _emit_point(module, program, order, f"{name}_single")
+    point.linkage = "internal"
+    _emit_batch(module, program, program.derivatives(order), point, f"{name}_batch")
+
+
+def _sizes(program: Program | Polynomial, order: int) -> list[int]:
+    if isinstance(program, Polynomial):
+        return [program.variables**level for level in range(order + 1)]
+    return [len(level) for level in program.derivatives(order)]
+
+
+def _emit_point(
+    module: ir.Module, program: Program | Polynomial, order: int, name: str
+) -> ir.Function:
+    point = ir.Function(module, ir.FunctionType(VOID, [POINTER] * 5), name)
+    builder = ir.IRBuilder(point.append_basic_block())
+    if isinstance(program, Polynomial):
+        builder = _emit_polynomial(builder, program, order, point.args)
+    else:
+        _emit_body(builder, program, program.derivatives(order), point.args, lanes=1)
+    builder.ret_void()
+    return point
+
+
+def _emit_polynomial(
+    b: ir.IRBuilder, program: Polynomial, order: int, pointers: Any
+) -> ir.IRBuilder:
+    """Evaluate ``c + x.(b + S x / 2)`` and its derivatives ``b + S x`` and ``S`` by loops.
+
+    ``S x`` is summed column by column, so that the inner loop runs over independent sums.
+    """
+    q, p, *results = pointers
+    n, zero = program.variables, ir.Constant(emit.F64, 0.0)
+    count = ir.Constant(emit.I64, n)
+    slopes = _offset(b, p, 1)
+    curvature = _offset(b, p, 1 + n)
+    bent = b.alloca(emit.F64, count)
+    total = b.alloca(emit.F64)
+    b.store(b.load(p), total)
+    first = ir.Constant(emit.I64, 0)
+
+    def at(b: ir.IRBuilder, pointer: ir.Value, i: ir.Value) -> ir.Value:
+        return b.gep(pointer, [i])
+
+    def clear(b: ir.IRBuilder, i: ir.Value) -> None:
+        b.store(zero, at(b, bent, i))
+
+    def column(b: ir.IRBuilder, j: ir.Value) -> ir.IRBuilder:
+        x, start = b.load(at(b, q, j)), b.mul(j, count)
+
+        def row(b: ir.IRBuilder, i: ir.Value) -> None:
+            entry = b.load(at(b, curvature, b.add(start, i)))
+            b.store(b.fadd(b.load(at(b, bent, i)), b.fmul(entry, x)), at(b, bent, i))
+
+        return _loop(b, first, count, 1, row)
+
+    def term(b: ir.IRBuilder, i: ir.Value) -> None:
+        slope, change, x = (b.load(at(b, pointer, i)) for pointer in (slopes, bent, q))
+        inner = b.fadd(slope, b.fmul(ir.Constant(emit.F64, 0.5), change))
+        b.store(b.fadd(b.load(total), b.fmul(x, inner)), total)
+        if order >= 1:
+            b.store(b.fadd(slope, change), at(b, results[1], i))
+
+    def second(b: ir.IRBuilder, i: ir.Value) -> None:
+        entry = b.load(at(b, curvature, i)) if program.degree == 2 else zero
+        b.store(entry, at(b, results[2], i))
+
+    b = _loop(b, first, count, 1, clear)
+    if program.degree == 2:
+        b = _loop(b, first, count, 1, column)
+    b = _loop(b, first, count, 1, term)
+    b.store(b.load(total), results[0])
+    if order >= 2:
+        b = _loop(b, first, ir.Constant(emit.I64, n * n), 1, second)
+    return b
+
+
+def _emit_rows(
+    module: ir.Module,
+    program: Program | Polynomial,
+    sizes: list[int],
+    point: ir.Function,
+    name: str,
+) -> None:
+    """Loop over points one by one; parameters repeat after ``period`` rows of them."""
+    rows = ir.Function(module, ir.FunctionType(VOID, [emit.I64, emit.I64] + [POINTER] * 5), name)
+    count, period, q, p, *results = rows.args
+    strides = [*sizes, 0, 0][:3]
+
+    def one(b: ir.IRBuilder, i: ir.Value) -> None:
+        def moved(pointer: ir.Value, k: ir.Value, stride: int) -> ir.Value:
+            return b.gep(pointer, [b.mul(k, ir.Constant(emit.I64, stride))]) if stride else pointer
+
+        parameters = moved(p, b.urem(i, period), program.parameters)
+        places = [moved(r, i, stride) for r, stride in zip(results, strides, strict=True)]
+        b.call(point, [moved(q, i, program.variables), parameters, *places])
+
+    builder = ir.IRBuilder(rows.append_basic_block())
+    builder = _loop(builder, ir.Constant(emit.I64, 0), count, 1, one)
+    builder.ret_void()
 
 
 def _emit_batch(
@@ -67,8 +168,9 @@ def _loop(
     start: ir.Value,
     stop: ir.Value,
     step: int,
-    body: Callable[[ir.IRBuilder, ir.Value], None],
+    body: Callable[[ir.IRBuilder, ir.Value], ir.IRBuilder | None],
 ) -> ir.IRBuilder:
+    """Emit a loop; a body with loops of its own returns the builder at its end."""
     before = b.block
     head, inside, after = (b.append_basic_block(label) for label in ("head", "inside", "after"))
     b.branch(head)
@@ -76,12 +178,11 @@ def _loop(
     i = b.phi(emit.I64)
     i.add_incoming(start, before)
     b.cbranch(b.icmp_signed("<", i, stop), inside, after)
-    b.position_at_end(inside)
-    body(b, i)
-    i.add_incoming(b.add(i, ir.Constant(emit.I64, step)), b.block)
-    b.branch(head)
-    b.position_at_end(after)
-    return b
+    end = ir.IRBuilder(inside)
+    end = body(end, i) or end
+    i.add_incoming(end.add(i, ir.Constant(emit.I64, step)), end.block)
+    end.branch(head)
+    return ir.IRBuilder(after)
 
 
 def _emit_body(

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from polycorner.formulas.families import Family
+from polycorner.formulas.shapes import Shape
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
@@ -34,21 +35,34 @@ class Member(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Call(Value):
-    """One call of a family's kernel: which coordinates go in, which rows come out."""
+    """One call of a kernel: which coordinates go in, which rows come out."""
 
-    family: Family
+    family: Family | Shape
     reads: tuple[int, ...]
     parameters: Array
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
 
+def resolve(f: Member) -> tuple[Family | Shape, tuple[int, ...], tuple[float, ...], int]:
+    """Return what evaluates a function: kernel, coordinates, parameters and column."""
+    binding = f.family.bindings.get(f.member_name)
+    if binding is None:
+        return f.family, f.reads, f.parameters, f.family.names.index(f.member_name)
+    reads = tuple([f.reads[i] for i in binding.reads])
+    return binding.shape, reads, (*f.parameters, *binding.numbers), 0
+
+
 class _Batch:
-    """Calls of one kernel that differ only in what they read: one call over all of them."""
+    """Calls of one kernel with different coordinates or parameters: one call over all of them."""
 
     def __init__(self, calls: Sequence[Call]) -> None:
         first = calls[0]
-        self.kernel, self.parameters = first.family.kernel, first.parameters
+        self.kernel = first.family.kernel
+        same = len({call.parameters.tobytes() for call in calls}) == 1
+        numbers = [first.parameters] if same else [call.parameters for call in calls]
+        self.parameters = np.array(numbers)
+        self.period = len(numbers)
         self.address = self.parameters.ctypes.data  # of an array that this value keeps alive
         self.reads = np.array([call.reads for call in calls])
         everything = first.columns == tuple(range(len(first.family.names)))
@@ -64,7 +78,7 @@ class _Batch:
         """Evaluate at every row of ``q`` ``(N, n)`` and scatter the results."""
         count, order = len(self.reads), len(results) - 1
         inputs = q[:, self.reads].reshape(len(q) * count, self.reads.shape[1])
-        parts = self.kernel.over(inputs, self.address, order)
+        parts = self.kernel.over(inputs, self.address, order, self.period)
         for result, part, place in zip(results, parts, self.places, strict=False):
             shaped = part.reshape(len(q), count, *part.shape[1:])
             result[(slice(None), *place)] = shaped[:, :, self.columns]
@@ -76,7 +90,7 @@ class _Batch:
             single = self.kernel.at(q[self.reads[0]], self.address, order)
             parts = tuple([part[None] for part in single])
         else:
-            parts = self.kernel.over(q[self.reads], self.address, order)
+            parts = self.kernel.over(q[self.reads], self.address, order, self.period)
         for result, part, place in zip(results, parts, self.places, strict=False):
             result[place] = part[:, self.columns]
 
@@ -92,18 +106,20 @@ class Bundle(Value):
 
     def __init__(self, manifold: Manifold, functions: Sequence[Member]) -> None:
         self.manifold, self.functions = manifold, tuple(functions)
-        grouped: dict[tuple[int, tuple[int, ...], tuple[float, ...]], list[int]] = {}
+        grouped: dict[Any, list[tuple[int, int]]] = {}
+        resolved: dict[Any, tuple[Family | Shape, tuple[int, ...], Array]] = {}
         for row, f in enumerate(self.functions):
-            grouped.setdefault((id(f.family), f.reads, f.parameters), []).append(row)
-        self.calls = [self._call(rows) for rows in grouped.values()]
+            family, reads, numbers, column = resolve(f)
+            key = (family.key or id(family), reads, numbers)
+            grouped.setdefault(key, []).append((row, column))
+            if key not in resolved:
+                resolved[key] = (family, reads, np.array(numbers, dtype=np.float64))
+        self.calls = [
+            Call(*resolved[key], *map(tuple, zip(*places, strict=True)))
+            for key, places in grouped.items()
+        ]
         only = self.calls[0] if len(self.calls) == 1 else None
         self._direct = only if only is not None and self._is_direct(only) else None
-
-    def _call(self, rows: list[int]) -> Call:
-        first = self.functions[rows[0]]
-        columns = [first.family.names.index(self.functions[row].member_name) for row in rows]
-        numbers = np.array(first.parameters, dtype=np.float64)
-        return Call(first.family, first.reads, numbers, tuple(rows), tuple(columns))
 
     def _is_direct(self, call: Call) -> bool:
         n, m = self.manifold.dimension, len(call.family.names)
@@ -111,9 +127,9 @@ class Bundle(Value):
 
     @cached_property
     def _batches(self) -> list[_Batch]:
-        grouped: dict[tuple[int, bytes, tuple[int, ...]], list[Call]] = {}
+        grouped: dict[Any, list[Call]] = {}
         for call in self.calls:
-            key = (id(call.family), call.parameters.tobytes(), call.columns)
+            key = (call.family.key or id(call.family), call.columns)
             grouped.setdefault(key, []).append(call)
         return [_Batch(calls) for calls in grouped.values()]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.expressions import kinks
 from polycorner.formulas.programs import Program
+from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
 from polycorner.values import Value
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from polycorner.formulas.kernels import Kernel
 
     Expressions = Mapping[str, sympy.Expr]
+
+
+MOST_TOGETHER = 200  # second derivatives of a family that is compiled whole
 
 
 class Written:
@@ -70,6 +74,8 @@ class Family(Value):
     kinks : mapping from str to tuple of str
         The subexpressions across which derivatives of each function may jump.  A model that writes
         its formulas on branches which fit together leaves it empty.
+    bindings : mapping from str to Binding
+        The shapes that the functions are evaluated as; empty where the family is compiled whole.
     """
 
     names: tuple[str, ...]
@@ -79,6 +85,7 @@ class Family(Value):
     key: str = ""
     unit: str = ""
     kinks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    bindings: Mapping[str, Binding] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -96,10 +103,21 @@ class Family(Value):
         _check_new("definitions", tuple(definitions or ()), variables + parameters)
         given = {name: _sympified(name, e) for name, e in expressions.items()}
         known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
-        found = {name: kinks([e, *known.values()]) for name, e in given.items()}
-        written = Written(known, given)
-        family = cls(tuple(given), variables, parameters, written, unit=unit, kinks=found)
-        return replace(family, key=family.program().digest())
+        family = cls(tuple(given), variables, parameters, Written(known, given), unit=unit)
+        symbols = variables, parameters
+        bindings: dict[str, Binding] = {}
+        if _is_shared(family, known):
+            bindings = {name: bind(name, e, *symbols, known) for name, e in given.items()}
+            numbers = [(name, b.shape.key, b.reads, b.exact) for name, b in bindings.items()]
+            key = digest([*symbols, *numbers])
+        else:
+            key = family.program().digest()
+        bent = {
+            name: kinks([e, *known.values()])
+            for name, e in given.items()
+            if name not in bindings or not bindings[name].is_polynomial
+        }
+        return replace(family, key=key, bindings=bindings, kinks=bent)
 
     def program(self) -> Program:
         """Return the straight-line program of the values."""
@@ -119,15 +137,8 @@ class Family(Value):
     @cached_property
     def kernel(self) -> "Kernel":
         """The compiled functions."""
-        from polycorner.formulas.kernels import Kernel
-
-        return Kernel(
-            self.key,
-            self.program,
-            variables=len(self.variables),
-            parameters=len(self.parameters),
-            outputs=len(self.names),
-        )
+        sizes = len(self.variables), len(self.parameters), len(self.names)
+        return shared_kernel(self.key, self.program, *sizes)
 
     def expression(self, name: str) -> "sympy.Expr":
         """Return one function with all definitions written out."""
@@ -142,6 +153,17 @@ class Family(Value):
         for definition, e in definitions.items():
             written[definition] = expand(e)
         return expand(expressions[name])
+
+
+def _is_shared(family: Family, definitions: "Expressions") -> bool:
+    """Whether functions are compiled one by one, as shapes, and not together.
+
+    Together, few functions of few variables share their operations and are evaluated by one call;
+    the derivatives of many, most of them zero, would all be compiled.
+    """
+    functions = len(family.names)
+    entries = functions * len(family.variables) ** 2
+    return functions == 1 or (entries > MOST_TOGETHER and not definitions)
 
 
 def _is_importable(function: Any) -> bool:

@@ -19,13 +19,14 @@ from llvmlite import binding as llvm
 from llvmlite import ir
 
 from polycorner.formulas import batches, emit, programs, translate
-from polycorner.formulas.batches import emit_functions
+from polycorner.formulas.batches import emit_lanes, emit_points
 from polycorner.formulas.cache import read_code, source_key, write_code
-from polycorner.formulas.programs import Program
+from polycorner.formulas.programs import Polynomial, Program
 from polycorner.spaces.manifold import Array
 
 LOG = logging.getLogger("polycorner.compilation")
 OPTIMISATION = 2
+MANY = 64  # points from which on they are evaluated in lanes
 
 
 class Kernel:
@@ -44,7 +45,7 @@ class Kernel:
     def __init__(
         self,
         key: str,
-        program: Callable[[], Program],
+        program: Callable[[], Program | Polynomial],
         *,
         variables: int,
         parameters: int,
@@ -55,8 +56,8 @@ class Kernel:
         self._compiled: dict[int, CompiledKernel] = {}
 
     @cached_property
-    def program(self) -> Program:
-        """The straight-line program."""
+    def program(self) -> Program | Polynomial:
+        """What is compiled: a straight-line program, or a polynomial given by its coefficients."""
         return self._program()
 
     def compiled(self, order: int) -> "CompiledKernel":
@@ -72,9 +73,12 @@ class Kernel:
         """
         return self.compiled(order).at(q, parameters)
 
-    def over(self, q: Array, parameters: int, order: int) -> tuple[Array, ...]:
-        """Return values, gradients and Hessians at every row of ``q`` ``(N, k)``."""
-        return self.compiled(order).over(q, parameters)
+    def over(self, q: Array, parameters: int, order: int, period: int = 1) -> tuple[Array, ...]:
+        """Return values, gradients and Hessians at every row of ``q`` ``(N, k)``.
+
+        ``parameters`` are those of the first ``period`` rows, one after the other; they repeat.
+        """
+        return self.compiled(order).over(q, parameters, period)
 
 
 class CompiledKernel:
@@ -89,20 +93,14 @@ class CompiledKernel:
     """
 
     def __init__(self, kernel: Kernel, order: int) -> None:
-        name = _symbol(kernel.key, order)
-        code = read_code(name)
-        self.origin = "compiled" if code is None else "loaded"
-        if code is None:
-            LOG.debug(
-                "compiling %d formulas with derivatives up to order %d", kernel.outputs, order
-            )
-            code = _machine_code(kernel.program, order, name)
-            write_code(name, code)
-        self._engine, addresses = _load(code, name)
-        self.point, packed, batch = addresses
+        self.kernel, self.order = kernel, order
+        self._name = _symbol(kernel.key, order)
+        entries = ("point", "packed", "rows")
+        self._engine, addresses, self.origin = self._code(emit_points, self._name, entries)
+        self.point, packed, rows = addresses
         pointer = ctypes.c_void_p
         self._packed = ctypes.PYFUNCTYPE(None, pointer, pointer)(packed)
-        self._batch = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[pointer] * 5)(batch)
+        self._rows = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 2, *[pointer] * 5)(rows)
         k, m = kernel.variables, kernel.outputs
         self._shapes = ((m,), (m, k), (m, k, k))[: order + 1]
         ends = np.cumsum([k, *(int(np.prod(shape)) for shape in self._shapes)]).tolist()
@@ -111,6 +109,31 @@ class CompiledKernel:
             (slice(a, b), shape) for a, b, shape in zip(ends, ends[1:], self._shapes, strict=False)
         ]
 
+    def _code(
+        self, emitted: Callable[..., Any], name: str, entries: tuple[str, ...]
+    ) -> tuple[Any, list[int], str]:
+        """Return an engine with machine code, the addresses in it, and where it came from."""
+        code, kernel = read_code(name), self.kernel
+        origin = "compiled" if code is None else "loaded"
+        if code is None:
+            LOG.debug(
+                "compiling %d formulas with derivatives up to order %d", kernel.outputs, self.order
+            )
+            module = ir.Module(name=name)
+            emitted(module, kernel.program, self.order, name)
+            code = _machine_code(module)
+            write_code(name, code)
+        return *_load(code, [f"{name}_{entry}" for entry in entries]), origin
+
+    @cached_property
+    def _lanes(self) -> Any:
+        """The code for batches in lanes; None for polynomials, whose loops are as fast."""
+        if isinstance(self.kernel.program, Polynomial):
+            return None
+        engine, (batch,), _ = self._code(emit_lanes, f"{self._name}_lanes", ("batch",))
+        call = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 5)(batch)
+        return engine, call
+
     def at(self, q: Array, parameters: int) -> tuple[Array, ...]:
         """Evaluate at one point; see :meth:`Kernel.at`."""
         block = np.empty(self._size)
@@ -118,16 +141,24 @@ class CompiledKernel:
         self._packed(address(block), parameters)
         return tuple([block[part].reshape(shape) for part, shape in self._views])
 
-    def over(self, q: Array, parameters: int) -> tuple[Array, ...]:
+    def over(self, q: Array, parameters: int, period: int = 1) -> tuple[Array, ...]:
         """Evaluate at every row; see :meth:`Kernel.over`."""
         outputs = tuple([np.empty((len(q), *shape)) for shape in self._shapes])
-        self.fill(np.ascontiguousarray(q), parameters, outputs)
+        self.fill(np.ascontiguousarray(q), parameters, outputs, period)
         return outputs
 
-    def fill(self, q: Array, parameters: int, outputs: tuple[Array, ...]) -> None:
-        """Evaluate at every row of ``q``; all arrays C-contiguous, ``q`` of shape ``(N, k)``."""
-        addresses = [*(output.ctypes.data for output in outputs), None, None]
-        self._batch(len(q), q.ctypes.data, parameters, *addresses[:3])
+    def fill(self, q: Array, parameters: int, outputs: tuple[Array, ...], period: int = 1) -> None:
+        """Evaluate at every row of ``q``; all arrays C-contiguous, ``q`` of shape ``(N, k)``.
+
+        Few points, and points with parameters of their own, are evaluated one by one: code for
+        lanes is compiled when it is first worth it.  The results are the same to the last bit.
+        """
+        addresses = [*(output.ctypes.data for output in outputs), None, None][:3]
+        lanes = self._lanes if period == 1 and len(q) >= MANY else None
+        if lanes is None:
+            self._rows(len(q), period, q.ctypes.data, parameters, *addresses)
+        else:
+            lanes[1](len(q), q.ctypes.data, parameters, *addresses)
 
 
 def address(array: Array) -> int:
@@ -171,22 +202,20 @@ def _symbol(key: str, order: int) -> str:
     return f"polycorner_{digest[:32]}_{order}"
 
 
-def _load(code: bytes, name: str) -> tuple[Any, list[int]]:
+def _load(code: bytes, entries: list[str]) -> tuple[Any, list[int]]:
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    entries = (f"{name}_point", f"{name}_packed", f"{name}_batch")
     return engine, [engine.get_function_address(entry) for entry in entries]
 
 
-def _machine_code(program: Program, order: int, name: str) -> bytes:
-    module = ir.Module(name=name)
+def _machine_code(module: ir.Module) -> bytes:
     module.triple = llvm.get_default_triple()
-    emit_functions(module, program, order, name)
     parsed = llvm.parse_assembly(str(module))
     parsed.verify()
     target = _target_machine()
     options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION)
+    options.loop_vectorization = True
     builder = llvm.create_pass_builder(target, options)
     builder.getModulePassManager().run(parsed, builder)
     code: bytes = target.emit_object(parsed)

@@ -263,3 +263,27 @@ class Program:
             hessian = [d(d(f, min(i, j)), max(i, j)) for f in self.outputs for i in k for j in k]
             levels += (hessian,)
         return levels
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """A polynomial ``c + b.x + x.S x / 2`` of given dimension and degree, all coefficients data.
+
+    Its parameters are ``c``, ``b (n,)`` and, for degree two, the symmetric ``S (n, n)``.
+
+    Attributes
+    ----------
+    variables : int
+        ``n``.
+    degree : int
+        1 or 2.
+    """
+
+    variables: int
+    degree: int
+
+    @property
+    def parameters(self) -> int:
+        """The number of coefficients."""
+        n = self.variables
+        return 1 + n + (n * n if self.degree == 2 else 0)

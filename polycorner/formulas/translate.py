@@ -41,7 +41,7 @@ def compile_expressions(
         Naming a symbol that is neither variable, parameter nor definition, or a function that
         has no translation.
     """
-    translator = _Translator(variables, parameters)
+    translator = Translator(variables, parameters)
     for name, expression in (definitions or {}).items():
         translator.subject = name
         translator.names[name] = translator.translate(expression)
@@ -52,7 +52,7 @@ def compile_expressions(
     return Program(translator.graph, tuple(outputs), len(variables), len(parameters))
 
 
-class _Translator:
+class Translator:
     """Translator of SymPy trees that visits each shared subexpression once."""
 
     def __init__(self, variables: Sequence[str], parameters: Sequence[str]) -> None:
@@ -63,6 +63,7 @@ class _Translator:
         self._seen: dict[sympy.Basic, int] = {}
 
     def translate(self, expression: "sympy.Basic") -> int:
+        """Return the node of an expression."""
         if expression not in self._seen:
             self._seen[expression] = self._translate(expression)
         return self._seen[expression]
@@ -70,7 +71,7 @@ class _Translator:
     def _translate(self, e: "sympy.Basic") -> int:
         kind = type(e).__name__
         if kind in {"Symbol", "Dummy"}:
-            return self._symbol(str(e))
+            return self.symbol(str(e))
         if getattr(e, "is_Rational", False) or getattr(e, "is_Float", False):
             return self._number(e)
         rule = self._rules.get(kind)
@@ -81,19 +82,29 @@ class _Translator:
 
     def _number(self, e: "sympy.Basic") -> int:
         exact = _exact(e)
-        if exact and not 0 < _size(exact) < math.inf:
+        if not representable((exact.numerator, exact.denominator)):
             msg = (
                 f"{self.subject}: expected numbers that double precision can hold, between "
                 f"4.9e-324 and 1.8e308 in size; got {e.evalf(6)}"
             )
             raise ValueError(msg)
-        return self.graph.const(exact)
+        return self.number(exact)
 
-    def _symbol(self, name: str) -> int:
+    @property
+    def known(self) -> Iterable[str]:
+        """The names of all symbols."""
+        return self.names
+
+    def number(self, value: Fraction) -> int:
+        """Return the node of a number."""
+        return self.graph.const(value)
+
+    def symbol(self, name: str) -> int:
+        """Return the node of a symbol."""
         if name not in self.names:
             msg = (
                 f"{self.subject}: the symbol {name} is no coordinate and no parameter; "
-                f"known are {', '.join(self.names)}"
+                f"known are {', '.join(self.known)}"
             )
             raise ValueError(msg)
         return self.names[name]
@@ -178,11 +189,14 @@ class _Translator:
         return result
 
 
-def _size(number: Fraction) -> float:
+def representable(number: tuple[int, int] | float) -> bool:
+    """Whether a number, given as numerator and denominator or as a double, fits in a double."""
+    if not isinstance(number, tuple):
+        return math.isfinite(number)
     try:
-        return abs(float(number))
+        return number[0] == 0 or number[0] / number[1] != 0
     except OverflowError:
-        return math.inf
+        return False
 
 
 def _exact(number: "sympy.Basic") -> Fraction:

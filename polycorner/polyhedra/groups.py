@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 Part = Union["AllOf", "AnyOf", SmoothFunction, "sympy.Expr"]
 
+BENT = frozenset({"Min", "Max", "Abs"})
 MOST_BRANCHES = 256  # of one expression with Min and Max outermost
 
 
@@ -133,22 +134,30 @@ def outermost(expression: Any) -> Any:
     >>> outermost(2 - Abs(x)), outermost(3 * Max(x, 1) - 6), outermost(x**2)
     (AllOf(2 - x, x + 2), AnyOf(3*x - 6, -3), x**2)
     """
-    if type(expression).__name__ not in {"Min", "Max", "Add", "Mul"}:
+    kind = type(expression).__name__
+    if kind not in {"Min", "Max", "Add", "Mul"} or not any(map(_is_bent, _terms(expression))):
         return expression
-    if _count(expression) > MOST_BRANCHES:
-        return expression
-    return _branched(expression)
+    return expression if _count(expression) > MOST_BRANCHES else _branched(expression)
+
+
+def _terms(expression: "sympy.Expr") -> "tuple[sympy.Expr, ...]":
+    return expression.args if expression.is_Add else (expression,)
+
+
+def _is_bent(term: "sympy.Expr") -> bool:
+    """Whether a term is a multiple of Min, Max or Abs."""
+    core = term.args[1] if term.is_Mul and len(term.args) == 2 else term
+    return type(core).__name__ in BENT
 
 
 def _count(expression: "sympy.Expr") -> int:
     """Return the number of branches of an expression."""
-    terms = expression.as_ordered_terms() if expression.is_Add else [expression]
+    terms = _terms(expression)
     return math.prod(sum(map(_count, _choices(term)[1])) or 1 for term in terms)
 
 
 def _branched(expression: "sympy.Expr") -> Any:
-    terms = expression.args if expression.is_Add else (expression,)
-    for term in terms:
+    for term in _terms(expression):
         group, choices = _choices(term)
         if choices and (expression.is_Add or type(term).__name__ != "Abs"):
             rest = expression - term
@@ -160,7 +169,7 @@ def _choices(term: "sympy.Expr") -> "tuple[type[_Group], list[sympy.Expr]]":
     """Return a multiple of Min, Max or Abs as a group of its choices; none for other terms."""
     factor, core = term.as_coeff_Mul()
     kind = type(core).__name__
-    if kind not in {"Min", "Max", "Abs"}:
+    if kind not in BENT:
         return AllOf, []
     args = [core.args[0], -core.args[0]] if kind == "Abs" else list(core.args)
     lowest = (kind == "Min") == bool(factor > 0)

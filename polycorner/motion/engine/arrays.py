@@ -47,10 +47,12 @@ class Sizes(NamedTuple):
         """Return the sizes of bodies with room for so many contacts between them."""
         body, N, k = bodies.body, bodies.count, bodies.dimension
         F, m, R = len(body.friction), len(body.contacts), sum(c.rows for c in body.friction)
-        families = [body.formulation.forces, *(call.family for call in body.gaps)]
+        families = [body.formulation.forces]
         if bodies.contacts is not None:
             families += [bodies.contacts.gaps, *(slip for slip, _, _ in bodies.contacts.slips)]
-        kernels = [len(f.names) * (1 + len(f.variables)) + len(f.variables) for f in families]
+        shapes = [(len(f.names), len(f.variables)) for f in families]
+        shapes += [(len(call.family.names), len(call.reads)) for call in body.gaps]
+        kernels = [m * (1 + k) + k for m, k in shapes]
         pairs = min(N * (N - 1) // 2, 64 * N) if N > 1 else 0
         return cls(
             N=N,
