@@ -15,7 +15,7 @@ from polycorner import checks
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.elements import Completeness
 from polycorner.skeletons.flags import Crossing, Flag
-from polycorner.skeletons.links import Link, singular_figure
+from polycorner.skeletons.links import SAMPLED, Link, singular_figure
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.singularities import singular_point, singular_points
@@ -262,7 +262,7 @@ class Explorer(EdgeTracer):
 
     def _uncrossed(self) -> Iterator[tuple[Flag, HeldPoint, Array]]:
         """Yield ways into faces that were not crossed yet: from edges, then from apexes."""
-        if self.symmetry.relabels:
+        if self.symmetry.relabels or (isinstance(self.polyhedron, Link) and self._is_large):
             return
         while self._finished < len(self.curves):
             for face, ray in self.faces_beside(self._finished).items():
@@ -276,6 +276,11 @@ class Explorer(EdgeTracer):
                 if not sector.rays and sector.sample is not None and flag not in self.tried:
                     way = self.manifold.difference(sector.sample.q, record.point.q) / self.scales
                     yield flag, sector.sample, way
+
+    @property
+    def _is_large(self) -> bool:
+        """Whether a link's faces are too many to cross: those of the corner suffice."""
+        return len(self.manifold.names) - len(self.polyhedron.equation_names) >= SAMPLED
 
     def faces_beside(self, k: int) -> Mapping[frozenset[int], Ray]:
         """Return the two-dimensional faces that meet an edge, and a ray into each."""
