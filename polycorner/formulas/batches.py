@@ -9,6 +9,7 @@ from llvmlite import ir
 from polycorner.formulas import emit
 from polycorner.formulas.programs import Polynomial, Program
 
+SPARSE = 64  # results from which on structural zeros are cleared together
 POINTER, VOID = ir.PointerType(emit.F64), ir.VoidType()
 
 
@@ -209,9 +210,33 @@ def _emit_body(
         leaf("par", i)
     emitter = emit.Emitter(b, program.graph, leaf, lanes)
     for nodes, pointer in zip(levels, results, strict=False):
+        if lanes == 1 and _is_sparse(program, nodes):
+            _store_sparse(b, emitter, pointer, nodes)
+            continue
         for start in range(0, len(nodes), emit.LANES):
             values = [emitter.value(node) for node in nodes[start : start + emit.LANES]]
             _store(b, values, pointer, start, len(nodes), lanes)
+
+
+def _is_sparse(program: Program, nodes: list[int]) -> bool:
+    """Whether most of many results are structurally zero."""
+    zero = program.graph.const(0)
+    return len(nodes) >= SPARSE and 2 * sum(node != zero for node in nodes) <= len(nodes)
+
+
+def _store_sparse(
+    b: ir.IRBuilder, emitter: emit.Emitter, pointer: ir.Value, nodes: list[int]
+) -> None:
+    """Clear all results and store those that are not structurally zero."""
+    zero = emitter.graph.const(0)
+    byte, flag = ir.IntType(8), ir.IntType(1)
+    clear = b.module.declare_intrinsic("llvm.memset", [ir.PointerType(byte), emit.I64])
+    size = ir.Constant(emit.I64, 8 * len(nodes))
+    block = b.bitcast(pointer, ir.PointerType(byte))
+    b.call(clear, [block, ir.Constant(byte, 0), size, ir.Constant(flag, 0)])
+    for position, node in enumerate(nodes):
+        if node != zero:
+            b.store(emitter.value(node), _offset(b, pointer, position))
 
 
 def _offset(b: ir.IRBuilder, pointer: ir.Value, position: int) -> ir.Value:

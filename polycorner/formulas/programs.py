@@ -22,8 +22,10 @@ class Graph:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
+        self._supports: list[int] = []
         self._index: dict[Node, int] = {}
         self._derivatives: dict[tuple[int, int], int] = {}
+        self._zero = -1
 
     def node(self, op: str, *args: Payload) -> int:
         """Return the node ``op(args)``, adding it when it is new."""
@@ -31,10 +33,26 @@ class Graph:
         if key not in self._index:
             self._index[key] = len(self.nodes)
             self.nodes.append(key)
+            self._supports.append(self._support(op, args))
         return self._index[key]
+
+    def _support(self, op: str, args: tuple[Payload, ...]) -> int:
+        """Return the variables that an operation depends on, one bit each."""
+        if op == "var":
+            return 1 << int(args[0])
+        if op in {"const", "par"}:
+            return 0
+        support = 0
+        for child in args:
+            support |= self._supports[int(child)]
+        return support
 
     def const(self, value: Fraction | int | str) -> int:
         """Return a constant node: an exact fraction, or ``"pi"`` or ``"e"``."""
+        if value == 0:
+            if self._zero < 0:
+                self._zero = self.node("const", Fraction(0))
+            return self._zero
         return self.node("const", value if isinstance(value, str) else Fraction(value))
 
     def _value(self, a: int) -> Fraction | None:
@@ -150,6 +168,8 @@ class Graph:
 
     def derivative(self, a: int, variable: int) -> int:
         """Return the partial derivative of node ``a`` by variable number ``variable``."""
+        if not self._supports[a] >> variable & 1:
+            return self.const(0)
         key = (a, variable)
         if key not in self._derivatives:
             self._derivatives[key] = self._differentiate(a, variable)
