@@ -4,7 +4,7 @@ A claimed local minimum is refuted by a feasible point nearby whose energy is lo
 sampled on spheres about it, from 1e-1 to 1e-3 of its size, carried back to the set by Newton's
 method on the violated functions; and SLSQP looks for lower points in boxes about it.  A point that
 is lower counts only if mpmath confirms both, with 30 digits and a margin far above the point's own
-error; the coarsest radii count only if the energy never rises on the way.
+error; farther away, or behind a barrier, only if the energy stays below the point's all the way.
 """
 
 import warnings
@@ -22,7 +22,8 @@ Array = np.ndarray
 Parts = tuple[mpmath.mpf, list[mpmath.mpf], list[mpmath.mpf]]  # energy, inequalities, equations
 RADII = (1e-3, 1e-2, 3e-2, 1e-1)
 TINY = (1e-9, 1e-7, 1e-5)  # for what is claimed to be no minimum, beside poles
-NEAR = 1e-2  # at which a lower point refutes without looking at the way to it
+NEAR = 1e-2  # up to which a lower point refutes without a way to it, unless there is a barrier
+BARRIER = 1e-11  # relative rise of the energy all over the smallest sphere
 FEASIBLE = 1e-9
 EXACT = 1e-24  # violation of a point that counts, with 30 digits
 SAME = 1e-6  # relative difference at which two energies count as the same
@@ -81,7 +82,7 @@ class Judge:
             return 0.0
         gain, worst = before[0] - after[0], after[1]
         slope = self._slope(q)
-        margin = 1e-11 * (1 + abs(before[0])) + slope * 1e-12 * (1 + np.abs(q).max())
+        margin = 1e-14 * (1 + abs(before[0])) + slope * 1e-12 * (1 + np.abs(q).max())
         return float(gain) if worst <= EXACT and gain > margin else 0.0
 
     def _polished(self, p: Array) -> list[mpmath.mpf]:
@@ -178,15 +179,20 @@ class Judge:
     ) -> Iterator[Lower]:
         """Yield confirmed lower points that refute ``q`` as a local minimum, nearest first."""
         q = np.asarray(q, float)
-        size = np.maximum(1.0, abs(q))
+        size, here = np.maximum(1.0, abs(q)), self.values(q)[0]
+        barred = False
         for radius in radii:
-            candidates = [*self._sampled(q, radius * size, generator, directions)]
-            candidates += self._descended(q, radius * size, generator)
+            sphere = list(self._sampled(q, radius * size, generator, directions))
+            if radius == RADII[0] and sphere:
+                lowest = min(energy for energy, _ in sphere)
+                barred = lowest - here > BARRIER * (1 + abs(here))
+            candidates = [*sphere, *self._descended(q, radius * size, generator)]
             best = min(candidates, key=lambda c: c[0], default=None)
-            if best is None or best[0] >= self.values(q)[0]:
+            if best is None or best[0] >= here:
                 continue
             gain = self.confirmed(q, best[1])
-            if gain > 0 and (radius <= NEAR or self._downhill(q, best[1])):
+            direct = radius <= NEAR and not barred
+            if gain > 0 and (direct or self._downhill(q, best[1])):
                 yield Lower(radius, gain, tuple(map(float, best[1])))
 
     def _sampled(
