@@ -10,6 +10,7 @@ from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.polishing import SETTLED, Endpoint
 from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.rescaling import rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
@@ -53,7 +54,8 @@ def minimise(
         of the face to machine precision.  ``"slsqp"`` is SciPy's ([Kraft]), ``"scp"`` a sequence
         of convex programmes in cvxpy; both end by solving the same KKT equations.
     max_iterations : int, optional
-        Limit on the steps in each piece.
+        Limit on the steps in each piece.  A descent that stalls, or is cut after a hundred steps
+        or more, goes on with scales estimated from the data, as often as there are estimates.
     tolerance, rank_tolerance : float, optional
         See :class:`~polycorner.minimisation.certificate.Certificate`.
 
@@ -212,7 +214,11 @@ def _lower_branch(problem: Problem, end: Endpoint, descent: Descent, limit: int)
 def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
     from polycorner.minimisation.descent import sqp
 
-    status, iterations, point, _ = problem.descend(piece, q, limit)
+    status, iterations, point, multipliers = problem.descend(piece, q, limit)
+    if status >= sqp.STALLED:
+        status, iterations, point = rescaled(
+            problem, piece, limit, (status, iterations, point, multipliers)
+        )
     failures = {
         sqp.INFEASIBLE: Verdict.INFEASIBLE,
         sqp.UNBOUNDED: Verdict.UNBOUNDED,

@@ -144,8 +144,10 @@ class Problem(Value):
         use[list(piece)] = True
         return use
 
-    def descend(self, piece: Piece, q: Array, limit: int) -> tuple[int, int, Array, Array]:
-        """Run the compiled descent inside one piece.
+    def descend(
+        self, piece: Piece, q: Array, limit: int, scales: Array | None = None
+    ) -> tuple[int, int, Array, Array]:
+        """Run the compiled descent inside one piece, in units of other ``scales`` if given.
 
         Returns
         -------
@@ -155,10 +157,14 @@ class Problem(Value):
         from polycorner.minimisation.descent import entry_points
 
         flat, size = self.flat
+        if scales is None:
+            scales = self.scales
+        else:
+            flat = (*flat[:4], scales)
         status, iterations, u, lam = entry_points.descend(
-            flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size, limit
+            flat, self.mask(piece), self.inequalities, self.rows, q / scales, size, limit
         )
-        return status, iterations, u * self.scales, lam
+        return status, iterations, u * scales, lam
 
     def restore(self, piece: Piece, q: Array) -> tuple[bool, Array]:
         """Project ``q`` onto a piece by repeated linearisation; return success and the point."""

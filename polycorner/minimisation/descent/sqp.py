@@ -15,14 +15,16 @@ from polycorner.minimisation.descent.feasibility import crosses_wall, project
 from polycorner.minimisation.descent.linear_algebra import cholesky, largest, largest_entry, plus
 from polycorner.minimisation.descent.quadratic_programme import solve_quadratic
 from polycorner.minimisation.descent.stationarity import (
+    FLAT,
     MINIMUM,
     REJECTED,
     SADDLE,
     classify,
+    leave_flat,
     leave_saddle,
 )
 
-CONVERGED, INFEASIBLE, UNBOUNDED, STALLED = 0, 1, 2, 3
+CONVERGED, INFEASIBLE, UNBOUNDED, STALLED, LEVEL = 0, 1, 2, 3, 4  # LEVEL: converged, but flat
 FIRST_CAP = 0.5  # longest first step, in scale units
 PATIENCE = 20  # steps after which convexification may use the active inequalities, too
 FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
@@ -53,6 +55,15 @@ def convexified(B, g, A, L):
             across = 10.0 * n * largest_entry(B)
         else:
             shift *= 8.0
+
+
+@njit
+def leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
+    """Move ``v`` off a saddle or a flat point to a lower one; return whether there was one."""
+    never_inline()
+    if outcome == SADDLE:
+        return leave_saddle(problem, use, on, m, v, ways[0], F, J, H, size, energy)
+    return outcome == FLAT and leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy)
 
 
 @njit
@@ -105,15 +116,15 @@ def descend(problem, use, m, rows, u, size, limit):
         for i in range(m):
             settled = settled and on[i] == before[i]
         if reach < 1e-9 or (reach < 0.5 and settled):
-            outcome, v, exact, way = classify(problem, use, on, m, u, F, J, H, size, energy)
+            outcome, v, exact, ways = classify(problem, use, on, m, u, F, J, H, size, energy)
             if outcome == MINIMUM:
                 return CONVERGED, iteration, v, exact
-            if outcome == SADDLE and leave_saddle(
-                problem, use, on, m, v, way, F, J, H, size, energy
-            ):
+            if leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
                 for k in range(n):
                     u[k] = v[k]
                 continue
+            if outcome == FLAT:
+                return LEVEL, iteration, v, exact
             if reach < 1e-9:
                 return STALLED, iteration, v if outcome != REJECTED else u, lam
         slope = 0.0
@@ -133,10 +144,8 @@ def descend(problem, use, m, rows, u, size, limit):
                     break
             factor *= 0.5
         if not accepted:
-            outcome, v, exact, way = classify(problem, use, on, m, u, F, J, H, size, energy)
-            if outcome == SADDLE and leave_saddle(
-                problem, use, on, m, v, way, F, J, H, size, energy
-            ):
+            outcome, v, exact, ways = classify(problem, use, on, m, u, F, J, H, size, energy)
+            if leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
                 for k in range(n):
                     u[k] = v[k]
                 continue

@@ -24,13 +24,18 @@ from polycorner.minimisation.descent.linear_algebra import (
 from polycorner.minimisation.descent.newton import RANK, polish
 
 EXACT = 1e-13  # scaled violation allowed after Newton's method
-MINIMUM, SADDLE, MOVING, REJECTED = 3, 2, 1, 0  # outcomes of `classify`
-CURVED = 1e-8  # relative curvature below which a stationary point is a saddle
+FLAT, MINIMUM, SADDLE, MOVING, REJECTED = 4, 3, 2, 1, 0  # outcomes of `classify`
+CURVED = 1e-8  # relative curvature beyond which a stationary point is a saddle, or a minimum
+RADII = (1e-3, 1e-2, 1e-1)  # steps in which flat directions are followed, in scale units
+MIXTURES = 4  # mixtures of flat directions to follow, per direction, where there are several
 
 
 @njit
-def least_curvature(F, J, H, lam, on, m, direction):
-    """Fill the direction of least curvature along the face; return the relative curvature."""
+def least_curvatures(F, J, H, lam, on, m):
+    """Return the least relative curvature along the face and the directions of least curvature.
+
+    The first direction has the least curvature; more follow if it vanishes in several.
+    """
     never_inline()
     n, total = H.shape[1], lam.size
     A, b, _, _ = normalised_rows(F, J, on, m)
@@ -53,20 +58,26 @@ def least_curvature(F, J, H, lam, on, m, direction):
         if s[a] > cut:
             M[a, a] += 2.0 * n * reference
     _, _, W = svd(M)
-    least, chosen = np.inf, 0
+    least, count, values, ways = np.inf, 1, np.zeros(n), np.zeros((n, n))
     for j in range(n):
-        value = 0.0
         for a in range(n):
             for c in range(n):
-                value += W[a, j] * M[a, c] * W[c, j]
-        value -= 2.0 * n * reference
-        if value < least:
-            least, chosen = value, j
-    for i in range(n):
-        direction[i] = 0.0
-        for a in range(n):
-            direction[i] += V[i, a] * W[a, chosen]
-    return least / reference
+                values[j] += W[a, j] * M[a, c] * W[c, j]
+        values[j] = values[j] / reference - 2.0 * n
+        first = values[j] < least
+        if not first and abs(values[j]) > CURVED:
+            continue
+        k = 0 if first else count
+        if first and abs(least) <= CURVED:
+            for i in range(n):
+                ways[count, i] = ways[0, i]
+        count += abs(least) <= CURVED if first else 1
+        least = min(least, values[j])
+        for i in range(n):
+            ways[k, i] = 0.0
+            for a in range(n):
+                ways[k, i] += V[i, a] * W[a, j]
+    return least, ways[:count].copy()
 
 
 @njit
@@ -76,17 +87,17 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
     Returns
     -------
     outcome
-        ``MINIMUM``, ``SADDLE``, ``MOVING`` (not stationary) or ``REJECTED`` (not reached, outside
-        the set, or not below ``energy``).
-    v, multipliers, direction
-        The point, its multipliers and the direction of least curvature.
+        ``MINIMUM``, ``FLAT`` (its second order vanishes in a direction), ``SADDLE``, ``MOVING``
+        (not stationary) or ``REJECTED`` (not reached, outside the set, or not below ``energy``).
+    v, multipliers, directions
+        The point, its multipliers and the directions of least curvature.
     """
     never_inline()
-    v, rows, direction = u.copy(), on.copy(), np.zeros(u.size)
+    v, rows, directions = u.copy(), on.copy(), np.zeros((1, u.size))
     for _ in range(4):
         lam, step = polish(problem, rows, m, np.zeros((0, u.size)), v, F, J, H, size)
         if not step < 1e-8 or largest(plus(v, -1.0, u)) > 0.5:
-            return REJECTED, v, lam, direction
+            return REJECTED, v, lam, directions
         added = False
         for i in range(m):
             if use[i] and not rows[i] and F[i] < -EXACT * length(J[i]):
@@ -103,15 +114,16 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
             stationary = False
     higher = F[last] > energy + 1e-9 * (abs(energy) + reference)
     if higher or violation(F, J, use, m) > FEASIBLE:
-        return REJECTED, v, lam, direction
+        return REJECTED, v, lam, directions
     if not (stationary and largest(pull) <= 1e-9 * reference):
-        return MOVING, v, lam, direction
+        return MOVING, v, lam, directions
     for i in range(m):
         # A contact without a multiplier does not constrain descent: it may open.
         rows[i] = rows[i] and lam[i] * length(J[i]) > 1e-9 * reference
-    if least_curvature(F, J, H, lam, rows, m, direction) >= -CURVED:
-        return MINIMUM, v, lam, direction
-    return SADDLE, v, lam, direction
+    least, directions = least_curvatures(F, J, H, lam, rows, m)
+    if least < -CURVED:
+        return SADDLE, v, lam, directions
+    return MINIMUM if least > CURVED else FLAT, v, lam, directions
 
 
 @njit
@@ -141,5 +153,48 @@ def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
         if reached and F[F.size - 1] < energy:
             for i in range(v.size):
                 v[i] = trial[i]
+            return True
+    return False
+
+
+@njit
+def leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy):
+    """Move ``v`` from a point with vanishing second order to a lower one nearby; return success.
+
+    Along every direction of ``ways``, and mixtures of them, both ways, straight steps are
+    projected onto the set, and curved ones keep the energy stationary across the direction, on the
+    face.  The energy must not rise on the way: no barrier is crossed.  A decrease counts beyond
+    the rounding error and what a violation within the tolerance can give.
+    """
+    never_inline()
+    evaluate(problem, v, F, J, H, size, True)
+    last = F.size - 1
+    noise = 1e-13 * (abs(F[last]) + largest_entry(H[last])) + 10.0 * FEASIBLE * largest(J[last])
+    energy = min(energy, F[last])
+    count = ways.shape[0]
+    along, everything = np.zeros((1, v.size)), count * (1 + (MIXTURES if count > 1 else 0))
+    for k in range(4 * everything):
+        j = k // 4
+        for i in range(v.size):
+            along[0, i] = ways[j, i] if j < count else 0.0
+            for c in range(count if j >= count else 0):
+                along[0, i] += np.cos(1.0 + j * np.sqrt(2.0 + c)) * ways[c, i]
+        way = along[0] / length(along[0])
+        along[0] = way
+        lowest, best = energy, v
+        for radius in RADII:
+            trial = plus(v, radius if k % 2 else -radius, way)
+            if k % 4 < 2:
+                reached = project(problem, use, m, trial, F, J, H, size, np.int64(6))
+            else:
+                _, step = polish(problem, on, m, along, trial, F, J, H, size)
+                reached = step < 1e-8 and violation(F, J, use, m) <= FEASIBLE
+            if not reached or not F[last] <= lowest + noise:
+                break
+            if F[last] < lowest:
+                lowest, best = F[last], trial
+        if lowest < energy - noise:
+            for i in range(v.size):
+                v[i] = best[i]
             return True
     return False

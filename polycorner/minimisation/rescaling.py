@@ -1,0 +1,62 @@
+"""Scales of badly scaled problems, estimated from the data where a descent has stalled.
+
+A descent measures steps in the manifold's scales.  Where these are far from the sizes over which
+the functions vary, steps are short and curvatures drown in rounding errors.  A stalled descent goes
+on from where it is, in scales that are estimated there, until one converges:
+
+* ``sqrt(max_j |L_jj| / |L_ii|)`` with ``L`` the Hessian of the Lagrangian, which makes the diagonal
+  of the scaled Hessian constant ([NW] sec. 2.2); where ``L`` is flat, the magnitude below;
+* ``|q_i|``, the magnitude of the coordinate, where it is larger than the manifold's scale.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from polycorner.minimisation.problem import Problem
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.spaces.manifold import Array
+
+End = tuple[int, int, Array, Array]  # status, iterations, point, multipliers
+FLAT = 1e-14  # diagonal entry, relative to the largest, below which a coordinate is flat
+UNEVEN = 1e3  # ratio of estimated scales, in the manifold's, for which a flat end is doubted
+PATIENCE = 100  # a lower limit on the steps is meant to cut the descent short
+
+
+def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int, int, Array]:
+    """Let a descent that stalled, or ended where it seems flat, go on in estimated scales.
+
+    Returns
+    -------
+    status, iterations, point
+        Of the first descent that converges to a point as low, otherwise those given; iterations
+        are those of all.
+    """
+    from polycorner.minimisation.descent import sqp
+
+    status, spent, q, multipliers = end
+    if status == sqp.STALLED and spent >= limit and limit < PATIENCE:
+        return status, spent, q
+    for scales in estimated_scales(problem, q, multipliers):
+        even = np.ptp(np.log(scales / problem.scales)) < np.log(UNEVEN)
+        if even and status == sqp.LEVEL:
+            break
+        ended, more, point, _ = problem.descend(piece, q, limit, scales)
+        spent += more
+        lower = problem.energy.value(point) <= problem.energy.value(q)
+        if lower and ended in (sqp.CONVERGED, sqp.LEVEL):
+            return ended, spent, point
+    return status, spent, q
+
+
+def estimated_scales(problem: Problem, q: Array, multipliers: Array) -> Iterator[Array]:
+    """Yield scales ``(n,)`` at ``q``, where the energy's multipliers by row are given."""
+    magnitudes = np.maximum(abs(q), problem.scales)
+    _, _, hessians = problem.evaluate(q, 2)
+    with np.errstate(all="ignore"):
+        hessian = hessians[-1] - np.tensordot(multipliers, hessians[:-1], 1)
+        sizes = abs(np.diag(hessian)) / problem.scales**2
+    if np.isfinite(sizes).all() and sizes.max() > 0:
+        flat = sizes <= FLAT * sizes.max()
+        yield np.where(flat, magnitudes, np.sqrt(sizes.max() / np.where(flat, 1.0, sizes)))
+    yield magnitudes

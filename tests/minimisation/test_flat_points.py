@@ -1,0 +1,60 @@
+"""Descents go on from flat inflections and saddles of higher order, and stay at minima."""
+
+import pytest
+import sympy as sp
+
+from polycorner import Manifold, Polyhedron, minimise
+
+PLANE = Manifold.euclidean("x y")
+x, y = PLANE.symbols
+BOX = Polyhedron(PLANE, {"left": x + 10, "right": 10 - x, "low": y + 10, "high": 10 - y})
+TURNS = {"straight": (1, 0), "turned": (sp.Rational(3, 5), sp.Rational(4, 5)), "across": (0, 1)}
+
+NO_MINIMA = {
+    "inflection": lambda u, v: u**3 + v**2,
+    "inflection of order five": lambda u, v: u**5 + v**2,
+    "maximum of order four": lambda u, v: -(u**4) + v**2,
+    "maximum of order six": lambda u, v: -(u**6) + v**2,
+    "monkey saddle": lambda u, v: u**3 - 3 * u * v**2,
+    "quartic saddle": lambda u, v: u**4 - 6 * u**2 * v**2 + v**4,
+    "between two parabolas": lambda u, v: (v - u**2) * (v - 3 * u**2),
+    "between two cubics": lambda u, v: (v - u**3) * (v - 2 * u**3),
+}
+MINIMA = {
+    "order four": lambda u, v: u**4 + v**2,
+    "order six": lambda u, v: u**6 + v**4,
+    "outside two parabolas": lambda u, v: (v - u**2) * (v - 3 * u**2) + 2 * u**4,
+    "locus": lambda u, v: (v - u**2) ** 2,
+}
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("kind", NO_MINIMA)
+def test_a_descent_goes_on_where_something_lower_is_near(kind, turn):
+    found = minimise(BOX, _turned(NO_MINIMA[kind], turn), [0.0, 0.0])
+    assert found.energy < -1
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("kind", MINIMA)
+def test_a_descent_stays_at_a_flat_minimum(kind, turn):
+    found = minimise(BOX, _turned(MINIMA[kind], turn), [0.0, 0.0])
+    assert found.point == pytest.approx([0, 0], abs=1e-9)
+
+
+def _turned(energy, turn):
+    c, s = TURNS[turn]
+    return energy(c * x + s * y, c * y - s * x)
+
+
+def test_a_descent_goes_on_along_a_curved_face():
+    """On the parabola the energy is x**3; its first and second order vanish at the vertex."""
+    D = Polyhedron(PLANE, {"floor": y - x**2, "left": x + 2, "right": 2 - x})
+    found = minimise(D, 2 * y - 2 * x**2 + x**3, [0.0, 0.0])
+    assert found.active == ("floor", "left")
+
+
+def test_a_barrier_is_not_crossed():
+    """A flat minimum stays the end of its basin, although a lower one lies close."""
+    found = minimise(BOX, x**4 * (x - sp.Rational(1, 20)) * (x - sp.Rational(1, 10)) + y**2, [0, 0])
+    assert found.point == pytest.approx([0, 0], abs=1e-9)
