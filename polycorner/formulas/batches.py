@@ -7,6 +7,7 @@ import numpy as np
 from llvmlite import ir
 
 from polycorner.formulas import emit
+from polycorner.formulas.adjoints import derivatives
 from polycorner.formulas.programs import Polynomial, Program
 
 SPARSE = 64  # results from which on structural zeros are cleared together
@@ -34,13 +35,13 @@ def emit_lanes(module: ir.Module, program: Program, order: int, name: str) -> No
     """Add ``name_batch`` to a module: many points in lanes, with the same parameters."""
     point = _emit_point(module, program, order, f"{name}_single")
     point.linkage = "internal"
-    _emit_batch(module, program, program.derivatives(order), point, f"{name}_batch")
+    _emit_batch(module, *derivatives(program, order), point, f"{name}_batch")
 
 
 def _sizes(program: Program | Polynomial, order: int) -> list[int]:
     if isinstance(program, Polynomial):
         return [program.variables**level for level in range(order + 1)]
-    return [len(level) for level in program.derivatives(order)]
+    return [len(program.outputs) * program.variables**level for level in range(order + 1)]
 
 
 def _emit_point(
@@ -51,7 +52,7 @@ def _emit_point(
     if isinstance(program, Polynomial):
         builder = _emit_polynomial(builder, program, order, point.args)
     else:
-        _emit_body(builder, program, program.derivatives(order), point.args, lanes=1)
+        _emit_body(builder, *derivatives(program, order), point.args, lanes=1)
     builder.ret_void()
     return point
 

@@ -18,7 +18,7 @@ import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir
 
-from polycorner.formulas import batches, emit, programs, translate
+from polycorner.formulas import adjoints, batches, emit, programs, translate
 from polycorner.formulas.batches import emit_lanes, emit_points
 from polycorner.formulas.cache import read_code, source_key, write_code
 from polycorner.formulas.programs import Polynomial, Program
@@ -193,7 +193,8 @@ def _target_machine() -> Any:
 @lru_cache(maxsize=1)
 def _generator_key() -> str:
     machine = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
-    code = source_key(*(room.__name__ for room in (programs, translate, emit, batches)), __name__)
+    rooms = (programs, translate, adjoints, emit, batches)
+    code = source_key(*(room.__name__ for room in rooms), __name__)
     return repr((code, llvmlite.__version__, machine))
 
 

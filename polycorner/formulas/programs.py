@@ -1,9 +1,9 @@
 """Straight-line programs: formulas as a graph of shared operations, and their derivatives.
 
 Every subexpression is stored once (hash-consing), so a quantity used by nine gaps is computed
-once; derivatives are taken in forward mode on the same graph, and zero derivatives never become
-operations ([GW] ch. 3, 6).  Branches (``Piecewise``, ``Min``, ``Max``, ``Abs``) become selections,
-whose derivative is the derivative of the branch taken.
+once; derivatives are taken on the same graph, here in forward mode, and zero derivatives never
+become operations ([GW] ch. 3, 6).  Branches (``Piecewise``, ``Min``, ``Max``, ``Abs``) become
+selections, whose derivative is the derivative of the branch taken.
 """
 
 import hashlib
@@ -26,6 +26,13 @@ class Graph:
         self._index: dict[Node, int] = {}
         self._derivatives: dict[tuple[int, int], int] = {}
         self._zero = -1
+
+    def copy(self) -> "Graph":
+        """Return a graph with the same nodes, to which others can be added."""
+        other = Graph()
+        other.nodes, other._supports = self.nodes.copy(), self._supports.copy()
+        other._index, other._zero = self._index.copy(), self._zero
+        return other
 
     def node(self, op: str, *args: Payload) -> int:
         """Return the node ``op(args)``, adding it when it is new."""
@@ -194,6 +201,20 @@ class Graph:
             return self._chain(op, a, children[0], slopes[0])
         return self._binary_rule(op, a, children, slopes)
 
+    def partials(self, a: int) -> list[tuple[int, int]]:
+        """Return the slope of an operation other than ``select`` by each argument that varies."""
+        op, args = self.nodes[a]
+        pair = [self._arg(a, k) for k in range(len(args))] if self._supports[a] else []
+        one, zero = self.const(1), self.const(0)
+        if len(pair) == 1:
+            return [(pair[0], self._chain(op, a, pair[0], one))]
+        units = ([one, zero], [zero, one])
+        return [
+            (child, self._binary_rule(op, a, pair, unit))
+            for child, unit in zip(pair, units, strict=False)
+            if self._supports[child]
+        ]
+
     def _binary_rule(self, op: str, a: int, children: list[int], slopes: list[int]) -> int:
         u, v = children
         du, dv = slopes
@@ -269,20 +290,6 @@ class Program:
         """Return a hash of the operations: equal programs have equal digests."""
         text = repr((self.graph.nodes, self.outputs, self.variables, self.parameters))
         return hashlib.sha256(text.encode()).hexdigest()
-
-    def derivatives(self, order: int) -> tuple[list[int], ...]:
-        """Return the nodes of the values, gradients and (upper) Hessians up to ``order``.
-
-        Gradients are listed row by row ``(m, k)``, Hessians as ``(m, k, k)``.
-        """
-        d, k = self.graph.derivative, range(self.variables)
-        levels: tuple[list[int], ...] = (list(self.outputs),)
-        if order >= 1:
-            levels += ([d(f, i) for f in self.outputs for i in k],)
-        if order >= 2:
-            hessian = [d(d(f, min(i, j)), max(i, j)) for f in self.outputs for i in k for j in k]
-            levels += (hessian,)
-        return levels
 
 
 @dataclass(frozen=True)

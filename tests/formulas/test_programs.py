@@ -8,6 +8,7 @@ import sympy as sp
 from hypothesis import assume, given
 from strategies import rational_terms
 
+from polycorner.formulas.adjoints import Reverse, derivatives
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.translate import compile_expressions
 
@@ -81,11 +82,12 @@ class TestGraph:
             seeded = [oracles.Dual(v, Fraction(i == j)) for j, v in enumerate(POINT)]
             exact = evaluated(term, seeded, oracles.Dual).b
             assert run(graph, graph.derivative(node, i), POINT) == exact
+            assert run(graph, Reverse(graph).row(node).get(i, graph.const(0)), POINT) == exact
 
     @given(rational_terms(depth=3, variables=2))
     def test_second_derivatives_are_exact_and_commute(self, term):
         graph, dual = Graph(), oracles.Dual
-        node = build(graph, term)
+        node, rows = build(graph, term), Reverse(graph)
 
         def constant(value):
             return dual(dual(Fraction(value)), dual(Fraction(0)))
@@ -100,6 +102,8 @@ class TestGraph:
                 exact = exact.b if isinstance(exact, dual) else exact
                 mixed = graph.derivative(graph.derivative(node, i), j)
                 assert run(graph, mixed, POINT) == exact
+                adjoint = rows.row(rows.row(node).get(i, graph.const(0))).get(j, graph.const(0))
+                assert run(graph, adjoint, POINT) == exact
 
     def test_an_operation_is_stored_once(self):
         graph = Graph()
@@ -156,7 +160,7 @@ class TestTranslation:
 
     def test_derivatives_are_listed_row_by_row(self):
         program = compile_expressions([x**2 * y, 3 * y], ("x", "y"))
-        values, gradients, hessians = program.derivatives(2)
+        program, (values, gradients, hessians) = derivatives(program, 2)
         point = POINT[:2]
         a, b = point
         assert [run(program.graph, node, point) for node in values] == [a * a * b, 3 * b]
