@@ -1,0 +1,128 @@
+"""First and later answers as problems grow: how much of the time is compilation.
+
+Every case runs in a fresh interpreter with an empty cache of compiled formulas; the compiled
+descent, which is made once for an installation, is loaded before the clock starts.  The clock runs
+from the polyhedron to the verdict of a certificate, or to the skeleton; SymPy's own work on the
+user's formulas comes before.  ``warm`` is the median of the same search repeated in that process.
+"""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from itertools import combinations
+from typing import Any
+
+from side_by_side import ROOT, print_table, seconds, write
+
+ROUNDS, WARM = 3, 7
+CASES = {
+    "bounds": (10, 30, 50, 100, 200),
+    "bounds and 100 quadratics": (10, 30, 50),
+    "half-planes, minimum": (50, 500),
+    "half-planes, skeleton": (50, 500),
+    "discs, all distances": (5, 10, 20),
+}
+
+
+def problem(case: str, n: int) -> tuple[Any, Any, Any, Any]:
+    """Return manifold, inequalities, energy and start of a case of one size."""
+    import numpy as np
+    import sympy
+
+    from polycorner import Manifold
+
+    rng = np.random.default_rng(0)
+    if case.startswith("half-planes"):
+        plane = Manifold.euclidean("x y")
+        x, y = plane.symbols
+        angles = np.sort(rng.uniform(0, 2 * np.pi, n)).tolist()
+        parts = [1 - sympy.Float(np.cos(a)) * x - sympy.Float(np.sin(a)) * y for a in angles]
+        return plane, parts, x + 2 * y, np.zeros(2)
+    discs = case.startswith("discs")
+    count = 2 * n if discs else n
+    space = Manifold.euclidean([f"x{i}" for i in range(count)])
+    q = space.symbols
+    if discs:
+        parts = [
+            (q[2 * i] - q[2 * j]) ** 2 + (q[2 * i + 1] - q[2 * j + 1]) ** 2 - 1
+            for i, j in combinations(range(n), 2)
+        ]
+        start = 1.5 * np.column_stack([np.arange(n), rng.random(n)]).ravel()
+        return space, parts, sum(x**2 for x in q), start
+    parts = [x + 1 for x in q] + [2 - x for x in q]
+    if "quadratics" in case:
+        for _ in range(100):
+            a = rng.standard_normal((n, n))
+            a = -a @ a.T / n
+            pairs = [(i, j) for i in range(n) for j in range(i + 1)]
+            terms = [sympy.Float(a[i, j]) * (q[i] * q[j]) for i, j in pairs]
+            slopes = [sympy.Float(b) * x for b, x in zip(rng.standard_normal(n), q, strict=True)]
+            parts.append(sympy.Add(*terms, *slopes, 10))
+    energy = sum((x - sympy.Float(c)) ** 2 for x, c in zip(q, 3 * rng.random(n), strict=True))
+    return space, parts, energy, 0.1 * rng.random(n)
+
+
+def one(case: str, n: int) -> None:
+    """Print the times of one case, as JSON."""
+    from polycorner import Manifold, Polyhedron, minimise, skeleton
+
+    line = Manifold.euclidean("t")
+    (t,) = line.symbols
+    minimise(Polyhedron(line, [t]), t, [1.0])  # loads the descent, from the usual cache
+    space, parts, energy, start = problem(case, n)
+    made: list[Any] = []
+
+    def search() -> None:
+        if case.endswith("skeleton"):  # every half-plane touches the unit circle: none is redundant
+            assert len(skeleton(made[0], [start]).corners) == n
+        else:
+            assert minimise(made[0], energy, start).is_minimum
+
+    def first() -> None:
+        made.append(Polyhedron(space, parts))
+        search()
+
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["POLYCORNER_CACHE_DIR"] = folder
+        cold = seconds(first)
+        warm = statistics.median(seconds(search) for _ in range(WARM))
+    print(json.dumps({"first": cold, "warm": warm}))
+
+
+def measured(case: str, n: int) -> dict[str, float]:
+    """Return the times of one case in a fresh process with an empty cache."""
+    command = [sys.executable, __file__, case, str(n)]
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    done = subprocess.run(
+        command,
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def main() -> None:
+    rows, figures = [], {}
+    for case, sizes in CASES.items():
+        for n in sizes:
+            runs = [measured(case, n) for _ in range(ROUNDS)]
+            first, warm = (statistics.median(r[k] for r in runs) for k in ("first", "warm"))
+            rows.append((case, n, round(first, 2), round(1e3 * warm, 2)))
+            figures[f"{case}, {n}"] = {"first_s": round(first, 3), "warm_ms": round(1e3 * warm, 3)}
+            print(rows[-1], flush=True)
+    print_table("First and later answers", ["case", "n", "first (s)", "warm (ms)"], rows)
+    write("compilation", figures)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        one(sys.argv[1], int(sys.argv[2]))
+    else:
+        main()
