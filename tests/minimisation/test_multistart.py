@@ -309,7 +309,9 @@ def test_points_are_drawn_where_the_inequalities_hold():
     """On a thin ring of a torus, of which a third is walled off."""
     torus = Manifold(("a", "b"), (math.tau, 360.0), (1.0, 57.0))
     a, b = torus.symbols
-    ring = Polyhedron(torus, {"open": sp.cos(a) + sp.Rational(1, 2)}, {"level": b - 10})
+    turn = 2 * sp.pi * (b - 10) / 360
+    parts = {"open": sp.cos(a) + sp.Rational(1, 2), "near": sp.cos(turn)}
+    ring = Polyhedron(torus, parts, {"level": sp.sin(turn)})
     found = minima(ring, sp.cos(2 * a), starts=40, rng=0)
     assert sum(found.counts) == 40
     exact = [-math.pi / 2, math.pi / 2]
