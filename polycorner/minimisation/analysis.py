@@ -1,30 +1,32 @@
 """Analysis of the optimality conditions at a point, over all pieces of the polyhedron there."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.minimisation.conditions import (
+    NEARLY_FLAT,
     Curvature,
     Multipliers,
     find_curvature,
     find_multipliers,
 )
+from polycorner.minimisation.constancy import symmetric_directions, without
+from polycorner.minimisation.corner_degeneracy import decide
+from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
+from polycorner.minimisation.evidence import steepest_descent
+from polycorner.minimisation.findings import OPEN, Analysis, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
-from polycorner.minimisation.verdicts import Entrapment, Verdict
-from polycorner.polyhedra.cones import Rows, inward_direction, null_space, rank
+from polycorner.minimisation.verdicts import Verdict
+from polycorner.polyhedra.cones import Rows, inward_direction, rank, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
 
-# Distances to which flat directions are followed, in scale units.
-PROBES = np.array([0.003, 0.03, -0.003, -0.03])
-OPEN = 10  # a product of multiplier and gap beyond so many tolerances is not rounding
+# Distances, in scale units, at which lower points are sought where a gradient vanishes.
+DISTANCES = 10.0 ** np.arange(-5, 0)
 # Where several pieces meet, the first of these verdicts that any of them has decides.
 DECISIVE = (
     Verdict.NOT_STATIONARY,
@@ -35,141 +37,6 @@ DECISIVE = (
     Verdict.WEAK_MINIMUM,
     Verdict.STRICT_MINIMUM,
 )
-PROBE_NOISE = 1e-12  # relative change of the energy that counts as rounding
-
-
-@dataclass(frozen=True, eq=False)
-class Local(Value):
-    """Derivatives at a point, in scaled coordinates, and the tolerances in force there."""
-
-    problem: Problem
-    point: Array
-    values: Array
-    gradients: Array
-    hessians: Array
-    tolerance: float
-    rank_tolerance: float
-
-    @cached_property
-    def reference(self) -> float:
-        """The size of the energy: its largest first or second derivative in scaled coordinates."""
-        return float(max(abs(self.gradients[-1]).max(), abs(self.hessians[-1]).max())) or 1.0
-
-    @property
-    def small(self) -> float:
-        """The size up to which a first derivative counts as zero."""
-        return self.tolerance * self.reference
-
-    @property
-    def sections(self) -> range:
-        """Rows of the equations."""
-        return range(self.problem.inequalities, len(self.values) - 1)
-
-
-@dataclass(frozen=True, eq=False)
-class Analysis(Value):
-    """First and second order at a point, in scaled coordinates.
-
-    Attributes
-    ----------
-    verdict : Verdict
-        What the conditions imply.
-    active : tuple of int
-        Rows of the active inequalities of the piece that decides.
-    gradients : (k + e, n) array
-        Gradients of the active inequalities, then of the equations.
-    multipliers : Multipliers
-        Of unit gradients.
-    independent : bool
-        Whether the gradients are linearly independent (LICQ).
-    strong_positions : tuple of int
-        Positions in ``active`` of an independent set of functions with positive multipliers.
-    weak : tuple of int
-        Rows with zero multipliers.
-    curvature : Curvature
-        The second-order condition.
-    reference : float
-        The size of the energy; see :attr:`Local.reference`.
-    small_curvature : float
-        Curvature that counts as zero.
-    flat_verified : bool
-        Whether the energy is constant along every direction in which the second order vanishes.
-    flat_change : float
-        Its largest relative change there; infinite where a direction could not be followed.
-    local : Local
-        The derivatives all this was computed from.
-    obstacle : str
-        Why the functions are not twice differentiable at the point; empty if they are.
-    """
-
-    verdict: Verdict
-    active: tuple[int, ...]
-    gradients: Array
-    multipliers: Multipliers
-    independent: bool
-    strong_positions: tuple[int, ...]
-    weak: tuple[int, ...]
-    curvature: Curvature
-    reference: float
-    small_curvature: float
-    flat_verified: bool
-    flat_change: float
-    local: Local
-    obstacle: str = ""
-
-    @property
-    def signature(self) -> tuple[int, int, int]:
-        """The lemma's ``(p, q, r)``."""
-        values = self.curvature.values
-        free = int((abs(values) <= self.small_curvature).sum())
-        return len(self.strong_positions), len(values) - free, free
-
-    @cached_property
-    def entrapment(self) -> dict[str, Entrapment]:
-        """The kind of entrapment in every direction."""
-        return dict(_entrapment(self))
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the active inequalities."""
-        return tuple(self.local.problem.polyhedron.names[i] for i in self.active)
-
-    @property
-    def held_names(self) -> tuple[str, ...]:
-        """Names of the active inequalities, then of the equations."""
-        return self.names + self.local.problem.polyhedron.equation_names
-
-    def by_name(self, values: Array) -> dict[str, float]:
-        """Return multipliers of unit gradients as multipliers ``dE/df`` of the functions."""
-        sizes = np.linalg.norm(self.gradients, axis=1)
-        safe = np.where(sizes > 0, sizes, 1.0)
-        return dict(zip(self.held_names, (values / safe).tolist(), strict=True))
-
-    @property
-    def named_multipliers(self) -> dict[str, float]:
-        """``dE/df`` for each active function and equation."""
-        return self.by_name(self.multipliers.values)
-
-    @property
-    def named_ranges(self) -> dict[str, tuple[float, float]]:
-        """The least and the largest value of each multiplier."""
-        lower, upper = map(self.by_name, (self.multipliers.lower, self.multipliers.upper))
-        return {name: (lower[name], upper[name]) for name in lower}
-
-    @property
-    def open_positions(self) -> list[int]:
-        """Positions of active functions whose gap is too large for their multiplier."""
-        if not self.multipliers.exist:
-            return []
-        k = len(self.active)
-        away = distances(self.local.values[list(self.active)], self.gradients[:k])
-        product = abs(self.multipliers.values[:k] * away)
-        return np.flatnonzero(product > OPEN * self.local.small).tolist()
-
-    @property
-    def stationary(self) -> bool:
-        """Whether the first-order conditions hold, complementarity included."""
-        return self.multipliers.exist and not self.open_positions
 
 
 def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float) -> Analysis:
@@ -195,61 +62,173 @@ def _without_conditions(local: Local, verdict: Verdict, reason: str) -> Analysis
     known = (np.where(np.isfinite(x), x, 0.0) for x in (local.gradients, local.hessians))
     gradients, hessians = known
     finite = replace(local, gradients=gradients, hessians=hessians)
-    found = _analyse_piece(finite, frozenset())
+    found = _analyse_piece(finite, frozenset(), higher=False)
     return replace(found, verdict=verdict, obstacle=reason, local=local)
 
 
-def _analyse_piece(local: Local, piece: Piece) -> Analysis:
+def _analyse_piece(local: Local, piece: Piece, *, higher: bool = True) -> Analysis:
+    """Analyse one piece; where the second order vanishes, to ``higher`` orders."""
     active = tuple(sorted(piece))
     k, small = len(active), local.small
     gradients = local.gradients[[*active, *local.sections]]
-    rows = Rows(gradients, local.rank_tolerance)
+    blind = _blind(local, active)
+    seen = [i for i in range(len(gradients)) if i not in blind]
+    kept = sum(1 for i in seen if i < k)
+    rows = Rows(gradients[seen] if blind else gradients, local.rank_tolerance)
     slope = local.gradients[-1]
     most = 0.1 * float(np.linalg.norm(slope)) / local.rank_tolerance + small
-    multipliers = find_multipliers(rows, k, slope, small, most)
+    multipliers = find_multipliers(rows, kept, slope, small, most)
+    left = slope - multipliers.values @ rows.units
+    multipliers = multipliers.spread(seen, len(gradients)) if blind else multipliers
     values = multipliers.values[:k]
-    strong = [*np.flatnonzero(abs(values) > small).tolist(), *range(k, len(gradients))]
-    weak = [active[i] for i in np.flatnonzero(abs(values) <= small)]
-    face = rows if len(strong) == len(gradients) else Rows(gradients[strong], local.rank_tolerance)
+    strong = [i for i in seen if i >= k or abs(values[i]) > small]
+    weak = tuple(active[i] for i in seen if i < k and abs(values[i]) <= small)
+    face = rows if len(strong) == len(seen) else Rows(gradients[strong], local.rank_tolerance)
     hessian = _lagrangian_hessian(local, active, gradients, multipliers)
     small_curvature = local.tolerance * max(local.reference, float(abs(hessian).max()))
-    curvature = find_curvature(hessian, face.null_space, local.gradients[weak], small_curvature)
+    weak_rows = local.gradients[list(weak)]
+    curvature = find_curvature(hessian, face.null_space, weak_rows, small_curvature, left)
     away = distances(local.values[list(active)], gradients[:k])
     verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
-    change = 0.0
-    if verdict is Verdict.UNDECIDED and curvature.least >= -small_curvature:
-        held = frozenset(active[i] for i in strong if i < k)
-        change = _flat_change(local, held, curvature.flat, piece)
-        verdict = Verdict.MINIMUM_ALONG_LOCUS if change <= PROBE_NOISE else verdict
-    elif verdict is Verdict.STRICT_MINIMUM and weak:
-        verdict = Verdict.WEAK_MINIMUM
-    return Analysis(
+    independent = rows.independent and not blind
+    positive = np.array([i for i in strong if i < k and values[i] > small], dtype=np.int64)
+    result = Analysis(
         verdict=verdict,
         active=active,
         gradients=gradients,
         multipliers=multipliers,
-        independent=rows.independent,
-        strong_positions=_independent_positions(rows, np.flatnonzero(values > small), k, local),
-        weak=tuple(weak),
+        independent=independent,
+        strong_positions=_independent_positions(gradients, seen, positive, k, local),
+        weak=weak,
+        blind=blind,
         curvature=curvature,
         reference=local.reference,
         small_curvature=small_curvature,
-        flat_verified=not curvature.flat.shape[1] or change <= PROBE_NOISE,
-        flat_change=change,
+        decision=None,
         local=local,
     )
+    if verdict is Verdict.UNDECIDED and higher and curvature.least >= -small_curvature:
+        decision = _decide(result, piece, strong, hessian)
+        result = replace(result, decision=decision, verdict=decision.verdict)
+    elif verdict is Verdict.STRICT_MINIMUM and weak:
+        result = replace(result, verdict=Verdict.WEAK_MINIMUM)
+    return _with_blind(result) if blind else result
+
+
+def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:
+    """Return positions of functions whose gradients vanish, as far as the point is known.
+
+    A function that vanishes to order ``p >= 2`` at a distance ``d`` from the point has
+    ``|f| / |df| = d / p`` and ``|df| / |d^2 f| = d / (p - 1)``.  So it is active within the
+    tolerance only if the second quotient is at most twice the tolerance.  Its gradient says
+    nothing about the set, and a multiplier of it nothing about the energy.
+    """
+    numbers = [*active, *local.sections]
+    sizes = abs(local.gradients[numbers]).max(axis=1, initial=0.0)
+    bends = abs(local.hessians[numbers]).max(axis=(1, 2), initial=0.0)
+    return tuple(np.flatnonzero(sizes <= OPEN * local.tolerance * bends).tolist())
+
+
+def _with_blind(a: Analysis) -> Analysis:
+    """Return an analysis without the functions whose gradients vanish as one with them.
+
+    A minimum of the larger set is one of the smaller.  A way down has to stay where these
+    functions are not negative, which is tried at a few distances.
+    """
+    if a.verdict.is_minimum:
+        return a
+    way = (
+        steepest_descent(a)[1] if a.verdict is Verdict.NOT_STATIONARY else a.curvature.vectors[:, 0]
+    )
+    if a.verdict in {Verdict.NOT_STATIONARY, Verdict.SADDLE} and _leads_down(a, way):
+        return a
+    return replace(a, verdict=Verdict.NO_MULTIPLIER)
+
+
+def _leads_down(a: Analysis, way: Array) -> bool:
+    """Whether the piece contains lower points in a direction, ever nearer to the point."""
+    local, k = a.local, len(a.active)
+    if any(i >= k for i in a.blind) or len(a.gradients) > k:
+        return False
+    points = local.point + DISTANCES[:, None] * way * local.problem.scales
+    values, gradients = local.problem.evaluate(points, 1)
+    kept = [row for i, row in enumerate(a.active) if i not in a.blind]
+    vanishing = [a.active[i] for i in a.blind]
+    inside = (values[:, vanishing] > 0).all() and (values[:, kept] >= -1e-12).all()
+    return bool(
+        inside and (values[:, -1] < local.values[-1]).all() and np.isfinite(gradients).all()
+    )
+
+
+def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Decision:
+    """Decide by higher orders on the face of independent strongly active functions."""
+    local, flat = a.local, a.curvature.flat
+    numbers = [*a.active, *local.sections]
+    rows = tuple(numbers[i] for i in strong)
+    if not a.weak and not without(flat, symmetric_directions(local.problem, rows)).shape[1]:
+        return symmetric(flat)
+    held, values, exact = strong, a.multipliers.values, not a.blind
+    if rank(a.gradients[strong], local.rank_tolerance) < len(strong):
+        held, values = _basic_multipliers(a, strong)
+        hessian, exact = _hessian_with(local, numbers, a.gradients, values), False
+        tangent = Rows(a.gradients[held], local.rank_tolerance).null_space
+        curvature = find_curvature(hessian, tangent, local.gradients[[]], a.small_curvature)
+        if curvature.least < -a.small_curvature or a.weak:
+            return undecided(len(hessian), "the multipliers are not unique")
+        flat = curvature.flat
+    sizes = np.linalg.norm(a.gradients[held], axis=1)
+    return decide(
+        Situation(
+            problem=local.problem,
+            point=local.point,
+            piece=piece,
+            rows=tuple(numbers[i] for i in held),
+            multipliers=values[held] / sizes,
+            exact=exact,
+            weak=a.weak,
+            hessian=hessian,
+            flat=flat,
+            reference=local.reference,
+            small=local.small,
+            small_curvature=a.small_curvature,
+            nearly=NEARLY_FLAT * a.small_curvature,
+        )
+    )
+
+
+def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array]:
+    """Return positions of independent functions that alone balance the energy, and multipliers.
+
+    Non-negative least squares ends with independent columns; the face of these functions contains
+    that of all.
+    """
+    from scipy.optimize import nnls
+
+    k, units = len(a.active), unit_rows(a.gradients)
+    equations = [i for i in strong if i >= k]
+    shares, _ = nnls(np.vstack([units[strong], -units[equations]]).T, a.local.gradients[-1])
+    values = np.zeros(len(units))
+    values[strong] = shares[: len(strong)]
+    values[equations] -= shares[len(strong) :]
+    used = [i for i in strong if values[i] != 0]
+    spanned = rank(units[used], a.local.rank_tolerance)
+    for i in equations:  # one that carries nothing still belongs to the face
+        if i not in used and rank(units[[*used, i]], a.local.rank_tolerance) > spanned:
+            used, spanned = [*used, i], spanned + 1
+    return used, values
 
 
 def _lagrangian_hessian(
     local: Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
 ) -> Array:
+    return _hessian_with(local, [*active, *local.sections], rows, multipliers.values)
+
+
+def _hessian_with(local: Local, numbers: list[int], rows: Array, values: Array) -> Array:
+    """Return the Lagrangian's Hessian with given multipliers of unit gradients."""
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    numbers = [*active, *local.sections]
-    result: Array = local.hessians[-1].copy()
-    for row, value, size in zip(numbers, multipliers.values, sizes, strict=True):
-        if size > 0:
-            result -= value / size * local.hessians[row]
-    return result
+    factors = np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0)
+    return np.asarray(local.hessians[-1] - np.tensordot(factors, local.hessians[numbers], axes=1))
 
 
 def _verdict(
@@ -278,74 +257,20 @@ def _verdict(
     return Verdict.STRICT_MINIMUM
 
 
-def _flat_change(local: Local, face: Piece, flat: Array, piece: Piece) -> float:
-    """Return the relative change of the energy along flat directions and generic mixtures."""
-    if not flat.shape[1]:
-        return np.inf
-    left, singular, _ = np.linalg.svd(flat, full_matrices=False)
-    held = left[:, singular > 1e-6 * singular[0]].T
-    directions = flat.T
-    if flat.shape[1] > 1:
-        # Weights without rational relations: no polynomial of low degree vanishes on all mixtures.
-        powers = np.sqrt([[2.0], [3.0], [5.0]]) ** np.arange(flat.shape[1])
-        mixed = powers @ flat.T
-        directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
-    change = local.problem.probe(face, piece, local.point, directions, held, PROBES)
-    return change / (abs(float(local.values[-1])) + local.reference)
-
-
 def _independent_positions(
-    rows: Rows, positive: NDArray[np.int64], k: int, local: Local
+    gradients: Array, seen: list[int], positive: NDArray[np.int64], k: int, local: Local
 ) -> tuple[int, ...]:
     """Return positions of strongly active functions with independent gradients, greedily."""
     candidates = positive.tolist()
-    if rows.independent:
+    sections = [i for i in seen if i >= k]
+    if rank(gradients[[*candidates, *sections]], local.rank_tolerance) == len(candidates) + len(
+        sections
+    ):
         return tuple(candidates)
     chosen: list[int] = []
-    sections = list(range(k, len(rows.units)))
-    reached = rank(rows.units[sections], local.rank_tolerance)
+    reached = rank(gradients[sections], local.rank_tolerance)
     for i in candidates:
-        if rank(rows.units[[*chosen, i, *sections]], local.rank_tolerance) > reached:
+        if rank(gradients[[*chosen, i, *sections]], local.rank_tolerance) > reached:
             chosen.append(i)
             reached += 1
     return tuple(chosen)
-
-
-def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
-    local, multipliers, curvature, small = a.local, a.multipliers, a.curvature, a.small_curvature
-    names = local.problem.polyhedron.names
-    for position in a.strong_positions:
-        yield names[a.active[position]], Entrapment.HALF_V
-    for position, row in enumerate(a.active):
-        if multipliers.values[position] < -local.small:
-            yield names[row], Entrapment.NONE
-    if multipliers.residual > local.small:
-        return  # not stationary on the face: its curvature there is no entrapment
-    curved = curvature.vectors[:, curvature.values > small]
-    held: list[int] = []
-    for row in a.weak:
-        slopes = local.gradients[[*held, row]] @ curved
-        if rank(slopes, 1e-6) > len(held):
-            held.append(row)
-            yield names[row], Entrapment.HALF_U
-    inner = curved @ null_space(local.gradients[held] @ curved, 1e-6) if held else curved
-    others = (
-        (inner, Entrapment.U),
-        (curvature.vectors[:, abs(curvature.values) <= small], Entrapment.FREE),
-        (curvature.vectors[:, curvature.values < -small], Entrapment.NONE),
-    )
-    taken = dict.fromkeys((names[row] for row in a.active), 1)
-    for vectors, kind in others:
-        for vector in vectors.T:
-            label = _direction_name(vector, local.problem.polyhedron.manifold.names)
-            taken[label] = taken.get(label, 0) + 1
-            yield label if taken[label] == 1 else f"{label} ({taken[label]})", kind
-
-
-def _direction_name(vector: Array, names: tuple[str, ...]) -> str:
-    """Name a direction after the coordinates that change by at least half the largest change."""
-    top = abs(vector).max()
-    large = [i for i in range(len(vector)) if abs(vector[i]) >= 0.5 * top]
-    sign = np.sign(vector[large[0]])
-    words = [("+" if vector[i] * sign > 0 else "-") + names[i] for i in large]
-    return "".join(words).removeprefix("+")

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from polycorner.minimisation.analysis import Analysis, analyse
+from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.explanation import explanation
+from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.verdicts import Entrapment, Verdict

@@ -9,18 +9,20 @@ coordinates, the conditions are those of [NW] ch. 12:
 """
 
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
-from polycorner.polyhedra.cones import Rows, linear_programme, null_space, unit_rows
+from polycorner.minimisation.copositivity import least_directions
+from polycorner.polyhedra.cones import Rows, linear_programme, unit_rows
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-MAX_WEAK = 10  # weakly active functions up to which the critical cone's faces are enumerated
 # A curvature up to this multiple of the tolerance is not trusted, as it is positive beside an
 # inflection, too; the direction is then treated as flat.
 NEARLY_FLAT = 30.0
+# Nor is one at which Newton's step, what is left of the gradient over the curvature, is longer than
+# this, in scale units: at a degenerate point nearby, both vanish.
+REACHED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,12 @@ class Multipliers(Value):
     def unique(self) -> bool:
         """Whether the multipliers are unique."""
         return bool((self.upper - self.lower <= 1e-7 * (1 + abs(self.values).max(initial=0))).all())
+
+    def spread(self, positions: list[int], count: int) -> "Multipliers":
+        """Return these as multipliers of ``count`` functions, zero for all others."""
+        whole = np.zeros((3, count))
+        whole[:, positions] = self.values, self.lower, self.upper
+        return Multipliers(whole[0], whole[1], whole[2], self.exist, self.residual)
 
     def complementary(self, away: Array, small: float) -> bool:
         """Whether every product of a multiplier and its scaled gap is small."""
@@ -131,12 +139,13 @@ class Curvature(Value):
     vectors : (n, k) array
         Their orthonormal eigenvectors, in scaled coordinates.
     least : float
-        Least value of the form on unit vectors of the critical cone, ``inf`` if the cone is 0;
-        where the form is positive on the whole tangent space, the least there, a lower bound.
+        Least value found on unit vectors of the critical cone, of the sign of the least one, and
+        ``inf`` if the cone is 0; without weak functions, or where the form is positive on the
+        whole tangent space, the least there.
     flat : (n, r) array
-        Unit directions of the cone in which the form vanishes, or very nearly.
+        Unit directions of the cone in which the form vanishes, or very nearly; all others are sums.
     decided : bool
-        False when there are too many weakly active functions to enumerate the cone's faces.
+        False when the cone has too many extreme rays for its form to be decided.
     """
 
     values: Array
@@ -146,70 +155,26 @@ class Curvature(Value):
     decided: bool
 
 
-def find_curvature(hessian: Array, basis: Array, weak: Array, small: float) -> Curvature:
+def find_curvature(
+    hessian: Array, basis: Array, weak: Array, small: float, left: Array | None = None
+) -> Curvature:
     """Minimise the form of ``hessian`` on ``{d in span(basis), weak d >= 0, |d| = 1}``.
 
     Without weak rows the least value is the least eigenvalue on the null space.  With them the
-    minimum lies in the relative interior of some face of the cone and is an eigenvector there,
-    so enumerating faces and eigenvectors is exact.
+    sign of the least value is that of the form's copositivity on the cone's extreme rays; see
+    :mod:`~polycorner.minimisation.copositivity`.
     """
     values, inner = np.linalg.eigh(basis.T @ hessian @ basis)
     vectors = basis @ inner
-    if not len(weak) or (len(values) and values[0] > NEARLY_FLAT * small):
-        flat = vectors[:, (values >= -small) & (values <= NEARLY_FLAT * small)]
+    if not len(weak):
+        level = (values >= -small) & (values <= NEARLY_FLAT * small)
+        if left is not None and len(values):
+            level |= (values > 0) & (abs(left @ vectors) > REACHED * values)
         least = float(values[0]) if len(values) else np.inf
-        return Curvature(values, vectors, least, flat, decided=True)
-    if len(weak) > MAX_WEAK:
-        return Curvature(values, vectors, np.nan, np.empty((len(hessian), 0)), decided=False)
-    least, flat = _least_on_cone(hessian, basis, unit_rows(weak), small)
-    return Curvature(values, vectors, least, flat, decided=True)
-
-
-def _least_on_cone(hessian: Array, basis: Array, weak: Array, small: float) -> tuple[float, Array]:
-    least = np.inf
-    flat: list[Array] = []
-    for size in range(len(weak) + 1):
-        for chosen in combinations(range(len(weak)), size):
-            face = basis @ null_space(weak[list(chosen)] @ basis, 1e-6)
-            if not face.shape[1]:
-                continue
-            values, inner = np.linalg.eigh(face.T @ hessian @ face)
-            for value, group in _clusters(values, small):
-                direction = _member(face @ inner[:, group], weak)
-                if direction is None:
-                    continue
-                least = min(least, value)
-                if -small <= value <= NEARLY_FLAT * small:
-                    flat.append(direction)
-    return least, np.array(flat).T if flat else np.empty((len(hessian), 0))
-
-
-def _clusters(values: Array, small: float) -> list[tuple[float, list[int]]]:
-    """Group nearly equal eigenvalues, whose eigenvectors are not determined one by one."""
-    groups: list[list[int]] = []
-    for i, value in enumerate(values):
-        if groups and value - values[groups[-1][-1]] <= small:
-            groups[-1].append(i)
-        else:
-            groups.append([i])
-    return [(float(values[group[0]]), group) for group in groups]
-
-
-def _member(vectors: Array, weak: Array) -> Array | None:
-    """Return a vector of the span with ``weak d >= 0``, or None if there is only 0."""
-    edge = 1e-9
-    if vectors.shape[1] == 1:
-        column = vectors[:, 0]
-        for sign in (1.0, -1.0):
-            if (sign * weak @ column >= -edge).all():
-                return np.asarray(sign * column)
-        return None
-    for i in range(vectors.shape[1]):
-        for sign in (1.0, -1.0):
-            cost = np.zeros(vectors.shape[1])
-            cost[i] = -sign
-            found = linear_programme(cost, -weak @ vectors, np.zeros(len(weak)), bound=1.0)
-            if sign * found[i] > 1e-6:
-                direction = vectors @ found
-                return np.asarray(direction / np.linalg.norm(direction))
-    return None
+        return Curvature(values, vectors, least, vectors[:, level], decided=True)
+    if len(values) and values[0] > NEARLY_FLAT * small:
+        return Curvature(values, vectors, float(values[0]), vectors[:, :0], decided=True)
+    form = basis.T @ hessian @ basis
+    rows = unit_rows(weak) @ basis
+    least, zeros, decided = least_directions(form, rows, small, NEARLY_FLAT * small)
+    return Curvature(values, vectors, least, basis @ zeros, decided=decided)

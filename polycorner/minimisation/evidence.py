@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from polycorner.minimisation.analysis import Analysis
 from polycorner.minimisation.conditions import find_curvature
+from polycorner.minimisation.findings import Analysis
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.spaces.manifold import Array
 
+PASSES = 60  # of Dinkelbach's method, which converges faster than linearly
 IMPLIED = 1e-9  # distance up to which a unit gradient counts as lying in the cone of others
 
 
@@ -19,6 +20,7 @@ def steepest_descent(a: Analysis) -> tuple[float, Array]:
     from scipy.optimize import nnls
 
     units, slope = unit_rows(a.gradients), a.local.gradients[-1]
+    units[list(a.blind)] = 0.0
     rows = np.vstack([units, -units[len(a.active) :]])
     rest = slope - (nnls(rows.T, slope)[0] @ rows if len(rows) else 0.0)
     rate = float(np.linalg.norm(rest))
@@ -31,7 +33,7 @@ def implied_functions(a: Analysis) -> list[int]:
 
     units, k = unit_rows(a.gradients), len(a.active)
     found = []
-    for i in range(k):
+    for i in (i for i in range(k) if i not in a.blind):
         rows = np.vstack([np.delete(units, i, axis=0), -units[k:]])
         if len(rows) and nnls(rows.T, units[i])[1] <= IMPLIED:
             found.append(i)
@@ -41,8 +43,8 @@ def implied_functions(a: Analysis) -> list[int]:
 def least_curvature(a: Analysis) -> tuple[float, Array] | None:
     """Return the least value of the Lagrangian's Hessian on the critical cone and its direction.
 
-    None if the cone is the origin.  Shifted by its least value, the form vanishes exactly in the
-    directions that attain it.
+    None if the cone is the origin.  Shifted by the value found last, the form has a least value of
+    the sign of what is missing (Dinkelbach's method): zero exactly where that is the least.
     """
     values, vectors = a.curvature.values, a.curvature.vectors
     if not len(values):
@@ -51,12 +53,14 @@ def least_curvature(a: Analysis) -> tuple[float, Array] | None:
         return float(values[0]), oriented(vectors[:, 0])
     rows = a.local.gradients[list(a.weak)]
     least = float(values[0])
-    for _ in range(2):  # the second pass finds the directions of the value from the first
+    for _ in range(PASSES):
         form = (vectors * (values - least)) @ vectors.T
         found = find_curvature(form, vectors, rows, a.small_curvature)
         if not np.isfinite(found.least):
             return None
         least += found.least
+        if abs(found.least) <= a.small_curvature:
+            break
     rates = np.einsum("ik,ij,jk->k", found.flat, form, found.flat)
     return least, found.flat[:, int(rates.argmin())]
 

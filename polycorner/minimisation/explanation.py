@@ -9,14 +9,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from polycorner.minimisation.analysis import PROBES, Analysis
-from polycorner.minimisation.conditions import MAX_WEAK, NEARLY_FLAT
+from polycorner.minimisation.conditions import NEARLY_FLAT
+from polycorner.minimisation.copositivity import MAX_RAYS
 from polycorner.minimisation.evidence import (
     implied_functions,
     least_curvature,
     oriented,
     steepest_descent,
 )
+from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
 from polycorner.polyhedra.strata import Stratum, distances
@@ -195,7 +196,13 @@ def _slope_along(a: Analysis) -> str:
 
 
 def _dependence(a: Analysis) -> Iterator[str]:
-    if a.independent:
+    if a.blind:
+        vanishing = _names([a.held_names[i] for i in a.blind])
+        yield (
+            f"At the point the gradient vanishes of {vanishing}: to first order that says nothing "
+            "about the set, and the following leaves it out."
+        )
+    if a.independent or len(a.blind) == len(a.gradients):
         return
     names = a.held_names
     size = rank(a.gradients, a.local.rank_tolerance)
@@ -222,8 +229,8 @@ def _dependence(a: Analysis) -> Iterator[str]:
 def _second_order(a: Analysis) -> Iterator[str]:
     if not a.curvature.decided:
         yield (
-            f"{len(a.weak)} functions are weakly active, more than the {MAX_WEAK} up to which the "
-            "second order is decided."
+            f"{len(a.weak)} functions are weakly active, and the critical cone has more extreme "
+            f"rays than the {MAX_RAYS} up to which the second order is decided."
         )
         return
     found = least_curvature(a)
@@ -241,7 +248,7 @@ def _second_order(a: Analysis) -> Iterator[str]:
             yield "Another choice of the multipliers may still prove a minimum."
     elif a.curvature.flat.shape[1]:
         yield f"The second order vanishes, or nearly so, {where}."
-        yield _followed(a)
+        yield _higher(a)
         yield _across(a)
     else:
         yield (
@@ -263,14 +270,29 @@ def _across(a: Analysis) -> str:
     )
 
 
-def _followed(a: Analysis) -> str:
-    if not np.isfinite(a.flat_change):
-        return "It could not be followed, so nothing is decided."
-    text = (
-        f"Followed both ways along the face by up to {abs(PROBES).max():g} scale units, such "
-        f"directions change the energy by {number(a.flat_change, 2)} of its own size: "
+def _higher(a: Analysis) -> str:
+    """State what higher orders decide, and where."""
+    d = a.decision
+    if d is None:
+        return ""
+    if d.verdict is Verdict.UNDECIDED:
+        return f"Higher orders decide nothing: {d.reason}."
+    where = f"the curve on the face with the tangent {_direction(a, oriented(d.direction))}"
+    if d.verdict is Verdict.MINIMUM_ALONG_LOCUS and d.followed is not None:
+        far = d.followed.reach
+        text = f"The energy is constant along {where}: {d.reason}"
+        if not np.isfinite(far):
+            return f"{text}."
+        series = f" The series has the degree {d.order}." if d.order else ""
+        return (
+            f"{text}.{series} Over {number(far, 3)} scale units the "
+            f"energy changes by {number(d.followed.change, 2)} of its own size."
+        )
+    words = "decreases along" if d.verdict is Verdict.SADDLE else "grows, most slowly along"
+    return (
+        f"Expanded to degree {d.order} where the second order vanishes, the energy {words} "
+        f"{where}: terms of degree {d.degree} decide."
     )
-    return text + ("they are free." if a.flat_verified else "nothing is decided.")
 
 
 def _entrapment(a: Analysis) -> Iterator[str]:
@@ -280,7 +302,9 @@ def _entrapment(a: Analysis) -> Iterator[str]:
     groups: dict[str, list[str]] = {}
     for direction, kind in kinds.items():
         vague = kind is Entrapment.FREE and not a.flat_verified
-        groups.setdefault("undecided" if vague else kind.value, []).append(direction)
+        decided = a.decision is not None and a.decision.verdict is not Verdict.UNDECIDED
+        word = "of higher order" if decided else "undecided"
+        groups.setdefault(word if vague else kind.value, []).append(direction)
     shown = "; ".join(f"{kind}: {', '.join(which)}" for kind, which in groups.items())
     yield f"Entrapment by direction: {shown}."
 

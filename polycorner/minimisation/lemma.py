@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polycorner.minimisation.analysis import Analysis
+from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array

@@ -37,6 +37,7 @@ STRIDE = 0.5  # longest step of a walk, in scale units
 STEPS = 200  # of a walk, at most
 PARTS = (1.0, 0.5, 0.25, 0.1, 0.02)  # fractions of a step, tried in turn
 GAIN = 0.1  # fraction of its length by which a step must approach its goal
+LEAST = 1e-3  # fraction of the distance from its goal by which a step should reduce it
 BESIDE = 0.1  # distance of the second point at which a symmetry is checked, in scale units
 INVARIANT = 1e-8  # relative change of the energy allowed under a symmetry
 NET = 0.5  # distance between the points kept of a locus, in scale units
@@ -124,24 +125,29 @@ class Quotient:
             miss = goal - self.place(p)
             if abs(miss).max() <= SAME:
                 return True
-            step = self._towards(p, miss)
+            step = self._towards(p, miss, slack)
             reached = None if step is None else self._stepped(p, step, goal, energy, slack)
             if reached is None:
                 return False
             p = reached
         return False
 
-    def _towards(self, p: Array, miss: Array) -> Array | None:
-        """Return the step along flat directions that best reduces ``miss``; None if none does."""
+    def _towards(self, p: Array, miss: Array, slack: float) -> Array | None:
+        """Return the step along flat directions that best reduces ``miss``; None if none does.
+
+        Near a crossing of loci all curvatures are small: those are flat that change the energy by
+        no more than ``slack``.
+        """
         analysis = Certificate(self.problem, p).analysis
         curvature = analysis.curvature
-        flat = curvature.vectors[:, abs(curvature.values) <= analysis.small_curvature]
+        level = max(analysis.small_curvature, slack)
+        flat = curvature.vectors[:, abs(curvature.values) <= level]
         if not flat.shape[1]:
             return None
         moves = 1e-5 * flat.T * self.problem.scales
         slopes = [(self.place(p + v) - self.place(p - v)) / 2e-5 for v in moves]
         weights = np.linalg.lstsq(np.array(slopes).T, miss, rcond=1e-6)[0]
-        if np.linalg.norm(miss - weights @ slopes) > (1 - GAIN) * np.linalg.norm(miss):
+        if np.linalg.norm(miss - weights @ slopes) > (1 - LEAST) * np.linalg.norm(miss):
             return None
         step = flat @ weights
         return np.asarray(step * min(1.0, STRIDE / max(abs(step).max(), 1e-300)))

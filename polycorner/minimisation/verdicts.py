@@ -10,9 +10,15 @@ class Verdict(Enum):
     MINIMUM_ALONG_LOCUS = "local minimum, attained along a locus on which the energy is constant"
     WEAK_MINIMUM = "strict local minimum with a weakly active function: its multiplier is zero"
     NOT_STATIONARY = "not a minimum: the energy decreases to first order in a feasible direction"
-    SADDLE = "not a minimum: stationary, but the energy decreases to second order"
-    NO_MULTIPLIER = "undecided: no multipliers exist, and no direction points inward (a cusp)"
-    UNDECIDED = "undecided: stationary, but the second order vanishes in a feasible direction"
+    SADDLE = "not a minimum: stationary, but the energy decreases to second or higher order"
+    NO_MULTIPLIER = (
+        "undecided: no multipliers exist, and no direction is seen to lead inward (a cusp, or a "
+        "gradient that vanishes)"
+    )
+    UNDECIDED = (
+        "undecided: stationary, but the second order vanishes in a feasible direction, and higher "
+        "orders do not decide"
+    )
     NOT_SMOOTH = "undecided: a derivative that the conditions need jumps there or is not finite"
     OUTSIDE = "the point does not lie in the polyhedron"
     INFEASIBLE = (

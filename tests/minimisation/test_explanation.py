@@ -211,28 +211,44 @@ def test_a_cusp_decides_nothing():
 def test_a_direction_in_which_the_energy_is_constant_is_free():
     text = certify(Polyhedron(M3, {"floor": z}), z + 2 * y**2, [1.0, 0.0, 0.0]).explain()
     assert "The second order vanishes, or nearly so, in the direction (dx = 1)." in text
-    assert "they are free" in text
+    assert "The energy is constant along the curve on the face with the tangent (dx = 1)" in text
     across = sentence(text, "Across them")
     assert figures(across, "the least curvature is") == [4]
     assert direction(across, M3).tolist() == [0, 1, 0]
     assert "half-V: floor; U: y; free: x." in text
 
 
-@pytest.mark.parametrize("power", [3, 4])
-def test_a_direction_of_higher_order_is_undecided_and_not_called_free(power):
+@pytest.mark.parametrize(("power", "verdict"), [(3, "Not a minimum"), (4, "Strict")])
+def test_a_direction_of_higher_order_is_named_with_its_order(power, verdict):
     text = certify(Polyhedron(M2, {"floor": y}), y + x**power, [0.0, 0.0]).explain()
-    assert text.startswith("Undecided")
-    assert "nothing is decided" in text
-    assert "undecided: x." in text
+    assert text.startswith(verdict)
+    assert f"the tangent (dx = 1): terms of degree {power} decide." in text
+    assert "of higher order: x." in text
     assert "free" not in text
 
 
+def test_what_higher_orders_do_not_decide_is_said():
+    text = certify(Polyhedron(M2, {"floor": y}), y + x**18, [0.0, 0.0]).explain()
+    assert text.startswith("Undecided")
+    assert "Higher orders decide nothing: constant to the degree of the series, but" in text
+    assert "undecided: x." in text
+
+
+def test_a_gradient_that_vanishes_is_named():
+    D = Polyhedron(M2, {"odd": (x - 1) ** 2, "up": y})
+    c = certify(D, x**2 + y, [1.0, 0.0])
+    text = c.explain()
+    assert c.verdict is Verdict.NOT_STATIONARY
+    assert "the gradient vanishes of odd" in text
+    assert direction(sentence(text, "The energy decreases fastest"), M2).tolist() == [-1, 0]
+
+
 def test_too_many_weak_contacts():
-    M = Manifold.euclidean([f"x{i}" for i in range(11)])
+    M = Manifold.euclidean([f"x{i}" for i in range(15)])
     D = Polyhedron(M, {f"w{i}": s for i, s in enumerate(M.symbols)})
     form = sum(s**2 for s in M.symbols) - 4 * M.symbols[0] * M.symbols[1]
-    text = certify(D, form, [0.0] * 11).explain()
-    assert "11 functions are weakly active, more than the 10" in text
+    text = certify(D, form, [0.0] * 15).explain()
+    assert "15 functions are weakly active, and the critical cone has more extreme rays" in text
 
 
 def test_a_contact_that_is_nearly_closed_under_a_large_force():

@@ -219,7 +219,7 @@ def test_what_is_no_minimum_is_counted_by_its_verdict():
     assert (len(slope), slope.elsewhere, slope.others) == (0, {Verdict.UNBOUNDED: 20}, ())
     empty = minima(Polyhedron(PLANE, {"never": -1 - X**2}), Y, starts=[[0.0, 0.0], [1.0, 1.0]])
     assert empty.elsewhere == {Verdict.INFEASIBLE: 2}
-    flat = minima(HALF_PLANE, X**4 + Y**2, starts=30, box=SQUARE)
+    flat = minima(HALF_PLANE, X**18 + Y**2, starts=30, box=SQUARE)
     assert flat.elsewhere == {Verdict.UNDECIDED: 30}
     assert [c.verdict for c in flat.others] == [Verdict.UNDECIDED]
     for found in (slope, empty, flat):
@@ -227,6 +227,14 @@ def test_what_is_no_minimum_is_counted_by_its_verdict():
             f"0 minima, up to the symmetry, from {found.starts} starts; "
             f"{found.starts} ended in no minimum."
         )
+
+
+def test_two_lines_of_minima_that_cross_are_one_locus():
+    u, v = X - 0.2, Y - 0.1
+    starts = [[0.9, 0.3], [0.3, -0.7], [-0.6, 0.15], [0.25, 0.8], [-0.7, -0.2]]
+    found = minima(Polyhedron(PLANE, {"far": Y + 50}), (u * v) ** 2, starts=starts)
+    assert [c.verdict for c in found] == [Verdict.MINIMUM_ALONG_LOCUS]
+    assert found.counts == (5,)
 
 
 def test_minima_are_a_sequence_the_lowest_first():

@@ -1,0 +1,181 @@
+"""Evidence that an energy is constant along a locus: symmetries, and distances followed."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from polycorner.minimisation.germs import Face, bordered_system
+from polycorner.minimisation.problem import Problem
+from polycorner.polyhedra.cones import null_space
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.strata import distances
+from polycorner.spaces.manifold import Array
+
+RADII = (0.1, 1.0, 10.0, 100.0)  # of random points, in scale units
+POINTS = 16  # at each radius
+FEWEST = 8  # finite gradients of a function from which a symmetry is read
+VANISHING = 1e-150  # relative size of a derivative that is underflow
+SYMMETRIC = 1e-10  # relative size of a derivative that is rounding
+FIRST, LAST = 1e-3, 128.0  # distances followed, in scale units, each twice the one before
+BENT = 0.05  # error of linear prediction, relative to the step, beyond which none is followed
+CONSTANT = 1e-12  # relative change of the energy that counts as rounding
+STEPS = 8  # of Newton's method
+INSIDE = 1e-9  # scaled violation allowed along a locus
+
+
+@lru_cache(maxsize=256)
+def symmetric_directions(problem: Problem, rows: tuple[int, ...]) -> Array:
+    """Return an orthonormal basis ``(n, t)`` of the directions in which nothing ever changes.
+
+    The derivatives of the energy and of the functions in ``rows`` along them vanish identically:
+    an analytic function that vanishes at random points vanishes with probability one.  Columns are
+    compared each with its own size, so that a slow change is not taken for none.
+    """
+    n, chosen = problem.dimension, [*rows, -1]
+    generator = np.random.default_rng(0)
+    directions = generator.normal(size=(len(RADII), POINTS, n))
+    points = (np.array(RADII)[:, None, None] * directions).reshape(-1, n) * problem.scales
+    with np.errstate(all="ignore"):
+        gradients = problem.evaluate(points, 1)[1][:, chosen]
+    finite = np.isfinite(gradients).all(axis=2)
+    if (finite.sum(axis=0) < FEWEST).any():
+        return np.empty((n, 0))
+    found = gradients[finite]
+    largest = abs(found).max(axis=1)
+    found = found[largest > 0] / largest[largest > 0, None]
+    sizes = abs(found).max(axis=0, initial=0.0)
+    moving = sizes > VANISHING
+    basis = np.eye(n)[:, ~moving]
+    if moving.any():
+        scaled = found[:, moving] / sizes[moving]
+        _, singular, right = np.linalg.svd(scaled)
+        level = int((singular > SYMMETRIC * singular[0]).sum())
+        others = np.zeros((n, len(right) - level))
+        others[moving] = right[level:].T / sizes[moving, None]
+        basis = np.hstack([basis, others])
+    return orthonormal(basis)
+
+
+def orthonormal(vectors: Array) -> Array:
+    """Return an orthonormal basis of the span of columns, those of tiny remainder left out."""
+    sizes = np.linalg.norm(vectors, axis=0)
+    unit = vectors[:, sizes > 0] / sizes[sizes > 0]
+    left, singular, _ = np.linalg.svd(unit, full_matrices=False)
+    return np.asarray(left[:, singular > 1e-6])
+
+
+def without(vectors: Array, removed: Array) -> Array:
+    """Return an orthonormal basis of the span of columns projected off orthonormal ones."""
+    rest = vectors - removed @ (removed.T @ vectors)
+    return orthonormal(rest[:, np.linalg.norm(rest, axis=0) > 1e-6])
+
+
+@dataclass(frozen=True)
+class Constancy:
+    """How far the energy was found constant along directions, and its largest change there."""
+
+    reach: float
+    change: float
+    followed: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether every direction was followed, and the energy is constant to rounding."""
+        return self.followed and self.change <= CONSTANT
+
+
+def constancy(
+    problem: Problem, piece: Piece, q: Array, face: Face, *, one_sided: bool, reference: float
+) -> Constancy:
+    """Follow the directions of a face both ways, by steps that double, until it ends or bends.
+
+    Beyond a fold of the locus other stationary points would be followed.
+
+    Parameters
+    ----------
+    problem : Problem
+    piece : frozenset of int
+        Inequalities that must hold.
+    q : (n,) array
+    face : Face
+        Its ``moving`` directions are followed, and generic mixtures of them.
+    one_sided : bool
+        Whether only the positive sides are followed.
+    reference : float
+        The size of the energy's derivatives.
+    """
+    c = face.moving.shape[1]
+    weights = np.eye(c)
+    if c > 1:
+        mixed = np.sqrt([[2.0], [3.0], [5.0]]) ** np.arange(c)
+        weights = np.vstack([weights, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
+    reach, change, followed = 0.0, 0.0, True
+    for w in weights:
+        sides = [w] if one_sided else [w, -w]
+        found = [_followed(problem, piece, q, face, side, reference) for side in sides]
+        far = max(distance for distance, _ in found)
+        followed = followed and far > 0
+        reach = far if not reach else min(reach, far)
+        change = max(change, *(moved for _, moved in found))
+    return Constancy(reach, change, followed)
+
+
+def _followed(
+    problem: Problem, piece: Piece, q: Array, face: Face, w: Array, reference: float
+) -> tuple[float, float]:
+    """Return the distance followed in one direction, and the largest relative change."""
+    start = q / problem.scales
+    guess = np.concatenate([start, face.multipliers])
+    state = _corrected(problem, face, start, np.zeros(len(w)), guess)
+    tangent = np.concatenate([face.moving @ w, np.zeros(len(face.multipliers))])
+    if state is None:
+        return 0.0, 0.0
+    level = float(problem.energy.value(state[: len(q)] * problem.scales))
+    size = abs(level) + reference
+    reach, change, t = 0.0, 0.0, FIRST
+    while t <= LAST:
+        step = t - reach
+        guess = state + step * tangent
+        found = _corrected(problem, face, start, t * w, guess)
+        if found is None or abs((found - guess)[: len(q)]).max() > BENT * step:
+            break
+        values, gradients = problem.evaluate(found[: len(q)] * problem.scales, 1)
+        if not _is_inside(piece, values, gradients):
+            break
+        pull = gradients[-1] - found[len(q) :] @ gradients[list(face.rows)]
+        slope = abs(face.moving.T @ pull).max()
+        moved = max(abs(values[-1] - level) / (1 + t) ** 2, slope / (1 + t))
+        change = max(change, float(moved) / size)
+        tangent = (found - state) / step
+        state, reach, t = found, t, 2 * t
+    return reach, change
+
+
+def _is_inside(piece: Piece, values: Array, gradients: Array) -> bool:
+    away = distances(values[:-1], gradients[:-1])
+    return bool(np.isfinite(values).all() and (away[sorted(piece)] >= -INSIDE).all())
+
+
+def _corrected(problem: Problem, face: Face, start: Array, w: Array, state: Array) -> Array | None:
+    """Solve the stationarity conditions of the face at given values of its directions."""
+    n, rows = len(start), list(face.rows)
+    held = np.hstack([face.moving, face.still])
+    target = np.concatenate([w, np.zeros(face.still.shape[1])])
+    across = null_space(held.T, 1e-9) if held.size else np.eye(n)
+    for _ in range(STEPS):
+        values, gradients, hessians = problem.evaluate(state[:n] * problem.scales, 2)
+        if not np.isfinite(hessians).all():
+            return None
+        lam, A = state[n:], gradients[rows]
+        pull = gradients[-1] - lam @ A
+        hessian = hessians[-1] - np.einsum("i,ijk->jk", lam, hessians[rows])
+        residual = np.concatenate(
+            [held.T @ (state[:n] - start) - target, values[rows], across.T @ pull]
+        )
+        matrix = bordered_system(hessian, A, held, across)
+        step = np.linalg.lstsq(matrix, residual, rcond=1e-12)[0]
+        state = state - step
+        if abs(step[:n]).max() <= 1e-12 * (1 + abs(state[:n]).max()):
+            return np.asarray(state)
+    return np.asarray(state) if abs(step[:n]).max() <= 1e-9 * (1 + abs(state[:n]).max()) else None

@@ -1,0 +1,133 @@
+"""Truncated power series in a few variables.
+
+A series is an array ``(2, K)``: its coefficients, by increasing degree, and bounds of their
+rounding errors in units of the machine's precision, propagated to first order: for a product
+``|a| e_b + e_a |b| + |a| |b|``, for a function ``|f'(a)| e_a + |f(a)|`` ([GW] ch. 13 for the
+arithmetic, [Higham] sec. 3.3 for running error bounds).
+"""
+
+from functools import cached_property, lru_cache
+from itertools import combinations_with_replacement
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.spaces.manifold import Array
+
+EPSILON = float(np.finfo(np.float64).eps)
+
+
+class Ring:
+    """Power series in ``variables`` variables, truncated beyond total degree ``order``.
+
+    Attributes
+    ----------
+    exponents : (K, variables) array of int
+        Exponents of the monomials, by increasing degree; ``degrees`` are their sums.
+    """
+
+    def __init__(self, variables: int, order: int) -> None:
+        self.variables, self.order = variables, order
+        rows = [
+            [chosen.count(i) for i in range(variables)]
+            for degree in range(order + 1)
+            for chosen in combinations_with_replacement(range(variables), degree)
+        ]
+        self.exponents = np.array(rows, dtype=np.int64).reshape(len(rows), variables)
+        self.degrees: NDArray[np.int64] = self.exponents.sum(axis=1)
+        self.index = {tuple(row): k for k, row in enumerate(rows)}
+        ends = np.searchsorted(self.degrees, np.arange(order + 2)).tolist()
+        triples = sorted(
+            (self.index[tuple(self.exponents[i] + self.exponents[j])], i, j)
+            for i, degree in enumerate(self.degrees.tolist())
+            for j in range(ends[order - degree + 1])
+        )
+        to, self._left, self._right = (np.array(column) for column in zip(*triples, strict=True))
+        self._starts = np.flatnonzero(np.diff(to, prepend=-1))
+
+    @property
+    def size(self) -> int:
+        """The number of coefficients."""
+        return len(self.degrees)
+
+    def constant(self, value: float) -> Array:
+        """Return a constant series, exact."""
+        series = np.zeros((2, self.size))
+        series[0, 0] = value
+        return series
+
+    def variable(self, i: int) -> Array:
+        """Return the series of variable number ``i``."""
+        series = np.zeros((2, self.size))
+        if self.order:
+            series[0, 1 + i] = 1.0
+        return series
+
+    def mul(self, a: Array, b: Array) -> Array:
+        """Return the product."""
+        u, v = abs(a[0]), abs(b[0])
+        left, right = self._left, self._right
+        parts = np.empty((2, len(left)))
+        parts[0] = a[0, left] * b[0, right]
+        parts[1] = u[left] * (b[1] + v)[right] + a[1, left] * v[right]
+        return np.asarray(np.add.reduceat(parts, self._starts, axis=1))
+
+    def compose(self, taylor: Array, a: Array) -> Array:
+        """Return ``f(a)`` for Taylor coefficients ``(order + 2,)`` of ``f`` at ``a``'s constant."""
+        small, size = a.copy(), abs(a)
+        small[:, 0], small[1], size[0, 0], size[1] = 0.0, 0.0, 0.0, 0.0
+        slopes = abs(taylor[1:]) * np.arange(1, len(taylor))
+        value, bound, slope = (
+            self._horner(c, s)
+            for c, s in (
+                (taylor[:-1], small),
+                (abs(taylor[:-1]), size),
+                (slopes, size),
+            )
+        )
+        errors = np.zeros((2, self.size))
+        errors[0] = a[1]
+        value[1] = bound[0] + self.mul(slope, errors)[0]
+        return value
+
+    def _horner(self, coefficients: Array, a: Array) -> Array:
+        result = self.constant(coefficients[-1])
+        for c in coefficients[-2::-1]:
+            result = self.mul(result, a)
+            result[0, 0] += c
+        return result
+
+    @cached_property
+    def shifts(self) -> list[tuple[int, int, int, float]]:
+        """Entries ``(to, from, variable, factor)`` of the partial derivatives."""
+        return [
+            (self.index[tuple(e - np.eye(self.variables, dtype=np.int64)[i])], k, i, float(e[i]))
+            for k, e in enumerate(self.exponents)
+            for i in range(self.variables)
+            if e[i]
+        ]
+
+    def derivative(self, coefficients: Array, i: int) -> Array:
+        """Return the coefficients of the partial derivative by variable ``i``."""
+        result = np.zeros_like(coefficients)
+        for to, source, variable, factor in self.shifts:
+            if variable == i:
+                result[to] += factor * coefficients[source]
+        return result
+
+    def shifted(self, coefficients: Array, move: Array) -> Array:
+        """Return the coefficients of ``p(w + move)``, by Taylor's formula."""
+        total, term = coefficients.copy(), coefficients
+        for k in range(1, self.order + 1):
+            term = sum(
+                (step / k * self.derivative(term, i) for i, step in enumerate(move) if step),
+                np.zeros_like(term),
+            )
+            total += term
+        return total
+
+
+@lru_cache(maxsize=64)
+def ring(variables: int, order: int) -> Ring:
+    """Return the ring of truncated series, from a cache."""
+    return Ring(variables, order)
