@@ -1,6 +1,7 @@
 """Formulas as they are written: where they are not smooth, and whether they suit a circle."""
 
 import math
+import textwrap
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import sympy
 
 KINKED = frozenset({"Abs", "Min", "Max", "Piecewise"})
+SHOWN = 60  # characters of a formula in a warning
 SAMPLES = 16  # points at which a period is tested
 CHANGE = 1e-7  # relative change over a period that is rounding
 SPREAD = 2.0  # size, in scale units, of the region of the lines that is sampled
@@ -36,7 +38,9 @@ def announce(name: str, found: Sequence[str]) -> None:
     """Warn that a function is not smooth everywhere, if so."""
     if not found:
         return
-    shown = f"{found[0]} and {len(found) - 1} more" if len(found) > 1 else found[0]
+    shown = textwrap.shorten(min(found, key=len), SHOWN, placeholder=" ...")
+    if len(found) > 1:
+        shown += f" and {len(found) - 1} more"
     msg = (
         f"{name}: its derivatives may jump, because of {shown}; where they do, a point is neither "
         "certified as a minimum nor refuted"

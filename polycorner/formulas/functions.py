@@ -201,10 +201,13 @@ class SmoothFunction(Value):
         return self._bundle.evaluate(self.manifold.points(q), 2)[2][..., 0, :, :]
 
 
-def check_function(function: SmoothFunction) -> None:
-    """Warn of kinks, and raise ValueError for a function that is not periodic on a circle."""
+def check_function(function: SmoothFunction, *, periodic: bool = True) -> None:
+    """Warn of kinks; raise ValueError for a function that should be periodic and is not.
+
+    A section, such as ``sin((a + b) / 2) = 0``, may change its sign, or fix an angle in one chart.
+    """
     announce(function.name, function.kinks)
-    if any(map(math.isfinite, (function.manifold.periods[i] for i in function.reads))):
+    if periodic and any(map(math.isfinite, (function.manifold.periods[i] for i in function.reads))):
         family = function.family
         check_periodic(
             function.name,

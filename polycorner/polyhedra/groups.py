@@ -61,7 +61,10 @@ class _Plain:
 
 @dataclass
 class _Collection:
-    """The functions of one argument, and names for those that have none."""
+    """The functions of one argument, and names for those that have none.
+
+    In inequalities, Min and Max are groups, and functions on a circle are periodic.
+    """
 
     manifold: Manifold
     argument: str
@@ -113,7 +116,7 @@ class _Collection:
         if isinstance(part, _Plain):
             assert family is not None
             part = SmoothFunction.member(family, part.name, self.manifold)
-            check_function(part)
+            check_function(part, periodic=self.branching)  # an equation may be a section
         if all(part is not f for f in self.functions):
             self.functions.append(part)
         return part
