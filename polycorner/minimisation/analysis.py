@@ -176,6 +176,8 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
         if curvature.least < -a.small_curvature or a.weak:
             return undecided(len(hessian), "the multipliers are not unique")
         flat = curvature.flat
+        if not flat.shape[1]:
+            return _second_order(a, held, values)
     sizes = np.linalg.norm(a.gradients[held], axis=1)
     return decide(
         Situation(
@@ -194,6 +196,17 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
             nearly=NEARLY_FLAT * a.small_curvature,
         )
     )
+
+
+def _second_order(a: Analysis, held: list[int], values: Array) -> Decision:
+    """Decide by positive curvature on the face of independent functions that balance the energy.
+
+    It suffices where their multipliers are positive: other functions only make the set smaller.
+    """
+    n = a.gradients.shape[1]
+    if all(values[i] > a.local.small for i in held if i < len(a.active)):
+        return Decision(Verdict.STRICT_MINIMUM, 2, 2, np.zeros(n), "")
+    return undecided(n, "the multipliers are not unique")
 
 
 def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array]:

@@ -135,7 +135,7 @@ def outermost(expression: Any) -> Any:
     >>> from sympy import Abs, Max, Symbol
     >>> x = Symbol("x", real=True)
     >>> outermost(2 - Abs(x)), outermost(3 * Max(x, 1) - 6), outermost(x**2)
-    (AllOf(2 - x, x + 2), AnyOf(3*x - 6, -3), x**2)
+    (AllOf(2 - x, x + 2), AnyOf(-3, 3*x - 6), x**2)
     """
     kind = type(expression).__name__
     if kind not in {"Min", "Max", "Add", "Mul"} or not any(map(_is_bent, _terms(expression))):
@@ -168,12 +168,17 @@ def _branched(expression: "sympy.Expr") -> Any:
     return expression
 
 
+def _order(expression: "sympy.Expr") -> Any:
+    """Return a key for an order that is the same in every process."""
+    return expression.sort_key()
+
+
 def _choices(term: "sympy.Expr") -> "tuple[type[_Group], list[sympy.Expr]]":
     """Return a multiple of Min, Max or Abs as a group of its choices; none for other terms."""
     factor, core = term.as_coeff_Mul()
     kind = type(core).__name__
     if kind not in BENT:
         return AllOf, []
-    args = [core.args[0], -core.args[0]] if kind == "Abs" else list(core.args)
+    args = [core.args[0], -core.args[0]] if kind == "Abs" else sorted(core.args, key=_order)
     lowest = (kind == "Min") == bool(factor > 0)
     return AllOf if lowest else AnyOf, [factor * a for a in args]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import refuse
 from polycorner.minimisation import Certificate, minimise
+from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
@@ -74,7 +75,7 @@ def descent(
         An intersection.
     energy : SmoothFunction or sympy.Expr
     start : (n,) array
-        The start; outside the polyhedron, the nearest point found by repeated linearisation.
+        The start; outside the polyhedron, the path begins at a point of it nearby.
     stride : float, optional
         Longest step in scale units; a longer one may pass through thin bodies.
     most : int, optional
@@ -102,9 +103,13 @@ def descent(
 def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Array]:
     """Return the points of the path; none if the polyhedron is not reached."""
     everything = frozenset(range(problem.inequalities))
-    reached, q = problem.restore(everything, q)
+    reached, nearby = problem.restore(everything, q)
     if not reached:
-        return []
+        found = approach(problem, everything, q)
+        if not found.feasible:
+            return []
+        nearby = found.point
+    q = nearby
     points, step = [q], stride
     height, way, pressed = _downhill(problem, q)
     while len(points) < most and step > LEAST:
