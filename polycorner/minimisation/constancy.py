@@ -21,6 +21,8 @@ FIRST, LAST = 1e-3, 128.0  # distances followed, in scale units, each twice the 
 BENT = 0.05  # error of linear prediction, relative to the step, beyond which none is followed
 CONSTANT = 1e-12  # relative change of the energy that counts as rounding
 STEPS = 8  # of Newton's method
+SMALLER = 16  # steps in place of one that may have been a jump, and the distance of equal points
+SAME = 1e-6
 INSIDE = 1e-9  # scaled violation allowed along a locus
 
 
@@ -146,10 +148,34 @@ def _followed(
         pull = gradients[-1] - found[len(q) :] @ gradients[list(face.rows)]
         slope = abs(face.moving.T @ pull).max()
         moved = max(abs(values[-1] - level) / (1 + t) ** 2, slope / (1 + t))
+        if moved > CONSTANT * size and not _leads_to(
+            found, problem, face, start, w, state, reach, t
+        ):
+            break
         change = max(change, float(moved) / size)
         tangent = (found - state) / step
         state, reach, t = found, t, 2 * t
     return reach, change
+
+
+def _leads_to(
+    found: Array,
+    problem: Problem,
+    face: Face,
+    start: Array,
+    w: Array,
+    state: Array,
+    begin: float,
+    end: float,
+) -> bool:
+    """Whether small steps arrive at the same point, so that a long one was no jump elsewhere."""
+    before = here = state
+    for t in np.linspace(begin, end, SMALLER + 1)[1:]:
+        there = _corrected(problem, face, start, t * w, 2 * here - before)
+        if there is None:
+            return False
+        before, here = here, there
+    return bool(abs(here - found).max() <= SAME * (1 + abs(found).max()))
 
 
 def _is_inside(piece: Piece, values: Array, gradients: Array) -> bool:

@@ -243,6 +243,7 @@ def _reason(certificate: Certificate) -> str:
     if analysis.weak:
         names = ", ".join(d.names[i] for i in analysis.weak)
         return f"the multiplier of {names} is zero, so that derivatives are one-sided"
-    if analysis.verdict is Verdict.UNDECIDED or (analysis.decision and analysis.decision.degree > 2):
+    higher = analysis.decision is not None and analysis.decision.degree > 2
+    if higher or analysis.verdict is Verdict.UNDECIDED:
         return "the second order vanishes in a direction that is not free"
     return ""
