@@ -171,8 +171,11 @@ def _leads_to(
     """Whether small steps arrive at the same point, so that a long one was no jump elsewhere."""
     before = here = state
     for t in np.linspace(begin, end, SMALLER + 1)[1:]:
-        there = _corrected(problem, face, start, t * w, 2 * here - before)
-        if there is None:
+        guess = 2 * here - before
+        there = _corrected(problem, face, start, t * w, guess)
+        if there is None or (
+            here is not before and abs(there - guess).max() > BENT * abs(there - here).max()
+        ):
             return False
         before, here = here, there
     return bool(abs(here - found).max() <= SAME * (1 + abs(found).max()))

@@ -112,14 +112,17 @@ def reduce_energy(
     half = ring(face.variables, order // 2)
     curve, multipliers = system.solve(half)
     full = ring(face.variables, order)
-    value = system.lagrangian(full, _padded(curve, full), _padded(multipliers, full))
+    unknowns = _padded(curve, full), _padded(multipliers, full)
+    value = system.lagrangian(full, *unknowns)
     value[0, 0] = 0.0
     blur = np.full(face.variables, POINT * (1.0 + float(abs(q / problem.scales).max())))
     size = abs(value[0])
     missed = system.errors(half, curve, multipliers)
     if curve[:, 0, 1 + face.variables :].any():
         missed[1:] += EPSILON  # the directions are rounded: so is every coefficient of a bent curve
-    missed = np.pad(missed, (0, full.size - half.size))
+    lacking = abs(system.step(full, *unknowns))
+    # Their product with the terms that the curve lacks has a degree that the energy still has.
+    missed = np.concatenate([missed, lacking[:, half.size :].sum(axis=0)])
     noise = EPSILON * value[1] + full.shifted(size, blur) - size
     noise += system.size * full.mul(*[np.stack([missed, 0 * missed])] * 2)[0]
     return Germ(full, value[0], noise, curve[:, 0])
@@ -173,9 +176,12 @@ class _System(Value):
         unknowns[:n, 0, 0] = self.q / self.problem.scales
         unknowns[n:, 0, 0] = self.face.multipliers
         for _ in range(domain.order + 2):
-            residual = self._residual(domain, unknowns[:n], unknowns[n:])
-            unknowns[:, 0] -= self.inverse @ residual
+            unknowns[:, 0] -= self.step(domain, unknowns[:n], unknowns[n:])
         return unknowns[:n], unknowns[n:]
+
+    def step(self, domain: Ring, u: Array, multipliers: Array) -> Array:
+        """Return what the linearised conditions subtract from the unknowns."""
+        return np.asarray(self.inverse @ self._residual(domain, u, multipliers))
 
     def _functions(self, domain: Ring, u: Array, *, slopes: bool) -> list[list[Array]]:
         """Return the series of the face's functions, then of the energy."""

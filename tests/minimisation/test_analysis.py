@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from corners import LARGEST, Corner
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from oracles_minima import feasible_around
@@ -90,6 +90,20 @@ def test_a_bent_quadrant_has_the_signature_it_was_built_with(corner):
     assert c.holds(1e-13)
 
 
+def bent(n, bends, contacts, slopes, curvatures):
+    """Return a corner whose locus bends, so that long steps along it, or short series, mislead."""
+    return Corner(
+        np.eye(n) + 0.125,
+        np.zeros(n),
+        np.array(bends),
+        contacts,
+        np.array(slopes),
+        np.array(curvatures),
+    )
+
+
+@example(bent(3, [0.25, 0, 0], 0, [0.0, 0, 0], [0.1, 0, 0]))
+@example(bent(3, [0, 0.25, 0], 1, [3.0, 0, 0], [0.0, 1, 0]))
 @given(corners(curved=1, free=1, bent_locus=True) | corners(curved=1, free=2, bent_locus=True))
 def test_a_bent_locus_is_followed(corner):
     c = corner.certify()
