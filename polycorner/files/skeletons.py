@@ -16,7 +16,7 @@ from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
 from polycorner.skeletons.explorer import Explorer, SearchState
 from polycorner.skeletons.flags import Crossing, Flag
-from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.points import Quotient, independent_equations
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import End
@@ -127,7 +127,11 @@ def load_skeleton(
 
 def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> Explorer:
     extent, n = read_number(content["extent"]), polyhedron.dimension
-    quotient = Quotient(polyhedron, symmetry, float(content["tolerance"]), extent)
+    points = [_points(q, n, 1) for _, q in content["starts"]]
+    points += [_points(entry["points"], n, 2)[0] for entry in content["edges"]]
+    points += [_points(corner["point"], n, 1) for corner in content["corners"]]
+    equations = independent_equations(polyhedron, points)
+    quotient = Quotient(polyhedron, symmetry, float(content["tolerance"]), extent, equations)
     explorer = Explorer(quotient, [], _generator(content["random"]))
     for corner in content["corners"]:
         active = frozenset(map(polyhedron.names.index, corner["active"]))
@@ -200,7 +204,6 @@ def _curve(curve: Curve) -> dict[str, Any]:
         "start": curve.start,
         "stop": curve.stop,
         "relabelled": changed,
-        "length": float(curve.length),
         "points": curve.points.tolist(),
     }
 
@@ -214,7 +217,6 @@ def _read_curve(entry: dict[str, Any], n: int) -> Curve:
         start=_pair(entry["start"]),
         stop=_pair(entry["stop"]),
         relabelled=entry["relabelled"],
-        length=float(entry["length"]),
     )
 
 

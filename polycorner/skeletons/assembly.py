@@ -29,7 +29,7 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
             ),
             kinds=curve.kinds,
             polyline=curve.points,
-            length=curve.length,
+            quotient=explorer.quotient,
         )
         for curve in explorer.curves
     )
@@ -199,7 +199,7 @@ def _components(
         return {}
     if point is None:
         point = explorer.quotient.at(explorer.curves[0].points[0])
-    fixed = len(point.matrix([])) - len(explorer.polyhedron.equations)
+    fixed = len(point.matrix([])) - len(explorer.quotient.equations)
     free = explorer.manifold.dimension - len(point.matrix([]))
     counts = {fixed: len(explorer.records), fixed + 1: len(explorer.curves)}
     if free >= 2:

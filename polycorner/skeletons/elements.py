@@ -1,7 +1,7 @@
 """Skeletons of polyhedra: corners, edges, faces and their incidences."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
+from polycorner.skeletons.arcs import arc_length
+from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
@@ -83,15 +85,26 @@ class Edge(Value):
         How either end comes about.
     polyline : (k, n) array
         Points along it, in coordinates that are not wrapped.
-    length : float
-        Length of the polyline in scale units, orthogonal to the symmetry.
+    quotient : Quotient
+        The polyhedron modulo its symmetry.
     """
 
     active: tuple[str, ...]
     ends: tuple[int | None, int | None]
     kinds: tuple[End, End]
     polyline: Array
-    length: float
+    quotient: Quotient = field(repr=False)
+
+    @cached_property
+    def length(self) -> float:
+        """Length of the curve in scale units, orthogonal to the symmetry.
+
+        Integrated to ``1e-11`` between the ends of the polyline; see
+        :func:`~polycorner.skeletons.arcs.arc_length`.  A cusp at an end is known less exactly, to
+        about ``1e-7``.
+        """
+        names = self.quotient.polyhedron.names
+        return arc_length(self.quotient, self.polyline, [names.index(f) for f in self.active])
 
     @property
     def is_closed(self) -> bool:

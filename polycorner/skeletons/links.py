@@ -133,7 +133,10 @@ def _link(
 ) -> tuple[tuple[Ray, ...], tuple[Sector, ...]]:
     """Return rays and sectors from the link of one radius."""
     quotient = point.quotient
-    link = Quotient(Link(point, radius), Symmetry(), quotient.tolerance, EXTENT)
+    sphere = Link(point, radius)
+    extra = range(len(point.values), quotient.count + len(sphere.equation_names))
+    equations = (*quotient.equations, *extra)
+    link = Quotient(sphere, Symmetry(), quotient.tolerance, EXTENT, equations)
     found = search(link, list(_starts(point, link, active, frame, radius, notes)))
     names = ", ".join(quotient.polyhedron.names[i] for i in sorted(active))
     if found.registry.lost:

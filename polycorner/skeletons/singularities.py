@@ -49,7 +49,7 @@ class SingularPoint(HeldPoint):
 
     def __init__(self, quotient: Quotient, q: Array, kept: list[int]) -> None:
         super().__init__(quotient, q, kept)
-        held = [*kept, *range(quotient.count, len(self.values))]
+        held = quotient.held(kept)
         self.values = self.values.copy()
         self.values[held] = 0.0
         sizes = np.linalg.norm(self.gradients, axis=1)
@@ -81,7 +81,7 @@ def singular_point(
 
     None if there is none within ``reach`` scale units that is isolated.
     """
-    held = [*kept, *range(quotient.count, len(quotient.at(q).values))]
+    held = quotient.held(kept)
     found = _solved(quotient, q, held, reach) if held else None
     if found is None or not _sinks(quotient, found[0], held):
         return None

@@ -44,7 +44,6 @@ class Curve(Value):
     start: EdgeEnd | None
     stop: EdgeEnd | None
     relabelled: Relabelling
-    length: float
 
     def __post_init__(self) -> None:
         if len(self.points) < 2:
@@ -103,10 +102,7 @@ class EdgeTracer:
         walk = follow(ray.sample, ray.direction, passive=ray.active)
         points = np.vstack([record.point.q, walk.points])
         stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
-        curve = Curve(
-            points, ray.active, (End.CORNER, walk.end), end, stop, carried,
-            walk.length + ray.distance,
-        )  # fmt: skip
+        curve = Curve(points, ray.active, (End.CORNER, walk.end), end, stop, carried)
         self.curves.append(curve)
         number = len(self.curves) - 1
         record.edges[i] = number
@@ -204,10 +200,7 @@ class EdgeTracer:
         if len(walks) == 2:
             points = np.vstack([walks[1].points[::-1], points[1:]])
             kinds = (walks[1].end, forth.end)
-        curve = Curve(
-            points, active, kinds, None, None, {},
-            sum(w.length for w in walks),
-        )  # fmt: skip
+        curve = Curve(points, active, kinds, None, None, {})
         self.curves.append(curve)
         self._remark(curve)
         return len(self.curves) - 1
@@ -249,7 +242,7 @@ class EdgeTracer:
 
     def _undirected(self, point: EvaluatedPoint, active: frozenset[int]) -> list[int]:
         """Return the active functions and equations whose gradients have no direction."""
-        return point.vanishing([*active, *range(self.quotient.count, len(point.values))])
+        return point.vanishing(self.quotient.held(active))
 
     def _note_undirected(self, point: EvaluatedPoint, rows: list[int]) -> None:
         every = (*self.polyhedron.names, *self.polyhedron.equation_names)

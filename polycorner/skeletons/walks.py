@@ -122,7 +122,8 @@ class _Follower:
         self.extent = quotient.extent if extent is None else extent
         held = passive.union(start.kept)
         self.watched = np.array([i for i in range(quotient.count) if i not in held], dtype=np.int64)
-        self.passive = sorted(passive.difference(start.kept))
+        implied = range(quotient.count, len(start.values))
+        self.passive = sorted(passive.union(implied).difference(quotient.held(start.kept)))
         self.union = quotient.polyhedron.is_union
         negative = self.union & (start.values[self.watched] < 0)
         self.signs = np.where(negative, -1.0, 1.0)
@@ -328,8 +329,10 @@ class _Follower:
 
     def _return(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
         """Return where this step passes the start of the walk again, and the tangent there."""
-        near = 2 * self._chord(point)
-        if self.length < near or abs(self._from_home(point.q)).max() > near:
+        quotient = self.quotient
+        manifold = quotient.polyhedron.manifold
+        near = 2 * quotient.symmetry.separation(manifold, point.q, self.point.q)
+        if self.length < 2 * self._chord(point) or abs(self._from_home(point.q)).max() > near:
             return None
         ahead = self._from_home(self.start.q + 1e-6 * self.scales * self.out)
 

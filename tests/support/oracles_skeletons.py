@@ -209,15 +209,6 @@ def arc_length(curve, start, stop):
     return quad(speed, start, stop, epsabs=1e-12, epsrel=1e-12)[0]
 
 
-# Steps turn by at most a quarter: an inscribed polyline is shorter than its arc, not by more.
-SAGITTA = math.sin(0.125) / 0.125
-
-
-def inscribed(length, exact):
-    """Whether a polyline's length is that of an inscribed one of a given arc."""
-    return exact * SAGITTA <= length <= exact * (1 + 1e-9)
-
-
 def turned(polyline, centre):
     """Return the angle that a polyline in the plane turns about a point."""
     away = np.asarray(polyline) - centre
