@@ -16,7 +16,7 @@ from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
 from polycorner.skeletons.explorer import Explorer, SearchState
 from polycorner.skeletons.flags import Crossing, Flag
-from polycorner.skeletons.points import Quotient, independent_equations
+from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import End
@@ -130,8 +130,7 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> E
     points = [_points(q, n, 1) for _, q in content["starts"]]
     points += [_points(entry["points"], n, 2)[0] for entry in content["edges"]]
     points += [_points(corner["point"], n, 1) for corner in content["corners"]]
-    equations = independent_equations(polyhedron, points)
-    quotient = Quotient(polyhedron, symmetry, float(content["tolerance"]), extent, equations)
+    quotient = Quotient.near(polyhedron, symmetry, float(content["tolerance"]), extent, points)
     explorer = Explorer(quotient, [], _generator(content["random"]))
     for corner in content["corners"]:
         active = frozenset(map(polyhedron.names.index, corner["active"]))

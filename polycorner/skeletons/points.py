@@ -60,6 +60,19 @@ class Quotient:
     extent: float
     equations: tuple[int, ...]
 
+    @classmethod
+    def near(
+        cls,
+        polyhedron: Polyhedron,
+        symmetry: Symmetry,
+        tolerance: float,
+        extent: float,
+        points: Iterable[Array],
+    ) -> "Quotient":
+        """Return it with the equations that are independent near some points."""
+        equations = independent_equations(polyhedron, points)
+        return cls(polyhedron, symmetry, tolerance, extent, equations)
+
     @property
     def count(self) -> int:
         """The number of inequalities; equations have the positions after them."""

@@ -11,7 +11,7 @@ from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
 from polycorner.skeletons.explorer import Budget, Explorer, SearchState
-from polycorner.skeletons.points import Quotient, independent_equations
+from polycorner.skeletons.points import Quotient
 from polycorner.spaces.manifold import reals
 
 EXTENT = 1000.0
@@ -89,8 +89,7 @@ def skeleton(
     if points.ndim != 2:
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)
-    equations = independent_equations(polyhedron, points)
-    quotient = Quotient(polyhedron, symmetry or Symmetry(), tolerance, float(extent), equations)
+    quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerance, float(extent), points)
     explorer = Explorer(quotient, points, checks.generator("rng", rng))
     return _run(explorer, budget, progress)
 

@@ -23,7 +23,8 @@ fewest = settings(max_examples=settings.default.max_examples // 8)
 
 def figure(D, q, symmetry=None):
     """Return what leaves a point, with all functions that matter there."""
-    point = Quotient(D, symmetry or Symmetry(), 1e-8, 100.0).at(np.asarray(q, dtype=float))
+    point = np.asarray(q, dtype=float)
+    point = Quotient.near(D, symmetry or Symmetry(), 1e-8, 100.0, [point]).at(point)
     explorer = Explorer(point.quotient, [], np.random.default_rng(0))
     return explorer.registry.figure(point, point.active())[1]
 

@@ -23,7 +23,8 @@ TAU = math.tau
 
 
 def quotient(D, *, symmetry=None, extent=100.0):
-    return Quotient(D, symmetry or Symmetry(), 1e-8, extent)
+    equations = range(len(D.functions), len(D.functions) + len(D.equations))
+    return Quotient(D, symmetry or Symmetry(), 1e-8, extent, tuple(equations))
 
 
 ELLIPSE = Family.of(
