@@ -31,6 +31,7 @@ EXTENT = 30.0
 # Random points of a link of a curve or a surface, and sets of functions to hold there.
 POINTS = 16
 MAX_SETS = 40
+HALVINGS = 40  # of Newton steps towards them
 # Largest dimension of a quotient in which links are sampled.
 SAMPLED = 3
 
@@ -188,8 +189,8 @@ def _starts(
         ways = [(frame @ y, sets) for y in unit_rows(random)]
     for way, sets in ways:
         for kept in sets:
-            start = projected(
-                link, point.q + scales * way, link.at(point.q + scales * way).basis(kept), 2.0
-            )
+            q = point.q + scales * way
+            # Where curves touch, steps are halved until they are told apart.
+            start = projected(link, q, link.at(q).basis(kept), 2.0, HALVINGS)
             if start is not None and start.active() is not None:
                 yield start.q

@@ -261,7 +261,9 @@ def _on_equations(polyhedron: Polyhedron, q: Array) -> Array | None:
     return None
 
 
-def projected(quotient: Quotient, q: Array, kept: Sequence[int], reach: float) -> HeldPoint | None:
+def projected(
+    quotient: Quotient, q: Array, kept: Sequence[int], reach: float, steps: int = NEWTON
+) -> HeldPoint | None:
     """Return the nearest point where the held functions vanish.
 
     None if Newton's method does not converge within ``reach`` scale units of ``q``, or meets
@@ -270,7 +272,7 @@ def projected(quotient: Quotient, q: Array, kept: Sequence[int], reach: float) -
     """
     scales = quotient.polyhedron.manifold.scale_array
     moved, last = 0.0, math.inf
-    for _ in range(NEWTON):
+    for _ in range(steps):
         frame = HeldPoint(quotient, q, kept)
         if not frame.finite or frame.condition < SINGULAR:
             return None

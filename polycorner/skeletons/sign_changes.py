@@ -44,7 +44,8 @@ def sign_change(
     """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
     a, b = 0.0, far
     (fa, _), (fb, at) = value(a), value(b)
-    if abs(fb) < 1e-15:
+    small = 1e-15 * max(abs(fa), abs(fb))
+    if abs(fb) <= small:
         return b, at
     s, side = far, 0
     for _ in range(80):
@@ -52,7 +53,7 @@ def sign_change(
             break
         s = (a * fb - b * fa) / (fb - fa)
         f, at = value(s)
-        if f == 0.0 or abs(f) < 1e-15:
+        if abs(f) <= small:
             break
         if (f > 0) == (fb > 0):
             b, fb = s, f

@@ -13,6 +13,7 @@ from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.registry import (
+    NEAR,
     SAME,
     CornerRecord,
     CornerRegistry,
@@ -127,7 +128,7 @@ class EdgeTracer:
         record = self.records[k]
         rays = record.figure.rays
         distance = rays[0].distance if rays else 1e-3
-        back = self._before(walk, distance, singular=record.figure.singular)
+        back = self._before(walk, record, distance)
         sample = None if back is None else back.q
         match = self.registry.match(record, sample, ray, carried, range(len(rays)))
         if match is None:
@@ -139,11 +140,17 @@ class EdgeTracer:
             return None, {}
         return (k, match[0]), match[1]
 
-    def _before(self, walk: Walk, distance: float, *, singular: bool) -> HeldPoint | None:
-        """Return the point of a walk at a distance before its end."""
-        away = np.linalg.norm((walk.points - walk.last.q) / self.scales, axis=1)
+    def _before(self, walk: Walk, record: CornerRecord, distance: float) -> HeldPoint | None:
+        """Return the point of a walk at a distance before the corner where it ends.
+
+        Singular corners are known less exactly than edges beside each other are apart there, so
+        the distance is that from the corner in record, where it is not elsewhere on the orbit.
+        """
+        moved = self.manifold.difference(record.point.q, walk.last.q)
+        end = walk.last.q + moved * (abs(moved / self.scales).max() < NEAR)
+        away = np.linalg.norm((walk.points - end) / self.scales, axis=1)
         beyond = np.flatnonzero(away > distance)
-        if not singular or not len(beyond):
+        if not record.figure.singular or not len(beyond):
             guess = walk.last.q - distance * self.scales * walk.tangent
             return projected(self.quotient, guess, walk.last.kept, distance)
         point: HeldPoint | None = HeldPoint(
@@ -152,7 +159,7 @@ class EdgeTracer:
         for _ in range(INWARD):
             if point is None:
                 return None
-            way = (walk.last.q - point.q) / self.scales
+            way = (end - point.q) / self.scales
             length = float(np.linalg.norm(way))
             # By less than half of the way, so that no step leads to another branch.
             step = min(length - distance, 0.4 * length) * point.tangent(way)

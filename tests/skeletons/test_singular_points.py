@@ -28,6 +28,7 @@ CURVES = {
     "lemniscate": (u**2 - v**2 - r2**2, (1, 2, 2), [(0, 0)], (0.5, 0.1)),
     "figure eight": (4 * u**2 * (1 - u**2) - v**2, (1, 2, 2), [(0, 0)], (0.5, 0.1)),
     "trefoil": (u**3 - 3 * u * v**2 - r2**2, (1, 3, 3), [(0, 0)], (0.5, 0.1)),
+    "rose of four petals": (4 * u**2 * v**2 - r2**3, (1, 4, 4), [(0, 0)], (0.5, 0.5)),
     "two circles": (
         -((u - 1) ** 2 + v**2 - 2) * ((u + 1) ** 2 + v**2 - 2),
         (2, 4, 2),
@@ -95,6 +96,18 @@ class TestPlane:
         atlas = found(D, [[0.1, 0.5]], rng=seed)
         assert counts(atlas) == (1, 2, 2)
         assert atlas.euler_characteristic == 1
+        check_incidence(atlas)
+
+    @given(st.floats(0, math.tau), st.floats(0.3, 1), st.integers(0, 99))
+    @few
+    def test_regions_that_touch_along_a_line(self, angle, width, seed):
+        """``|v| <= w u^2``: both halves touch in the origin, thinner than any sector."""
+        a, b = math.cos(angle), math.sin(angle)
+        p, q = a * x + b * y, a * y - b * x
+        D = Polyhedron(PLANE, {"f": width**2 * p**4 - q**2, "lid": 1 - p, "wall": 1 + p})
+        inner = [[side * a / 2, side * b / 2] for side in (1, -1)]
+        atlas = found(D, inner, rng=seed)
+        assert (counts(atlas), atlas.euler_characteristic) == ((5, 6, 2), 1)
         check_incidence(atlas)
 
     def test_curves_that_nearly_cross_do_not(self):
