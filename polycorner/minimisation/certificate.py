@@ -21,7 +21,7 @@ from polycorner.minimisation.explanation import explanation
 from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.verdicts import Entrapment, Verdict
+from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.strata import (
     RANK_TOLERANCE,
     TOLERANCE,
@@ -47,6 +47,9 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
+# What an analysis finds where a search has stopped says less than that it has not converged.
+VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALONG_LOCUS})
+
 
 @dataclass(frozen=True, eq=False)
 class Certificate(Value, Printed):
@@ -70,7 +73,10 @@ class Certificate(Value, Printed):
     iterations : int
         Number of its steps.
     search : Verdict or None
-        Set when the search failed: INFEASIBLE, UNBOUNDED or NOT_CONVERGED.
+        Set when the search failed: INFEASIBLE, UNBOUNDED, NOT_ATTAINED, DOMAIN_EDGE or
+        NOT_CONVERGED.
+    note : str
+        What the search saw, in words, where it failed.
     """
 
     problem: Problem
@@ -80,6 +86,7 @@ class Certificate(Value, Printed):
     method: str = "certify"
     iterations: int = 0
     search: Verdict | None = field(default=None)
+    note: str = ""
 
     def __post_init__(self) -> None:
         point = self.problem.polyhedron.manifold.wrap(self.point)
@@ -145,10 +152,10 @@ class Certificate(Value, Printed):
     @property
     def verdict(self) -> Verdict:
         """The verdict; its value is a sentence."""
-        if self.search in (Verdict.INFEASIBLE, Verdict.UNBOUNDED):
+        if self.search in SEARCHES:
             return self.search
         found = self.analysis.verdict
-        if self.search is not None and found in (Verdict.NOT_STATIONARY, Verdict.OUTSIDE):
+        if self.search is not None and found in VAGUE:
             return self.search
         return found
 
@@ -210,7 +217,7 @@ class Certificate(Value, Printed):
         Opening wall, all other contacts kept closed, lowers the energy at the rate 3 per mm:
         its multiplier is negative.
         """
-        return explanation(self.analysis, self.stratum, self.verdict, self.search, unit)
+        return explanation(self.analysis, self.stratum, self.verdict, self.search, unit, self.note)
 
     def __repr__(self) -> str:
         """Return the verdict, the point, the energy and the active functions in one line."""

@@ -18,7 +18,7 @@ from polycorner.minimisation.evidence import (
     steepest_descent,
 )
 from polycorner.minimisation.findings import Analysis
-from polycorner.minimisation.verdicts import Entrapment, Verdict
+from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
 from polycorner.polyhedra.strata import Stratum, distances
 from polycorner.printing import angle_unit, number
@@ -29,7 +29,12 @@ SEEN = 1e-6  # smallest component of a unit direction that is shown
 
 
 def explanation(
-    a: Analysis, stratum: Stratum, verdict: Verdict, search: Verdict | None, unit: str | None
+    a: Analysis,
+    stratum: Stratum,
+    verdict: Verdict,
+    search: Verdict | None,
+    unit: str | None,
+    note: str = "",
 ) -> str:
     """Explain why a point is or is not a minimum, with one or two sentences a line.
 
@@ -43,8 +48,12 @@ def explanation(
         The verdict, and how the search for the point failed, if it did.
     unit : str or None
         Unit of the inequalities.
+    note : str, optional
+        What the search saw.
     """
-    lines = [_headline(verdict, search), _position(a, stratum, unit)]
+    lines = [_headline(verdict, search), note, _position(a, stratum, unit)]
+    if verdict in SEARCHES and a.verdict not in {Verdict.OUTSIDE, Verdict.NOT_STATIONARY}:
+        return "\n".join(line for line in lines if line)
     if a.obstacle:
         lines.append(f"The conditions of first and second order do not apply: {a.obstacle}.")
     elif a.verdict is not Verdict.OUTSIDE:

@@ -1,16 +1,19 @@
 """Local minimisation of an energy on a polyhedron by three methods that must agree."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.domain_edges import domain_edge
+from polycorner.minimisation.escapes import escape
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.polishing import SETTLED, Endpoint
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.rescaling import rescaled
+from polycorner.minimisation.rescaling import PATIENCE, rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
@@ -24,6 +27,8 @@ Method = Literal["newton", "slsqp", "scp"]
 Descent = Callable[[Problem, Piece, Array, int], Endpoint]  # from a point, inside one piece
 
 MAX_SWITCHES = 50  # of branches in a union
+FIRM = {Verdict.STRICT_MINIMUM, Verdict.WEAK_MINIMUM}  # not decided by rounding far away
+DISTANT = 8.0  # scale units beyond which a flat end is doubted
 
 
 def minimise(
@@ -89,12 +94,14 @@ def minimise(
     q = polyhedron.manifold.point(start, "start")
     if method != "newton":
         problem.check_energy(q, "start")
-    end = _descend_union(problem, q, _DESCENTS[method], int(max_iterations))
+    end = _descend_union(problem, q, _diagnosing(method), int(max_iterations))
     if end.failure is Verdict.INFEASIBLE:
         problem.check_energy(q, "start")
-    return Certificate(
-        problem, end.point, tolerance, rank_tolerance, method, end.iterations, end.failure
-    )
+    ways = (tolerance, rank_tolerance, method, end.iterations)
+    found = Certificate(problem, end.point, *ways, end.failure, end.note)
+    if end.failure is None and end.note and found.verdict not in FIRM:
+        return replace(found, search=Verdict.NOT_CONVERGED)  # so far away, rounding decides
+    return found
 
 
 def stationary_on(
@@ -177,7 +184,7 @@ def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> 
         if lower is None:
             break
         end, spent = lower, spent + lower.iterations
-    return Endpoint(end.point, spent, end.failure)
+    return replace(end, iterations=spent)
 
 
 def _descend_from_outside(
@@ -224,7 +231,7 @@ def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
         sqp.UNBOUNDED: Verdict.UNBOUNDED,
         sqp.STALLED: Verdict.NOT_CONVERGED,
     }
-    return Endpoint(point, iterations, failures.get(status))
+    return Endpoint(point, iterations, failures.get(status), flat=status == sqp.LEVEL)
 
 
 def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
@@ -234,3 +241,41 @@ def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
 
 
 _DESCENTS: dict[str, Descent] = {"newton": _newton, "slsqp": slsqp, "scp": _scp}
+
+
+def _diagnosing(method: Method) -> Descent:
+    """Return a method's descent whose failures say where they end, as far as that is seen."""
+    plain = _DESCENTS[method]
+
+    def descent(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+        end = plain(problem, piece, q, limit)
+        if end.failure is None and not end.flat:
+            return end
+        if end.failure is Verdict.INFEASIBLE or not _is_doubtful(problem, q, end):
+            return end
+        return _diagnosed(problem, piece, q, limit, end)
+
+    return descent
+
+
+def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
+    """Whether a descent has failed, or ended far away where nothing is decided."""
+    if end.failure is not None:
+        return True
+    if abs((end.point - start) / problem.scales).max() < DISTANT:
+        return False
+    return Certificate(problem, end.point).verdict is Verdict.UNDECIDED
+
+
+def _diagnosed(problem: Problem, piece: Piece, q: Array, limit: int, end: Endpoint) -> Endpoint:
+    """Return the end of a failed descent with what is seen of where it leads."""
+    edge = domain_edge(problem, piece, end.point)
+    if edge is not None:
+        return Endpoint(edge.point, end.iterations, Verdict.DOMAIN_EDGE, edge.note)
+    if end.failure is Verdict.NOT_CONVERGED and limit < PATIENCE:
+        return replace(end, note=f"It was stopped after {end.iterations} steps.")
+    found = escape(problem, piece, q)
+    if found.verdict is Verdict.NOT_CONVERGED or (found.verdict is None and end.failure is None):
+        return end if end.failure is None else replace(end, failure=found.verdict, note=found.note)
+    point = end.point if end.failure is found.verdict else found.point
+    return Endpoint(point, end.iterations, found.verdict, found.note)

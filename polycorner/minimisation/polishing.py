@@ -18,11 +18,16 @@ SETTLED = 1e-8  # last step of Newton's method, in scale units, up to which it h
 
 @dataclass(frozen=True)
 class Endpoint:
-    """End point of a descent inside one piece of a polyhedron, with its failure, if any."""
+    """End point of a descent inside one piece of a polyhedron, with its failure, if any.
+
+    ``note`` says in words what the search saw; ``flat`` that the second order seems to vanish.
+    """
 
     point: Array
     iterations: int
     failure: Verdict | None
+    note: str = ""
+    flat: bool = False
 
 
 def polished(
@@ -72,7 +77,7 @@ def _on_face(problem: Problem, piece: Piece, q: Array, face: Piece) -> Array | N
         if not last < SETTLED or abs((point - q) / problem.scales).max() > 0.1:
             return None
         violated = _violated(problem, piece, point)
-        if violated is None:
+        if violated is None or not np.isfinite(problem.energy.value(point)):
             return None
         negative = _negative(problem, face, point)
         if not violated and not negative:

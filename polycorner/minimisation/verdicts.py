@@ -24,7 +24,14 @@ class Verdict(Enum):
     INFEASIBLE = (
         "no point of the polyhedron was reached: no step lowers the violation to first order"
     )
-    UNBOUNDED = "the energy decreases without end: unbounded below, or no minimum is attained"
+    UNBOUNDED = "the energy decreases without end, as far as it was followed"
+    NOT_ATTAINED = (
+        "no minimum is attained: the search goes to infinity while the energy falls towards a bound"
+    )
+    DOMAIN_EDGE = (
+        "the search ends at the edge of the domain of a function, beyond which it has no value or "
+        "no derivatives"
+    )
     NOT_CONVERGED = "the search stopped before it reached a stationary point"
 
     @property
@@ -33,6 +40,10 @@ class Verdict(Enum):
         return self in _MINIMA
 
 
+# Verdicts on a search rather than on the point at which it ended.
+SEARCHES = frozenset(
+    {Verdict.INFEASIBLE, Verdict.UNBOUNDED, Verdict.NOT_ATTAINED, Verdict.DOMAIN_EDGE}
+)
 _MINIMA = frozenset({Verdict.STRICT_MINIMUM, Verdict.MINIMUM_ALONG_LOCUS, Verdict.WEAK_MINIMUM})
 
 

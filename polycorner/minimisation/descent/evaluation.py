@@ -42,12 +42,12 @@ def evaluate(problem, u, F, J, H, size, second):
 
 @njit
 def violation(F, J, use, m):
-    """Return the largest scaled violation of the constraints in use."""
+    """Return the largest scaled violation of the constraints in use; infinite off their domain."""
     never_inline()
     worst = 0.0
     for i in range(F.size - 1):
         miss = abs(F[i]) if i >= m else (-F[i] if use[i] else 0.0)
-        if np.isnan(F[i]) and (i >= m or use[i]):
+        if not np.isfinite(F[i]) and (i >= m or use[i]):
             return np.inf
         if miss > 0.0:
             size = length(J[i])

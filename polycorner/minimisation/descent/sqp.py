@@ -27,6 +27,7 @@ from polycorner.minimisation.descent.stationarity import (
 CONVERGED, INFEASIBLE, UNBOUNDED, STALLED, LEVEL = 0, 1, 2, 3, 4  # LEVEL: converged, but flat
 FIRST_CAP = 0.5  # longest first step, in scale units
 PATIENCE = 20  # steps after which convexification may use the active inequalities, too
+HUGE = 1e250  # derivatives beyond overflow in products
 FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
 
 
@@ -35,10 +36,13 @@ def convexified(B, g, A, L):
     """Fill ``L`` with the Cholesky factor of ``B`` made positive definite.
 
     First a multiple of ``A^T A`` is added, which does not change a step tangential to the rows of
-    ``A``; then, only if needed, multiples of the identity in a geometric sequence.
+    ``A``; then, only if needed, multiples of the identity in a geometric sequence.  Returns whether
+    numbers are small enough for that.
     """
     never_inline()
     n = B.shape[0]
+    if not max(largest_entry(B), largest(g)) < HUGE:
+        return False
     across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g))
     if shift < 1e-300:
         shift = 1e-300 if shift > 0.0 else 1.0
@@ -50,7 +54,7 @@ def convexified(B, g, A, L):
                 for j in range(A.shape[0]):
                     C[i, k] += across * A[j, i] * A[j, k]
         if cholesky(C, L):
-            return
+            return True
         if across == 0.0 and A.shape[0] > 0:
             across = 10.0 * n * largest_entry(B)
         else:
@@ -97,7 +101,8 @@ def descend(problem, use, m, rows, u, size, limit):
             return STALLED, iteration, u, lam
         if rows - 1 > m or iteration > PATIENCE:
             section, _, _, _ = normalised_rows(F, J, on if iteration > PATIENCE else nothing, m)
-        convexified(lagrangian_hessian(H, lam), g, section, L)
+        if not convexified(lagrangian_hessian(H, lam), g, section, L):
+            return STALLED, iteration, u, lam
         A, b, keep, sizes = normalised_rows(F, J, use, m)
         for j in range(b.size):
             if abs(b[j]) < FEASIBLE:

@@ -112,7 +112,7 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
         add_multiple(pull, -lam[i], J[i])
         if i < m and rows[i] and lam[i] * length(J[i]) < -1e-9 * reference:
             stationary = False
-    higher = F[last] > energy + 1e-9 * (abs(energy) + reference)
+    higher = not F[last] <= energy + 1e-9 * (abs(energy) + reference)  # or not finite
     if higher or violation(F, J, use, m) > FEASIBLE:
         return REJECTED, v, lam, directions
     if not (stationary and largest(pull) <= 1e-9 * reference):

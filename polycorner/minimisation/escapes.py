@@ -1,0 +1,255 @@
+"""Searches that go to infinity: energies without bound, infima that are not attained, far minima.
+
+A search that has gone far, or has run out of steps, is repeated in scales that grow with the
+distance ``d`` from its start.  So distances grow geometrically, and a minimum at any distance is
+found where the numbers resolve it.  Otherwise the descent leaves a trace of energies, judged by
+how fast they fall as the distance is multiplied: with ``t = log d`` and ``a = -dE/dt``,
+
+================================  ==============================================================
+``a`` grows, or shrinks as        ``E`` falls without bound, as ``-d^p``, ``-log d`` and
+``t^-q`` with ``q < 1``           ``-sqrt(log d)``
+``a`` shrinks as ``t^-q`` with    ``E`` has a bound, as ``d^-p``, ``exp(-d)`` and ``1/log d``,
+``q > 1``, or as ``d^-p``         which no point attains
+================================  ==============================================================
+
+and nothing is said in between.  This is evidence along one path, over the distances it went.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from polycorner.minimisation.problem import Problem
+from polycorner.minimisation.verdicts import Verdict
+from polycorner.polyhedra.cones import null_space
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.strata import distances
+from polycorner.printing import number
+from polycorner.spaces.manifold import Array
+
+STAGES, STEPS = 240, 2  # descents in growing scales, and their steps
+BEYOND = 1e30  # distance, in scale units, up to which an energy without bound is followed
+SHOWN = 1e8  # distance up to which a point of an endless descent is resolved well enough to show
+DEEP = 1e60  # a fall by so many times the energy's size at the start is taken to be without bound
+SPACED = 1.4  # ratio of successive distances of a trace
+STRAIGHT, DOUBLINGS = 2.5, 5.0  # doublings of the distance needed, with a ray to go on and without
+ACROSS = 1e-6  # Newton's step across a valley, relative to that along it
+CLOSED = 1e-8  # gap of a contact, in scale units
+FARTHER = 1e6  # times the distance to which the energy has to fall on along a ray
+POWER = 0.15  # exponent of d with which energies fall towards a bound
+STEADY = 1.5  # ratio up to which successive exponents are those of one power
+# Exponents q of rates t^-q, which have a sum exactly for q > 1 (Bertrand's series).
+DIVERGENT, CONVERGENT = 0.7, 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Escape:
+    """Where a search that went far ends.
+
+    Attributes
+    ----------
+    verdict : Verdict or None
+        UNBOUNDED, NOT_ATTAINED or NOT_CONVERGED; None for a stationary point that was reached.
+    point : (n,) array
+        That point, or one of the trace.
+    note : str
+        What was seen, in words.
+    """
+
+    verdict: Verdict | None
+    point: Array
+    note: str
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Points ever lower and farther from the first, at distances that grow geometrically.
+
+    ``gone`` are the distances in scale units, ``size`` is that of the energy at the start: its
+    value or derivatives; ``last`` is the last point reached, ``lowest`` its energy; ``level`` and
+    ``converged`` say whether a descent ended there, with a flat second order or a regular one.
+    """
+
+    points: Array
+    gone: Array
+    energies: Array
+    size: float
+    last: Array
+    lowest: float
+    level: bool
+    converged: bool
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """None where a descent ended, NOT_CONVERGED otherwise."""
+        return None if self.level or self.converged else Verdict.NOT_CONVERGED
+
+    @property
+    def rates(self) -> tuple[Array, Array]:
+        """The rates ``a = -dE/dt`` and the middle logarithms ``t``, as far as they are resolved."""
+        t, falls = np.log(self.gone), -np.diff(self.energies)
+        seen = falls > 1e-13 * abs(self.energies[1:])
+        count = len(falls) if seen.all() else int(seen.argmin())
+        rates = falls[:count] / np.diff(t)[:count]
+        return rates, (t[1:] + t[:-1])[:count] / 2
+
+
+@np.errstate(all="ignore")
+def escape(problem: Problem, piece: Piece, start: Array) -> Escape:
+    """Follow the energy downhill in scales that grow with the distance, and say where it goes."""
+    reached, origin = problem.restore(piece, start)
+    if not reached or not np.isfinite(problem.energy.value(origin)):
+        return Escape(Verdict.NOT_CONVERGED, start, "")
+    trace = _trace(problem, piece, origin)
+    if not len(trace.gone):
+        return Escape(trace.verdict, trace.last, "")
+    far, low = number(trace.gone[-1], 2), number(trace.lowest, 6)
+    if trace.converged:
+        return Escape(None, trace.last, f"The descent ended {far} scale units from its start.")
+    went = f"The energy fell to {low} over {far} scale units"
+    if _is_attained_nowhere(problem, piece, trace):
+        return Escape(
+            Verdict.NOT_ATTAINED,
+            trace.last,
+            f"{went}, by less and less each time that the distance was doubled: its decreases have "
+            "a finite sum.",
+        )
+    far_on = _far_along(problem, piece, trace) if len(trace.gone) > 1 else trace
+    if _is_without_bound(trace) or _is_without_bound(far_on):
+        return Escape(
+            Verdict.UNBOUNDED,
+            trace.points[max(0, int((trace.gone <= SHOWN).sum()) - 1)],
+            f"{went}, and its decreases do not shrink as the distance is multiplied.",
+        )
+    return Escape(
+        trace.verdict,
+        trace.last,
+        f"{went}; whether it has a bound beyond is not seen.",
+    )
+
+
+def _trace(problem: Problem, piece: Piece, origin: Array) -> Trace:
+    from polycorner.minimisation.descent import sqp
+
+    q, status, energy = origin, sqp.STALLED, problem.energy.value(origin)
+    size = max(float(abs(x[-1]).max()) for x in problem.evaluate(origin, 2))
+    points: list[Array] = []
+    gone: list[float] = []
+    energies: list[float] = []
+    for _ in range(STAGES):
+        reach = max(1.0, gone[-1] if gone else 0.0)
+        status, _, after, _ = problem.descend(piece, q, STEPS, problem.scales * reach)
+        lower = problem.energy.value(after)
+        if not np.isfinite(after).all() or not lower <= energy:
+            break
+        idle = np.array_equal(q, after)
+        q, energy = after, lower
+        far = float(abs((q - origin) / problem.scales).max())
+        if far >= (SPACED * gone[-1] if gone else 1.0):
+            points.append(q)
+            gone.append(far)
+            energies.append(energy)
+        if idle or status in {sqp.CONVERGED, sqp.LEVEL} or far > BEYOND or energy < -DEEP * size:
+            break
+    level, converged = status == sqp.LEVEL, status == sqp.CONVERGED
+    ended = np.array(points), np.array(gone), np.array(energies)
+    return Trace(*ended, size, q, energy, level, converged)
+
+
+def _slowing(trace: Trace) -> float:
+    """Return the exponent with which the rates shrink in ``t``, over the later half of a trace.
+
+    It is nan where the trace is not long enough.
+    """
+    rates, t = trace.rates
+    if len(rates) < max(DOUBLINGS, len(trace.gone) - 1) or trace.gone[-1] < BEYOND:
+        return np.nan
+    half = len(rates) // 2
+    return float(-np.log(rates[-1] / rates[half]) / np.log(t[-1] / t[half]))
+
+
+def _is_without_bound(trace: Trace) -> bool:
+    """Whether the energy fell far below all bounds, or falls on where a trace is long enough."""
+    return bool(trace.lowest < -DEEP * trace.size or _slowing(trace) <= DIVERGENT)
+
+
+def _is_attained_nowhere(problem: Problem, piece: Piece, trace: Trace) -> bool:
+    """Whether the energy falls towards a bound, as a power of the distance or of its logarithm.
+
+    Near a minimum in the distance the exponents would grow: a short trace is believed if they are
+    steady, or if the energy falls on along a ray.
+    """
+    if _slowing(trace) >= CONVERGENT:
+        return True
+    rates, t = trace.rates
+    doublings = np.log2(trace.gone[len(rates)] / trace.gone[0])
+    if len(rates) < 4 or doublings < STRAIGHT:
+        return False
+    powers = (-np.diff(np.log(rates)) / np.diff(t))[-3:]
+    if not (powers >= POWER).all():
+        return False
+    steady = doublings >= DOUBLINGS and powers.max() <= STEADY * powers.min()
+    if steady and not _nears_wall(problem, piece, trace):
+        return True
+    return bool(_far_along(problem, piece, trace).gone[-1] > FARTHER * trace.gone[-1])
+
+
+def _nears_wall(problem: Problem, piece: Piece, trace: Trace) -> bool:
+    """Whether a gap closes by no less each time that the distance is multiplied."""
+    values, gradients = problem.evaluate(trace.points[-3:], 1)
+    kept = sorted(piece)
+    away = np.array(
+        [distances(f[:-1], df[:-1])[kept] for f, df in zip(values, gradients, strict=True)]
+    )
+    closing = -np.diff(away, axis=0) / np.diff(np.log(trace.gone[-3:]))[:, None]
+    gaps = away[1] > CLOSED
+    return bool((gaps & (closing[1] > ACROSS * away[1]) & (closing[1] > closing[0])).any())
+
+
+def _far_along(problem: Problem, piece: Piece, trace: Trace) -> Trace:
+    """Return a trace with points of the ray that goes on from it, inside the set and not upward.
+
+    Rounding of the points moves them across the ray, where the energy is curved.
+    """
+    last, m = trace.points[-1], problem.inequalities
+    step = _straight_on(problem, piece, last, last - trace.points[-2])
+    length = float(abs(step / problem.scales).max())
+    if not length > 0:
+        return trace
+    ahead = 2.0 ** np.arange(np.log2(4 * BEYOND / length))
+    points = last + ahead[:, None] * step
+    values, gradients = problem.evaluate(points, 1)
+    curved = float(abs(problem.evaluate(last, 2)[2][-1]).max())
+    count, energy = 0, float(trace.energies[-1])
+    sizes = 4e-30 * np.square(points / problem.scales).sum(axis=1) * curved
+    for size, point, slopes in zip(sizes, values, gradients, strict=True):
+        away = distances(point[:-1], slopes[:-1])
+        noise = 1e-15 * abs(energy) + size
+        if (away[sorted(piece)] < -1e-10).any() or not (abs(away[m:]) <= 1e-10).all():
+            break
+        if not -np.inf < point[-1] <= energy + noise:
+            break
+        count, energy = count + 1, float(point[-1])
+    gone = trace.gone[-1] + ahead[:count] * length
+    return replace(
+        trace,
+        points=np.concatenate([trace.points, points[:count]]),
+        gone=np.concatenate([trace.gone, gone]),
+        energies=np.concatenate([trace.energies, values[:count, -1]]),
+        lowest=min(energy, trace.lowest),
+    )
+
+
+def _straight_on(problem: Problem, piece: Piece, q: Array, step: Array) -> Array:
+    """Return a step without its parts across the contacts, and across a valley of the energy.
+
+    Across a valley, Newton's step is far shorter than the step along it.
+    """
+    values, gradients, hessians = problem.evaluate(q, 2)
+    m, u = problem.inequalities, step / problem.scales
+    away = distances(values[:-1], gradients[:-1])
+    held = [*(i for i in sorted(piece) if away[i] <= CLOSED), *range(m, len(values) - 1)]
+    curvatures, vectors = np.linalg.eigh(hessians[-1])
+    short = abs(gradients[-1] @ vectors) <= ACROSS * np.linalg.norm(u) * curvatures
+    basis = null_space(np.vstack([gradients[held], vectors.T[short]]), 1e-8)
+    return np.asarray(basis @ (basis.T @ u) * problem.scales)
