@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Formulas = tuple[Expressions, Expressions]
 
 CONTACTS = ("A1B1", "A1B2", "A2B1", "A2B2", "A1b", "A2b", "aB1", "aB2", "ab")
+STATIONARY = (*(f"foot{contact}" for contact in CONTACTS[4:8]), *bodies.STATIONARY)
 DRUM = ("phi", "eta", "theta")
 PLANE = ("x", "y", "theta")
 BALLS = (("A1", 1, -1), ("A2", 1, 1), ("B1", 2, -1), ("B2", 2, 1))
@@ -33,13 +34,15 @@ def variables(names: tuple[str, ...]) -> tuple[str, ...]:
 @lru_cache(maxsize=1)
 def drum_gaps() -> families.Family:
     """Return the nine gaps in the drum; parameters ``l r t rho``."""
-    return _family(CONTACTS, DRUM, ("l", "r", "t", "rho"), lambda: _gaps(_drum_centres()))
+    symbols = DRUM, ("l", "r", "t", "rho")
+    return _family(CONTACTS, *symbols, lambda: _gaps(_drum_centres()), held=STATIONARY)
 
 
 @lru_cache(maxsize=1)
 def plane_gaps() -> families.Family:
     """Return the nine gaps in the developed plane; parameters ``l r t``."""
-    return _family(CONTACTS, PLANE, ("l", "r", "t"), lambda: _gaps(_plane_centres()))
+    symbols = PLANE, ("l", "r", "t")
+    return _family(CONTACTS, *symbols, lambda: _gaps(_plane_centres()), held=STATIONARY)
 
 
 @lru_cache(maxsize=1)
@@ -80,9 +83,11 @@ def _family(
     parameters: tuple[str, ...],
     formulas: "Callable[[], Formulas]",
     unit: str = "mm",
+    held: tuple[str, ...] = (),
 ) -> families.Family:
     key = repr((cache.source_key(bodies.__name__, __name__), names, coordinates, parameters))
-    return families.Family(names, variables(coordinates), parameters, formulas, key, unit)
+    symbols = variables(coordinates), parameters
+    return families.Family(names, *symbols, formulas, key, unit, stationary=held)
 
 
 def _symbols(names: str) -> "list[sympy.Symbol]":
@@ -95,11 +100,11 @@ def _symbols(names: str) -> "list[sympy.Symbol]":
 def _drum_centres() -> "Expressions":
     import sympy
 
-    length, rho = _symbols("l rho")
-    definitions: Expressions = {}
+    length, rho, per_diameter = _symbols("l rho per_diameter")
+    definitions: Expressions = {"per_diameter": 1 / (2 * rho)}
     for k in (1, 2):
         phi, eta, theta, s, c = _symbols(f"phi{k} eta{k} theta{k} s{k} c{k}")
-        definitions[f"s{k}"] = length * sympy.sin(theta) / (2 * rho)
+        definitions[f"s{k}"] = length * per_diameter * sympy.sin(theta)
         definitions[f"c{k}"] = sympy.sqrt(1 - s**2)
         for ball, owner, sign in BALLS:
             if owner == k:
@@ -142,16 +147,17 @@ def _gaps(centres: "Expressions") -> "Formulas":
     }
     for (a, b), distance in apart.items():
         expressions[f"{a}{b}"] = distance - 2 * r
-    ends = []
+    ends, per = [], {}
+    for rod in (("A1", "A2"), ("B1", "B2")):
+        along = bodies.minus(balls[rod[1]], balls[rod[0]])
+        per[rod] = define(f"per{rod[0][0]}", 1 / bodies.dot(along, along))
     for ball, owner, _ in BALLS:
         rod = ("B1", "B2") if owner == 1 else ("A1", "A2")
         contact = f"{ball}b" if owner == 1 else f"a{ball}"
         segment = (balls[rod[0]], balls[rod[1]])
-        at = define(f"foot{contact}", bodies.foot(balls[ball], *segment))
-        to_line = define(f"line{contact}", bodies.point_line_distance(balls[ball], *segment, at))
-        to_start, to_end = (apart[(ball, end) if owner == 1 else (end, ball)] for end in rod)
-        to_rod = bodies.point_segment_distance(at, to_start, to_end, to_line)
-        distance = define(f"d{contact}", to_rod)
+        line = define(f"line{contact}", bodies.foot(balls[ball], *segment, per[rod]))
+        at = define(f"foot{contact}", bodies.clamped(line))
+        distance = define(f"d{contact}", bodies.distance_from(balls[ball], *segment, at))
         ends.append(distance)
         expressions[contact] = distance - r - t
     crossing, distance = bodies.segment_segment_distance(

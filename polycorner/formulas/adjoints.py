@@ -9,6 +9,10 @@ the cost of ``f``, however many variables and operations there are.  The forward
 operation once per variable, and calls itself as deep as the formula is; it is cheaper for small
 programs whose outputs share most of what they read, and kept for them.
 
+Nodes on which no output depends to the first order (``stationary``) are constants to first
+derivatives, whose own derivatives are complete: by the envelope theorem ([Danskin]) the gradient
+of ``f(q) = F(q, t(q))``, where ``dF/dt = 0``, is ``dF/dq`` at ``t(q)``.
+
 A branch (``select``) is not entered: its gradient is the gradient of the branch taken, since an
 adjoint of zero times an infinite slope of the other branch would not be zero.
 """
@@ -43,10 +47,10 @@ def depth(graph: Graph, outputs: Iterable[int]) -> int:
 
 
 class Reverse:
-    """Gradients of the nodes of one graph by accumulation of adjoints."""
+    """Gradients of the nodes of one graph by accumulation of adjoints; ``held`` are constant."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, held: Iterable[int] = ()) -> None:
+        self.graph, self.held = graph, frozenset(held)
         self._rows: dict[int, Row] = {}
 
     def row(self, node: int) -> Row:
@@ -62,6 +66,8 @@ class Reverse:
         while waiting:
             a = -heapq.heappop(waiting)
             w = adjoints.pop(a)
+            if a in self.held:
+                continue
             op, args = g.nodes[a]
             if op == "var":
                 self._add(found, int(args[0]), w)
@@ -95,20 +101,28 @@ def derivatives(program: Program, order: int) -> tuple[Program, tuple[list[int],
     """
     g, k = program.graph.copy(), program.variables
     small = k <= FEW and depth(g, program.outputs) <= DEEP and len(g.nodes) <= MANY
-    row = _pushed(g, k) if small else Reverse(g).row
+    rule = _pushed if small else _pulled
     levels: tuple[list[int], ...] = (list(program.outputs),)
-    rows = [row(f) for f in program.outputs] if order >= 1 else []
+    first = rule(g, k, program.stationary)
+    rows = [first(f) for f in program.outputs] if order >= 1 else []
     if order >= 1:
         levels += ([found.get(i, g.const(0)) for found in rows for i in range(k)],)
     if order >= 2:
-        seconds = [{i: row(slope) for i, slope in found.items()} for found in rows]
+        second = rule(g, k, ())
+        seconds = [{i: second(slope) for i, slope in found.items()} for found in rows]
         pairs = [(min(i, j), max(i, j)) for i in range(k) for j in range(k)]
         zero = g.const(0)
         levels += ([s.get(i, Row()).get(j, zero) for s in seconds for i, j in pairs],)
     return replace(program, graph=g), levels
 
 
-def _pushed(graph: Graph, variables: int) -> Callable[[int], Row]:
+def _pulled(graph: Graph, _: int, held: Iterable[int]) -> Callable[[int], Row]:
+    return Reverse(graph, held).row
+
+
+def _pushed(graph: Graph, variables: int, held: Iterable[int]) -> Callable[[int], Row]:
+    graph.hold(held, variables)
+
     def row(node: int) -> Row:
         found = {i: graph.derivative(node, i) for i in range(variables)}
         return {i: slope for i, slope in found.items() if slope != graph.const(0)}

@@ -76,6 +76,10 @@ class Family(Value):
         its formulas on branches which fit together leaves it empty.
     bindings : mapping from str to Binding
         The shapes that the functions are evaluated as; empty where the family is compiled whole.
+    stationary : tuple of str
+        Definitions ``t`` on which no function depends to the first order, ``df/dt = 0``: what a
+        minimum over ``t`` is taken at, such as the foot of a perpendicular.  First derivatives
+        leave their changes out (the envelope theorem, [Danskin]); second ones do not.
     """
 
     names: tuple[str, ...]
@@ -86,6 +90,7 @@ class Family(Value):
     unit: str = ""
     kinks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     bindings: Mapping[str, Binding] = field(default_factory=dict, repr=False)
+    stationary: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -123,9 +128,8 @@ class Family(Value):
         """Return the straight-line program of the values."""
         definitions, expressions = self.formulas()
         ordered = [expressions[name] for name in self.names]
-        return compile_expressions(
-            ordered, self.variables, self.parameters, definitions, self.names
-        )
+        symbols = self.variables, self.parameters
+        return compile_expressions(ordered, *symbols, definitions, self.names, self.stationary)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes, with formulas that a pickle cannot name written out."""

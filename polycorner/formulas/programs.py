@@ -7,11 +7,14 @@ selections, whose derivative is the derivative of the branch taken.
 """
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
 Payload = int | str | Fraction
 Node = tuple[str, tuple[Payload, ...]]
+
+POWERS_OF_TWO = frozenset(Fraction(2) ** k for k in range(-4, 5) if k)
 
 
 class Graph:
@@ -79,7 +82,21 @@ class Graph:
             return self.sub(a, self._arg(b))
         if self.nodes[a][0] == "neg":
             return self.sub(b, self._arg(a))
+        (f, x), (g, y) = self._scaled(a), self._scaled(b)
+        if f == g != 1:
+            return self.mul(self.const(f), self.add(x, y))
         return self.node("add", min(a, b), max(a, b))
+
+    def _scaled(self, a: int) -> tuple[Fraction, int]:
+        """Return a product as a power of two, whose place does not matter, and the rest."""
+        op, args = self.nodes[a]
+        f = self._value(int(args[0])) if op == "mul" else None
+        return (f, int(args[1])) if f and f in POWERS_OF_TWO else (Fraction(1), a)
+
+    def core(self, a: int) -> int:
+        """Return a node without the sign and the power of two that products pass on."""
+        op, args = self.nodes[a]
+        return self._scaled(int(args[0]) if op == "neg" else a)[1]
 
     def sub(self, a: int, b: int) -> int:
         """Return ``a - b``."""
@@ -94,19 +111,20 @@ class Graph:
             return self.neg(b)
         if self.nodes[b][0] == "neg":
             return self.add(a, self._arg(b))
-        return self.node("sub", a, b)
+        if self.nodes[a][0] == "neg":
+            return self.neg(self.add(self._arg(a), b))
+        (f, x), (g, y) = self._scaled(a), self._scaled(b)
+        if f == g != 1:
+            return self.mul(self.const(f), self.sub(x, y))
+        opposite = self._index.get(("sub", (b, a)))
+        return self.node("sub", a, b) if opposite is None else self.node("neg", opposite)
 
     def neg(self, a: int) -> int:
         """Return ``-a``."""
         u = self._value(a)
         if u is not None:
             return self.const(-u)
-        op, args = self.nodes[a]
-        if op == "neg":
-            return self._arg(a)
-        if op == "sub":
-            return self.node("sub", args[1], args[0])
-        return self.node("neg", a)
+        return self._arg(a) if self.nodes[a][0] == "neg" else self.node("neg", a)
 
     def mul(self, a: int, b: int) -> int:
         """Return ``a * b``."""
@@ -125,6 +143,12 @@ class Graph:
             return self.neg(self.mul(self._arg(a), b))
         if self.nodes[b][0] == "neg":
             return self.neg(self.mul(a, self._arg(b)))
+        (f, x), (g, y) = self._scaled(a), self._scaled(b)
+        if u is not None:
+            merged = g != 1 and u in POWERS_OF_TWO
+            return self.mul(self.const(u * g), y) if merged else self.node("mul", a, b)
+        if f != 1 or g != 1:
+            return self.mul(self.const(f * g), self.mul(x, y))
         return self.node("mul", min(a, b), max(a, b))
 
     def div(self, a: int, b: int) -> int:
@@ -172,6 +196,10 @@ class Graph:
         child = self.nodes[a][1][position]
         assert isinstance(child, int)
         return child
+
+    def hold(self, nodes: Iterable[int], variables: int) -> None:
+        """Treat nodes as constants in the derivatives taken from now on, and no others."""
+        self._derivatives = {(a, i): self.const(0) for a in nodes for i in range(variables)}
 
     def derivative(self, a: int, variable: int) -> int:
         """Return the partial derivative of node ``a`` by variable number ``variable``."""
@@ -223,7 +251,8 @@ class Graph:
         if op == "sub":
             return self.sub(du, dv)
         if op == "mul":
-            return self.add(self.mul(du, v), self.mul(u, dv))
+            one = self.mul(du, v)
+            return self.mul(self.const(2), one) if u == v else self.add(one, self.mul(u, dv))
         if op == "div":
             return self.mul(self.sub(du, self.mul(a, dv)), self.inv(v))
         if op == "atan2":
@@ -231,10 +260,8 @@ class Graph:
             return self.div(self.sub(self.mul(v, du), self.mul(u, dv)), norm)
         if op == "pow":
             slope = self.mul(v, self.node("pow", u, self.sub(v, self.const(1))))
-            power_part = self.mul(slope, du)
-            if self._value(dv) == 0:
-                return power_part
-            return self.add(power_part, self.mul(self.mul(a, self.unary("log", u)), dv))
+            growth = self.mul(self.mul(a, self.unary("log", u)), dv) if self._value(dv) != 0 else dv
+            return self.add(self.mul(slope, du), growth)
         msg = f"no derivative rule for {op}"
         raise AssertionError(msg)
 
@@ -279,16 +306,20 @@ class Program:
         The node of each expression.
     variables, parameters : int
         How many of each the program reads.
+    stationary : tuple of int
+        Nodes on which no output depends to the first order, wherever it is evaluated.
     """
 
     graph: Graph
     outputs: tuple[int, ...]
     variables: int
     parameters: int
+    stationary: tuple[int, ...] = ()
 
     def digest(self) -> str:
         """Return a hash of the operations: equal programs have equal digests."""
-        text = repr((self.graph.nodes, self.outputs, self.variables, self.parameters))
+        sizes = self.variables, self.parameters
+        text = repr((self.graph.nodes, self.outputs, *sizes, self.stationary))
         return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -21,6 +21,7 @@ def compile_expressions(
     parameters: Sequence[str] = (),
     definitions: "Mapping[str, sympy.Expr] | None" = None,
     names: Sequence[str] = (),
+    stationary: Iterable[str] = (),
 ) -> Program:
     """Translate SymPy expressions into one program.
 
@@ -34,6 +35,8 @@ def compile_expressions(
         Intermediate quantities by name, in an order in which each uses only earlier ones.
     names : sequence of str, optional
         Names of the expressions in error messages.
+    stationary : iterable of str, optional
+        Definitions on which no expression depends to the first order.
 
     Raises
     ------
@@ -49,7 +52,8 @@ def compile_expressions(
     for position, expression in enumerate(expressions):
         translator.subject = names[position] if names else f"expression {position + 1}"
         outputs.append(translator.translate(expression))
-    return Program(translator.graph, tuple(outputs), len(variables), len(parameters))
+    held = tuple([translator.graph.core(translator.names[name]) for name in stationary])
+    return Program(translator.graph, tuple(outputs), len(variables), len(parameters), held)
 
 
 class Translator:

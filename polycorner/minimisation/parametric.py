@@ -168,7 +168,8 @@ def lifted_family(family: Family, used: frozenset[str]) -> Family:
     names = tuple(name for name in family.names if name in used)
     source = family.key or family.program().digest()
     key = repr(("parameters are variables", names, source))
-    return Family(names, family.variables + family.parameters, (), family.formulas, key)
+    symbols, held = family.variables + family.parameters, family.stationary
+    return Family(names, symbols, (), family.formulas, key, stationary=held)
 
 
 def partial_derivatives(function: SmoothFunction, point: Array, rates: Rates) -> Array:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 # then taken between ends and rods, which errs by less than the length times this number.
 PARALLEL = 1e-10
 
+# Definitions on which the distance of two segments does not depend to the first order.
+STATIONARY = ("at_first", "at_second", "mx", "my", "mz")
+
 
 def minus(p: "Point", q: "Point") -> "Point":
     """Return the vector from ``q`` to ``p``."""
@@ -42,25 +45,29 @@ def norm(u: "Point") -> "sympy.Expr":
     return sympy.sqrt(dot(u, u))
 
 
-def foot(p: "Point", start: "Point", end: "Point") -> "sympy.Expr":
-    """Return the position of the foot of ``p`` on a line: 0 at ``start``, 1 at ``end``."""
-    u = minus(end, start)
-    return dot(minus(p, start), u) / dot(u, u)
+def foot(p: "Point", start: "Point", end: "Point", per: "sympy.Expr") -> "sympy.Expr":
+    """Return the position of the foot of ``p`` on a line: 0 at ``start``, 1 at ``end``.
+
+    ``per`` is one over the squared distance of ``start`` and ``end``.
+    """
+    return per * dot(minus(p, start), minus(end, start))
 
 
-def point_line_distance(p: "Point", start: "Point", end: "Point", at: "sympy.Expr") -> "sympy.Expr":
-    """Return the distance of ``p`` from a line on which its foot is at ``at``."""
-    w, u = minus(p, start), minus(end, start)
-    return norm((w[0] - at * u[0], w[1] - at * u[1], w[2] - at * u[2]))
-
-
-def point_segment_distance(
-    at: "sympy.Expr", to_start: "sympy.Expr", to_end: "sympy.Expr", to_line: "sympy.Expr"
-) -> "sympy.Expr":
-    """Return the distance from a segment, given the foot and the three distances it may be."""
+def clamped(at: "sympy.Expr") -> "sympy.Expr":
+    """Return the position on a segment that is nearest to a position on its line."""
     import sympy
 
-    return sympy.Piecewise((to_start, at <= 0), (to_end, at >= 1), (to_line, True))
+    return sympy.Piecewise((0, at <= 0), (1, at >= 1), (at, True))
+
+
+def distance_from(p: "Point", start: "Point", end: "Point", at: "sympy.Expr") -> "sympy.Expr":
+    """Return the distance of ``p`` from the point of a line that is at ``at``.
+
+    It is least, and does not depend on ``at`` to the first order, where ``at`` is the foot of
+    ``p``; clamped to the segment, ``at`` is the foot or constant.
+    """
+    w, u = minus(p, start), minus(end, start)
+    return norm((w[0] - at * u[0], w[1] - at * u[1], w[2] - at * u[2]))
 
 
 def segment_segment_distance(
@@ -72,17 +79,26 @@ def segment_segment_distance(
 
     ``ends`` are the four distances of an end of one from the other segment.  Where the common
     perpendicular meets both segments it is the distance; elsewhere the least of ``ends`` is.
+
+    The perpendicular from ``x = a + s u`` to ``y = b + t v`` along the unit normal ``m`` has the
+    length ``m.(x - y)``, which does not depend on ``s``, ``t`` and ``m`` (``STATIONARY``) to the
+    first order: ``m.u = m.v = 0``, and ``x - y`` is along ``m``, whose change is orthogonal to it.
     """
     import sympy
 
     u, v, w = minus(first[1], first[0]), minus(second[1], second[0]), minus(first[0], second[0])
-    names = ("nx", "ny", "nz", "nn")
-    nx, ny, nz, nn = sympy.symbols(names, real=True)
-    normal = (nx, ny, nz)
+    names = ("nx", "ny", "nz", "nn", "per", *STATIONARY)
+    nx, ny, nz, nn, per, s, t, mx, my, mz = sympy.symbols(names, real=True)
+    normal, unit = (nx, ny, nz), (mx, my, mz)
     # Everything from the common normal n = u x v: |u|^2 |v|^2 - (u.v)^2 would lose all digits for
     # nearly parallel segments.  The foot on the first is at s/nn, on the second at t/nn.
-    definitions = dict(zip(names, (*cross(u, v), dot(normal, normal)), strict=True))
-    s, t = -dot(cross(w, v), normal), -dot(cross(w, u), normal)
-    crossing = sympy.And(nn > PARALLEL**2 * dot(u, u) * dot(v, v), 0 < s, s < nn, 0 < t, t < nn)
-    apart = sympy.Abs(dot(w, normal)) / sympy.sqrt(nn)
-    return definitions, sympy.Piecewise((apart, crossing), (sympy.Min(*ends), True))
+    past_first, past_second = -dot(cross(w, v), normal), -dot(cross(w, u), normal)
+    side = sympy.Piecewise((-1, dot(w, normal) < 0), (1, True))
+    common = (*cross(u, v), dot(normal, normal), side / sympy.sqrt(nn))
+    written = (*common, past_first * per**2, past_second * per**2, *(per * n for n in normal))
+    inside = sympy.And(0 < past_first, past_first < nn, 0 < past_second, past_second < nn)
+    crossing = sympy.And(nn > PARALLEL**2 * dot(u, u) * dot(v, v), inside)
+    between = tuple(w[i] + s * u[i] - t * v[i] for i in range(3))
+    apart = dot(between, unit)
+    distance = sympy.Piecewise((apart, crossing), (sympy.Min(*ends), True))
+    return dict(zip(names, written, strict=True)), distance

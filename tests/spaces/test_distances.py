@@ -21,11 +21,9 @@ LONGEST = 10.0
 
 
 def point_segment(p, start, end):
-    to_ends = [bodies.norm(bodies.minus(p, q)) for q in (start, end)]
-    at = bodies.foot(p, start, end)
-    return bodies.point_segment_distance(
-        at, *to_ends, bodies.point_line_distance(p, start, end, at)
-    )
+    along = bodies.minus(end, start)
+    at = bodies.clamped(bodies.foot(p, start, end, 1 / bodies.dot(along, along)))
+    return bodies.distance_from(p, start, end, at)
 
 
 @pytest.fixture(scope="module")
