@@ -27,6 +27,7 @@ from polycorner.spaces.manifold import Array
 
 # Distances, in scale units, at which lower points are sought where a gradient vanishes.
 DISTANCES = 10.0 ** np.arange(-5, 0)
+STEPS = (0.1, 0.01, 0.001)  # in scale units, at which a way down on the set itself is sought
 # Where several pieces meet, the first of these verdicts that any of them has decides.
 DECISIVE = (
     Verdict.NOT_STATIONARY,
@@ -112,7 +113,10 @@ def _analyse_piece(local: Local, piece: Piece, *, higher: bool = True) -> Analys
         result = replace(result, decision=decision, verdict=decision.verdict)
     elif verdict is Verdict.STRICT_MINIMUM and weak:
         result = replace(result, verdict=Verdict.WEAK_MINIMUM)
-    return _with_blind(result) if blind else result
+    result = _with_blind(result) if blind else result
+    if result.verdict is Verdict.NO_MULTIPLIER and higher and _falls_on_set(result):
+        return replace(result, verdict=Verdict.NOT_STATIONARY)
+    return result
 
 
 def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:
@@ -143,6 +147,26 @@ def _with_blind(a: Analysis) -> Analysis:
     if a.verdict in {Verdict.NOT_STATIONARY, Verdict.SADDLE} and _leads_down(a, way):
         return a
     return replace(a, verdict=Verdict.NO_MULTIPLIER)
+
+
+def _falls_on_set(a: Analysis) -> bool:
+    """Whether points of the set itself lie in the steepest direction, lower at its rate when near.
+
+    Dependent gradients do not exclude a way down, as those of two equal equations: the linearised
+    cone is then that of the set all the same.
+    """
+    local, problem = a.local, a.local.problem
+    rate, way = steepest_descent(a)
+    if rate <= local.small:
+        return False
+    for step in STEPS:
+        ahead = local.point + step * way * problem.scales
+        reached, point = problem.restore(frozenset(a.active), ahead)
+        moved = float(np.linalg.norm((point - ahead) / problem.scales))
+        fall = float(local.values[-1] - problem.energy.value(point))
+        if not (reached and moved <= step / 4 and (step == STEPS[0] or fall >= rate * step / 2)):
+            return False
+    return True
 
 
 def _leads_down(a: Analysis, way: Array) -> bool:

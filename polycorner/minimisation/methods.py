@@ -16,6 +16,7 @@ from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.rescaling import PATIENCE, rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.verdicts import Verdict
+from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
 from polycorner.spaces.manifold import Array
@@ -249,6 +250,8 @@ def _diagnosing(method: Method) -> Descent:
 
     def descent(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
         end = plain(problem, piece, q, limit)
+        if end.failure is not None and problem.rows - problem.inequalities > 2:
+            end = _without_dependent(problem, piece, q, plain, limit, end)
         if end.failure is None and not end.flat:
             return end
         if end.failure is Verdict.INFEASIBLE or not _is_doubtful(problem, q, end):
@@ -256,6 +259,24 @@ def _diagnosing(method: Method) -> Descent:
         return _diagnosed(problem, piece, q, limit, end)
 
     return descent
+
+
+def _without_dependent(
+    problem: Problem, piece: Piece, q: Array, plain: Descent, limit: int, end: Endpoint
+) -> Endpoint:
+    """Repeat a failed descent with independent equations that imply the others nearby."""
+    d, m = problem.polyhedron, problem.inequalities
+    chosen = independent_equations(d, [end.point, q])
+    if len(chosen) == len(d.equations):
+        return end
+    parts = [d.functions[i] for i in sorted(piece)]
+    kept = Polyhedron(d.manifold, parts, [d.equations[i - m] for i in chosen])
+    smaller = pose(kept, problem.energy)
+    found = plain(smaller, frozenset(range(len(piece))), q, limit)
+    values, gradients = problem.evaluate(found.point, 1)
+    if not (abs(distances(values[m:-1], gradients[m:-1])) <= TOLERANCE).all():
+        return end
+    return found
 
 
 def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:

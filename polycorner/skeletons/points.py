@@ -8,11 +8,11 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 
 import numpy as np
 
-from polycorner.polyhedra.cones import independent_rows, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
+from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
@@ -24,11 +24,6 @@ LAST = 1e-8
 # Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
 SINGULAR = 1e-14
 NEWTON = 8
-# For the rank of equations: points that are looked at, distances in scale units of points beside
-# them, and steps to the equations.
-RANKED = 4
-AROUND = (1e-3, 0.1, 1.0)
-STEPS = 50
 # Tolerances within which a gradient must keep its direction.
 VICINITY = 10.0
 # Smallest diagonal entry of the triangular factor for which orbits count as independent.
@@ -204,61 +199,6 @@ class HeldPoint(EvaluatedPoint):
             return 1.0
         frame = np.vstack([self._normal.T, t])
         return float(np.sign(np.linalg.det(frame) * np.diagonal(self._factor).prod()))
-
-
-def independent_equations(polyhedron: Polyhedron, points: Iterable[Array]) -> tuple[int, ...]:
-    """Return positions of equations with independent gradients that span those of all equations.
-
-    The rank of equations on the set is the largest near given points: near, because it may fall
-    short at the points themselves; on the set, because beside it dependent equations, such as one
-    equation and its square, may have independent gradients.  Equations whose gradients vary least
-    in size come first: those of squares vanish on the set, those of multiples may.
-
-    Parameters
-    ----------
-    polyhedron : Polyhedron
-        The set.
-    points : iterable of (n,) arrays
-        Points on the set or beside it.
-    """
-    first, count = len(polyhedron.functions), len(polyhedron.equation_names)
-    rng, scales = np.random.default_rng(0), polyhedron.manifold.scale_array
-    found = (
-        _on_equations(polyhedron, q + radius * scales * rng.standard_normal(len(q)))
-        for q in islice(points, RANKED if count > 1 else 0)
-        for radius in AROUND
-    )
-    samples = [gradients for gradients in found if gradients is not None]
-    if not samples:
-        return tuple(range(first, first + count))
-    sizes = np.linalg.norm(samples, axis=2)
-    steady = sizes.min(axis=0) / np.maximum(sizes.max(axis=0), 1e-300)
-    order = np.argsort(-steady, kind="stable").tolist()
-    most = max((_first_independent(gradients, order) for gradients in samples), key=len)
-    return tuple(first + i for i in sorted(most))
-
-
-def _first_independent(gradients: Array, order: list[int]) -> list[int]:
-    """Return the positions, taken in order, of rows that are independent of those before."""
-    chosen: list[int] = []
-    for i in order:
-        if rank(gradients[[*chosen, i]], RANK_TOLERANCE) > len(chosen):
-            chosen.append(i)
-    return chosen
-
-
-def _on_equations(polyhedron: Polyhedron, q: Array) -> Array | None:
-    """Return the gradients of all equations where Gauss and Newton's steps to them end, if so."""
-    first, scales = len(polyhedron.functions), polyhedron.manifold.scale_array
-    for _ in range(STEPS):
-        values, gradients = (part[first:] for part in evaluated(polyhedron, q))
-        if not (np.isfinite(values).all() and np.isfinite(gradients).all()):
-            return None
-        step = -np.asarray(np.linalg.lstsq(gradients, values, rcond=RANK_TOLERANCE)[0])
-        if np.linalg.norm(step) <= LAST:
-            return gradients
-        q = q + scales * step
-    return None
 
 
 def projected(
