@@ -28,6 +28,7 @@ from polycorner.spaces.manifold import Array
 # Distances, in scale units, at which lower points are sought where a gradient vanishes.
 DISTANCES = 10.0 ** np.arange(-5, 0)
 STEPS = (0.1, 0.01, 0.001)  # in scale units, at which a way down on the set itself is sought
+ON = 1e-9  # distance, in scale units, up to which a point counts as one of the set
 # Where several pieces meet, the first of these verdicts that any of them has decides.
 DECISIVE = (
     Verdict.NOT_STATIONARY,
@@ -159,12 +160,16 @@ def _falls_on_set(a: Analysis) -> bool:
     rate, way = steepest_descent(a)
     if rate <= local.small:
         return False
+    smaller = problem.with_independent_equations(frozenset(a.active), [local.point])
+    everything = frozenset(range(smaller.inequalities))
     for step in STEPS:
         ahead = local.point + step * way * problem.scales
-        reached, point = problem.restore(frozenset(a.active), ahead)
+        reached, point = smaller.restore(everything, ahead)
         moved = float(np.linalg.norm((point - ahead) / problem.scales))
         fall = float(local.values[-1] - problem.energy.value(point))
-        if not (reached and moved <= step / 4 and (step == STEPS[0] or fall >= rate * step / 2)):
+        if not (reached and moved <= step / 4 and problem.equations_hold(point, ON)):
+            return False
+        if step < STEPS[0] and not fall >= rate * step / 2:
             return False
     return True
 

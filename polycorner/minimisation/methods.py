@@ -16,7 +16,6 @@ from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.rescaling import PATIENCE, rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.verdicts import Verdict
-from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
 from polycorner.spaces.manifold import Array
@@ -265,18 +264,11 @@ def _without_dependent(
     problem: Problem, piece: Piece, q: Array, plain: Descent, limit: int, end: Endpoint
 ) -> Endpoint:
     """Repeat a failed descent with independent equations that imply the others nearby."""
-    d, m = problem.polyhedron, problem.inequalities
-    chosen = independent_equations(d, [end.point, q])
-    if len(chosen) == len(d.equations):
+    smaller = problem.with_independent_equations(piece, [end.point, q])
+    if len(smaller.polyhedron.equations) == len(problem.polyhedron.equations):
         return end
-    parts = [d.functions[i] for i in sorted(piece)]
-    kept = Polyhedron(d.manifold, parts, [d.equations[i - m] for i in chosen])
-    smaller = pose(kept, problem.energy)
     found = plain(smaller, frozenset(range(len(piece))), q, limit)
-    values, gradients = problem.evaluate(found.point, 1)
-    if not (abs(distances(values[m:-1], gradients[m:-1])) <= TOLERANCE).all():
-        return end
-    return found
+    return found if problem.equations_hold(found.point, TOLERANCE) else end
 
 
 def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -199,6 +201,23 @@ class Problem(Value):
             flat, *masks, self.inequalities, self.rows, q / self.scales, *ways, steps, size
         )
         return change
+
+    def with_independent_equations(self, piece: Piece, points: Iterable[Array]) -> "Problem":
+        """Return the problem in one piece, of the equations there that imply the others.
+
+        These are independent near given points.
+        """
+        d, m = self.polyhedron, self.inequalities
+        chosen = independent_equations(d, points)
+        parts = [d.functions[i] for i in sorted(piece)]
+        return pose(
+            Polyhedron(d.manifold, parts, [d.equations[i - m] for i in chosen]), self.energy
+        )
+
+    def equations_hold(self, q: Array, tolerance: float) -> bool:
+        """Whether ``q`` lies on all equations, to first order within a distance."""
+        values, gradients = (part[self.inequalities : -1] for part in self.evaluate(q, 1))
+        return bool((abs(distances(values, gradients)) <= tolerance).all())
 
 
 def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:
