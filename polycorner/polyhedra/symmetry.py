@@ -110,6 +110,19 @@ class Symmetry(Value):
         """Return how far the continuous orbits of two points are apart, in scale units."""
         return float(abs(self.displacement(manifold, p, q)).max())
 
+    def possible(self, manifold: Manifold, p: Array, points: Array, tolerance: float) -> list[int]:
+        """Return the positions of points ``(k, n)`` that ``p`` may be carried to.
+
+        Distances alone exclude the others; nothing is excluded where relabellings or invariants
+        are functions of the user's.
+        """
+        if self.relabel is not None or self.invariants is not None:
+            return list(range(len(points)))
+        moved = np.array([element.apply(p) for element in self.group])
+        away = abs(manifold.difference(moved[:, None], points)) / manifold.scale_array
+        found: list[int] = np.flatnonzero((away.max(axis=-1) <= tolerance).any(axis=0)).tolist()
+        return found
+
     def relabellings(
         self, manifold: Manifold, p: Array, q: Array, tolerance: float
     ) -> list[Relabelling]:

@@ -82,9 +82,8 @@ class CornerRegistry:
             return None
         point = self._polished(point, active)
         key = self._key(point.q)
-        for k, record in enumerate(self.records):
-            if abs(record.key - key).max() > NEAR:
-                continue
+        for k in self._alike(point.q, key):
+            record = self.records[k]
             carried = self.symmetry.relabellings(self.manifold, point.q, record.point.q, SAME)
             there = self.names(record.active)
             same = [p for p in carried if renamed(self.names(active), p) == there]
@@ -96,6 +95,16 @@ class CornerRegistry:
                     f"are closer than {SAME:g} scale units: kept apart"
                 )
         return self._add(point, active, key)
+
+    def _alike(self, q: Array, key: Array) -> list[int]:
+        """Return the positions of the corners that a point may be."""
+        if not self.records:
+            return []
+        keys = np.array([record.key for record in self.records])
+        alike = np.flatnonzero(abs(keys - key).max(axis=1) <= NEAR)
+        points = np.array([self.records[k].point.q for k in alike]).reshape(-1, len(q))
+        found: list[int] = alike[self.symmetry.possible(self.manifold, q, points, SAME)].tolist()
+        return found
 
     def _polished(self, point: EvaluatedPoint, active: frozenset[int]) -> EvaluatedPoint:
         basis = point.basis(active)

@@ -246,46 +246,47 @@ class _Follower:
         return np.asarray(self.point.q + s * (chord + (1 - s) * ((1 - s) * out - s * back)))
 
     def _event(self, point: HeldPoint, t: Array) -> tuple[HeldPoint, Array] | None:
-        """Return the first point of this step where the face changes, and the tangent there."""
-        found: list[tuple[float, int, HeldPoint, bool]] = []
-        for j, sign in self._suspects(point, t):
-            record = self._closing(point, j, sign)
-            if record is not None:
-                found.append((record[0], j, record[1], record[2]))
-        for _, j, where, crosses in sorted(found, key=lambda item: item[:2]):
-            if self._matters(where):
-                return where, where.tangent(self.t)
-            if crosses:
+        """Return the first point where the face changes, and the tangent there; cut the step."""
+        event: tuple[HeldPoint, Array] | None = None
+        crossed: dict[int, HeldPoint | None] = {}
+        while self._chord(point) > 0:
+            ahead = [found for found in self._suspects(point, t) if found[0] not in crossed]
+            if not ahead:
+                break
+            j, sign = ahead[0]
+            where, crosses = self._closing(point, j, sign) or (None, False)
+            crossed[j] = where if crosses else None
+            if where is not None and self._matters(where):
+                point, t = event = where, where.tangent(self.t)
+        for j, where in crossed.items():
+            if where is not None and self._chord(where) < self._chord(point):
                 self.signs[self.watched == j] *= -1
-        return None
+        return event
 
     def _matters(self, where: HeldPoint) -> bool:
         """Whether the face changes here: in a union a zero may be irrelevant."""
-        if not self.union:
-            return True
-        active = where.active()
-        if active is None:
-            return True
-        held = set(self.point.kept).union(self.passive)
-        return not active <= held
+        active = where.active() if self.union else None
+        return active is None or not active <= set(self.point.kept).union(self.passive)
 
     def _suspects(self, point: HeldPoint, t: Array) -> list[tuple[int, float]]:
-        """Return functions that change sign or may dip to zero in this step, and their signs."""
+        """Return functions that change sign or may dip to zero in this step, and their signs.
+
+        Those expected to vanish early come first, those that may only dip last.
+        """
         here, there, rows = self.point, point, self.watched
         f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
         slope0 = self.signs * (here.gradients[rows] @ self.t)
         slope1 = self.signs * (there.gradients[rows] @ t)
         reach = np.maximum(here.sizes[rows], there.sizes[rows]) * self._chord(point)
         found = may_vanish((f0, f1), (slope0, slope1), reach, self._chord(point))
+        found.sort(key=lambda k: f0[k] / (f0[k] - f1[k]) if f1[k] < 0 < f0[k] else f1[k] >= 0)
         return [(int(rows[k]), float(self.signs[k])) for k in found]
 
     def _chord(self, point: HeldPoint) -> float:
         return float(np.linalg.norm((point.q - self.point.q) / self.scales))
 
-    def _closing(
-        self, point: HeldPoint, j: int, sign: float
-    ) -> tuple[float, HeldPoint, bool] | None:
-        """Return where function ``j`` first reaches zero: fraction, point, and whether it crosses.
+    def _closing(self, point: HeldPoint, j: int, sign: float) -> tuple[HeldPoint, bool] | None:
+        """Return where function ``j`` first reaches zero, and whether it crosses.
 
         A function that ends positive is followed to where its slope vanishes; there it touches
         (within the tolerance), has crossed before, or was only near.
@@ -302,20 +303,16 @@ class _Follower:
             if distance > self.quotient.tolerance:
                 return None
             if distance >= -self.quotient.tolerance:
-                return far, end, False
+                return end, False
 
         def value(s: float) -> tuple[float, HeldPoint]:
             at = self._between(point, s)
             return sign * float(at.values[j]), at
 
-        if end is point and self.point.is_curve:
-            quick = self._crossing(point, j)
-            if quick is not None:
-                return (*quick, True)
-        s, where = sign_change(value, far)
-        return s, where, end is point
+        quick = self._crossing(point, j) if end is point and self.point.is_curve else None
+        return quick or sign_change(value, far)[1], end is point
 
-    def _crossing(self, point: HeldPoint, j: int) -> tuple[float, HeldPoint] | None:
+    def _crossing(self, point: HeldPoint, j: int) -> HeldPoint | None:
         """Return where ``j`` crosses zero, by Newton's method; None if that leaves the step."""
         f0, f1 = self.point.values[j], point.values[j]
         guess = self._guess(point, f0 / (f0 - f1))
@@ -325,7 +322,7 @@ class _Follower:
             return None
         chord = (point.q - self.point.q) / self.scales
         s = float((record.q - self.point.q) / self.scales @ chord / (chord @ chord))
-        return (s, HeldPoint(self.quotient, record.q, self.point.kept)) if 0 <= s <= 1 else None
+        return HeldPoint(self.quotient, record.q, self.point.kept) if 0 <= s <= 1 else None
 
     def _return(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
         """Return where this step passes the start of the walk again, and the tangent there."""

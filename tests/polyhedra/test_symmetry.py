@@ -267,3 +267,20 @@ class TestPieces:
         D = polytope(SQUARE, [1] * 4)
         one, other = skeleton(D, [[0.1, 0.2]]), skeleton(D, [[0.1, 0.2]], symmetry=Symmetry())
         assert isomorphic(one, other)
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 0.25, 0.5, 1.0, 3.0, 3.5 - math.tau]), min_size=12, max_size=12)
+)
+def test_points_that_are_excluded_at_once_are_carried_nowhere(numbers):
+    """Also across the ends of a circle, and exactly where no function of the user's decides."""
+    ring = Manifold(("r", "a"), periods=(math.inf, math.tau), scales=(1.0, 0.5))
+    turned = Element(lambda q: np.array([q[0], q[1] + 0.5]), {"f": "g", "g": "f"})
+    points = np.reshape(numbers, (6, 2))
+    plain = Symmetry(elements=[turned])
+    by_invariant = Symmetry(elements=[turned], invariants=lambda q: q[:1])
+    for symmetry in (plain, by_invariant):
+        found = symmetry.possible(ring, points[0], points, 1e-6)
+        carried = [k for k in range(6) if symmetry.relabellings(ring, points[0], points[k], 1e-6)]
+        assert set(carried) <= set(found)
+        assert symmetry is by_invariant or carried == found
