@@ -25,6 +25,7 @@ from polycorner.printing import angle_unit, number
 from polycorner.spaces.manifold import Array
 
 DIGITS = 6
+VANISHING = 1e-3  # slope, relative to that of the parabola, at which a value counts as stationary
 SEEN = 1e-6  # smallest component of a unit direction that is shown
 
 
@@ -107,10 +108,17 @@ def _missed(a: Analysis, unit: str | None) -> str:
     else:
         worst = int(np.flatnonzero(away[:m] == short)[0])
         violated = f"the inequality {d.names[worst]}"
+    slope, bend = abs(local.gradients[worst]).max(), abs(local.hessians[worst]).max()
+    vanishing = slope <= VANISHING * np.sqrt(abs(local.values[worst]) * bend)
+    size = (
+        "and its gradient vanishes there: no small step changes it to first order"
+        if vanishing
+        else f"to first order {number(abs(away[worst]), DIGITS)} scale units from zero (tolerance "
+        f"{local.tolerance:g})"
+    )
     text = (
         f"The largest violation is that of {violated}: its function is "
-        f"{_with(local.values[worst], unit)}, to first order {number(abs(away[worst]), DIGITS)} "
-        f"scale units from zero (tolerance {local.tolerance:g})."
+        f"{_with(local.values[worst], unit)}, {size}."
     )
     failing = [d.names[i] for i in np.flatnonzero(away[:m] < -local.tolerance) if i != worst]
     failing += [

@@ -23,6 +23,7 @@ from polycorner.spaces.manifold import Array
 
 EVALUATIONS = 400  # limit of each least-squares minimisation
 STATIONARY = 1e-6  # slope of the violation, relative to its size, that counts as zero
+REFINEMENTS = 30  # steps of Newton's method at the end
 MOVES = (1e-2, 1.0)  # lengths of random steps off a stationary point, in scale units
 
 
@@ -66,6 +67,7 @@ def approach(problem: Problem, piece: Piece, q: Array) -> Approach:
         other, less = violation.least(u + move * rng.standard_normal(u.size))
         if less < size:
             u, size = other, less
+    u = violation.refined(u)
     return Approach(u * problem.scales, feasible=False, stationary=violation.is_stationary(u))
 
 
@@ -106,7 +108,32 @@ class _Violation:
             )
         return end.x, float(np.sqrt(2 * end.cost))
 
+    def refined(self, u: Array) -> Array:
+        """Return a nearby stationary point by Newton's method, or the last point that is better.
+
+        The Hessian of ``|v|^2 / 2`` is ``dv^T dv + sum v_i d^2 v_i``.  Least squares without the
+        second term converge slowly where the violation is large and curved.
+        """
+        slope = self.slope(u)
+        for _ in range(REFINEMENTS):
+            if not np.isfinite(slope).all() or not slope.any():
+                break
+            v, rows = self.residuals(u), self.jacobian(u)
+            hessians = self.problem.evaluate(u * self.problem.scales, 2)[2][self.rows]
+            curved = rows.T @ rows + np.tensordot(v * self.weights, hessians, axes=1)
+            if not np.isfinite(curved).all():
+                break
+            after = u - np.linalg.lstsq(curved, slope, rcond=1e-12)[0]
+            left = self.slope(after)
+            if not np.linalg.norm(left) < np.linalg.norm(slope):
+                break
+            u, slope = after, left
+        return u
+
+    def slope(self, u: Array) -> Array:
+        """Return the gradient of ``|v|^2 / 2``."""
+        return np.asarray(self.residuals(u) @ self.jacobian(u))
+
     def is_stationary(self, u: Array) -> bool:
-        v, rows = self.residuals(u), self.jacobian(u)
-        slope = float(abs(v @ rows).max(initial=0.0))
-        return bool(slope <= STATIONARY * float(np.linalg.norm(v)))
+        slope = float(abs(self.slope(u)).max(initial=0.0))
+        return bool(slope <= STATIONARY * float(np.linalg.norm(self.residuals(u))))

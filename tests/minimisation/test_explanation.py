@@ -202,7 +202,7 @@ def test_dependent_contacts_that_are_pulled_open():
 
 
 def test_a_cusp_decides_nothing():
-    text = certify(Polyhedron(M2, {"a": y - x**2, "b": 2 * x**2 - y}), x, [0.0, 0.0]).explain()
+    text = certify(Polyhedron(M2, {"a": y - x**2, "b": -(x**2) - y}), x, [0.0, 0.0]).explain()
     assert text.startswith("Undecided: no multipliers exist")
     assert "The gradients of a, b are dependent and leave no inward direction" in text
     assert "decreases" not in text
@@ -265,6 +265,12 @@ def test_angles_bear_their_unit():
     phi, s = M.symbols
     text = certify(Polyhedron(M, {"floor": s}), s + sp.sin(phi), [0.0, 0.0]).explain()
     assert "(dphi = -0.5 rad) at the rate 0.5 per scale unit" in text
+
+
+def test_a_way_down_between_tangent_parabolas_is_seen():
+    c = certify(Polyhedron(M2, {"a": y - x**2, "b": 2 * x**2 - y}), x, [0.0, 0.0])
+    assert c.verdict is Verdict.NOT_STATIONARY
+    assert "(dx = -1)" in c.explain()
 
 
 def test_searches_that_failed_say_so():

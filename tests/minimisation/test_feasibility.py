@@ -110,3 +110,17 @@ def test_the_other_branch_of_a_union_is_reached():
     found = minimise(D, x**2 + y, [0.0, 0.0])
     assert found.is_minimum
     assert found.point == pytest.approx([0, 51], abs=1e-9)
+
+
+@given(st.integers(-9, 9), st.integers(-9, 9), st.integers(-3, 3))
+def test_an_empty_disc_is_explained_without_a_distance(p, q, order):
+    """Where a gradient vanishes, a distance to first order would say nothing."""
+    empty = SmoothFunction.member(
+        BOWL, "bowl", PLANE, parameters=[1.0, 0.0, 1.0, 0.0, 0.0, -(10.0**order)]
+    )
+    found = minimise(Polyhedron(PLANE, [empty]), x + y, [float(p), float(q) + 0.5])
+    assert found.verdict is Verdict.INFEASIBLE
+    assert found.point == pytest.approx([0, 0], abs=1e-3)
+    text = found.explain()
+    assert "its gradient vanishes there" in text
+    assert "scale units" not in text

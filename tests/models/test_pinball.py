@@ -299,11 +299,11 @@ def test_the_top_of_a_pin_is_no_place_to_rest():
 
 
 def test_no_minimum_is_asserted_in_the_cusp_between_two_pins_that_touch():
-    """The ball does rest there, but no multiplier can say so."""
+    """A ball would rest there, but the set goes on below, through the single point of contact."""
     board = Pinball(pins=[(2, 4, 0.5), (3, 4, 0.5)], wedges=(), cups=())
     cusp = certify(board.polyhedron, board.energy, [2.5, 4.0])
     assert cusp.stratum.local_type is LocalType.DEGENERATE
-    assert cusp.verdict is Verdict.NO_MULTIPLIER
+    assert cusp.verdict is Verdict.NOT_STATIONARY
     assert not any(np.allclose(c, [2.5, 4]) for c in board.corners())
 
 
