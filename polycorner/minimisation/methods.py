@@ -13,7 +13,7 @@ from polycorner.minimisation.escapes import escape
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.polishing import SETTLED, Endpoint
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.rescaling import PATIENCE, rescaled
+from polycorner.minimisation.rescaling import PATIENCE, advice, rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
@@ -289,6 +289,7 @@ def _diagnosed(problem: Problem, piece: Piece, q: Array, limit: int, end: Endpoi
         return replace(end, note=f"It was stopped after {end.iterations} steps.")
     found = escape(problem, piece, q)
     if found.verdict is Verdict.NOT_CONVERGED or (found.verdict is None and end.failure is None):
-        return end if end.failure is None else replace(end, failure=found.verdict, note=found.note)
+        note = f"{found.note} {advice(problem, end.point)}".lstrip()
+        return end if end.failure is None else replace(end, failure=found.verdict, note=note)
     point = end.point if end.failure is found.verdict else found.point
     return Endpoint(point, end.iterations, found.verdict, found.note)

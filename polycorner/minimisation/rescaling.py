@@ -15,6 +15,7 @@ import numpy as np
 
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Piece
+from polycorner.printing import number
 from polycorner.spaces.manifold import Array
 
 End = tuple[int, int, Array, Array]  # status, iterations, point, multipliers
@@ -60,3 +61,15 @@ def estimated_scales(problem: Problem, q: Array, multipliers: Array) -> Iterator
         flat = sizes <= FLAT * sizes.max()
         yield np.where(flat, magnitudes, np.sqrt(sizes.max() / np.where(flat, 1.0, sizes)))
     yield magnitudes
+
+
+def advice(problem: Problem, q: Array) -> str:
+    """Return in words which scales of the manifold the curvatures at a point suggest, if others."""
+    scales = next(estimated_scales(problem, q, np.zeros(problem.rows - 1)))
+    if not np.isfinite(scales).all() or np.ptp(np.log(scales / problem.scales)) < np.log(UNEVEN):
+        return (
+            "No other scales of single coordinates suggest themselves; more steps may help "
+            "(max_iterations)."
+        )
+    shown = ", ".join(number(scale, 2) for scale in scales / scales.min() * problem.scales.min())
+    return f"A manifold with scales=({shown}) would suit the curvatures there."

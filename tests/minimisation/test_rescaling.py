@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, Verdict, minimise
 from polycorner.formulas import Family
+from polycorner.minimisation.problem import pose
+from polycorner.minimisation.rescaling import advice
 
 PLANE = Manifold.euclidean("x y")
 x, y = PLANE.symbols
@@ -66,3 +68,24 @@ def test_a_small_limit_still_cuts_a_search_short():
     assert found.verdict is Verdict.NOT_CONVERGED
     assert found.iterations == 3
     assert np.isfinite(found.energy)
+
+
+@pytest.mark.parametrize("order", [8, 9])
+def test_a_search_that_stopped_says_what_may_help(order):
+    """The banks of a bent valley are steep in both coordinates: no scales of theirs help."""
+    found = minimise(FREE, (1 - x) ** 2 + 10**order * (y - x**2) ** 2, [-1.2, 1.0])
+    if found.verdict is Verdict.NOT_CONVERGED:
+        assert "No other scales" in found.explain()
+        assert "max_iterations" in found.explain()
+    assert not found.is_minimum or found.point == pytest.approx([1, 1], abs=1e-3)
+
+
+@given(powers, powers)
+def test_scales_are_suggested_where_curvatures_differ(i, j):
+    E = SmoothFunction.member(BOWL, "bowl", PLANE, parameters=[10.0**i, 10.0**j])
+    text = advice(pose(FREE, E), np.array([1.0, 1.0]))
+    if abs(i - j) < 3:
+        assert "No other scales" in text
+    else:
+        low = min(i, j)
+        assert f"scales=({10.0 ** (i - low):.2g}, {10.0 ** (j - low):.2g})" in text
