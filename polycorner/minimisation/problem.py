@@ -77,7 +77,7 @@ class Problem(Value):
         if order >= 1:
             results[1] = results[1] * self.scales
         if order >= 2:
-            results[2] = results[2] * np.outer(self.scales, self.scales)
+            results[2] *= np.outer(self.scales, self.scales)  # (M, n, n) may be large: no copy
         return tuple(results)
 
     @cached_property

@@ -79,13 +79,11 @@ def normalised_rows(F, J, use, m):
 def lagrangian_hessian(H, lam):
     """Return the Hessian of ``E - sum lam f``."""
     never_inline()
-    n = H.shape[1]
-    L = np.empty((n, n))
-    for a in range(n):
-        for c in range(n):
-            L[a, c] = H[lam.size, a, c]
-            for i in range(lam.size):
-                if lam[i] != 0.0:
+    L = H[lam.size].copy()
+    for i in range(lam.size):
+        if lam[i] != 0.0:
+            for a in range(L.shape[0]):
+                for c in range(L.shape[1]):
                     L[a, c] -= lam[i] * H[i, a, c]
     return L
 
@@ -95,10 +93,12 @@ def all_finite(J, H, lam, last):
     """Whether all gradients, and the Hessians with a nonzero multiplier, are finite."""
     never_inline()
     for i in range(last + 1):
+        curved = i == last or lam[i] != 0.0
         for a in range(J.shape[1]):
             if not np.isfinite(J[i, a]):
                 return False
-            for b in range(J.shape[1]):
-                if (i == last or lam[i] != 0.0) and not np.isfinite(H[i, a, b]):
-                    return False
+            if curved:
+                for b in range(J.shape[1]):
+                    if not np.isfinite(H[i, a, b]):
+                        return False
     return True

@@ -29,10 +29,13 @@ def project_out(Q, R, count, w):
 
 
 @njit
-def orthonormalise(W, active, count, Q, R):
-    """Orthonormalise the active rows of ``W`` by Gram-Schmidt with one reorthogonalisation."""
+def orthonormalise(W, active, known, count, Q, R):
+    """Orthonormalise the active rows of ``W`` by Gram-Schmidt with one reorthogonalisation.
+
+    The first ``known`` of them are so already.
+    """
     never_inline()
-    for j in range(count):
+    for j in range(known, count):
         rest, _, y = project_out(Q, R, j, W[active[j]])
         for k in range(j):
             R[k, j] = y[k]
@@ -89,7 +92,7 @@ def solve_quadratic(L, g, A, b, equations):
     lam, sign = np.zeros(rows), np.zeros(rows)
     active, is_active = np.empty(rows + 1, np.int64), np.zeros(rows, np.bool_)
     Q, R = np.zeros((n, n)), np.zeros((n, n))
-    count, failed = np.int64(0), False
+    count, known, failed = np.int64(0), np.int64(0), False
     for _ in range(20 * (rows + n) + 20):
         p = most_violated(A, b, x, is_active, rows - equations, rows, True)
         if p < 0:
@@ -100,7 +103,8 @@ def solve_quadratic(L, g, A, b, equations):
         for k in range(n):
             W[p, k] *= sign[p]
         while True:
-            orthonormalise(W, active, count, Q, R)
+            orthonormalise(W, active, known, count, Q, R)
+            known = count
             rest, r, _ = project_out(Q, R, count, W[p])
             size = length(rest)
             independent = size > 1e-10 * length(W[p])
@@ -130,7 +134,7 @@ def solve_quadratic(L, g, A, b, equations):
             lam[active[drop]] = 0.0
             for j in range(drop, count - 1):
                 active[j] = active[j + 1]
-            count -= 1
+            count, known = count - 1, drop
         if failed:
             break
     for i in range(rows):
