@@ -14,10 +14,12 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
-from polycorner.skeletons.explorer import Explorer, SearchState
+from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import End
 
@@ -68,6 +70,11 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
         "starts": [[count, start.tolist()] for count, start in explorer.starts],
         "pending": list(explorer.pending),
         "tried": sorted(map(_flag, explorer.tried), key=str),
+        "patches": [[sorted(p.active), p.point.tolist()] for p in explorer.patches],
+        "links": [sorted(map(list, link), key=str) for link in explorer.links],
+        "origins": [q.tolist() for q in explorer.origins],
+        "least": {name: number(x) for name, x in explorer.least.items()},
+        "sought": list(explorer.sought),
         "notes": explorer.notes,
         "lost": bool(explorer.registry.lost),
         "random": _listed(explorer.rng.bit_generator.state),
@@ -144,6 +151,12 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> E
     explorer.starts.extend((count, _points(start, n, 1)) for count, start in content["starts"])
     explorer.pending.extend((corner, ray) for corner, ray in content["pending"])
     explorer.tried.update(map(_read_flag, content["tried"]))
+    for active, point in content.get("patches", ()):
+        explorer.patches.append(Patch(frozenset(active), _points(point, n, 1)))
+    explorer.links += [frozenset(map(_anchor, link)) for link in content.get("links", ())]
+    explorer.origins += [_points(q, n, 1) for q in content.get("origins", ())]
+    explorer.least.update({k: read_number(x) for k, x in content.get("least", {}).items()})
+    explorer.sought = _pair(content.get("sought")) or explorer.sought
     for sentence in content["notes"]:
         explorer.registry.note(sentence)
     explorer.registry.lost = bool(content["lost"])
@@ -221,6 +234,11 @@ def _read_curve(entry: dict[str, Any], n: int) -> Curve:
 
 def _pair(half: list[int] | None) -> tuple[int, int] | None:
     return None if half is None else (half[0], half[1])
+
+
+def _anchor(written: list[Any]) -> Anchor:
+    kind, where = written
+    return kind, _pair(where) or (0, 0) if isinstance(where, list) else int(where)
 
 
 def _flag(flag: Flag) -> list[Any]:

@@ -1,4 +1,4 @@
-from .elements import Completeness, Corner, Edge, Face, Skeleton
+from .elements import Completeness, Contact, Corner, Edge, Face, Skeleton
 from .explorer import Budget
 from .refinement import traced
 from .search import resume, skeleton
@@ -7,6 +7,7 @@ from .walks import End
 __all__ = [
     "Budget",
     "Completeness",
+    "Contact",
     "Corner",
     "Edge",
     "End",

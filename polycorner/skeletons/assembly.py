@@ -1,16 +1,22 @@
 """A frozen skeleton from what a search found."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
 from polycorner.polyhedra.symmetry import renamed
-from polycorner.skeletons.elements import Completeness, Corner, Edge, Face, Skeleton
+from polycorner.skeletons.elements import Completeness, Contact, Corner, Edge, Face, Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Flag
+from polycorner.skeletons.indices import Border, seeds_of
+from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.vertex_figures import Ray
 from polycorner.skeletons.walks import End
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from networkx.utils import UnionFind
@@ -19,6 +25,7 @@ if TYPE_CHECKING:
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
     """Return the skeleton as far as it was found."""
     faces, components = _faces(explorer)
+    closed = tuple(_closed_face(explorer, patch) for patch in explorer.patches)
     corners = tuple(_corner(explorer, record) for record in explorer.records)
     edges = tuple(
         Edge(
@@ -37,11 +44,12 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
         polyhedron=explorer.polyhedron,
         corners=corners,
         edges=edges,
-        faces=faces,
+        faces=faces + closed,
         complete=complete,
         notes=tuple(explorer.notes),
         components=components,
         whole=_whole(explorer),
+        contacts=_contacts(explorer, corners, edges, faces + closed),
         state=explorer.state,
     )
 
@@ -105,9 +113,63 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
                     for curve in curves
                 ),
                 closed=not any(boundary[curve[0]] in loose for curve in curves),
+                border=_border(explorer, group, len(curves)),
             )
         )
     return tuple(faces), _components(explorer, flags, surface, len(faces))
+
+
+def _closed_face(explorer: Explorer, patch: Patch) -> Face:
+    border = Border(explorer.quotient, patch.active, patch.point[None], (), (), 0)
+    return Face(_ordered(explorer, explorer.registry.names(patch.active)), (), True, border)
+
+
+def _border(explorer: Explorer, group: list[Flag], curves: int) -> Border | None:
+    """Return the edges around a face, and its corners; None where they are not known."""
+    if explorer.symmetry.relabels or any(flag[0] == "apex" for flag in group):
+        return None
+    positions = sorted({_edge_of(explorer, flag) for flag in group} - {-1})
+    around = [explorer.curves[k] for k in positions]
+    members, corners = set(group), []
+    for k, record in enumerate(explorer.records):
+        for sector in record.figure.sectors:
+            names = explorer.registry.names(sector.active)
+            rays = sector.rays
+            if rays and ("half", (k, rays[0]), names) in members:
+                first, last = (
+                    _ray(record.figure.rays[i]) for i in (sector.rays[0], sector.rays[-1])
+                )
+                corners.append((first, last))
+    names = group[0][2]
+    return Border(
+        quotient=explorer.quotient,
+        active=frozenset(i for i, name in enumerate(explorer.polyhedron.names) if name in names),
+        seeds=seeds_of([curve.points for curve in around]) if around else np.empty((0, 0)),
+        edges=tuple((c.active, c.points, c.start is None) for c in around),
+        corners=tuple(corners),
+        curves=curves,
+    )
+
+
+def _ray(ray: Ray) -> tuple[frozenset[int], Array]:
+    return ray.active, np.array([ray.sample.q, ray.direction])
+
+
+def _contacts(
+    explorer: Explorer,
+    corners: Sequence[Corner],
+    edges: Sequence[Edge],
+    faces: Sequence[Face],
+) -> dict[str, Contact]:
+    kinds = [
+        Counter(name for part in parts for name in part.active) for parts in (corners, edges, faces)
+    ]
+    found = {}
+    for name in explorer.polyhedron.names:
+        at, along, on = (kind[name] for kind in kinds)
+        least = None if at or along or on else explorer.least.get(name)
+        found[name] = Contact(at, along, on, least)
+    return found
 
 
 def _groups(sets: "UnionFind", flags: Iterable[Flag]) -> list[list[Flag]]:
@@ -194,20 +256,41 @@ def _components(
 ) -> dict[int, int]:
     from networkx.utils import UnionFind
 
-    point = explorer.records[0].point if explorer.records else None
-    if point is None and not explorer.curves:
+    points = [record.point.q for record in explorer.records[:1]]
+    points += [curve.points[0] for curve in explorer.curves[:1]]
+    points += [patch.point for patch in explorer.patches[:1]]
+    if not points:
         return {}
-    if point is None:
-        point = explorer.quotient.at(explorer.curves[0].points[0])
+    point = explorer.quotient.at(points[0])
     fixed = len(point.matrix([])) - len(explorer.quotient.equations)
     free = explorer.manifold.dimension - len(point.matrix([]))
     counts = {fixed: len(explorer.records), fixed + 1: len(explorer.curves)}
     if free >= 2:
-        counts[fixed + 2] = faces
+        counts[fixed + 2] = faces + len(explorer.patches)
     if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
-        inside = UnionFind()
+        inside = UnionFind([("patch", k) for k in range(len(explorer.patches))])
         for flag in flags:
             if flag[0] != "apex":
                 inside.union(("edge", _edge_of(explorer, flag)), surface[flag])
-        counts[fixed + 3] = len({inside[surface[flag]] for flag in flags})
+        for link in explorer.links:
+            inside.union(*(place for anchor in link for place in _places(explorer, anchor)))
+        every = [("patch", k) for k in range(len(explorer.patches))]
+        counts[fixed + 3] = len({inside[x] for x in [*every, *(surface[f] for f in flags)]})
     return counts
+
+
+def _places(explorer: Explorer, anchor: Anchor) -> Iterator[tuple[str, int]]:
+    """Yield the edges that something a descent arrived at stands for, or the closed face."""
+    kind, where = anchor
+    if kind == "patch" and isinstance(where, int):
+        yield "patch", where
+    elif kind == "curve" and isinstance(where, int):
+        yield "edge", where
+    elif kind == "corner" and isinstance(where, int):
+        if not explorer.records[where].figure.singular:
+            yield from (("edge", k) for k in explorer.records[where].edges.values())
+    elif isinstance(where, tuple):
+        record = explorer.records[where[0]]
+        found = record.edges.get(record.orbit[where[1]])
+        if found is not None:
+            yield "edge", found

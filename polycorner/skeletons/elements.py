@@ -11,6 +11,7 @@ from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
 from polycorner.skeletons.arcs import arc_length
 from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.indices import Border, face_euler_characteristic
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
 class Completeness(Enum):
     """Completeness of a skeleton; the value is a sentence."""
 
-    EXHAUSTED = "every edge that was found is traced; what no start leads to stays unseen"
+    EXHAUSTED = "all that was met is traced; islands were sought by sampling, not excluded"
     GAPS = "some edges could not be traced: the notes say which"
     BUDGET = "budget or time was used up: edges or faces are left"
     INTERRUPTED = "interrupted: edges or faces are left"
-    SEEDS = "no start leads to an edge or a corner"
+    SEEDS = "no start leads to a corner, an edge or a closed face"
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ class Edge(Value):
 
 
 @dataclass(frozen=True)
-class Face:
+class Face(Value):
     """A two-dimensional face, modulo the symmetry.
 
     Attributes
@@ -126,20 +127,54 @@ class Face:
     active : tuple of str
         Functions that vanish on it.
     boundary : tuple of tuple of int
-        Its boundary curves, each as the positions of its edges; none for an apex.
+        Its boundary curves, each as the positions of its edges; none for an apex or a closed
+        surface.
     closed : bool
         Whether every boundary curve closes: no end at infinity, and no corner where the face
         could not be followed.
+    border : Border or None
+        What its Euler characteristic is computed from.
     """
 
     active: tuple[str, ...]
     boundary: tuple[tuple[int, ...], ...]
     closed: bool
+    border: Border | None = field(default=None, compare=False, repr=False)
+
+    @cached_property
+    def euler_characteristic(self) -> int | None:
+        """That of the face with its boundary, from the critical points of heights on it.
+
+        A disc with ``b`` holes and ``g`` handles has ``1 - b - 2 g``.  None where it is not
+        determined: the face is not compact, a net does not cover it or leaves it where no edge
+        was found, heights do not agree, or the search divided by a finite symmetry.  Computed
+        when it is asked for.
+        """
+        return face_euler_characteristic(self.border) if self.border and self.closed else None
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Where a function of a polyhedron vanishes on it, as far as was found.
+
+    Attributes
+    ----------
+    corners, edges, faces : int
+        On how many of them it is active.
+    least : float or None
+        Least value in the polyhedron that samples and minimisation found, if it was never met;
+        None if it was met, or no islands were sought.
+    """
+
+    corners: int
+    edges: int
+    faces: int
+    least: float | None
 
     @property
-    def euler_characteristic(self) -> int:
-        """That of a sphere with as many holes as there are boundary curves."""
-        return 2 - len(self.boundary)
+    def met(self) -> bool:
+        """Whether it is active anywhere."""
+        return self.corners + self.edges + self.faces > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +198,8 @@ class Skeleton(Printed, Value):
     whole : bool
         Whether faces were assembled everywhere: not where a face lies on both sides of an edge,
         or modulo relabellings.
+    contacts : mapping from str to Contact
+        For every function where it is active, or the least value that was found.
     state : object
         The state of the search, for :func:`resume`.
     """
@@ -175,6 +212,7 @@ class Skeleton(Printed, Value):
     notes: tuple[str, ...]
     components: Mapping[int, int]
     whole: bool = True
+    contacts: Mapping[str, Contact] = field(default_factory=dict)
     state: Any = None
 
     def __repr__(self) -> str:
@@ -184,25 +222,24 @@ class Skeleton(Printed, Value):
 
     def _sheet(self) -> Sheet:
         notes = (f"Note: {note}" for note in self.notes)
-        tables = (_corner_table(self), _edge_table(self), _face_table(self))
-        return Sheet(
-            "Skeleton",
-            (facts(_counts(self)), *tables, *notes, units(self.polyhedron.manifold.periods)),
-        )
+        tables = (table(self) for table in (_corner_table, _edge_table, _face_table))
+        unit = units(self.polyhedron.manifold.periods)
+        contacts = list(_contact_table(self))
+        return Sheet("Skeleton", (facts(_counts(self)), *tables, *contacts, *notes, unit))
 
     @property
     def euler_characteristic(self) -> int | None:
         """Corners minus edges plus the Euler characteristics of the faces.
 
         It is that of the union of all of them: the polyhedron itself if it has dimension two,
-        its boundary if it has dimension three, provided that faces have no handles.  A closed
-        edge counts zero.  It is that of what was found, without islands that no start leads to.
+        its boundary if it has dimension three.  A closed edge counts zero.  It is that of what
+        was found, without islands that were not.
         None where it is not determined; :attr:`euler_note` gives the reason.
         """
         if self.euler_note:
             return None
         open_edges = sum(not edge.is_closed for edge in self.edges)
-        surfaces = sum(face.euler_characteristic for face in self.faces)
+        surfaces = sum(face.euler_characteristic or 0 for face in self.faces)
         return len(self.corners) - open_edges + surfaces
 
     @property
@@ -218,6 +255,8 @@ class Skeleton(Printed, Value):
             return "the boundary of a face is not closed"
         if not self.whole:
             return "faces were not assembled everywhere"
+        if any(face.euler_characteristic is None for face in self.faces):
+            return "that of a face is not determined"
         return ""
 
     @cached_property
@@ -303,10 +342,19 @@ def _face_table(found: Skeleton) -> Table:
         (
             str(k),
             names(face.active) or "-",
-            "; ".join(" ".join(map(str, curve)) for curve in face.boundary),
+            "; ".join(" ".join(map(str, curve)) for curve in face.boundary) or "-",
             "yes" if face.closed else "no",
         )
         for k, face in enumerate(found.faces)
     )
     head = ("face", "active", "edges around it", "closed")
     return listed("Faces", head, rows, len(found.faces), (0,))
+
+
+def _contact_table(found: Skeleton) -> Iterator[Table]:
+    missed = [(name, c.least) for name, c in found.contacts.items() if not c.met]
+    if not missed:
+        return
+    rows = ((name, "not sought" if least is None else number(least, 6)) for name, least in missed)
+    head = ("never met", "least value found")
+    yield listed("Functions", head, rows, len(missed), (1,))

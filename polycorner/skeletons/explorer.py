@@ -4,7 +4,7 @@ import copy
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from time import monotonic
@@ -17,16 +17,18 @@ from polycorner.skeletons.elements import Completeness
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.links import SAMPLED, Link, singular_figure
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
-from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
 from polycorner.skeletons.singularities import singular_point, singular_points
-from polycorner.skeletons.tracing import Curve, EdgeEnd, EdgeTracer
+from polycorner.skeletons.states import SearchState, copied
+from polycorner.skeletons.tracing import Curve, EdgeEnd
 from polycorner.skeletons.vertex_figures import Ray, faces_beside
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
 
 # Random directions of a descent.
 DIRECTIONS = 6
+# Points of a closed edge that a face is crossed from.
+ACROSS = 6
 # Points of a face from which its singular points are sought.
 TRIES = 4
 # The first walks of a descent end after this part of the extent.
@@ -59,66 +61,26 @@ class Budget:
         checks.real("seconds", self.seconds, above=0, infinite=True, unit="s")
 
 
-@dataclass(frozen=True, eq=False)
-class SearchState(Value):
-    """Everything that a search found and has left to do.
-
-    Attributes
-    ----------
-    quotient : Quotient
-        The polyhedron with its symmetry and tolerances.
-    records : tuple of CornerRecord
-        Corners.
-    curves : tuple of Curve
-        Edges.
-    crossings : tuple of Crossing
-        Straight ways across faces.
-    starts : tuple of (int, (n,) array)
-        Numbered starts that no descent was made from yet.
-    pending : tuple of EdgeEnd
-        Ends of edges to trace.
-    tried : frozenset
-        Faces beside edges and apexes that were crossed.
-    notes : tuple of str
-        What a user should know.
-    lost : bool
-        Whether something could not be followed.
-    rng : numpy.random.Generator
-        For the descents that are left.
-    """
-
-    quotient: Quotient
-    records: tuple[CornerRecord, ...]
-    curves: tuple[Curve, ...]
-    crossings: tuple[Crossing, ...]
-    starts: tuple[tuple[int, Array], ...]
-    pending: tuple[EdgeEnd, ...]
-    tried: frozenset[Flag]
-    notes: tuple[str, ...]
-    lost: bool
-    rng: np.random.Generator
-
-
-class Explorer(EdgeTracer):
+class Explorer(Prober):
     """A search in progress."""
 
     def __init__(
         self, quotient: Quotient, starts: Iterable[Array], rng: np.random.Generator
     ) -> None:
-        super().__init__(quotient, partial(singular_figure, _searched))
-        self.rng = rng
+        probes = not isinstance(quotient.polyhedron, Link)
+        super().__init__(quotient, partial(singular_figure, _searched), rng, probes=probes)
         self.starts: deque[tuple[int, Array]] = deque(enumerate(starts))
         self.crossings: list[Crossing] = []
         self.tried: set[Flag] = set()
         self._beside: dict[int, Mapping[frozenset[int], Ray]] = {}
-        self._sought: Counter[frozenset[int]] = Counter()  # singular points, by face
+        self._tries: Counter[frozenset[int]] = Counter()  # singular points, by face
         self._finished = 0  # edges beside which every face was crossed
 
     @classmethod
     def resumed(cls, state: SearchState) -> "Explorer":
         """Return a search in a given state; the state stays as it is."""
         explorer = cls(state.quotient, (), copy.deepcopy(state.rng))
-        explorer.registry.records += map(_copied, state.records)
+        explorer.registry.records += map(copied, state.records)
         explorer.registry.notes.update(dict.fromkeys(state.notes))
         explorer.registry.lost = state.lost
         explorer.curves += state.curves
@@ -126,6 +88,11 @@ class Explorer(EdgeTracer):
         explorer.starts.extend(state.starts)
         explorer.pending.extend(state.pending)
         explorer.tried |= state.tried
+        explorer.patches += state.patches
+        explorer.links += state.links
+        explorer.origins += state.origins
+        explorer.least.update(state.least)
+        explorer.sought = state.sought
         return explorer
 
     @property
@@ -133,12 +100,17 @@ class Explorer(EdgeTracer):
         """The state of the search, independent of what it does next."""
         return SearchState(
             quotient=self.quotient,
-            records=tuple(map(_copied, self.records)),
+            records=tuple(map(copied, self.records)),
             curves=tuple(self.curves),
             crossings=tuple(self.crossings),
             starts=tuple(self.starts),
             pending=tuple(self.pending),
             tried=frozenset(self.tried),
+            patches=tuple(self.patches),
+            links=tuple(self.links),
+            origins=tuple(self.origins),
+            least=dict(self.least),
+            sought=self.sought,
             notes=tuple(self.notes),
             lost=self.registry.lost,
             rng=copy.deepcopy(self.rng),
@@ -162,7 +134,7 @@ class Explorer(EdgeTracer):
                 progress(count, count + len(self.pending), f"{len(self.records)} corners")
         except KeyboardInterrupt:
             return Completeness.INTERRUPTED
-        if not self.curves and not self.records:
+        if not self.curves and not self.records and not self.patches:
             return Completeness.SEEDS
         return Completeness.GAPS if self.registry.lost else Completeness.EXHAUSTED
 
@@ -184,79 +156,116 @@ class Explorer(EdgeTracer):
                 descents -= 1
             else:
                 way = next(self._uncrossed(), None)
-                if way is None:
+                if way is not None:
+                    yield len(self.tried) < crossings, partial(self._cross, *way)
+                    self.tried.add(way[0])
+                elif self.sought[0] < ROUNDS and self.sought[1] != self._found:
+                    yield descents > 0, self._seek
+                else:
                     return
-                yield len(self.tried) < crossings, partial(self._cross, *way)
-                self.tried.add(way[0])
+
+    def _seek(self) -> None:
+        """Seek islands; those that may be new become starts."""
+        self.starts.extend((ISLAND, q) for q in self.seek())
+        self.sought = (self.sought[0] + 1, self._found)
+
+    @property
+    def _found(self) -> int:
+        return len(self.records) + len(self.curves) + len(self.patches)
 
     # ------------------------------------------------------------------------------------- descents
 
     def _descend(self, number: int, start: Array) -> None:
         """Walk straight ahead in random directions, from face to smaller face, to corners."""
-        point = self.quotient.at(start)
-        active = point.active() if np.isfinite(point.values).all() else None
-        if active is None:
-            self.registry.note(f"start {number} lies outside the polyhedron: left out")
-        elif not self._descend_from(point, active, both=True):
+        point = self.entered(number, start)
+        if point is None:
+            return
+        active = point.active() or frozenset()
+        known, whole = self._found, self._free(point, frozenset()) == 3
+        found = self._descend_from(point, active, both=number != ISLAND)
+        if not found and number != ISLAND:
             self.registry.note(
                 f"start {number}: straight walks in {DIRECTIONS} directions, forth and back, met "
                 f"nothing within {self.quotient.extent:g} scale units"
             )
+        through = whole and not self.polyhedron.is_union and not self.symmetry.relabels
+        if through and len(active) == 1 and self._found > known:
+            for there, beyond in self.inside(point, active):
+                found |= self._descend_from(there, beyond, both=False)
+        if through and len(active) < 2 and len(found) > 1:
+            self.links.append(found)
 
-    def _descend_from(self, point: EvaluatedPoint, active: frozenset[int], *, both: bool) -> bool:
-        """Descend from a point of a face; return whether that found an edge or a corner."""
+    def _descend_from(
+        self, point: EvaluatedPoint, active: frozenset[int], *, both: bool
+    ) -> frozenset[Anchor]:
+        """Descend from a point of a face; return the edges and closed faces that were found."""
         undirected = self._undirected(point, active)
         free = self._free(point, active.difference(undirected))
         if free > 0 and undirected:
             return self._singular(point, active, undirected)
         if free == 0 or (free == 1 and not self._on_curve(point, active)):
-            self.corner(point)
-            return True
+            found = self.corner(point)
+            return frozenset() if found is None else frozenset([("corner", found[0])])
         if free == 1:
-            return self._edge_at(point, active) is not None
-        met = self._find_singular(point, active)
-        for there, found in islice(self._straight(point, active), 2 if both else 1):
-            met |= self._descend_from(there, found, both=False)
-        return met
+            edge = self._edge_at(point, active)
+            return frozenset() if edge is None else frozenset([edge])
+        patch = self.patch_at(point, active) if free == 2 else None
+        if patch is not None:
+            return frozenset([("patch", patch)])
+        apexes = self._find_singular(point, active)
+        return apexes | self._descend_across(point, active, free, 2 if both else 1)
 
     def _singular(
         self, point: EvaluatedPoint, active: frozenset[int], undirected: list[int]
-    ) -> bool:
+    ) -> frozenset[Anchor]:
         """Record the singular corner at a point where gradients have no direction, if it is one."""
         reach = VICINITY * self.quotient.tolerance
         corner = singular_point(self.quotient, point.q, sorted(active), reach)
         if corner is None or corner.active() is None:
             self._note_undirected(point, undirected)
-            return False
-        self.corner(corner)
-        return True
+            return frozenset()
+        found = self.corner(corner)
+        return frozenset() if found is None else frozenset([("corner", found[0])])
 
-    def _find_singular(self, point: EvaluatedPoint, face: frozenset[int]) -> bool:
-        """Record the singular corners that a point of a face leads to; return whether any."""
-        self._sought[face] += 1
-        if isinstance(self.polyhedron, Link) or self._sought[face] > TRIES:
-            return False
+    def _find_singular(self, point: EvaluatedPoint, face: frozenset[int]) -> frozenset[Anchor]:
+        """Record the singular corners that a point of a face leads to."""
+        self._tries[face] += 1
+        if not self.probes or self._tries[face] > TRIES:
+            return frozenset()
         corners = [self.corner(found) for found in singular_points(point, face)]
-        return any(corner is not None for corner in corners)
+        return frozenset(("corner", corner[0]) for corner in corners if corner is not None)
+
+    def _descend_across(
+        self, point: EvaluatedPoint, active: frozenset[int], free: int, most: int
+    ) -> frozenset[Anchor]:
+        """Descend along straight walks; where they meet nothing, by a net or by long walks."""
+
+        def descended(
+            ends: Iterable[tuple[EvaluatedPoint, frozenset[int]]],
+        ) -> frozenset[Anchor]:
+            every = (self._descend_from(q, there, both=False) for q, there in islice(ends, most))
+            return frozenset().union(*every)
+
+        found = descended(self._straight(point, active, self.quotient.extent / SHORT))
+        if not found and free == 2:
+            known = len(self.patches)
+            found = descended(self.explored(point, active))
+            if len(self.patches) > known:
+                return frozenset([("patch", known)])
+        return found or descended(self._straight(point, active, self.quotient.extent))
 
     def _straight(
-        self, point: EvaluatedPoint, active: frozenset[int]
+        self, point: EvaluatedPoint, active: frozenset[int], extent: float
     ) -> Iterator[tuple[EvaluatedPoint, frozenset[int]]]:
-        """Yield the ends of straight walks in random directions and their opposites.
-
-        Walks are short first; only where none of them ends in a smaller face are they long.
-        """
+        """Yield the ends of straight walks in random directions and their opposites."""
         point = HeldPoint(self.quotient, point.q, point.basis(active))
-        met = False
-        for extent in (self.quotient.extent / SHORT, self.quotient.extent):
-            for _ in range(0 if met else DIRECTIONS):
-                v = point.tangent(self.rng.standard_normal(len(point.q)))
-                for way in (v, -v):
-                    walk = follow(point, way, passive=active, home=True, extent=extent)
-                    there = walk.last.active() if walk.end is End.CORNER else None
-                    if there is not None:
-                        met = True
-                        yield walk.last, there
+        for _ in range(DIRECTIONS):
+            v = point.tangent(self.rng.standard_normal(len(point.q)))
+            for way in (v, -v):
+                walk = follow(point, way, passive=active, home=True, extent=extent)
+                there = walk.last.active() if walk.end is End.CORNER else None
+                if there is not None:
+                    yield walk.last, there
 
     # ------------------------------------------------------------------------------------ crossings
 
@@ -300,6 +309,16 @@ class Explorer(EdgeTracer):
         return self.quotient.at(curve.middle)
 
     def _cross(self, start: Flag, sample: HeldPoint, direction: Array) -> None:
+        """Walk straight across a face, from several points if it starts at a closed edge."""
+        self._cross_along(start, sample, direction)
+        face = sample.active() or frozenset()
+        curve = self.curves[start[1]] if start[0] == "curve" else None
+        for q in curve.points[:: max(1, len(curve.points) // ACROSS)] if curve else ():
+            for ray in faces_beside(self.quotient.at(q), curve.active if curve else face):
+                if ray.active == face:
+                    self._cross_along(start, ray.sample, ray.direction)
+
+    def _cross_along(self, start: Flag, sample: HeldPoint, direction: Array) -> None:
         """Walk straight across a face and record the edge at the end; look for its apexes."""
         face = sample.active() or frozenset()
         walk = follow(sample, direction, passive=face)
@@ -335,7 +354,3 @@ def _searched(quotient: Quotient, starts: Sequence[Array]) -> Explorer:
     explorer = Explorer(quotient, starts, np.random.default_rng(0))
     explorer.run(Budget(), silent)
     return explorer
-
-
-def _copied(record: CornerRecord) -> CornerRecord:
-    return replace(record, edges=dict(record.edges))

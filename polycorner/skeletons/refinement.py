@@ -4,8 +4,8 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.skeletons.elements import Edge, Skeleton
-from polycorner.skeletons.explorer import SearchState
 from polycorner.skeletons.points import projected
+from polycorner.skeletons.states import SearchState
 from polycorner.spaces.manifold import Array
 
 

@@ -10,8 +10,9 @@ from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Completeness, Skeleton
-from polycorner.skeletons.explorer import Budget, Explorer, SearchState
+from polycorner.skeletons.explorer import Budget, Explorer
 from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.states import SearchState
 from polycorner.spaces.manifold import reals
 
 EXTENT = 1000.0
@@ -35,14 +36,16 @@ def skeleton(
     to an edge, and along the edge to a corner.  It traces every edge out of every corner to the
     next corner until nothing new is found.  Then it crosses every two-dimensional face from the
     middle of every edge, which joins the boundary curves of a face and finds parts that are
-    connected through faces alone.
+    connected through faces alone.  At last it looks for islands: boundary that random chords
+    through the polyhedron end on, or that minimising a function that was never met leads to.
+    Neither proves that there are no others.
 
     Parameters
     ----------
     polyhedron : Polyhedron
         The set.
     starts : sequence of (n,) arrays
-        Points of the set.
+        Points of the set; one outside is moved in by the least displacement that is found.
     symmetry : Symmetry, optional
         Symmetry to divide by.  With relabellings corners, edges and faces are counted up to
         them.
@@ -68,8 +71,8 @@ def skeleton(
     Raises
     ------
     TypeError, ValueError
-        For arguments of a wrong kind or shape.  A start outside the polyhedron is no error: it
-        is reported in ``Skeleton.notes``.
+        For arguments of a wrong kind or shape.  A start outside the polyhedron is no error:
+        ``Skeleton.notes`` tell what it violates and where it was moved.
 
     Examples
     --------

@@ -34,8 +34,15 @@ class TestStarts:
         assert not told(atlas, "start 1")
         assert atlas.complete is Completeness.EXHAUSTED
 
-    def test_nothing_is_found_from_outside_alone(self):
+    def test_starts_outside_alone_are_moved_in(self):
         atlas = skeleton(TRIANGLE, [[-1, -1], [2, 2]])
+        assert counts(atlas) == (3, 3, 1)
+        assert atlas.complete is Completeness.EXHAUSTED
+        for number, away in ((0, 2**0.5), (1, 1.5 * 2**0.5)):
+            assert told(atlas, f"start {number} lies outside", f"moved in by {away:.3g} scale")
+
+    def test_nothing_is_found_in_an_empty_set(self):
+        atlas = skeleton(Polyhedron(PLANE, [x, y, -1 - x - y]), [[-1, -1], [2, 2]])
         assert counts(atlas) == (0, 0, 0)
         assert atlas.complete is Completeness.SEEDS
         assert atlas.euler_characteristic is None
@@ -72,7 +79,7 @@ class TestStarts:
         assert told(atlas, "chart") or len(atlas.corners) == 3
 
     def test_a_set_without_edges_is_told_from_an_empty_one(self):
-        atlas = skeleton(Polyhedron(SPACE, {"ball": 1 - x**2 - y**2 - z**2}), [[0, 0, 0]], extent=5)
+        atlas = skeleton(Polyhedron(SPACE, {"bowl": z - x**2 - y**2}), [[0, 0, 1]], extent=5)
         assert atlas.complete is Completeness.SEEDS
         assert told(atlas, "start 0")
         assert not told(atlas, "outside")

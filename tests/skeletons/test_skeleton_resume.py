@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy as sp
 from skeleton_shapes import ball, counts, identical, isomorphic, polytope, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
@@ -104,7 +105,9 @@ class TestResume:
     def test_an_interruption_before_anything_was_found(self):
         part = skeleton(CUBE, START, progress=Interrupter(1))
         assert part.complete is Completeness.INTERRUPTED
-        again = skeleton(TRIANGLE, [[-1, -1], [0.2, 0.2]], progress=Interrupter(1))
+        parts = {"left": x, "base": y, "lid": 1 - x - y, "log": sp.log(x + 2)}
+        undefined = Polyhedron(PLANE, parts)
+        again = skeleton(undefined, [[-5, -1], [0.2, 0.2]], progress=Interrupter(1))
         assert again.complete is Completeness.INTERRUPTED
         assert counts(again) == (0, 0, 0)
         assert counts(resume(again)) == (3, 3, 1)

@@ -1,0 +1,337 @@
+"""Euler characteristics of two-dimensional faces, by stratified Morse theory.
+
+For a height without degenerate critical points on a compact face and on its edges,
+
+    chi = sum over critical points of (-1)^index * (1 - chi(lower link across the stratum)):
+
+a critical point inside counts ``(-1)^index``; a minimum of the height along an edge counts 1 and a
+maximum -1 if the height rises into the face there, otherwise 0; a corner counts 1 if the height
+rises everywhere, -1 if it falls on two sides of a rise, otherwise 0 [GoreskyMacPherson, part I].
+Several heights in general position have to agree.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from polycorner.skeletons.heights import Height
+from polycorner.skeletons.nets import Net
+from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.surfaces import Surface
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+# Heights that have to agree, and that are tried.
+AGREEING = 3
+HEIGHTS = 8
+NEWTON = 20
+# Distance across an edge, in scale units, at which the side of a face is told.
+ACROSS = 1e-7
+# Determinant of a Hessian, relative to its entries, below which it counts as degenerate.
+DEGENERATE = 1e-6
+# Parts of the way from a point of the net to a critical point at which it must be on the face.
+WAY = np.linspace(0.1, 1.0, 10)
+PARALLEL = 1e-6
+FAR = 1e9
+HALVINGS = 12
+# Distance in scale units from the end of an edge at which it is looked at last.
+BEFORE = 1e-3
+# Last Newton step, in scale units, to a critical point.
+CONVERGED = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Border(Value):
+    """The boundary of a two-dimensional face.
+
+    Attributes
+    ----------
+    quotient : Quotient
+        The polyhedron modulo its symmetry.
+    active : frozenset of int
+        Functions that vanish on the face.
+    seeds : (k, n) array
+        Points of the face or of its boundary.
+    edges : tuple of (frozenset of int, (k, n) array, bool)
+        Active functions and points of every edge around it, and whether it closes by itself.
+    corners : tuple of pairs of (frozenset of int, (2, n) array)
+        For every corner of the face and both of its edges there, the active functions, and a point
+        of the edge with the direction away from the corner.
+    curves : int
+        Number of boundary curves.
+    """
+
+    quotient: Quotient
+    active: frozenset[int]
+    seeds: Array
+    edges: tuple[tuple[frozenset[int], Array, bool], ...]
+    corners: tuple[tuple[tuple[frozenset[int], Array], tuple[frozenset[int], Array]], ...]
+    curves: int
+
+
+def face_euler_characteristic(border: Border) -> int | None:
+    """Return the Euler characteristic of a compact face; None where it is not determined.
+
+    It is not where a net does not cover the face, where the net leaves the face elsewhere than
+    at the edges of the border, or where heights do not agree.
+    """
+    symmetry = border.quotient.symmetry
+    if symmetry.relabels or symmetry.elements:
+        return None
+    surface = Surface(border.quotient, border.active, border.seeds[0])
+    net = Net(surface, border.seeds)
+    if not net.complete or not _enclosed(surface, net, border):
+        return None
+    rng = np.random.default_rng(0)
+    found: list[int] = []
+    for _ in range(HEIGHTS):
+        total = _counted(border, surface, net, Height(surface, rng))
+        if total is not None:
+            found.append(total)
+        if len(found) == AGREEING:
+            break
+    if len(found) < AGREEING or len(set(found)) > 1:
+        return None
+    handles = 2 - border.curves - found[0]
+    orientable = symmetry.invariants is None
+    return found[0] if handles >= 0 and not (orientable and handles % 2) else None
+
+
+def _counted(border: Border, surface: Surface, net: Net, height: Height) -> int | None:
+    total = _inside(surface, net, height)
+    for edge in border.edges:
+        along = None if total is None else _along(surface, height, *edge)
+        total = None if along is None or total is None else total + along
+    for rays in border.corners:
+        at = None if total is None else _at_corner(surface, height, rays)
+        total = None if at is None or total is None else total + at
+    return total
+
+
+def _enclosed(surface: Surface, net: Net, border: Border) -> bool:
+    """Whether rays of a net leave the face only near the edges of its border."""
+    if not len(net.ends):
+        return True
+    ends = surface.embedded(net.ends)
+    near = np.zeros(len(ends), dtype=bool)
+    for _, points, _ in border.edges:
+        where = surface.embedded(points)
+        chords = np.diff(where, axis=0)
+        lengths = np.einsum("kn,kn->k", chords, chords)
+        for start, chord, length in zip(where[:-1], chords, lengths, strict=True):
+            apart = surface.apart(ends, start[None])
+            part = np.clip(apart @ chord / max(length, 1e-300), 0, 1)
+            off = np.linalg.norm(apart - part[:, None] * chord, axis=1)
+            near |= off < 0.2 * np.sqrt(length) + 1e-5
+    return bool(near.all())
+
+
+# ------------------------------------------------------------------------------------------ inside
+
+
+def _inside(surface: Surface, net: Net, height: Height) -> int | None:
+    """Return the sum of ``(-1)^index`` over the critical points inside the face."""
+    starts, radii = _starts(surface, net)
+    q, first = starts, True
+    for _ in range(NEWTON):
+        _, slope, curvature, tangents = _restricted(surface, height, q)
+        if tangents is None:
+            return None
+        step = _newton(slope, curvature)
+        long = np.linalg.norm(step, axis=1)
+        if first:
+            near = long < 3 * radii
+            q, step, long, tangents = q[near], step[near], long[near], tangents[near]
+            starts, radii, first = starts[near], radii[near], False
+        if not len(q):
+            return 0
+        step *= np.minimum(1.0, radii / np.maximum(long, 1e-300))[:, None]
+        q, found = surface.projected(q + surface.scales * np.einsum("knt,kt->kn", tangents, step))
+        away = np.linalg.norm((q - starts) / surface.scales, axis=1)
+        keep = found & (away < 4 * radii)
+        q, starts, radii, last = q[keep], starts[keep], radii[keep], long[keep]
+        if (last < CONVERGED).all():
+            break
+    q = q[last < CONVERGED] if len(q) else q
+    return _signed(surface, net, height, _distinct(surface, q))
+
+
+def _starts(surface: Surface, net: Net) -> tuple[Array, Array]:
+    rounds = net.frames * (0.5 * net.radii)[:, None, None]
+    moves = [0 * rounds[..., 0], *(sign * rounds[..., i] for i in (0, 1) for sign in (1, -1))]
+    points = np.concatenate([net.points + surface.scales * move for move in moves])
+    q, found = surface.projected(points)
+    return q[found], np.tile(net.radii, len(moves))[found]
+
+
+def _restricted(
+    surface: Surface, height: Height, q: Array
+) -> tuple[Array, Array, Array, Array | None]:
+    """Return values, and gradients and Hessians of the height along the surface."""
+    values, gradients = surface.evaluated(q)
+    tangents = surface.tangents(q, gradients)
+    if tangents is None:
+        return values, q, q, None
+    slope, curvature = height.restricted(q, gradients, tangents)
+    known = np.isfinite(slope).all() and np.isfinite(curvature).all()
+    return values, slope, curvature, tangents if known else None
+
+
+def _newton(slope: Array, curvature: Array) -> Array:
+    (a, b), (c, d) = curvature.transpose(1, 2, 0)
+    det = a * d - b * c
+    with np.errstate(all="ignore"):
+        step = -np.stack([d * slope[:, 0] - b * slope[:, 1], a * slope[:, 1] - c * slope[:, 0]], 1)
+        step = step / det[:, None]
+    return np.asarray(np.clip(np.nan_to_num(step, nan=FAR), -FAR, FAR))
+
+
+def _distinct(surface: Surface, q: Array) -> Array:
+    where = surface.embedded(q) if len(q) else q
+    chosen: list[int] = []
+    for k in range(len(q)):
+        apart = surface.apart(where[k][None], where[chosen]) if chosen else np.full((1, 1), np.inf)
+        if (np.linalg.norm(apart, axis=1) > 1e-5).all():
+            chosen.append(k)
+    return q[chosen]
+
+
+def _signed(surface: Surface, net: Net, height: Height, q: Array) -> int | None:
+    if not len(q):
+        return 0
+    values, _, curvature, tangents = _restricted(surface, height, q)
+    if tangents is None:
+        return None
+    on = surface.contains(values)
+    total = 0
+    for k in np.flatnonzero(on):
+        det, size = np.linalg.det(curvature[k]), np.linalg.norm(curvature[k])
+        if abs(det) < DEGENERATE * size**2 or not _reached(surface, net, q[k]):
+            return None
+        total += 1 if det > 0 else -1
+    return total
+
+
+def _reached(surface: Surface, net: Net, q: Array) -> bool:
+    """Whether a straight way leads from a point of the net to a point without leaving the face."""
+    apart = surface.apart(surface.embedded(q[None]), net.where)
+    distance = np.linalg.norm(apart, axis=1)
+    for j in np.argsort(distance)[:8]:
+        if distance[j] > 2 * net.radii[j]:
+            break
+        flat = net.frames[j] @ (net.images[j].T @ apart[j])
+        way, found = surface.projected(net.points[j] + surface.scales * WAY[:, None] * flat)
+        if (found & surface.contains(surface.values(way))).all():
+            return True
+    return False
+
+
+# ------------------------------------------------------------------------------------ the boundary
+
+
+def _along(
+    surface: Surface, height: Height, active: frozenset[int], points: Array, closed: bool
+) -> int | None:
+    """Return what extrema of the height along an edge count."""
+    if not closed:
+        points = _approached(surface, active, points)
+    inner = slice(None) if closed else slice(1, -1)
+    chords = np.gradient(points / surface.scales, axis=0)[inner]
+    found = _sides(surface, height, active, points[inner], chords)
+    if found is None:
+        return None
+    along, across, _ = found
+    total = 0
+    for k in np.flatnonzero(along[:-1] * along[1:] < 0):
+        rise = across[k]
+        if rise * across[k + 1] <= 0:
+            ends = points[inner][[k, k + 1]]
+            rise = _rise(surface, height, active, ends, float(along[k]))
+        if rise == 0:
+            return None
+        if rise > 0:
+            total += 1 if along[k] < 0 else -1
+    return total
+
+
+def _approached(surface: Surface, active: frozenset[int], points: Array) -> Array:
+    """Return the points of an edge with one more just before its end."""
+    back = points[-2] - points[-1]
+    part = min(0.5, BEFORE / float(np.linalg.norm(back / surface.scales)))
+    edge = Surface(surface.quotient, active, points[-2])
+    last, _ = edge.projected((points[-1] + part * back)[None])
+    return np.concatenate([points[:-1], last, points[-1:]])
+
+
+def _rise(
+    surface: Surface, height: Height, active: frozenset[int], ends: Array, first: float
+) -> float:
+    """Return how the height rises into the face at its extremum between two points of an edge."""
+    edge, rise = Surface(surface.quotient, active, ends[0]), 0.0
+    chord = (ends[1] - ends[0])[None] / surface.scales
+    for _ in range(HALVINGS):
+        middle, found = edge.projected(ends.mean(axis=0)[None])
+        sides = _sides(surface, height, active, middle, chord) if found.all() else None
+        if sides is None:
+            return 0.0
+        rise = float(sides[1][0])
+        same = float(sides[0][0]) * first > 0
+        ends = np.array([middle[0], ends[1]] if same else [ends[0], middle[0]])
+    return rise
+
+
+def _sides(
+    surface: Surface, height: Height, active: frozenset[int], q: Array, chords: Array
+) -> tuple[Array, Array, Array] | None:
+    """Return slopes of the height along an edge and into the face, and directions into it."""
+    _, gradients = surface.evaluated(q)
+    tangents = surface.tangents(q, gradients)
+    rows = sorted(active - surface.active)
+    if tangents is None or not rows:
+        return None
+    across = np.einsum("knt,kin->kit", tangents, gradients[:, rows])
+    sizes = np.linalg.norm(across, axis=2)
+    across = across[:, int(np.argmax(sizes.min(axis=0)))]
+    size = np.linalg.norm(across, axis=1)
+    if not (size > 0).all():
+        return None
+    across = across / size[:, None]
+    normal = np.einsum("knt,kt->kn", tangents, across)
+    flat = np.stack([-across[:, 1], across[:, 0]], 1)
+    along = np.einsum("knt,kt->kn", tangents, flat)
+    along *= np.sign(np.einsum("kn,kn->k", along, chords))[:, None]
+    sides = []
+    for sign in (1, -1):
+        p, found = surface.projected(q + sign * ACROSS * surface.scales * normal)
+        sides.append(found & surface.contains(surface.values(p)))
+    if not (sides[0] ^ sides[1]).all():
+        return None
+    inward = np.where(sides[0], 1.0, -1.0)[:, None] * normal
+    slopes = height.slopes(q, np.stack([along, inward], axis=-1))
+    return slopes[:, 0], slopes[:, 1], inward
+
+
+def _at_corner(
+    surface: Surface, height: Height, rays: tuple[tuple[frozenset[int], Array], ...]
+) -> int | None:
+    """Return what a corner counts."""
+    both = [_sides(surface, height, active, ray[:1], ray[1:]) for active, ray in rays]
+    if both[0] is None or both[1] is None:
+        return None
+    along = np.concatenate([found[0] for found in both if found])
+    here, there = (ray[1] for _, ray in rays)
+    turn = float(both[0][2][0] @ there)
+    reflex = turn < -PARALLEL
+    if abs(turn) <= PARALLEL and float(here @ there) > 0 and surface.polyhedron.is_union:
+        return None
+    if (along > 0).all():
+        return 0 if reflex else 1
+    if (along < 0).all():
+        return -1 if reflex else 0
+    return 0
+
+
+def seeds_of(edges: Sequence[Array]) -> Array:
+    """Return points of edges that a net starts from."""
+    return np.concatenate([points[1:-1][:: max(1, len(points) // 40)] for points in edges])

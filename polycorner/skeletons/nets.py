@@ -1,0 +1,191 @@
+"""Nets of points that cover a two-dimensional face.
+
+Around every point of the net the surface is nearly flat within a radius; the net is complete when
+rays from every point, up to its radius, end near another point of the net or at the boundary of the
+face.  This is the continuation of implicit manifolds in several dimensions by overlapping discs
+[Henderson].
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.skeletons.surfaces import Flags, Surface
+from polycorner.spaces.manifold import Array
+
+RAYS = 12
+LEVELS = 4
+# Cosine of the angle that a normal may turn within the radius of a point.
+TURN = 0.85
+# Part of the radius within which a point covers others, and their height over its plane.
+COVERED = 0.85
+WITHIN = 1.1
+HEIGHT = 0.35
+FIRST = 0.5
+GROWTH = 1.5
+SHRINK = 0.7
+SHORTEST = 1e-4
+# Longest radius as a part of a circle's circumference.
+CIRCLE = 0.08
+MOST = 3000
+BISECTIONS = 20
+
+
+class Net:
+    """A growing net of points on a face.
+
+    Attributes
+    ----------
+    points : (k, n) array
+        The points, with frames of the tangent plane and radii in scale units.
+    starts, ends : (l, n) arrays
+        Points of the net, and points just outside the face where rays from them have left it.
+    complete : bool
+        Whether the face is covered.
+    """
+
+    def __init__(self, surface: Surface, seeds: Array, extent: float = math.inf) -> None:
+        self.surface, self.extent = surface, extent
+        n = len(surface.scales)
+        circles = np.array(surface.manifold.periods) / surface.scales
+        self.longest = CIRCLE * float(circles.min(initial=math.inf))
+        self.points, self.frames = np.empty((0, n)), np.empty((0, n, 2))
+        self.radii, self.normals = np.empty(0), np.empty((0, len(surface.held), n))
+        self.where = np.empty((0, n))
+        self.images = np.empty((0, n, 2))
+        self.starts: Array = np.empty((0, n))
+        self.ends: Array = np.empty((0, n))
+        self.complete = self._grow(seeds, np.full(len(seeds), min(FIRST, self.longest)))
+
+    def _grow(self, candidates: Array, radii: Array) -> bool:
+        while len(candidates):
+            known = len(self.points)
+            if not self._add(candidates, radii) or len(self.points) > MOST:
+                return False
+            new = np.arange(known, len(self.points))
+            moved = (self.points[new] - self.points[0]) / self.surface.scales
+            if (abs(moved) > self.extent).any():
+                return False
+            candidates, radii = self._rays(new)
+            if np.isnan(radii).any():
+                return False
+        return True
+
+    def _add(self, points: Array, radii: Array) -> bool:
+        """Add those points that no other covers, one after another."""
+        points, found = self.surface.projected(points)
+        points, radii = points[found], radii[found]
+        _, gradients = self.surface.evaluated(points)
+        tangents = self.surface.tangents(points, gradients)
+        if tangents is None:
+            return False
+        frames, images = self.surface.frames(points, tangents)
+        normals, _ = self.surface.normals(gradients)
+        where = self.surface.embedded(points)
+        free = ~self.covers(where, normals)
+        for k in np.flatnonzero(free):
+            if not free[k]:
+                continue
+            one = slice(k, k + 1)
+            free &= ~self._covered(
+                where, normals, where[one], images[one], normals[one], radii[one]
+            )
+            if len(self.where) == 0:
+                self.where, self.images = np.empty((0, where.shape[1])), images[:0]
+            self.points = np.concatenate([self.points, points[one]])
+            self.frames = np.concatenate([self.frames, frames[one]])
+            self.images = np.concatenate([self.images, images[one]])
+            self.normals = np.concatenate([self.normals, normals[one]])
+            self.where = np.concatenate([self.where, where[one]])
+            self.radii = np.concatenate([self.radii, radii[one]])
+        return True
+
+    def covers(self, where: Array, normals: Array, part: float = COVERED) -> Flags:
+        """Whether embedded points with given normals lie near a point of the net."""
+        if not len(self.points):
+            return np.zeros(len(where), dtype=bool)
+        chunks = range(0, len(where), 200)
+        parts = [
+            self._covered(
+                where[k : k + 200], normals[k : k + 200],
+                self.where, self.images, self.normals, part / COVERED * self.radii,
+            )
+            for k in chunks
+        ]  # fmt: skip
+        return np.concatenate(parts) if parts else np.zeros(0, dtype=bool)
+
+    def _covered(
+        self, p: Array, normals: Array, q: Array, images: Array, others: Array, radii: Array
+    ) -> Flags:
+        apart = self.surface.apart(p[:, None], q[None])
+        flat = np.einsum("abn,bnt->abt", apart, images)
+        along = np.einsum("abt,abt->ab", flat, flat)
+        height = np.einsum("abn,abn->ab", apart, apart) - along
+        near = (along < (COVERED * radii) ** 2) & (height < (HEIGHT * radii) ** 2)
+        if self.surface.quotient.symmetry.invariants is None and normals.shape[1]:
+            cosines = np.einsum("arn,brn->abr", normals, others)
+            near &= (cosines > TURN - 0.15).all(axis=2)
+        found: Flags = near.any(axis=1)
+        return found
+
+    def _rays(self, new: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Return ends of rays that nothing covers, and radii for them."""
+        starts, radii = [], []
+        angles = math.tau * np.arange(RAYS) / RAYS
+        circle = np.array([np.cos(angles), np.sin(angles)])
+        while len(new):
+            rays = np.einsum("knt,tr->krn", self.frames[new], circle) * self.surface.scales
+            levels = (np.arange(LEVELS) + 1) / LEVELS
+            steps = self.radii[new][:, None, None, None] * levels[:, None] * rays[:, :, None]
+            guess = self.points[new][:, None, None] + steps
+            shape = guess.shape[:3]
+            q, found = self.surface.projected(guess.reshape(-1, guess.shape[-1]))
+            values, gradients = self.surface.evaluated(q)
+            normals, _ = self.surface.normals(gradients)
+            inside = (found & self.surface.contains(values)).reshape(shape)
+            cosines = np.einsum(
+                "kxrn,krn->kxr",
+                normals.reshape(len(new), RAYS * LEVELS, *normals.shape[1:]),
+                self.normals[new],
+            ).min(axis=2, initial=1.0)
+            flat = (cosines > TURN).reshape(shape) & found.reshape(shape)
+            reached = np.logical_and.accumulate(inside & flat, axis=2)
+            # Levels up to the first outside the face must be seen without a doubt.
+            before = np.logical_and.accumulate(inside, axis=2)[..., :-1]
+            seen = np.concatenate([np.ones_like(before[..., :1]), before], axis=2)
+            bent = (seen & ~flat).any(axis=(1, 2))
+            if (self.radii[new][bent] < SHORTEST).any():
+                return np.empty((1, q.shape[1])), np.full(1, np.nan)
+            self.radii[new[bent]] *= SHRINK
+            good = ~bent
+            q, normals = q.reshape(guess.shape), normals.reshape(*shape, *normals.shape[1:])
+            whole = reached[..., -1] & good[:, None]
+            starts.append(self._uncovered(q[whole][:, -1], normals[whole][:, -1]))
+            length = np.broadcast_to(self.radii[new][:, None], whole.shape)[whole]
+            radii.append(length)
+            self._leave(new, guess, reached, good)
+            new = new[bent]
+        points = np.concatenate([p for p, _ in starts])
+        found = np.concatenate([f for _, f in starts])
+        allowed = np.minimum(GROWTH * np.concatenate(radii), self.longest)
+        return points[found], allowed[found]
+
+    def _uncovered(self, q: Array, normals: Array) -> tuple[Array, Flags]:
+        return q, ~self.covers(self.surface.embedded(q), normals) if len(q) else np.zeros(0, bool)
+
+    def _leave(self, new: NDArray[np.intp], guess: Array, reached: Flags, good: Flags) -> None:
+        """Keep where rays leave the face, by bisection."""
+        k, r = np.nonzero(~reached[..., -1] & good[:, None])
+        count = reached[k, r].sum(axis=1)
+        start = self.points[new][k]
+        far = guess[k, r, count]
+        low, high = count / (count + 1.0), np.ones(len(k))
+        for _ in range(BISECTIONS if len(k) else 0):
+            middle = (low + high) / 2
+            q, found = self.surface.projected(start + middle[:, None] * (far - start))
+            inside = found & self.surface.contains(self.surface.values(q))
+            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        end, _ = self.surface.projected(start + high[:, None] * (far - start))
+        self.starts = np.concatenate([self.starts, start])
+        self.ends = np.concatenate([self.ends, end])

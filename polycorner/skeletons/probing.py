@@ -1,0 +1,248 @@
+"""Faces without edges, starts outside, and islands while a skeleton grows."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from polycorner.polyhedra.symmetry import renamed
+from polycorner.skeletons.islands import Cloud, minimised, moved_in, on_zero, violated
+from polycorner.skeletons.nets import WITHIN, Net
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
+from polycorner.skeletons.registry import SingularFigure, written_point
+from polycorner.skeletons.surfaces import Surface
+from polycorner.skeletons.tracing import Curve, EdgeEnd, EdgeTracer
+from polycorner.skeletons.walks import End, follow
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+# Starts that a function met by chords gives, chords looked at for them, and how often islands are
+# sought.
+TARGETS = 2
+HITS = 6
+ROUNDS = 3
+# Points that chains start from.
+SEEDS = 64
+# Part of a chord of an edge within which a point lies on the edge.
+ASIDE = 0.25
+# Distance in scale units from a face at which a walk inside starts, and walks of that kind.
+INSIDE = 1e-5
+WALKS = 6
+# Edges that a point of a face is joined to by straight ways.
+SEEN = 12
+ISLAND = -1
+
+# What a descent arrives at: the end of an edge at a corner, an edge or a closed face by position.
+Anchor = tuple[str, EdgeEnd | int]
+
+
+@dataclass(frozen=True, eq=False)
+class Patch(Value):
+    """A closed face without edges, by its functions and one of its points."""
+
+    active: frozenset[int]
+    point: Array
+
+
+class Prober(EdgeTracer):
+    """Closed faces, links through the interior, and what the search for islands found."""
+
+    def __init__(
+        self,
+        quotient: Quotient,
+        singular: SingularFigure,
+        rng: np.random.Generator,
+        *,
+        probes: bool,
+    ) -> None:
+        super().__init__(quotient, singular)
+        self.rng, self.probes = rng, probes
+        self.patches: list[Patch] = []
+        self.links: list[frozenset[Anchor]] = []
+        self.origins: list[Array] = []
+        self.least: dict[str, float] = {}
+        self.sought = (0, -1)  # how often islands were sought, and what was known then
+        self._nets: dict[int, Net] = {}
+        self._open: list[tuple[frozenset[int], Net]] = []
+
+    # ----------------------------------------------------------------------------------- starts
+
+    def entered(self, number: int, start: Array) -> EvaluatedPoint | None:
+        """Return a start, moved in if it lies outside; None if it cannot be, which is noted."""
+        point = self.quotient.at(start)
+        finite = bool(np.isfinite(point.values).all())
+        if finite and point.active() is not None:
+            self.origins.append(start)
+            return point
+        words = ", ".join(violated(self.quotient, point.values))
+        label = f"start {number} lies outside the polyhedron ({words})"
+        inside = moved_in(self.quotient, start) if self.probes else None
+        if inside is None:
+            self.registry.note(f"{label}: left out, no point of the polyhedron was found from it")
+            return None
+        away = np.linalg.norm((inside.q - start) / self.scales)
+        self.registry.note(
+            f"{label}: moved in by {away:.3g} scale units, to {written_point(inside.q)}"
+        )
+        self.origins.append(inside.q)
+        return inside
+
+    # ----------------------------------------------------------------------------- closed faces
+
+    def patch_at(self, point: EvaluatedPoint, active: frozenset[int]) -> int | None:
+        """Return the position of the closed face that a point lies on, among those known."""
+        for k, patch in enumerate(self.patches):
+            for g in self.symmetry.group:
+                names = renamed(self.registry.names(active), g.names)
+                if names == self.registry.names(patch.active) and self._on_net(k, g.apply(point.q)):
+                    return k
+        return None
+
+    def _on_net(self, k: int, q: Array) -> bool:
+        if k not in self._nets:
+            self._nets[k] = self._net(self.patches[k].active, self.patches[k].point)
+        return self._is_on(self._nets[k], q)
+
+    def _is_open(self, point: EvaluatedPoint, active: frozenset[int]) -> bool:
+        """Whether a point lies on a face that a net could not cover."""
+        return any(there == active and self._is_on(net, point.q) for there, net in self._open)
+
+    @staticmethod
+    def _is_on(net: Net, q: Array) -> bool:
+        _, gradients = net.surface.evaluated(q[None])
+        normals, _ = net.surface.normals(gradients)
+        return bool(net.covers(net.surface.embedded(q[None]), normals, WITHIN)[0])
+
+    def _net(self, active: frozenset[int], q: Array) -> Net:
+        surface = Surface(self.quotient, active, q)
+        return Net(surface, q[None], extent=self.quotient.extent)
+
+    def explored(
+        self, point: EvaluatedPoint, active: frozenset[int]
+    ) -> Iterator[tuple[EvaluatedPoint, frozenset[int]]]:
+        """Cover a face by a net: yield where it ends; if it closes, keep it as a closed face."""
+        symmetry = self.symmetry
+        orbits = len(symmetry.directions(self.manifold, point.q))
+        if not self.probes or symmetry.relabels or (orbits and symmetry.invariants is None):
+            return
+        if self._is_open(point, active):
+            return
+        net = self._net(active, point.q)
+        if not net.complete:
+            self._open.append((active, net))
+        if net.complete and not len(net.ends):
+            self._nets[len(self.patches)] = net
+            self.patches.append(Patch(active, point.q))
+        kept = point.basis(active)
+        for k in range(0, len(net.ends), max(1, len(net.ends) // WALKS)):
+            start = HeldPoint(self.quotient, net.starts[k], kept)
+            ahead = (net.ends[k] - start.q) / self.scales
+            walk = follow(start, ahead, passive=active, extent=self.quotient.extent)
+            there = walk.last.active() if walk.end is End.CORNER else None
+            if there is not None:
+                yield walk.last, there
+
+    def inside(
+        self, point: EvaluatedPoint, active: frozenset[int]
+    ) -> Iterator[tuple[EvaluatedPoint, frozenset[int]]]:
+        """Yield what walks through the interior from a point of a facet arrive at."""
+        (row,) = active
+        normal = point.gradients[row] / np.linalg.norm(point.gradients[row])
+        start = HeldPoint(self.quotient, point.q + INSIDE * self.scales * normal, [])
+        if start.active():
+            return
+        for k in range(WALKS):
+            way = self.rng.standard_normal(len(normal))
+            way = normal if k == 0 else way - min(0.0, 2 * way @ normal) * normal
+            walk = follow(start, way, extent=self.quotient.extent)
+            there = walk.last.active() if walk.end is End.CORNER else None
+            if there is not None:
+                yield walk.last, there
+
+    # ---------------------------------------------------------------------------------- islands
+
+    def met(self) -> frozenset[int]:
+        """Return the functions that vanish at a corner, along an edge or on a closed face."""
+        sets = [record.active for record in self.records]
+        sets += [curve.active for curve in self.curves]
+        sets += [patch.active for patch in self.patches]
+        return frozenset().union(*sets)
+
+    def seek(self) -> list[Array]:
+        """Return points on boundary that may be new."""
+        if self.symmetry.relabels or not self.origins or not self.probes:
+            return []
+        cloud = Cloud(self.quotient, self._seeds(), self._span(), self.rng)
+        met, targets = self.met(), list[Array]()
+        for row in range(self.quotient.count):
+            found = list(self._targets(cloud, row)) if len(cloud.points) else []
+            if not found and row not in met and len(cloud.points):
+                least, zero = minimised(cloud, row)
+                self.least[self.polyhedron.names[row]] = least
+                found = [] if zero is None else [zero]
+            targets += found
+        return targets
+
+    def _known(self) -> Array:
+        parts = [np.array(self.origins)]
+        parts += [record.point.q[None] for record in self.records]
+        parts += [curve.points for curve in self.curves]
+        parts += [net.points for net in self._nets.values()]
+        return np.concatenate(parts)
+
+    def _seeds(self) -> Array:
+        known = self._known()
+        first = known[: min(len(self.origins), SEEDS // 2)]
+        return np.concatenate([first, self.rng.choice(known, SEEDS // 2)])
+
+    def _span(self) -> Array:
+        """Return how far chords may reach in every coordinate."""
+        known = self._known()
+        wide = known.max(axis=0) - known.min(axis=0) + self.scales
+        return np.asarray(np.minimum(2 * wide, np.array(self.manifold.periods)))
+
+    def _targets(self, cloud: Cloud, row: int) -> Iterable[Array]:
+        """Yield ends of chords at a function that lie on no known edge or closed face."""
+        count = seen = 0
+        low, high = self._limits()
+        curves = [curve for curve in self.curves if row in curve.active]
+        for rows, q in cloud.hits:
+            if count == TARGETS or seen == HITS:
+                break
+            if row not in rows or (q < low).any() or (q > high).any():
+                continue
+            if any(self._near(q, curve.points) for curve in curves):
+                continue
+            seen += 1
+            point = on_zero(self.quotient, q, frozenset([row]))
+            active = point.active() if point is not None else None
+            if point is None or active is None or self._is_known(point, active, curves):
+                continue
+            count += 1
+            yield point.q
+
+    def _limits(self) -> tuple[Array, Array]:
+        """Return where islands are sought: if edges are open, in the box of what is known."""
+        known = self._known()
+        if any(End.INFINITY in curve.kinds for curve in self.curves):
+            return known.min(axis=0), known.max(axis=0)
+        return np.full_like(known[0], -np.inf), np.full_like(known[0], np.inf)
+
+    def _is_known(self, point: EvaluatedPoint, active: frozenset[int], curves: list[Curve]) -> bool:
+        """Whether a point lies on a closed face, or straight ways on its face lead to an edge."""
+        if self._is_open(point, active) or self.patch_at(point, active) is not None:
+            return True
+        middles = [curve.middle for curve in curves if active < curve.active][:SEEN]
+        if not middles:
+            return False
+        surface = Surface(self.quotient, active, point.q)
+        return bool(surface.sees(point.q, np.array(middles)).any())
+
+    def _near(self, q: Array, points: Array) -> bool:
+        """Whether a point lies near the chords of an edge."""
+        apart = self.manifold.difference(q, points) / self.scales
+        chords = np.diff(points, axis=0) / self.scales
+        lengths = np.einsum("kn,kn->k", chords, chords)
+        parts = np.einsum("kn,kn->k", apart[:-1], chords) / np.maximum(lengths, 1e-300)
+        off = apart[:-1] - np.clip(parts, 0, 1)[:, None] * chords
+        return bool((np.einsum("kn,kn->k", off, off) < ASIDE**2 * lengths).any())

@@ -1,0 +1,156 @@
+"""The surface that a two-dimensional face lies on, for many points at once.
+
+The surface is where the functions that are active on the face, and the equations, vanish.  Points
+are told apart by their coordinates, or by the invariants of the symmetry, and nearby ones compared
+in orthonormal frames of the tangent plane.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.skeletons.points import NEWTON, Quotient
+from polycorner.spaces.manifold import Array
+
+Flags = NDArray[np.bool_]
+
+EXACT = 1e-11
+# Step of differences of invariants, in scale units.
+DIFFERENCE = 1e-6
+# Parts of a straight way that are looked at.
+WAY = np.linspace(0.05, 0.95, 10)
+
+
+class Surface:
+    """Where the functions of a face vanish.
+
+    Parameters
+    ----------
+    quotient : Quotient
+        The polyhedron modulo its symmetry.
+    active : set of int
+        Functions that vanish on the face.
+    seed : (n,) array
+        A point of the face or of its boundary.
+    """
+
+    def __init__(self, quotient: Quotient, active: frozenset[int], seed: Array) -> None:
+        self.quotient, self.active = quotient, active
+        self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
+        self.scales = self.manifold.scale_array
+        equations = range(quotient.count, quotient.count + len(self.polyhedron.equations))
+        self.held = [*quotient.at(seed).basis(active), *equations]
+        self.watched = [i for i in range(quotient.count) if i not in active]
+        self._belongs: dict[tuple[bool, ...], bool] = {}
+
+    def values(self, q: Array) -> Array:
+        """Return values ``(k, m)`` of all functions."""
+        with np.errstate(all="ignore"):
+            found: Array = self.polyhedron.bundle.evaluate(q, 0)[0]
+        return found
+
+    def evaluated(self, q: Array) -> tuple[Array, Array]:
+        """Return values ``(k, m)`` and scaled gradients ``(k, m, n)`` of all functions."""
+        with np.errstate(all="ignore"):
+            values, gradients = self.polyhedron.bundle.evaluate(q, 1)
+        return values, gradients * self.scales
+
+    def normals(self, gradients: Array) -> tuple[Array, Array]:
+        """Return unit gradients of the held functions ``(k, r, n)`` and their lengths."""
+        rows = gradients[:, self.held]
+        sizes = np.sqrt(np.einsum("kij,kij->ki", rows, rows))
+        with np.errstate(all="ignore"):
+            return np.nan_to_num(rows / sizes[..., None]), sizes
+
+    def projected(self, q: Array) -> tuple[Array, Flags]:
+        """Return the nearest points of the surface, and which of them were found."""
+        size = np.zeros(len(q))
+        for _ in range(NEWTON if self.held else 0):
+            values, gradients = self.evaluated(q)
+            units, sizes = self.normals(gradients)
+            with np.errstate(all="ignore"):
+                target = -values[:, self.held] / sizes
+            size = np.asarray(abs(target).max(axis=1))
+            if not (size > EXACT).any():
+                break
+            q = q + self.scales * _shortest(units, np.nan_to_num(target))
+        return q, (size < 1e-8) & np.isfinite(q).all(axis=1)
+
+    def contains(self, values: Array) -> Any:
+        """Whether points of the surface with given values lie on the face, not on another one."""
+        signs = values[:, self.watched] > 0
+        if not self.polyhedron.is_union:
+            return signs.all(axis=1)
+        found = np.zeros(len(signs), dtype=bool)
+        patterns, where = np.unique(signs, axis=0, return_inverse=True)
+        for k, pattern in enumerate(patterns):
+            found[where.ravel() == k] = self._belongs_to(tuple(pattern.tolist()))
+        return found & np.isfinite(values).all(axis=1)
+
+    def sees(self, p: Array, q: Array) -> Any:
+        """Whether straight ways from one point of the face to others stay on it."""
+        away = self.manifold.difference(q, p)
+        way = p + WAY[:, None, None] * away
+        found, on = self.projected(way.reshape(-1, len(p)))
+        on &= self.contains(self.values(found))
+        return on.reshape(len(WAY), len(q)).all(axis=0)
+
+    def _belongs_to(self, pattern: tuple[bool, ...]) -> bool:
+        if pattern not in self._belongs:
+            signs = [0] * self.quotient.count
+            for i, positive in zip(self.watched, pattern, strict=True):
+                signs[i] = 1 if positive else -1
+            pieces = self.polyhedron.signs_to_pieces(signs)
+            here = bool(pieces) and frozenset().union(*pieces) == self.active
+            self._belongs[pattern] = here
+        return self._belongs[pattern]
+
+    # ----------------------------------------------------------------------------- tangent planes
+
+    def tangents(self, q: Array, gradients: Array) -> Array | None:
+        """Return orthonormal frames of the tangent planes ``(k, n, 2)``; None if they are none."""
+        units, _ = self.normals(gradients)
+        orbits = [self.quotient.symmetry.directions(self.manifold, p) for p in q]
+        if orbits and len(orbits[0]):
+            units = np.concatenate([units, np.array(orbits)], axis=1)
+        if units.shape[1] + 2 != len(self.scales):
+            return None
+        if not units.shape[1]:
+            return np.tile(np.eye(2), (len(q), 1, 1))
+        _, singular, right = np.linalg.svd(np.nan_to_num(units))
+        if (singular[:, -1] < RANK_TOLERANCE * singular[:, 0]).any():
+            return None
+        return np.asarray(right[:, -2:].transpose(0, 2, 1))
+
+    def embedded(self, q: Array) -> Array:
+        """Return what points are compared by: scaled coordinates, or the invariants."""
+        invariants = self.quotient.symmetry.invariants
+        return q / self.scales if invariants is None else np.array([invariants(p) for p in q])
+
+    def frames(self, q: Array, tangents: Array) -> tuple[Array, Array]:
+        """Return tangents ``(k, n, 2)`` whose images, ``(k, N, 2)``, are orthonormal."""
+        if self.quotient.symmetry.invariants is None:
+            return tangents, tangents
+        steps = DIFFERENCE * self.scales[:, None] * tangents
+        sides = [
+            (self.embedded(q + steps[..., i]) - self.embedded(q - steps[..., i])) / (2 * DIFFERENCE)
+            for i in (0, 1)
+        ]
+        images, factors = np.linalg.qr(np.stack(sides, axis=-1))
+        return tangents @ np.linalg.inv(factors), images
+
+    def apart(self, p: Array, q: Array) -> Array:
+        """Return displacements from embedded points ``q`` to embedded points ``p``."""
+        if self.quotient.symmetry.invariants is not None:
+            return np.asarray(p - q)
+        return self.manifold.difference(p * self.scales, q * self.scales) / self.scales
+
+
+def _shortest(units: Array, target: Array) -> Array:
+    """Return the shortest solutions ``(k, n)`` of ``units x = target``."""
+    if units.shape[1] > 1:
+        weights = np.linalg.pinv(units @ units.transpose(0, 2, 1), hermitian=True)
+        target = np.einsum("kij,kj->ki", weights, target)
+    return np.asarray(np.einsum("kin,ki->kn", units, target))
