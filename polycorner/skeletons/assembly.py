@@ -136,6 +136,8 @@ def _border(explorer: Explorer, group: list[Flag], curves: int) -> Border | None
             names = explorer.registry.names(sector.active)
             rays = sector.rays
             if rays and ("half", (k, rays[0]), names) in members:
+                if record.figure.singular:
+                    return None
                 first, last = (
                     _ray(record.figure.rays[i]) for i in (sector.rays[0], sector.rays[-1])
                 )

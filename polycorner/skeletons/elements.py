@@ -150,7 +150,9 @@ class Face(Value):
         was found, heights do not agree, or the search divided by a finite symmetry.  Computed
         when it is asked for.
         """
-        return face_euler_characteristic(self.border) if self.border and self.closed else None
+        if self.border is None:  # as at a singular corner
+            return 2 - len(self.boundary) if self.closed else None
+        return face_euler_characteristic(self.border) if self.closed else None
 
 
 @dataclass(frozen=True)
