@@ -1,7 +1,7 @@
 """A frozen skeleton from what a search found."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,7 @@ from polycorner.skeletons.elements import Completeness, Contact, Corner, Edge, F
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Flag
 from polycorner.skeletons.indices import Border, seeds_of
-from polycorner.skeletons.probing import Anchor, Patch
+from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.vertex_figures import Ray
 from polycorner.skeletons.walks import End
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
     """Return the skeleton as far as it was found."""
     faces, components = _faces(explorer)
-    closed = tuple(_closed_face(explorer, patch) for patch in explorer.patches)
     corners = tuple(_corner(explorer, record) for record in explorer.records)
     edges = tuple(
         Edge(
@@ -44,12 +43,12 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
         polyhedron=explorer.polyhedron,
         corners=corners,
         edges=edges,
-        faces=faces + closed,
+        faces=faces,
         complete=complete,
         notes=tuple(explorer.notes),
         components=components,
         whole=_whole(explorer),
-        contacts=_contacts(explorer, corners, edges, faces + closed),
+        contacts=_contacts(explorer, corners, edges, faces),
         state=explorer.state,
     )
 
@@ -101,6 +100,9 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
             broken.append(one)
     for crossing in explorer.crossings:
         surface.union(crossing.start, crossing.stop)
+    patches = _patches(explorer, flags)
+    for flag, k in patches.items():
+        surface.union(flag, next(other for other, j in patches.items() if j == k))
     loose = {boundary[flag] for flag in [*broken, *_ends(explorer, flags)]}
     faces = []
     for group in _groups(surface, flags):
@@ -113,19 +115,43 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
                     for curve in curves
                 ),
                 closed=not any(boundary[curve[0]] in loose for curve in curves),
-                border=_border(explorer, group, len(curves)),
+                border=_border(explorer, group, len(curves), patches.get(group[0])),
             )
         )
-    return tuple(faces), _components(explorer, flags, surface, len(faces))
+    alone = [k for k in range(len(explorer.patches)) if k not in patches.values()]
+    faces += [
+        Face(_ordered(explorer, explorer.registry.names(explorer.patches[k].active)), (), True, b)
+        for k, b in ((k, _closed_border(explorer, k)) for k in alone)
+    ]
+    return tuple(faces), _components(explorer, flags, surface, patches, len(faces))
 
 
-def _closed_face(explorer: Explorer, patch: Patch) -> Face:
-    border = Border(explorer.quotient, patch.active, patch.point[None], (), (), 0)
-    return Face(_ordered(explorer, explorer.registry.names(patch.active)), (), True, border)
+def _patches(explorer: Explorer, flags: Iterable[Flag]) -> dict[Flag, int]:
+    """Return the closed surfaces on which faces that only have apexes lie, by position."""
+    found = {}
+    for flag in flags if explorer.patches else ():
+        if flag[0] == "apex":
+            k, s = flag[1]
+            sector = explorer.records[k].figure.sectors[s]
+            here = None if sector.sample is None else sector.sample
+            on = None if here is None else explorer.patch_at(here, sector.active)
+            if on is not None:
+                found[flag] = on
+    return found
 
 
-def _border(explorer: Explorer, group: list[Flag], curves: int) -> Border | None:
-    """Return the edges around a face, and its corners; None where they are not known."""
+def _closed_border(explorer: Explorer, k: int) -> Border:
+    patch = explorer.patches[k]
+    return Border(explorer.quotient, patch.active, patch.point[None], (), (), 0)
+
+
+def _border(explorer: Explorer, group: list[Flag], curves: int, patch: int | None) -> Border | None:
+    """Return the edges around a face, and its corners; None where they are not known.
+
+    For a closed surface without those of its points that are apexes: of the whole surface.
+    """
+    if patch is not None:
+        return _closed_border(explorer, patch)
     if explorer.symmetry.relabels or any(flag[0] == "apex" for flag in group):
         return None
     positions = sorted({_edge_of(explorer, flag) for flag in group} - {-1})
@@ -254,7 +280,11 @@ def _edge_of(explorer: Explorer, flag: Flag) -> int:
 
 
 def _components(
-    explorer: Explorer, flags: Iterable[Flag], surface: "UnionFind", faces: int
+    explorer: Explorer,
+    flags: Iterable[Flag],
+    surface: "UnionFind",
+    patches: Mapping[Flag, int],
+    faces: int,
 ) -> dict[int, int]:
     from networkx.utils import UnionFind
 
@@ -268,12 +298,14 @@ def _components(
     free = explorer.manifold.dimension - len(point.matrix([]))
     counts = {fixed: len(explorer.records), fixed + 1: len(explorer.curves)}
     if free >= 2:
-        counts[fixed + 2] = faces + len(explorer.patches)
+        counts[fixed + 2] = faces
     if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
         inside = UnionFind([("patch", k) for k in range(len(explorer.patches))])
         for flag in flags:
             if flag[0] != "apex":
                 inside.union(("edge", _edge_of(explorer, flag)), surface[flag])
+        for flag, k in patches.items():
+            inside.union(("patch", k), surface[flag])
         for link in explorer.links:
             inside.union(*(place for anchor in link for place in _places(explorer, anchor)))
         every = [("patch", k) for k in range(len(explorer.patches))]

@@ -10,8 +10,8 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
 from polycorner.skeletons.arcs import arc_length
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.indices import Border, face_euler_characteristic
+from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Completeness(Enum):
     """Completeness of a skeleton; the value is a sentence."""
 
-    EXHAUSTED = "all that was met is traced; islands were sought by sampling, not excluded"
+    EXHAUSTED = "all that was met is traced; islands that no walk met are not excluded"
     GAPS = "some edges could not be traced: the notes say which"
     BUDGET = "budget or time was used up: edges or faces are left"
     INTERRUPTED = "interrupted: edges or faces are left"
@@ -152,7 +152,8 @@ class Face(Value):
         """
         if self.border is None:  # as at a singular corner
             return 2 - len(self.boundary) if self.closed else None
-        return face_euler_characteristic(self.border) if self.closed else None
+        found = face_euler_characteristic(self.border) if self.closed else None
+        return None if found is None else found - self.boundary.count(())
 
 
 @dataclass(frozen=True)

@@ -325,6 +325,8 @@ class Explorer(Prober):
         middle = self.quotient.at(walk.points[len(walk.points) // 2])
         self._find_singular(middle, face)
         active = walk.last.active() if walk.end is End.CORNER else None
+        if start[0] == "apex" and active is None and self.patch_at(middle, face) is None:
+            self._descend_across(middle, face, self._free(middle, face), 2)
         if active is None or not active > face:
             return
         undirected = self._undirected(walk.last, active)

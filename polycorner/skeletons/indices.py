@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner.skeletons.heights import Height
-from polycorner.skeletons.nets import Net
+from polycorner.skeletons.nets import LEVELS, Net
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.surfaces import Surface
 from polycorner.spaces.manifold import Array
@@ -25,6 +25,8 @@ from polycorner.values import Value
 # Heights that have to agree, and that are tried.
 AGREEING = 3
 HEIGHTS = 8
+# How many times more points a second net has on its rays, which may pass a narrow gap otherwise.
+FINER = 4
 NEWTON = 20
 # Distance across an edge, in scale units, at which the side of a face is told.
 ACROSS = 1e-7
@@ -80,8 +82,9 @@ def face_euler_characteristic(border: Border) -> int | None:
     if symmetry.relabels or symmetry.elements:
         return None
     surface = Surface(border.quotient, border.active, border.seeds[0])
-    net = Net(surface, border.seeds)
-    if not net.complete or not _enclosed(surface, net, border):
+    nets = (Net(surface, border.seeds, levels=levels) for levels in (LEVELS, FINER * LEVELS))
+    net = next((net for net in nets if net.complete and _enclosed(surface, net, border)), None)
+    if net is None:
         return None
     rng = np.random.default_rng(0)
     found: list[int] = []

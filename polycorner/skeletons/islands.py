@@ -131,7 +131,7 @@ def _programme(quotient: Quotient, q: Array, rows: Sequence[int], row: int | Non
     from scipy.optimize import minimize
 
     bundle, scales = quotient.polyhedron.bundle, quotient.polyhedron.manifold.scale_array
-    equations = list(range(quotient.count, quotient.count + len(quotient.polyhedron.equations)))
+    equations = quotient.equations
 
     def rated(which: Sequence[int], order: int) -> Any:
         def evaluate(u: Array) -> Array:

@@ -7,6 +7,7 @@ face.  This is the continuation of implicit manifolds in several dimensions by o
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +46,10 @@ class Net:
         Whether the face is covered.
     """
 
-    def __init__(self, surface: Surface, seeds: Array, extent: float = math.inf) -> None:
-        self.surface, self.extent = surface, extent
+    def __init__(
+        self, surface: Surface, seeds: Array, extent: float = math.inf, levels: int = LEVELS
+    ) -> None:
+        self.surface, self.extent, self.levels = surface, extent, levels
         n = len(surface.scales)
         circles = np.array(surface.manifold.periods) / surface.scales
         self.longest = CIRCLE * float(circles.min(initial=math.inf))
@@ -132,11 +135,11 @@ class Net:
     def _rays(self, new: NDArray[np.intp]) -> tuple[Array, Array]:
         """Return ends of rays that nothing covers, and radii for them."""
         starts, radii = [], []
-        angles = math.tau * np.arange(RAYS) / RAYS
+        angles = math.tau * np.arange(RAYS) / RAYS + self.levels  # any direction to begin with
         circle = np.array([np.cos(angles), np.sin(angles)])
         while len(new):
             rays = np.einsum("knt,tr->krn", self.frames[new], circle) * self.surface.scales
-            levels = (np.arange(LEVELS) + 1) / LEVELS
+            levels = (np.arange(self.levels) + 1) / self.levels
             steps = self.radii[new][:, None, None, None] * levels[:, None] * rays[:, :, None]
             guess = self.points[new][:, None, None] + steps
             shape = guess.shape[:3]
@@ -144,9 +147,10 @@ class Net:
             values, gradients = self.surface.evaluated(q)
             normals, _ = self.surface.normals(gradients)
             inside = (found & self.surface.contains(values)).reshape(shape)
+            inside &= self._joined(new, values.reshape(*shape, -1))
             cosines = np.einsum(
                 "kxrn,krn->kxr",
-                normals.reshape(len(new), RAYS * LEVELS, *normals.shape[1:]),
+                normals.reshape(len(new), RAYS * self.levels, *normals.shape[1:]),
                 self.normals[new],
             ).min(axis=2, initial=1.0)
             flat = (cosines > TURN).reshape(shape) & found.reshape(shape)
@@ -170,6 +174,15 @@ class Net:
         found = np.concatenate([f for _, f in starts])
         allowed = np.minimum(GROWTH * np.concatenate(radii), self.longest)
         return points[found], allowed[found]
+
+    def _joined(self, new: NDArray[np.intp], values: Array) -> Any:
+        """Whether rays stay on the face between their levels: in a union they may pass a gap."""
+        if not self.surface.polyhedron.is_union:
+            return True
+        here = self.surface.values(self.points[new])
+        first = np.broadcast_to(here[:, None, None], (*values.shape[:2], 1, values.shape[-1]))
+        before = np.concatenate([first, values[:, :, :-1]], axis=2)
+        return self.surface.joins(before, values)
 
     def _uncovered(self, q: Array, normals: Array) -> tuple[Array, Flags]:
         return q, ~self.covers(self.surface.embedded(q), normals) if len(q) else np.zeros(0, bool)

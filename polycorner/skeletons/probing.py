@@ -147,7 +147,10 @@ class Prober(EdgeTracer):
     ) -> Iterator[tuple[EvaluatedPoint, frozenset[int]]]:
         """Yield what walks through the interior from a point of a facet arrive at."""
         (row,) = active
-        normal = point.gradients[row] / np.linalg.norm(point.gradients[row])
+        size = np.linalg.norm(point.gradients[row])
+        if not size > 0:
+            return
+        normal = point.gradients[row] / size
         start = HeldPoint(self.quotient, point.q + INSIDE * self.scales * normal, [])
         if start.active():
             return

@@ -40,8 +40,7 @@ class Surface:
         self.quotient, self.active = quotient, active
         self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
         self.scales = self.manifold.scale_array
-        equations = range(quotient.count, quotient.count + len(self.polyhedron.equations))
-        self.held = [*quotient.at(seed).basis(active), *equations]
+        self.held = quotient.held(quotient.at(seed).basis(active))
         self.watched = [i for i in range(quotient.count) if i not in active]
         self._belongs: dict[tuple[bool, ...], bool] = {}
 
@@ -88,6 +87,23 @@ class Surface:
         for k, pattern in enumerate(patterns):
             found[where.ravel() == k] = self._belongs_to(tuple(pattern.tolist()))
         return found & np.isfinite(values).all(axis=1)
+
+    def joins(self, before: Array, after: Array) -> Flags:
+        """Whether values ``(..., m)`` that change in proportion stay those of the face.
+
+        Where functions change sign, one after another, the signs in between must be those of
+        points on the face.
+        """
+        a, b = before[..., self.watched], after[..., self.watched]
+        turned = (a > 0) != (b > 0)
+        found = np.ones(turned.shape[:-1], dtype=bool)
+        for where in zip(*np.nonzero(turned.sum(axis=-1) > 1), strict=True):
+            u, v = before[where], after[where]
+            changed = np.array(self.watched)[turned[where]]
+            at = np.sort(u[changed] / (u[changed] - v[changed]))
+            between = (at[:-1] + at[1:]) / 2
+            found[where] = self.contains(u + between[:, None] * (v - u)).all()
+        return found
 
     def sees(self, p: Array, q: Array) -> Any:
         """Whether straight ways from one point of the face to others stay on it."""

@@ -221,16 +221,15 @@ class EdgeTracer:
         )
 
     def lies_on(self, q: Array, curve: Curve) -> bool:
-        """Whether a point lies on a curve: on one of the chords' arcs beside its nearest vertex."""
-        apart = [self.symmetry.separation(self.manifold, q, p) for p in curve.points]
-        nearest = int(np.argmin(apart))
+        """Whether a point lies on a curve: on the arc over a chord that is as near as it is long.
+
+        The nearest vertex may belong to another part of the curve.
+        """
+        apart = np.array([self.symmetry.separation(self.manifold, q, p) for p in curve.points])
+        near = np.minimum(apart[:-1], apart[1:])
         chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
-        # A closed curve has its first point twice.
-        nearest = nearest or len(chords)
-        beside = {nearest - 1, nearest % len(chords)}
-        if apart[nearest] > max(chords[k] for k in beside):
-            return False
-        return any(self._on_arc(q, curve, k) for k in beside)
+        possible = [k for k in np.argsort(near) if near[k] <= chords[k]]
+        return any(self._on_arc(q, curve, int(k)) for k in possible)
 
     def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
         """Whether a point lies on the arc over chord ``k``: where the arc passes it."""

@@ -167,6 +167,40 @@ class TestClosedSurfaces:
         assert (counts(atlas), atlas.euler_characteristic) == ((0, 0, 1), 2)
 
 
+class TestKissingSpheres:
+    """Spheres that touch: their boundary is a chain of spheres, each point of contact a corner."""
+
+    @given(st.lists(st.floats(0.3, 1.2), min_size=2, max_size=3), seeds)
+    @few
+    def test_a_chain_of_balls_outside_which_one_is(self, radii, seed):
+        ends = np.concatenate([[0], 2 * np.cumsum(radii)])
+        chain = [
+            ball((float(end + r), 0, 0), r, f"ball{k}", inside=False)
+            for k, (end, r) in enumerate(zip(ends[:-1], radii, strict=True))
+        ]
+        middle, wide = float(ends[-1]) / 2, float(ends[-1])
+        D = Polyhedron(space(3), AllOf(*chain, ball((middle, 0, 0), wide, "room")))
+        atlas = skeleton(D, [[middle, 0.9 * wide, 0]], rng=seed)
+        assert counts(atlas) == (len(radii) - 1, 0, len(radii) + 1)
+        assert sorted(c.point[0] for c in atlas.corners) == pytest.approx(ends[1:-1], abs=1e-6)
+        assert atlas.euler_characteristic == 2 * (len(radii) + 1) - (len(radii) - 1)
+
+    @pytest.mark.parametrize("radius", [0.2, 0.5, 0.9])
+    def test_a_ball_that_touches_its_room_from_inside(self, radius):
+        inner = ball((1 - radius, 0, 0), radius, "ball", inside=False)
+        atlas = skeleton(
+            Polyhedron(space(3), AllOf(ball((0, 0, 0), 1, "room"), inner)), [[-0.9, 0, 0]]
+        )
+        assert (counts(atlas), atlas.euler_characteristic) == ((1, 0, 2), 3)
+
+    def test_three_balls_that_touch_each_other(self):
+        centres = [(0, 0, 0), (2, 0, 0), (1, math.sqrt(3), 0)]
+        balls = [ball(c, 1, f"ball{k}", inside=False) for k, c in enumerate(centres)]
+        D = Polyhedron(space(3), AllOf(*balls, ball((1, 1, 0), 4, "room")))
+        atlas = skeleton(D, [[1, 0.5, 2]])
+        assert (counts(atlas), atlas.euler_characteristic) == ((3, 0, 4), 5)
+
+
 class TestTorus:
     @given(st.floats(-1.9, 3).filter(lambda c: min(abs(c - k) for k in (-2, 0, 2)) > 0.1), seeds)
     @few
