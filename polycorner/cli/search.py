@@ -149,7 +149,7 @@ class Search(Kept):
 
         from polycorner.skeletons import Budget, skeleton
         from polycorner.skeletons import resume as resumed
-        from polycorner.skeletons.elements import Completeness
+        from polycorner.skeletons.parts import Completeness
 
         known = 0
         with working(f"searching {self.model}", "edges") as progress:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import instance
 from polycorner.container import XML, Kind, versions
-from polycorner.skeletons.elements import Corner, Edge, Skeleton
+from polycorner.skeletons.elements import Skeleton
+from polycorner.skeletons.parts import Corner, Edge
 from polycorner.skeletons.walks import End
 
 if TYPE_CHECKING:

@@ -13,9 +13,10 @@ from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
-from polycorner.skeletons.elements import Completeness, Skeleton
+from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Crossing, Flag
+from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord

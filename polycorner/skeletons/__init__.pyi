@@ -1,7 +1,8 @@
-from .elements import Completeness, Contact, Corner, Edge, Face, Skeleton
-from .explorer import Budget
+from .elements import Skeleton
+from .parts import Completeness, Contact, Corner, Edge, Face
 from .refinement import traced
 from .search import resume, skeleton
+from .states import Budget
 from .walks import End
 
 __all__ = [

@@ -1,183 +1,18 @@
-"""Skeletons of polyhedra: corners, edges, faces and their incidences."""
+"""Skeletons of polyhedra: parts and their incidences."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
-from polycorner.skeletons.arcs import arc_length
-from polycorner.skeletons.indices import Border, face_euler_characteristic
-from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.walks import End
-from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 if TYPE_CHECKING:
     import networkx as nx
-
-
-class Completeness(Enum):
-    """Completeness of a skeleton; the value is a sentence."""
-
-    EXHAUSTED = "all that was met is traced; islands that no walk met are not excluded"
-    GAPS = "some edges could not be traced: the notes say which"
-    BUDGET = "budget or time was used up: edges or faces are left"
-    INTERRUPTED = "interrupted: edges or faces are left"
-    SEEDS = "no start leads to a corner, an edge or a closed face"
-
-
-@dataclass(frozen=True, eq=False)
-class Corner(Value):
-    """A corner: a point that its active functions isolate, modulo the symmetry.
-
-    Attributes
-    ----------
-    point : (n,) array
-        The point: of its orbit the first that was found.
-    stratum : Stratum
-        Active functions, rank, dimension and local type there.
-    singular : bool
-        Whether the rank falls short: curves cross, touch or have a cusp, or a surface an apex.
-    edges : tuple of int
-        Edges that leave it, as positions in ``Skeleton.edges``, once for every end.
-    """
-
-    point: Array
-    stratum: Stratum
-    singular: bool
-    edges: tuple[int, ...]
-
-    @property
-    def active(self) -> tuple[str, ...]:
-        """Names of the active functions."""
-        return self.stratum.active
-
-    @property
-    def rank(self) -> int:
-        """Rank of the active gradients and equations."""
-        return self.stratum.rank
-
-    @property
-    def local_type(self) -> LocalType:
-        """What the polyhedron looks like here."""
-        return self.stratum.local_type
-
-    @property
-    def chirality(self) -> str | None:
-        """The model's ``chirality`` annotation, or None."""
-        return self.stratum.chirality
-
-
-@dataclass(frozen=True, eq=False)
-class Edge(Value):
-    """An edge: a curve on which the active functions vanish, modulo the symmetry.
-
-    Attributes
-    ----------
-    active : tuple of str
-        Functions that vanish along it.
-    ends : tuple of (int or None, int or None)
-        Corners at its ends, as positions in ``Skeleton.corners``; None where there is none.
-    kinds : tuple of (End, End)
-        How either end comes about.
-    polyline : (k, n) array
-        Points along it, in coordinates that are not wrapped.
-    quotient : Quotient
-        The polyhedron modulo its symmetry.
-    """
-
-    active: tuple[str, ...]
-    ends: tuple[int | None, int | None]
-    kinds: tuple[End, End]
-    polyline: Array
-    quotient: Quotient = field(repr=False)
-
-    @cached_property
-    def length(self) -> float:
-        """Length of the curve in scale units, orthogonal to the symmetry.
-
-        Integrated to ``1e-11`` between the ends of the polyline; see
-        :func:`~polycorner.skeletons.arcs.arc_length`.  A cusp at an end is known less exactly, to
-        about ``1e-7``.
-        """
-        names = self.quotient.polyhedron.names
-        return arc_length(self.quotient, self.polyline, [names.index(f) for f in self.active])
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether it is a closed curve without a corner."""
-        return self.kinds[0] is End.CLOSED
-
-    @property
-    def is_loop(self) -> bool:
-        """Whether it returns to the corner it left, or is closed without a corner."""
-        return self.is_closed or (self.ends[0] is not None and self.ends[0] == self.ends[1])
-
-
-@dataclass(frozen=True)
-class Face(Value):
-    """A two-dimensional face, modulo the symmetry.
-
-    Attributes
-    ----------
-    active : tuple of str
-        Functions that vanish on it.
-    boundary : tuple of tuple of int
-        Its boundary curves, each as the positions of its edges; none for an apex or a closed
-        surface.
-    closed : bool
-        Whether every boundary curve closes: no end at infinity, and no corner where the face
-        could not be followed.
-    border : Border or None
-        What its Euler characteristic is computed from.
-    """
-
-    active: tuple[str, ...]
-    boundary: tuple[tuple[int, ...], ...]
-    closed: bool
-    border: Border | None = field(default=None, compare=False, repr=False)
-
-    @cached_property
-    def euler_characteristic(self) -> int | None:
-        """That of the face with its boundary, from the critical points of heights on it.
-
-        A disc with ``b`` holes and ``g`` handles has ``1 - b - 2 g``.  None where it is not
-        determined: the face is not compact, a net does not cover it or leaves it where no edge
-        was found, heights do not agree, or the search divided by a finite symmetry.  Computed
-        when it is asked for.
-        """
-        if self.border is None:  # as at a singular corner
-            return 2 - len(self.boundary) if self.closed else None
-        found = face_euler_characteristic(self.border) if self.closed else None
-        return None if found is None else found - self.boundary.count(())
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Where a function of a polyhedron vanishes on it, as far as was found.
-
-    Attributes
-    ----------
-    corners, edges, faces : int
-        On how many of them it is active.
-    least : float or None
-        Least value in the polyhedron that samples and minimisation found, if it was never met;
-        None if it was met, or no islands were sought.
-    """
-
-    corners: int
-    edges: int
-    faces: int
-    least: float | None
-
-    @property
-    def met(self) -> bool:
-        """Whether it is active anywhere."""
-        return self.corners + self.edges + self.faces > 0
 
 
 @dataclass(frozen=True, eq=False)

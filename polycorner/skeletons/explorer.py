@@ -1,25 +1,22 @@
 """Search for the skeleton of a polyhedron: descents, edges, crossings of faces, in this order."""
 
 import copy
-import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from time import monotonic
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.progress import Progress, silent
-from polycorner.skeletons.elements import Completeness
 from polycorner.skeletons.flags import Crossing, Flag
-from polycorner.skeletons.links import SAMPLED, Link, singular_figure
+from polycorner.skeletons.links import Link, singular_figure
+from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
 from polycorner.skeletons.singularities import singular_point, singular_points
-from polycorner.skeletons.states import SearchState, copied
+from polycorner.skeletons.states import Budget, SearchState, copied
 from polycorner.skeletons.tracing import Curve, EdgeEnd
 from polycorner.skeletons.vertex_figures import Ray, faces_beside
 from polycorner.skeletons.walks import End, follow
@@ -33,32 +30,6 @@ ACROSS = 6
 TRIES = 4
 # The first walks of a descent end after this part of the extent.
 SHORT = 20
-
-
-@dataclass(frozen=True)
-class Budget:
-    """How much a search may do before it stops and can be resumed.
-
-    Attributes
-    ----------
-    edges : int
-        Most edges to trace; as many starts may be descended from, and as many faces crossed.
-    seconds : float
-        Time after which it stops: between two edges, descents or crossings, of which it does at
-        least one.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Naming the argument.
-    """
-
-    edges: int = 100_000
-    seconds: float = math.inf
-
-    def __post_init__(self) -> None:
-        checks.whole("budget", self.edges, least=1)
-        checks.real("seconds", self.seconds, above=0, infinite=True, unit="s")
 
 
 class Explorer(Prober):
@@ -271,7 +242,9 @@ class Explorer(Prober):
 
     def _uncrossed(self) -> Iterator[tuple[Flag, HeldPoint, Array]]:
         """Yield ways into faces that were not crossed yet: from edges, then from apexes."""
-        if self.symmetry.relabels or (isinstance(self.polyhedron, Link) and self._is_large):
+        if self.symmetry.relabels or (
+            isinstance(self.polyhedron, Link) and self.polyhedron.is_large
+        ):
             return
         while self._finished < len(self.curves):
             for face, ray in self.faces_beside(self._finished).items():
@@ -285,11 +258,6 @@ class Explorer(Prober):
                 if not sector.rays and sector.sample is not None and flag not in self.tried:
                     way = self.manifold.difference(sector.sample.q, record.point.q) / self.scales
                     yield flag, sector.sample, way
-
-    @property
-    def _is_large(self) -> bool:
-        """Whether a link's faces are too many to cross: those of the corner suffice."""
-        return len(self.manifold.names) - len(self.polyhedron.equation_names) >= SAMPLED
 
     def faces_beside(self, k: int) -> Mapping[frozenset[int], Ray]:
         """Return the two-dimensional faces that meet an edge, and a ray into each."""

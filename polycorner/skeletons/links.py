@@ -76,6 +76,11 @@ class Link(Polyhedron):
         self._sliced = _Sliced(base.bundle, point.q, scales, across)
 
     @property
+    def is_large(self) -> bool:
+        """Whether its faces are too many to cross: those of the corner suffice."""
+        return len(self.manifold.names) - len(self.equation_names) >= SAMPLED
+
+    @property
     def bundle(self) -> Bundle:
         """Inequalities first, equations after them, the sphere's last."""
         return self._sliced

@@ -3,7 +3,8 @@
 import numpy as np
 
 from polycorner import checks
-from polycorner.skeletons.elements import Edge, Skeleton
+from polycorner.skeletons.elements import Skeleton
+from polycorner.skeletons.parts import Edge
 from polycorner.skeletons.points import projected
 from polycorner.skeletons.states import SearchState
 from polycorner.spaces.manifold import Array

@@ -9,10 +9,11 @@ from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
-from polycorner.skeletons.elements import Completeness, Skeleton
-from polycorner.skeletons.explorer import Budget, Explorer
+from polycorner.skeletons.elements import Skeleton
+from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
-from polycorner.skeletons.states import SearchState
+from polycorner.skeletons.states import Budget, SearchState
 from polycorner.spaces.manifold import reals
 
 EXTENT = 1000.0

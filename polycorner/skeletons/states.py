@@ -1,10 +1,12 @@
-"""States of a search, kept apart from the search itself: they are pickled and saved."""
+"""Budgets of a search, and its states, which are pickled and saved."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
@@ -12,6 +14,32 @@ from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.tracing import Curve, EdgeEnd
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much a search may do before it stops and can be resumed.
+
+    Attributes
+    ----------
+    edges : int
+        Most edges to trace; as many starts may be descended from, and as many faces crossed.
+    seconds : float
+        Time after which it stops: between two edges, descents or crossings, of which it does at
+        least one.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument.
+    """
+
+    edges: int = 100_000
+    seconds: float = math.inf
+
+    def __post_init__(self) -> None:
+        checks.whole("budget", self.edges, least=1)
+        checks.real("seconds", self.seconds, above=0, infinite=True, unit="s")
 
 
 @dataclass(frozen=True, eq=False)

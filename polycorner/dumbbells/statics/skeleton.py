@@ -13,8 +13,9 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import ball_relabellings, relabellings
 from polycorner.polyhedra.symmetry import Element
 from polycorner.progress import Progress
-from polycorner.skeletons.elements import Corner, Skeleton
+from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.orbits import Orbits, orbits
+from polycorner.skeletons.parts import Corner
 from polycorner.skeletons.search import BUDGET, skeleton
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value

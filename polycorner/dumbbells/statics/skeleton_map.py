@@ -13,8 +13,9 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from polycorner.dumbbells.symmetries import relabellings
 from polycorner.progress import Progress, silent
-from polycorner.skeletons.elements import Completeness, Edge, Skeleton
+from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.orbits import Orbits
+from polycorner.skeletons.parts import Completeness, Edge
 from polycorner.skeletons.search import skeleton
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value

@@ -20,7 +20,7 @@ from polycorner.dumbbells.statics.skeleton_map import (
     pattern_at,
     signature_of,
 )
-from polycorner.skeletons.elements import Completeness
+from polycorner.skeletons.parts import Completeness
 
 # The file, not the function of the same name that its package exports.
 module = sys.modules["polycorner.dumbbells.statics.skeleton_map"]
