@@ -24,7 +24,7 @@ CASES = {
     "bounds and 100 quadratics": (10, 30, 50),
     "half-planes, minimum": (50, 500),
     "half-planes, skeleton": (50, 500),
-    "discs, all distances": (3, 5),
+    "discs, all distances": (10, 20),
 }
 
 

@@ -34,17 +34,17 @@ def plane_invariants(q: Array, half_length: float, unit: float) -> Array:
     Lengths are in ``unit``, the angle as cosine and sine times ``half_length / unit``.
     """
     across, along = q[3] - q[0], q[4] - q[1]
-    s, c, turn = math.sin(q[2]), math.cos(q[2]), q[5] - q[2]
+    s, c, turn = np.sin(q[2]), np.cos(q[2]), q[5] - q[2]
     place = (across * c - along * s, across * s + along * c)
-    arm = (half_length * math.cos(turn), half_length * math.sin(turn))
+    arm = (half_length * np.cos(turn), half_length * np.sin(turn))
     return np.array([*place, *arm]) / unit
 
 
 def drum_invariants(q: Array, half_length: float, unit: float, centre_radius: float) -> Array:
     """Return the differences of azimuth and axial position, and both headings; see above."""
     apart, along = q[3] - q[0], q[4] - q[1]
-    arms = [half_length * f(theta) for theta in (q[2], q[5]) for f in (math.cos, math.sin)]
-    around = (centre_radius * math.cos(apart), centre_radius * math.sin(apart))
+    arms = [half_length * f(theta) for theta in (q[2], q[5]) for f in (np.cos, np.sin)]
+    around = (centre_radius * np.cos(apart), centre_radius * np.sin(apart))
     return np.array([*around, along, *arms]) / unit
 
 

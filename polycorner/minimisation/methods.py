@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
@@ -29,6 +30,7 @@ Descent = Callable[[Problem, Piece, Array, int], Endpoint]  # from a point, insi
 MAX_SWITCHES = 50  # of branches in a union
 FIRM = {Verdict.STRICT_MINIMUM, Verdict.WEAK_MINIMUM}  # not decided by rounding far away
 DISTANT = 8.0  # scale units beyond which a flat end is doubted
+FADED = 1e-2  # size of derivatives, relative to those at the start, below which it is doubted
 
 
 def minimise(
@@ -253,9 +255,11 @@ def _diagnosing(method: Method) -> Descent:
             end = _without_dependent(problem, piece, q, plain, limit, end)
         if end.failure is None and not end.flat:
             return end
-        if end.failure is Verdict.INFEASIBLE or not _is_doubtful(problem, q, end):
+        if end.failure is Verdict.INFEASIBLE:
             return end
-        return _diagnosed(problem, piece, q, limit, end)
+        if _is_doubtful(problem, q, end):
+            return _diagnosed(problem, piece, q, limit, end)
+        return replace(end, failure=None)
 
     return descent
 
@@ -272,12 +276,23 @@ def _without_dependent(
 
 
 def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
-    """Whether a descent has failed, or ended far away where nothing is decided."""
-    if end.failure is not None:
+    """Whether a descent ended at no minimum, or far away where nothing is decided.
+
+    One that stalls at a minimum, as where gradients are dependent, has not failed.
+    """
+    far = bool(abs((end.point - start) / problem.scales).max() >= DISTANT)
+    if end.failure not in {None, Verdict.NOT_CONVERGED}:
         return True
-    if abs((end.point - start) / problem.scales).max() < DISTANT:
+    if end.failure is None and not far:
         return False
-    return Certificate(problem, end.point).verdict is Verdict.UNDECIDED
+    with np.errstate(all="ignore"):
+        found = Certificate(problem, end.point).analysis
+    if end.failure is None:
+        return found.verdict is Verdict.UNDECIDED
+    if not found.verdict.is_minimum:
+        return True
+    # Where derivatives fade, rounding decides.
+    return far and found.reference < FADED * Certificate(problem, start).analysis.reference
 
 
 def _diagnosed(problem: Problem, piece: Piece, q: Array, limit: int, end: Endpoint) -> Endpoint:

@@ -27,7 +27,7 @@ AGREEING = 3
 HEIGHTS = 8
 # How many times more points a second net has on its rays, which may pass a narrow gap otherwise.
 FINER = 4
-NEWTON = 20
+NEWTON = 10
 # Distance across an edge, in scale units, at which the side of a face is told.
 ACROSS = 1e-7
 # Determinant of a Hessian, relative to its entries, below which it counts as degenerate.
@@ -144,7 +144,7 @@ def _inside(surface: Surface, net: Net, height: Height) -> int | None:
         step = _newton(slope, curvature)
         long = np.linalg.norm(step, axis=1)
         if first:
-            near = long < 3 * radii
+            near = long < 2 * radii
             q, step, long, tangents = q[near], step[near], long[near], tangents[near]
             starts, radii, first = starts[near], radii[near], False
         if not len(q):

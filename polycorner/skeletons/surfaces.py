@@ -5,6 +5,7 @@ are told apart by their coordinates, or by the invariants of the symmetry, and n
 in orthonormal frames of the tangent plane.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ Flags = NDArray[np.bool_]
 EXACT = 1e-11
 # Step of differences of invariants, in scale units.
 DIFFERENCE = 1e-6
+# Points at which it is seen whether invariants are computed for many points at once.
+SAMPLE = 3
 # Parts of a straight way that are looked at.
 WAY = np.linspace(0.05, 0.95, 10)
 
@@ -42,6 +45,7 @@ class Surface:
         self.scales = self.manifold.scale_array
         self.held = quotient.held(quotient.at(seed).basis(active))
         self.watched = [i for i in range(quotient.count) if i not in active]
+        self._at_once: bool | None = None  # whether invariants of many points are found in one call
         self._belongs: dict[tuple[bool, ...], bool] = {}
 
     def values(self, q: Array) -> Array:
@@ -143,7 +147,13 @@ class Surface:
     def embedded(self, q: Array) -> Array:
         """Return what points are compared by: scaled coordinates, or the invariants."""
         invariants = self.quotient.symmetry.invariants
-        return q / self.scales if invariants is None else np.array([invariants(p) for p in q])
+        if invariants is None:
+            return q / self.scales
+        if self._at_once is None and len(q):
+            self._at_once = _is_elementwise(invariants, q[:SAMPLE])
+        if self._at_once:
+            return np.asarray(invariants(q.T)).T
+        return np.array([invariants(p) for p in q])
 
     def frames(self, q: Array, tangents: Array) -> tuple[Array, Array]:
         """Return tangents ``(k, n, 2)`` whose images, ``(k, N, 2)``, are orthonormal."""
@@ -162,6 +172,16 @@ class Surface:
         if self.quotient.symmetry.invariants is not None:
             return np.asarray(p - q)
         return self.manifold.difference(p * self.scales, q * self.scales) / self.scales
+
+
+def _is_elementwise(invariants: Callable[[Array], Array], q: Array) -> bool:
+    """Whether invariants written for a point ``(n,)`` give those of points ``(n, k)`` as well."""
+    each = np.array([invariants(p) for p in q])
+    try:
+        together = np.asarray(invariants(q.T))
+    except (TypeError, ValueError, IndexError):
+        return False
+    return together.shape == each.T.shape and bool(np.allclose(together.T, each, 1e-12, 1e-12))
 
 
 def _shortest(units: Array, target: Array) -> Array:
