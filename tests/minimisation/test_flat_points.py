@@ -1,9 +1,14 @@
 """Descents go on from flat inflections and saddles of higher order, and stay at minima."""
 
+import math
+
+import numpy as np
 import pytest
 import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
 
-from polycorner import Manifold, Polyhedron, minimise
+from polycorner import Manifold, Polyhedron, certify, minimise
 
 PLANE = Manifold.euclidean("x y")
 x, y = PLANE.symbols
@@ -58,3 +63,23 @@ def test_a_barrier_is_not_crossed():
     """A flat minimum stays the end of its basin, although a lower one lies close."""
     found = minimise(BOX, x**4 * (x - sp.Rational(1, 20)) * (x - sp.Rational(1, 10)) + y**2, [0, 0])
     assert found.point == pytest.approx([0, 0], abs=1e-9)
+
+
+@given(
+    st.sampled_from([3, 5, 7]),
+    st.floats(0, math.tau),
+    st.floats(0.3, 3),
+    st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
+    st.sampled_from([-1.0, 1.0]),
+)
+def test_beside_an_odd_inflection_with_a_free_direction_no_minimum_is_seen(
+    order, angle, size, start, sign
+):
+    """``(a q)^k`` with odd ``k`` is monotone: whatever point a search ends at, it is no minimum."""
+    u = (math.cos(angle) * x + math.sin(angle) * y) / size
+    D = Polyhedron(PLANE, {"room": 1000 - x**2 - y**2})
+    found = minimise(D, sign * u**order, start)
+    if not found.active:
+        assert not found.is_minimum
+    beside = np.array([math.cos(angle), math.sin(angle)]) * size * 3e-9
+    assert not certify(D, sign * u**order, beside).is_minimum
