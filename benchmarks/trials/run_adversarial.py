@@ -8,7 +8,7 @@ there is one all the same, of a kind that the theorem does not cover.  *open*: u
 is *false* if it says that a minimum is strict where none is.
 """
 
-import sys
+import argparse
 import warnings
 from collections import Counter
 from collections.abc import Iterator
@@ -25,6 +25,7 @@ from polycorner.minimisation import Verdict
 from polycorner.proofs import Proof
 
 SECONDS = 30.0
+ALL = 500
 SEED = 2
 STRICT = (Verdict.STRICT_MINIMUM, Verdict.WEAK_MINIMUM)
 COLUMNS = (
@@ -59,7 +60,9 @@ def trial(posed: Trial) -> Iterator[Facts]:
 
 
 def main() -> None:
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 500
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=ALL, help=f"problems ({ALL})")
+    count = parser.parse_args().count
     warnings.simplefilter("ignore")  # formulas with kinks are meant
     _warm()
     totals: dict[str, Counter[str]] = {}
@@ -80,7 +83,7 @@ def main() -> None:
     whole = sum(totals.values(), Counter())
     rows.append(["all", *(whole[c] for c in columns)])
     print_table(f"{count} adversarial problems", ["", *columns], rows)
-    if len(sys.argv) == 1:
+    if count == ALL:
         write("adversarial", {"counts": whole, "kinds": totals, "problems": results})
 
 

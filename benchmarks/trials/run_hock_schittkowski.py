@@ -8,7 +8,7 @@ and that the judge could not refute.  *declined*: any other verdict, or a senten
 INFEASIBLE although the violation decreases nearby.  The proofs are those of certified minima.
 """
 
-import sys
+import argparse
 from collections import Counter
 from collections.abc import Iterator
 from time import perf_counter
@@ -116,9 +116,12 @@ def row(name: str, facts: Facts) -> list[object]:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", nargs="*", help="problems, such as HS35; default all")
+    names = parser.parse_args().name
     results: dict[str, Facts] = {}
     _warm()
-    for problem in problems(*sys.argv[1:]):
+    for problem in problems(*names):
         facts = staged(trial, problem, seconds=SECONDS)
         facts["best known"] = problem.best
         if "class" not in facts:
@@ -134,7 +137,7 @@ def main() -> None:
         if "proof" in facts
     )
     print({name: counts[name] for name in CLASSES}, "proofs", dict(proofs))
-    if not sys.argv[1:]:
+    if not names:
         write("hock_schittkowski", {"counts": counts, "proofs": proofs, "problems": results})
 
 

@@ -9,6 +9,7 @@ another verdict, or a refusal in words.  *wrong*: a claim that the judge refuted
 does not come from the package's own checks.
 """
 
+import argparse
 import sys
 import traceback
 import warnings
@@ -180,9 +181,12 @@ def run(count: int, first: int) -> dict[str, Facts]:
 
 
 def main() -> None:
-    count, first = (*map(int, sys.argv[1:]), *(1000, 0)[len(sys.argv) - 1 :])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=1000, help="problems (1000)")
+    parser.add_argument("first", nargs="?", type=int, default=0, help="number of the first (0)")
+    chosen = parser.parse_args()
     _warm()
-    results = run(count, first)
+    results = run(chosen.count, chosen.first)
     table = {}
     for what in ("minimise", "certify"):
         claims = Counter(facts[what][0] for facts in results.values() if what in facts)
