@@ -171,7 +171,7 @@ def _prepare() -> None:
     """Set up code generation for this machine, and say where the C mathematics library is."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "msvcrt")
+    library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "ucrtbase")
     for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY):
         function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
         llvm.add_symbol(name, function.value)

@@ -167,7 +167,7 @@ class Graph:
     def unary(self, op: str, a: int) -> int:
         """Return an elementary function of ``a``."""
         u = self._value(a)
-        if u == 0 and op in {"sin", "tan", "asin", "atan", "sinh", "tanh", "sqrt"}:
+        if u == 0 and op in {"sin", "tan", "asin", "atan", "sinh", "tanh", "sqrt", "erf"}:
             return a
         if op == "sqrt" and u == 1:
             return a
@@ -277,8 +277,14 @@ class Graph:
             "sinh": lambda: self.unary("cosh", u),
             "cosh": lambda: self.unary("sinh", u),
             "exp": lambda: a,
+            "erf": lambda: self._bell(u),
         }[op]()
         return self.mul(slope, du)
+
+    def _bell(self, u: int) -> int:
+        """Return the derivative of the error function, ``2 exp(-u^2) / sqrt(pi)``."""
+        height = self.div(self.const(2), self.unary("sqrt", self.const("pi")))
+        return self.mul(height, self.unary("exp", self.neg(self.mul(u, u))))
 
     def _chain_reciprocal(self, op: str, a: int, u: int, du: int) -> int:
         one, square = self.const(1), self.mul(u, u)

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     import sympy
 
 LARGEST_POWER = 2**16  # up to which a power is a chain of multiplications
-UNARY = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
+UNARY = (
+    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "erf"
+)  # fmt: skip
 
 
 def compile_expressions(

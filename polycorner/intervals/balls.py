@@ -311,6 +311,7 @@ PARTIALS: dict[str, tuple[Callable[..., Any], ...]] = {
     "tanh": (lambda _, y: 1 - y * y,),
     "exp": (lambda _, y: y,),
     "log": (lambda x, _: 1 / x[0],),
+    "erf": (lambda x, _: 2 * (-square(x[0])).exp() / constant("pi").sqrt(),),
     "pow": (lambda x, _: x[1] * x[0] ** (x[1] - 1), lambda x, y: y * x[0].log()),
     "atan2": (
         lambda x, _: x[1] / (square(x[0]) + square(x[1])),

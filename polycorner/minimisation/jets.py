@@ -195,6 +195,14 @@ _arctangent = _integral(math.atan, 1.0, -1.0)
 _arcsine = _integral(math.asin, -1.0, -0.5)
 
 
+def _error_function(domain: Ring, a: Array) -> Array:
+    line = ring(1, domain.order + 1)
+    t = line.constant(a[0, 0]) + line.variable(0)
+    slope = 2 / math.sqrt(math.pi) * _exponential(line, _negative(line, line.mul(t, t)))[0]
+    rest = slope[:-1] / np.arange(1, domain.order + 2)
+    return domain.compose(np.array([math.erf(a[0, 0]), *rest]), a)
+
+
 def _arccosine(domain: Ring, a: Array) -> Array:
     result = _negative(domain, _arcsine(domain, a))
     result[0, 0] = math.acos(a[0, 0])
@@ -246,6 +254,7 @@ _RULES: dict[str, _Rule] = {
     "asin": _arcsine,
     "acos": _arccosine,
     "atan": _arctangent,
+    "erf": _error_function,
     "atan2": _angle,
     "lt": _comparison(lambda u, v: u < v),
     "le": _comparison(lambda u, v: u <= v),

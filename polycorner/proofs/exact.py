@@ -41,7 +41,7 @@ ZERO = Fraction(0)
 ONE = Fraction(1)
 # Elementary functions at their rational arguments with rational values.
 KNOWN: dict[str, tuple[Fraction, Fraction]] = {
-    **dict.fromkeys(("sin", "tan", "asin", "atan", "sinh", "tanh"), (ZERO, ZERO)),
+    **dict.fromkeys(("sin", "tan", "asin", "atan", "sinh", "tanh", "erf"), (ZERO, ZERO)),
     **dict.fromkeys(("cos", "cosh", "exp"), (ZERO, ONE)),
     **dict.fromkeys(("log", "acos"), (ONE, ZERO)),
 }

@@ -26,6 +26,7 @@ SMOOTH = {
     "sinh": sp.sinh(x + y),
     "cosh": sp.cosh(x * y),
     "tanh": sp.tanh(x - 2 * y),
+    "erf": sp.erf(x - y / 2),
     "exp": sp.exp(x * y),
     "exp of a negative": sp.exp(-x) * y,
     "power of e": sp.E ** (x + y**2),

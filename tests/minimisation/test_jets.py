@@ -19,7 +19,7 @@ FORMULAS = [
     sp.sin(x + 2 * y) * sp.exp(x * y),
     sp.sqrt(1 + x * y) + sp.log(y + 2),
     sp.atan2(y - 2, x - 1) + sp.atan(x * y) + sp.asin(x - y) + sp.acos(x * y),
-    sp.tan(x) * sp.tanh(y) + sp.sinh(x) - sp.cosh(y) + (1 + x) ** sp.Rational(2, 3),
+    sp.erf(x - y) + sp.tan(x) * sp.tanh(y) + sp.sinh(x) - sp.cosh(y) + (1 + x) ** sp.Rational(2, 3),
     (2 + x) ** y + sp.pi * x + sp.E,
     sp.Piecewise((x**2, x > 5), (x * y, True)) + sp.Abs(x - 3),
 ]

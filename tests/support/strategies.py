@@ -80,6 +80,7 @@ def smooth_expressions(symbols):
         sp.cos,
         sp.atan,
         sp.tanh,
+        sp.erf,
         lambda e: sp.tan(sp.tanh(e)),
         lambda e: sp.exp(sp.sin(e)),
         lambda e: sp.sinh(sp.cos(e)),
