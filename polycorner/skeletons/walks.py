@@ -170,8 +170,7 @@ class _Follower:
         return max(LONGEST_STEP, far)
 
     def _walk(self, end: End) -> Walk:
-        points = np.array(self.points)
-        return Walk(points, self.point, self.t, end, self.length)
+        return Walk(np.array(self.points), self.point, self.t, end, self.length)
 
     def _move(self, point: HeldPoint, t: Array) -> None:
         self.length += float(np.linalg.norm((point.q - self.point.q) / self.scales))
@@ -208,6 +207,9 @@ class _Follower:
     def _stopped(self, end: End) -> Walk:
         """Return the walk where no step is possible: a tip where one is found within reach."""
         tip = singular_point(self.quotient, self.point.q, self.point.kept, TIP)
+        held = set(self.point.kept).union(self.passive)
+        if tip is None and end is End.CHART and (self.point.active() or held) > held:
+            tip = SingularPoint(self.quotient, self.point.q, self.point.kept)  # where roots end
         if tip is None or tip.active() is None:
             return self._walk(end)
         self._move(tip, self.t)
@@ -326,9 +328,8 @@ class _Follower:
 
     def _return(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
         """Return where this step passes the start of the walk again, and the tangent there."""
-        quotient = self.quotient
-        manifold = quotient.polyhedron.manifold
-        near = 2 * quotient.symmetry.separation(manifold, point.q, self.point.q)
+        symmetry, manifold = self.quotient.symmetry, self.quotient.polyhedron.manifold
+        near = 2 * symmetry.separation(manifold, point.q, self.point.q)
         if self.length < 2 * self._chord(point) or abs(self._from_home(point.q)).max() > near:
             return None
         ahead = self._from_home(self.start.q + 1e-6 * self.scales * self.out)

@@ -13,7 +13,7 @@ from skeleton_shapes import check_incidence, counts
 from polycorner import Manifold, Polyhedron, SmoothFunction, skeleton
 from polycorner.files import load_skeleton, save_skeleton
 from polycorner.formulas.families import Family
-from polycorner.skeletons import Completeness, resume
+from polycorner.skeletons import Completeness, End, resume
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols
@@ -109,6 +109,22 @@ class TestPlane:
         atlas = found(D, inner, rng=seed)
         assert (counts(atlas), atlas.euler_characteristic) == ((5, 6, 2), 1)
         check_incidence(atlas)
+
+    @pytest.mark.parametrize("power", [sp.Rational(1, 2), sp.Rational(3, 2), sp.Rational(5, 2)])
+    @given(st.floats(0, math.tau), st.floats(0.5, 2), st.integers(0, 99))
+    @few
+    def test_tips_at_the_end_of_roots(self, power, angle, width, seed):
+        """``|v| <= w u^p`` as two functions, neither of which has values for ``u < 0``."""
+        a, b = math.cos(angle), math.sin(angle)
+        p, q = a * x + b * y, a * y - b * x
+        root = width * p**power
+        D = Polyhedron(PLANE, {"above": root - q, "below": root + q, "lid": 1 - p})
+        atlas = found(D, [[0.5 * a, 0.5 * b]], rng=seed)
+        assert counts(atlas) == (3, 3, 1)
+        assert atlas.euler_characteristic in (1, None)  # a cusp may be too thin for a net
+        (tip,) = [c for c in atlas.corners if c.active == ("above", "below")]
+        assert np.linalg.norm(tip.point) < 1e-5
+        assert all(edge.kinds == (End.CORNER, End.CORNER) for edge in atlas.edges)
 
     def test_curves_that_nearly_cross_do_not(self):
         """Between the lemniscate and one loop around both foci, or two."""
