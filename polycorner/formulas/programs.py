@@ -180,8 +180,7 @@ class Graph:
         if exponent < 0:
             return self.inv(self.power(a, -exponent))
         if exponent.denominator == 2:
-            root = self.unary("sqrt", a)
-            return self.mul(self.power(a, Fraction(int(exponent))), root)
+            return self.mul(self.power(a, Fraction(int(exponent))), self.unary("sqrt", a))
         if exponent.denominator == 1:
             half = self.power(a, Fraction(exponent.numerator // 2))
             square = self.mul(half, half)
@@ -218,9 +217,8 @@ class Graph:
             return self.const(0)
         if op == "select":
             condition, yes, no = (self._arg(a, k) for k in range(3))
-            return self.select(
-                condition, self.derivative(yes, variable), self.derivative(no, variable)
-            )
+            slopes = self.derivative(yes, variable), self.derivative(no, variable)
+            return self.select(condition, *slopes)
         children = [self._arg(a, k) for k in range(len(args))]
         slopes = [self.derivative(child, variable) for child in children]
         if all(self._value(slope) == 0 for slope in slopes):
@@ -324,9 +322,8 @@ class Program:
 
     def digest(self) -> str:
         """Return a hash of the operations: equal programs have equal digests."""
-        sizes = self.variables, self.parameters
-        text = repr((self.graph.nodes, self.outputs, *sizes, self.stationary))
-        return hashlib.sha256(text.encode()).hexdigest()
+        parts = self.graph.nodes, self.outputs, self.variables, self.parameters, self.stationary
+        return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

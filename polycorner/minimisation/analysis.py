@@ -19,6 +19,7 @@ from polycorner.minimisation.evidence import steepest_descent
 from polycorner.minimisation.findings import OPEN, Analysis, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
+from polycorner.minimisation.steadiness import steady
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import Rows, inward_direction, rank, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
@@ -28,10 +29,6 @@ from polycorner.spaces.manifold import Array
 # Distances, in scale units, at which lower points are sought where a gradient vanishes.
 DISTANCES = 10.0 ** np.arange(-5, 0)
 STEPS = (0.1, 0.01, 0.001)  # in scale units, at which a way down on the set itself is sought
-# Steps, relative to the coordinates, over which curvatures must be steady, and how small one must
-# be, relative to the largest, to be looked at.
-BESIDE = 1e-6
-FAINT = 1e-6
 ON = 1e-9  # distance, in scale units, up to which a point counts as one of the set
 # Where several pieces meet, the first of these verdicts that any of them has decides.
 DECISIVE = (
@@ -95,7 +92,7 @@ def _analyse_piece(local: Local, piece: Piece, *, higher: bool = True) -> Analys
     weak_rows = local.gradients[list(weak)]
     curvature = find_curvature(hessian, face.null_space, weak_rows, small_curvature, left)
     if not weak and np.isfinite(hessian).all():
-        curvature = _steady(local, active, gradients, multipliers, curvature)
+        curvature = steady(local, active, gradients, multipliers, curvature)
     away = distances(local.values[list(active)], gradients[:k])
     verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
     independent = rows.independent and not blind
@@ -124,40 +121,6 @@ def _analyse_piece(local: Local, piece: Piece, *, higher: bool = True) -> Analys
     if result.verdict is Verdict.NO_MULTIPLIER and higher and _falls_on_set(result):
         return replace(result, verdict=Verdict.NOT_STATIONARY)
     return result
-
-
-def _steady(
-    local: Local,
-    active: tuple[int, ...],
-    gradients: Array,
-    multipliers: Multipliers,
-    curvature: Curvature,
-) -> Curvature:
-    """Count as flat what bends up here and not as much a little further on.
-
-    Near an inflection of any order the curvature is positive on one side, however small: a search
-    ends beside it.  Looked at are the direction that bends most and those that bend much less.
-    """
-    values, vectors = curvature.values, curvature.vectors
-    if not len(values) or values[-1] <= 0:
-        return curvature
-    tried = (values > 0) & (values <= FAINT * values[-1])
-    tried[-1] = True
-    ways = vectors[:, tried].T
-    reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
-    numbers = [*active, *local.sections]
-    with np.errstate(all="ignore"):
-        points = local.point + reach * np.vstack([ways, -ways]) * local.problem.scales
-        hessians = local.problem.evaluate(points, 2)[2]
-        factors = multipliers.values / np.maximum(np.linalg.norm(gradients, axis=1), 1e-300)
-        moved = hessians[:, -1] - np.einsum("kpij,p->kij", hessians[:, numbers], factors)
-        both = np.vstack([ways, ways])
-        bends = np.einsum("ki,kij,kj->k", both, moved, both)
-        changed = abs(bends.reshape(2, -1) - values[tried]) > 0.5 * values[tried]
-    level = np.zeros(len(values), dtype=np.bool_)
-    level[tried] = changed.any(axis=0)
-    flat = without(np.hstack([curvature.flat, vectors[:, level]]), np.zeros((len(vectors), 0)))
-    return replace(curvature, flat=flat) if level.any() else curvature
 
 
 def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:

@@ -1,0 +1,49 @@
+"""Curvatures that are the same beside a point as at it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from polycorner.minimisation.conditions import Curvature, Multipliers
+from polycorner.minimisation.constancy import without
+from polycorner.minimisation.findings import Local
+from polycorner.spaces.manifold import Array
+
+# Steps, relative to the coordinates, over which curvatures must be steady, and how small one must
+# be, relative to the largest, to be looked at.
+BESIDE = 1e-6
+FAINT = 1e-6
+
+
+def steady(
+    local: Local,
+    active: tuple[int, ...],
+    gradients: Array,
+    multipliers: Multipliers,
+    curvature: Curvature,
+) -> Curvature:
+    """Count as flat what bends up here and not as much a little further on.
+
+    Near an inflection of any order the curvature is positive on one side, however small: a search
+    ends beside it.  Looked at are the direction that bends most and those that bend much less.
+    """
+    values, vectors = curvature.values, curvature.vectors
+    if not len(values) or values[-1] <= 0:
+        return curvature
+    tried = (values > 0) & (values <= FAINT * values[-1])
+    tried[-1] = True
+    ways = vectors[:, tried].T
+    reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
+    numbers = [*active, *local.sections]
+    with np.errstate(all="ignore"):
+        points = local.point + reach * np.vstack([ways, -ways]) * local.problem.scales
+        hessians = local.problem.evaluate(points, 2)[2]
+        factors = multipliers.values / np.maximum(np.linalg.norm(gradients, axis=1), 1e-300)
+        moved = hessians[:, -1] - np.einsum("kpij,p->kij", hessians[:, numbers], factors)
+        both = np.vstack([ways, ways])
+        bends = np.einsum("ki,kij,kj->k", both, moved, both)
+        changed = abs(bends.reshape(2, -1) - values[tried]) > 0.5 * values[tried]
+    level = np.zeros(len(values), dtype=np.bool_)
+    level[tried] = changed.any(axis=0)
+    flat = without(np.hstack([curvature.flat, vectors[:, level]]), np.zeros((len(vectors), 0)))
+    return replace(curvature, flat=flat) if level.any() else curvature
