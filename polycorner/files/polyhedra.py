@@ -111,6 +111,7 @@ def _family_entry(family: Family) -> Entries:
         "definitions": {name: formula_text(e) for name, e in definitions.items()},
         "formulas": {name: formula_text(expressions[name]) for name in family.names},
         "unit": family.unit,
+        "stationary": list(family.stationary),
     }
 
 
@@ -127,6 +128,7 @@ def _read_family(entry: Mapping[str, Any]) -> Family:
         parameters,
         read(entry["definitions"]),
         unit=entry["unit"],
+        stationary=entry.get("stationary", ()),
     )
 
 

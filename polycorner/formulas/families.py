@@ -101,6 +101,7 @@ class Family(Value):
         definitions: "Mapping[str, Any] | None" = None,
         *,
         unit: str = "",
+        stationary: Iterable[str] = (),
     ) -> "Family":
         """Return the family of given expressions, checking every symbol at once."""
         variables, parameters = tuple(variables), tuple(parameters)
@@ -108,7 +109,8 @@ class Family(Value):
         _check_new("definitions", tuple(definitions or ()), variables + parameters)
         given = {name: _sympified(name, e) for name, e in expressions.items()}
         known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
-        family = cls(tuple(given), variables, parameters, Written(known, given), unit=unit)
+        written, held = Written(known, given), tuple(stationary)
+        family = cls(tuple(given), variables, parameters, written, unit=unit, stationary=held)
         symbols = variables, parameters
         bindings: dict[str, Binding] = {}
         if _is_shared(family, known):

@@ -217,8 +217,8 @@ class Graph:
             return self.const(0)
         if op == "select":
             condition, yes, no = (self._arg(a, k) for k in range(3))
-            slopes = self.derivative(yes, variable), self.derivative(no, variable)
-            return self.select(condition, *slopes)
+            either = self.derivative(yes, variable), self.derivative(no, variable)
+            return self.select(condition, *either)
         children = [self._arg(a, k) for k in range(len(args))]
         slopes = [self.derivative(child, variable) for child in children]
         if all(self._value(slope) == 0 for slope in slopes):
