@@ -110,6 +110,14 @@ class Symmetry(Value):
         """Return how far the continuous orbits of two points are apart, in scale units."""
         return float(abs(self.displacement(manifold, p, q)).max())
 
+    def separations(self, manifold: Manifold, p: Array, points: Array) -> Array:
+        """Return how far the orbit of ``p`` is apart from those of points ``(k, n)``, ``(k,)``."""
+        if self.invariants is None:
+            apart = manifold.difference(p, points) / manifold.scale_array
+        else:
+            apart = np.array([self.invariants(q) for q in points]) - self.invariants(p)
+        return np.asarray(abs(apart).max(axis=1))
+
     def possible(self, manifold: Manifold, p: Array, points: Array, tolerance: float) -> list[int]:
         """Return the positions of points ``(k, n)`` that ``p`` may be carried to.
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
 from polycorner.polyhedra.symmetry import renamed
+from polycorner.skeletons.borders import Border, seeds_of
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Flag
-from polycorner.skeletons.indices import Border, seeds_of
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import CornerRecord

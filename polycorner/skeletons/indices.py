@@ -10,17 +10,14 @@ rises everywhere, -1 if it falls on two sides of a rise, otherwise 0 [GoreskyMac
 Several heights in general position have to agree.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
+from polycorner.skeletons.alignment import aligned
+from polycorner.skeletons.borders import Border
 from polycorner.skeletons.heights import Height
 from polycorner.skeletons.nets import LEVELS, Net
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.surfaces import Surface
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
 
 # Heights that have to agree, and that are tried.
 AGREEING = 3
@@ -43,44 +40,18 @@ BEFORE = 1e-3
 CONVERGED = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Border(Value):
-    """The boundary of a two-dimensional face.
-
-    Attributes
-    ----------
-    quotient : Quotient
-        The polyhedron modulo its symmetry.
-    active : frozenset of int
-        Functions that vanish on the face.
-    seeds : (k, n) array
-        Points of the face or of its boundary.
-    edges : tuple of (frozenset of int, (k, n) array, bool)
-        Active functions and points of every edge around it, and whether it closes by itself.
-    corners : tuple of pairs of (frozenset of int, (2, n) array)
-        For every corner of the face and both of its edges there, the active functions, and a point
-        of the edge with the direction away from the corner.
-    curves : int
-        Number of boundary curves.
-    """
-
-    quotient: Quotient
-    active: frozenset[int]
-    seeds: Array
-    edges: tuple[tuple[frozenset[int], Array, bool], ...]
-    corners: tuple[tuple[tuple[frozenset[int], Array], tuple[frozenset[int], Array]], ...]
-    curves: int
-
-
 def face_euler_characteristic(border: Border) -> int | None:
     """Return the Euler characteristic of a compact face; None where it is not determined.
 
     It is not where a net does not cover the face, where the net leaves the face elsewhere than
-    at the edges of the border, or where heights do not agree.
+    at the edges of the border, where heights do not agree, or where a finite symmetry carries the
+    face to itself.
     """
     symmetry = border.quotient.symmetry
-    if symmetry.relabels or symmetry.elements:
+    whole = None if symmetry.relabels else aligned(border)
+    if whole is None:
         return None
+    border = whole
     surface = Surface(border.quotient, border.active, border.seeds[0])
     nets = (Net(surface, border.seeds, levels=levels) for levels in (LEVELS, FINER * LEVELS))
     net = next((net for net in nets if net.complete and _enclosed(surface, net, border)), None)
@@ -333,8 +304,3 @@ def _at_corner(
     if (along < 0).all():
         return -1 if reflex else 0
     return 0
-
-
-def seeds_of(edges: Sequence[Array]) -> Array:
-    """Return points of edges that a net starts from."""
-    return np.concatenate([points[1:-1][:: max(1, len(points) // 40)] for points in edges])

@@ -6,7 +6,8 @@ from functools import cached_property
 
 from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.skeletons.arcs import arc_length
-from polycorner.skeletons.indices import Border, face_euler_characteristic
+from polycorner.skeletons.borders import Border
+from polycorner.skeletons.indices import face_euler_characteristic
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
@@ -140,8 +141,8 @@ class Face(Value):
 
         A disc with ``b`` holes and ``g`` handles has ``1 - b - 2 g``.  None where it is not
         determined: the face is not compact, a net does not cover it or leaves it where no edge
-        was found, heights do not agree, or the search divided by a finite symmetry.  Computed
-        when it is asked for.
+        was found, heights do not agree, or a finite symmetry carries it to itself or relabels
+        functions.  Computed when it is asked for.
         """
         if self.border is None:  # as at a singular corner
             return 2 - len(self.boundary) if self.closed else None

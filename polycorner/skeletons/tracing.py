@@ -194,23 +194,34 @@ class EdgeTracer:
                 f"the edge {self.registry.written(active)} {walks[0].end.value}", lost=True
             )
             return None
-        return "curve", self._free_edge(walks, here, active)
+        return self._free_edge(walks, here, active)
 
-    def _free_edge(self, walks: list[Walk], here: HeldPoint, active: frozenset[int]) -> int:
-        """Return the position of an edge without corners, new or known."""
+    def _free_edge(
+        self, walks: list[Walk], here: HeldPoint, active: frozenset[int]
+    ) -> tuple[str, EdgeEnd | int]:
+        """Return an edge along which no corner was met, new or known.
+
+        One that goes on beyond the extent may be known from another part of it: of two parts of a
+        curve that overlap, one contains an end of the other.
+        """
         for k, curve in enumerate(self.curves):
             if curve.start is None and self._is_image(here.q, active, curve):
-                return k
+                return "curve", k
         forth = walks[0]
         points = forth.points
         kinds = (forth.end, forth.end)
         if len(walks) == 2:
             points = np.vstack([walks[1].points[::-1], points[1:]])
             kinds = (walks[1].end, forth.end)
-        curve = Curve(points, active, kinds, None, None, {})
-        self.curves.append(curve)
-        self._remark(curve)
-        return len(self.curves) - 1
+        found = Curve(points, active, kinds, None, None, {})
+        for k, curve in enumerate(self.curves):
+            both = zip(curve.points[[0, -1]], curve.kinds, strict=True)
+            ends = [q for q, kind in both if kind is End.INFINITY]
+            if any(self._is_image(q, curve.active, found) for q in ends):
+                return ("curve", k) if curve.start is None else ("half", curve.start)
+        self.curves.append(found)
+        self._remark(found)
+        return "curve", len(self.curves) - 1
 
     def _is_image(self, q: Array, active: frozenset[int], curve: Curve) -> bool:
         """Whether a symmetry carries a point with given active functions to a curve."""
@@ -225,7 +236,7 @@ class EdgeTracer:
 
         The nearest vertex may belong to another part of the curve.
         """
-        apart = np.array([self.symmetry.separation(self.manifold, q, p) for p in curve.points])
+        apart = self.symmetry.separations(self.manifold, q, curve.points)
         near = np.minimum(apart[:-1], apart[1:])
         chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
         possible = [k for k in np.argsort(near) if near[k] <= chords[k]]

@@ -103,6 +103,7 @@ class TestTangentialContacts:
     """Walks meet functions that reach zero and turn back, at any phase of their steps."""
 
     @given(angles, st.floats(0.1, 0.9), seeds)
+    @few
     def test_a_hole_that_touches_the_rim_from_inside_is_a_singular_corner(self, angle, r, seed):
         D = Polyhedron(
             space(2),
@@ -123,6 +124,7 @@ class TestTangentialContacts:
         assert atlas.euler_characteristic == 0
 
     @given(angles, st.floats(0.1, 0.9), seeds)
+    @few
     def test_a_function_that_touches_from_outside_makes_a_corner_on_a_loop(self, angle, r, seed):
         D = Polyhedron(
             space(2),
@@ -137,6 +139,7 @@ class TestTangentialContacts:
         assert atlas.euler_characteristic == 1
 
     @given(angles, seeds)
+    @few
     def test_a_redundant_half_plane_that_touches_is_met(self, angle, seed):
         D = Polyhedron(
             space(2), AllOf(ball((0, 0), 1, "disc"), half_space(at(1, angle), 1, "line"))
@@ -146,6 +149,7 @@ class TestTangentialContacts:
         assert atlas.corners[0].local_type is LocalType.CONE
 
     @given(angles, st.floats(0.1, 0.9), seeds)
+    @few
     def test_the_union_of_discs_that_touch_has_two_faces(self, angle, r, seed):
         D = Polyhedron(space(2), AnyOf(ball((0, 0), 1, "one"), ball(at(1 + r, angle), r, "two")))
         atlas = skeleton(D, [[0.1, 0.2]], rng=seed)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skeleton_shapes import counts, polytope
 
-from polycorner import Manifold, Polyhedron, skeleton
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
 from polycorner.polyhedra import LocalType
 from polycorner.skeletons import Completeness, End
 
@@ -123,6 +123,16 @@ class TestOpenEnds:
         assert told(short, End.INFINITY.value)
         assert short.euler_characteristic is None
         assert (counts(long), long.notes) == ((4, 4, 1), ())
+
+    @pytest.mark.parametrize("extent", [100, 1000, 5000])
+    @pytest.mark.parametrize("shear", [0, 0.7, -2])
+    def test_edges_that_go_on_are_one_from_wherever_they_are_met(self, shear, extent):
+        """A road with a bottleneck: walks across it meet its sides far from where they began."""
+        u, v = x + shear * y, y
+        road = AllOf(v, 30 - v, AnyOf(14 - v, 10 - u, u - 13))
+        starts = [[0.5 - shear / 4, 0.25], [0.5 - 10 * shear, 10], [11.5 - 10 * shear, 10]]
+        atlas = skeleton(Polyhedron(PLANE, road), starts, extent=extent)
+        assert counts(atlas) == (4, 6, 1)
 
     def test_a_square_root_ends_the_chart(self):
         D = Polyhedron(PLANE, {"root": sp.sqrt(x) - y, "floor": y + 1, "wall": 4 - x})
