@@ -12,6 +12,7 @@ Gauss-Newton type, which is globally convergent to stationary points of ``phi`` 
 lowers the violation to first order: this is the evidence that there is no feasible point nearby.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,27 +48,16 @@ class Approach:
 
 
 def approach(problem: Problem, piece: Piece, q: Array) -> Approach:
-    """Search a feasible point of a piece at which the energy is finite, from outside.
-
-    A stationary point of the violation may be a saddle of it; random steps of several lengths lead
-    away from such a point, and the lowest end counts.
-    """
+    """Search a feasible point of a piece at which the energy is finite, from outside."""
     rows = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     violation = _Violation(problem, rows, q)
-    if not np.isfinite(violation.residuals(q / problem.scales)).all():
+    u = start = q / problem.scales
+    if not np.isfinite(violation.residuals(start)).all():
         return Approach(q, feasible=False, stationary=False)
-    rng = np.random.default_rng(0)
-    u, size = violation.least(q / problem.scales)
-    for move in (*MOVES, 0.0):
+    for u in violation.ends(start):
         reached, point = problem.restore(piece, u * problem.scales)
         if reached and np.isfinite(problem.energy.value(point)):
             return Approach(point, feasible=True, stationary=False)
-        if move == 0.0:
-            break
-        other, less = violation.least(u + move * rng.standard_normal(u.size))
-        if less < size:
-            u, size = other, less
-    u = violation.refined(u)
     return Approach(u * problem.scales, feasible=False, stationary=violation.is_stationary(u))
 
 
@@ -94,6 +84,22 @@ class _Violation:
         violated = ~self.signed | (values[self.rows] < 0)
         rows: Array = gradients[self.rows] * (self.weights * violated)[:, None]
         return rows
+
+    def ends(self, u: Array) -> Iterator[Array]:
+        """Yield ends of minimisations, ever lower.
+
+        A stationary point of the violation may be a saddle of it; random steps of several lengths
+        lead away from such a point.  In a long valley only Newton's method comes to the end.
+        """
+        rng = np.random.default_rng(0)
+        u, size = self.least(u)
+        yield u
+        for move in MOVES:
+            other, less = self.least(u + move * rng.standard_normal(u.size))
+            if less < size:
+                u, size = other, less
+                yield u
+        yield self.refined(u)
 
     def least(self, u: Array) -> tuple[Array, float]:
         """Minimise the violation from ``u``; return the end and the size of the violation."""
@@ -135,5 +141,5 @@ class _Violation:
         return np.asarray(self.residuals(u) @ self.jacobian(u))
 
     def is_stationary(self, u: Array) -> bool:
-        slope = float(abs(self.slope(u)).max(initial=0.0))
-        return bool(slope <= STATIONARY * float(np.linalg.norm(self.residuals(u))))
+        slope, size = abs(self.slope(u)).max(initial=0.0), np.linalg.norm(self.residuals(u))
+        return bool(0.0 < size and slope <= STATIONARY * size)

@@ -2,7 +2,7 @@
 
 import pytest
 import sympy as sp
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from polycorner import AnyOf, Manifold, Polyhedron, SmoothFunction, Verdict, minimise
@@ -31,6 +31,7 @@ def test_a_wall_at_any_distance_is_reached(distance, side, order):
 
 
 @given(whole, whole, whole, whole, st.lists(st.tuples(*[whole] * 5), min_size=1, max_size=4))
+@example(0, -5, 0, 0, [(1, 1, 0, 0, -1)])  # a long narrow valley of the violation
 def test_a_convex_set_with_interior_points_is_reached_from_everywhere(p, q, i, j, rows):
     """The squared violation of concave functions is convex: it has no other stationary points."""
 
