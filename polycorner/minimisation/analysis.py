@@ -42,14 +42,22 @@ DECISIVE = (
 )
 
 
-def analyse(problem: Problem, q: Array, tolerance: float, rank_tolerance: float) -> Analysis:
+def analyse(
+    problem: Problem,
+    q: Array,
+    tolerance: float,
+    rank_tolerance: float,
+    *,
+    brief: bool = False,
+) -> Analysis:
     """Analyse every piece of the polyhedron at ``q``; return the least favourable analysis.
 
     Where several pieces meet, a point is a minimum of the union exactly when it is a minimum of
-    each of them.
+    each of them.  In ``brief``, an energy that is constant over a distance counts as constant, as
+    it need not be where it changes very slowly: that is no evidence.
     """
     values, gradients, hessians = problem.evaluate(q, 2)
-    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance)
+    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance, brief)
     pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
     if not pieces or not np.isfinite(values[-1]):
         return _without_conditions(local, Verdict.OUTSIDE, "")
@@ -226,6 +234,7 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
             small=local.small,
             small_curvature=a.small_curvature,
             nearly=NEARLY_FLAT * a.small_curvature,
+            brief=local.brief,
         )
     )
 

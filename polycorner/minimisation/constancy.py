@@ -88,7 +88,14 @@ class Constancy:
 
 
 def constancy(
-    problem: Problem, piece: Piece, q: Array, face: Face, *, one_sided: bool, reference: float
+    problem: Problem,
+    piece: Piece,
+    q: Array,
+    face: Face,
+    *,
+    one_sided: bool,
+    reference: float,
+    least: float = 0.0,
 ) -> Constancy:
     """Follow the directions of a face both ways, by steps that double, until it ends or bends.
 
@@ -106,6 +113,9 @@ def constancy(
         Whether only the positive sides are followed.
     reference : float
         The size of the energy's derivatives.
+    least : float
+        If positive, the first side that ends at a shorter distance, or on which the energy changes,
+        is the last that is followed.
     """
     c = face.moving.shape[1]
     weights = np.eye(c)
@@ -114,12 +124,14 @@ def constancy(
         weights = np.vstack([weights, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
     reach, change, followed = 0.0, 0.0, True
     for w in weights:
-        sides = [w] if one_sided else [w, -w]
-        found = [_followed(problem, piece, q, face, side, reference) for side in sides]
-        far = max(distance for distance, _ in found)
+        far = 0.0
+        for side in [w] if one_sided else [w, -w]:
+            distance, moved = _followed(problem, piece, q, face, side, reference)
+            far, change = max(far, distance), max(change, moved)
+            if distance < least or (least and change > CONSTANT):
+                return Constancy(distance, change, followed=False)
         followed = followed and far > 0
         reach = far if not reach else min(reach, far)
-        change = max(change, *(moved for _, moved in found))
     return Constancy(reach, change, followed)
 
 

@@ -32,6 +32,7 @@ ORDERS = {1: 16, 2: 10, 3: 8, 4: 6}  # degree of the series by its number of var
 ORDER, MOST = 4, 12  # the degree beyond, and the most variables
 MOVE = 0.01  # distance in scale units by which the degenerate point may be missed
 CLIMBS = 1e-6  # relative rate at which a form grows into the cone from an isolated zero
+FAR = 0.5  # distance in scale units over which constancy suffices in brief
 FALLS = 1e-12  # relative fall of the energy that is seen
 FEASIBLE = 1e-9  # scaled violation that is rounding
 
@@ -59,6 +60,8 @@ class Situation(Value):
         Directions of the critical cone in which its form vanishes.
     reference, small, small_curvature, nearly : float
         The size of the energy, and of first and second derivatives that count as zero.
+    brief : bool
+        Whether constancy over a distance suffices, without a series.
     """
 
     problem: Problem
@@ -74,6 +77,7 @@ class Situation(Value):
     small: float
     small_curvature: float
     nearly: float
+    brief: bool
 
     def tangent(self, rows: tuple[int, ...]) -> Array:
         """Return an orthonormal basis of the directions tangent to functions."""
@@ -145,6 +149,18 @@ def decide_free(s: Situation, flat: Array) -> Decision:
     if moving.shape[1] > MOST:
         return no_decision(s, f"the second order vanishes in more than {MOST} directions")
     face = s.face((), moving)
+    if s.brief:
+        seen = constancy(
+            s.problem,
+            s.piece.difference(s.weak),
+            s.point,
+            face,
+            one_sided=False,
+            reference=s.reference,
+            least=FAR,
+        )
+        if seen.holds:
+            return Decision(Verdict.MINIMUM_ALONG_LOCUS, 0, 0, moving[:, 0], "followed", seen)
     germ = reduce_energy(s.problem, s.point, s.hessian, face, order_for(moving.shape[1]))
     if germ is None:
         return no_decision(s, "the conditions across these directions are singular")

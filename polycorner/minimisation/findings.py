@@ -29,6 +29,7 @@ class Local(Value):
     hessians: Array
     tolerance: float
     rank_tolerance: float
+    brief: bool = False
 
     @cached_property
     def reference(self) -> float:

@@ -172,11 +172,13 @@ class _System(Value):
         With the inverse of the linear part, every iteration makes one more degree right.
         """
         n = len(self.q)
-        unknowns = np.zeros((n + len(self.face.rows), 2, domain.size))
+        unknowns = np.zeros((n + len(self.face.rows), 2, 1))
         unknowns[:n, 0, 0] = self.q / self.problem.scales
         unknowns[n:, 0, 0] = self.face.multipliers
-        for _ in range(domain.order + 2):
-            unknowns[:, 0] -= self.step(domain, unknowns[:n], unknowns[n:])
+        for degree in [*range(1, domain.order + 1), domain.order, domain.order]:
+            known = ring(domain.variables, degree)
+            unknowns = _padded(unknowns, known)
+            unknowns[:, 0] -= self.step(known, unknowns[:n], unknowns[n:])
         return unknowns[:n], unknowns[n:]
 
     def step(self, domain: Ring, u: Array, multipliers: Array) -> Array:

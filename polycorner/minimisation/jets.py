@@ -73,8 +73,16 @@ class _Evaluation:
             if top not in needed and top not in self._done:
                 needed.add(top)
                 stack += self._children(top)
-        for k in sorted(needed):  # a node comes after its arguments
-            self._done[k] = self._operate(k)
+        found = []
+        with np.errstate(all="ignore"):
+            for k in sorted(needed):  # a node comes after its arguments
+                self._done[k] = self._operate(k)
+                found.append(self._done[k])
+        if found and not np.isfinite(found).all():
+            for k in needed:
+                del self._done[k]
+            msg = "an operation has no power series there"
+            raise NotAnalyticError(msg)
         return self._done[node]
 
     def _children(self, node: int) -> list[int]:
@@ -92,15 +100,10 @@ class _Evaluation:
             return self._inexact(named[exact] if isinstance(exact, str) else float(exact))
         series = [self._done[k] for k in self._children(node)]
         try:
-            with np.errstate(all="ignore"):
-                result = _RULES[op](self.ring, *series)
+            return _RULES[op](self.ring, *series)
         except (KeyError, ZeroDivisionError, OverflowError, ValueError) as error:
             msg = f"{op} has no power series there"
             raise NotAnalyticError(msg) from error
-        if not np.isfinite(result).all():
-            msg = f"{op} has no power series there"
-            raise NotAnalyticError(msg)
-        return result
 
     def _inexact(self, value: float) -> Array:
         series = self.ring.constant(value)

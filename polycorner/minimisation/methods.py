@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.domain_edges import domain_edge
 from polycorner.minimisation.escapes import escape
@@ -286,7 +287,7 @@ def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
     if end.failure is None and not far:
         return False
     with np.errstate(all="ignore"):
-        found = Certificate(problem, end.point).analysis
+        found = analyse(problem, end.point, TOLERANCE, RANK_TOLERANCE, brief=True)
     if end.failure is None:
         return found.verdict is Verdict.UNDECIDED
     if not found.verdict.is_minimum:

@@ -66,36 +66,32 @@ class Ring:
     def mul(self, a: Array, b: Array) -> Array:
         """Return the product."""
         u, v = abs(a[0]), abs(b[0])
-        left, right = self._left, self._right
-        parts = np.empty((2, len(left)))
-        parts[0] = a[0, left] * b[0, right]
-        parts[1] = u[left] * (b[1] + v)[right] + a[1, left] * v[right]
+        parts = self._products(np.array([a[0], u, a[1]]), np.array([b[0], b[1] + v, v]))
+        parts[1] += parts[2]
+        return parts[:2]
+
+    def _products(self, a: Array, b: Array) -> Array:
+        """Return the products of coefficients ``(k, K)``, row by row."""
+        parts = a.take(self._left, axis=1)
+        parts *= b.take(self._right, axis=1)
         return np.asarray(np.add.reduceat(parts, self._starts, axis=1))
 
     def compose(self, taylor: Array, a: Array) -> Array:
-        """Return ``f(a)`` for Taylor coefficients ``(order + 2,)`` of ``f`` at ``a``'s constant."""
-        small, size = a.copy(), abs(a)
-        small[:, 0], small[1], size[0, 0], size[1] = 0.0, 0.0, 0.0, 0.0
-        slopes = abs(taylor[1:]) * np.arange(1, len(taylor))
-        value, bound, slope = (
-            self._horner(c, s)
-            for c, s in (
-                (taylor[:-1], small),
-                (abs(taylor[:-1]), size),
-                (slopes, size),
-            )
-        )
-        errors = np.zeros((2, self.size))
-        errors[0] = a[1]
-        value[1] = bound[0] + self.mul(slope, errors)[0]
-        return value
+        """Return ``f(a)`` for Taylor coefficients ``(order + 2,)`` of ``f`` at ``a``'s constant.
 
-    def _horner(self, coefficients: Array, a: Array) -> Array:
-        result = self.constant(coefficients[-1])
-        for c in coefficients[-2::-1]:
-            result = self.mul(result, a)
-            result[0, 0] += c
-        return result
+        Horner's scheme gives the value, its bound ``sum |c_k| |a|^k`` and ``sum k |c_k| |a|^k-1``.
+        """
+        powers = np.array([a[0], abs(a[0]), abs(a[0])])
+        powers[:, 0] = 0.0
+        sizes = abs(taylor)
+        factors = np.array([taylor[:-1], sizes[:-1], sizes[1:] * np.arange(1, len(taylor))])
+        result = np.zeros_like(powers)
+        result[:, 0] = factors[:, -1]
+        for c in factors[:, -2::-1].T:
+            result = self._products(result, powers)
+            result[:, 0] += c
+        result[1] += self._products(result[2:], a[1:])[0]
+        return result[:2]
 
     @cached_property
     def shifts(self) -> list[tuple[int, int, int, float]]:
