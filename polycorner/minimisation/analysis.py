@@ -16,7 +16,7 @@ from polycorner.minimisation.constancy import symmetric_directions, without
 from polycorner.minimisation.corner_degeneracy import decide
 from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
 from polycorner.minimisation.evidence import steepest_descent
-from polycorner.minimisation.findings import OPEN, Analysis, Local
+from polycorner.minimisation.findings import OPEN, Analysis, Higher, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
 from polycorner.minimisation.steadiness import steady
@@ -48,16 +48,17 @@ def analyse(
     tolerance: float,
     rank_tolerance: float,
     *,
-    brief: bool = False,
+    higher: Higher = "series",
 ) -> Analysis:
     """Analyse every piece of the polyhedron at ``q``; return the least favourable analysis.
 
     Where several pieces meet, a point is a minimum of the union exactly when it is a minimum of
-    each of them.  In ``brief``, an energy that is constant over a distance counts as constant, as
-    it need not be where it changes very slowly: that is no evidence.
+    each of them.  Where the second order vanishes, ``higher`` orders are seen in a series, or left
+    alone; or, ``"followed"``, an energy that is constant over a distance counts as constant, which
+    is no evidence: it may change very slowly.
     """
     values, gradients, hessians = problem.evaluate(q, 2)
-    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance, brief)
+    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance, higher)
     pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
     if not pieces or not np.isfinite(values[-1]):
         return _without_conditions(local, Verdict.OUTSIDE, "")
@@ -72,13 +73,13 @@ def _without_conditions(local: Local, verdict: Verdict, reason: str) -> Analysis
     """Return the analysis of a point at which the conditions cannot be applied."""
     known = (np.where(np.isfinite(x), x, 0.0) for x in (local.gradients, local.hessians))
     gradients, hessians = known
-    finite = replace(local, gradients=gradients, hessians=hessians)
-    found = _analyse_piece(finite, frozenset(), higher=False)
+    finite = replace(local, gradients=gradients, hessians=hessians, higher="none")
+    found = _analyse_piece(finite, frozenset())
     return replace(found, verdict=verdict, obstacle=reason, local=local)
 
 
-def _analyse_piece(local: Local, piece: Piece, *, higher: bool = True) -> Analysis:
-    """Analyse one piece; where the second order vanishes, to ``higher`` orders."""
+def _analyse_piece(local: Local, piece: Piece) -> Analysis:
+    """Analyse one piece."""
     active = tuple(sorted(piece))
     k, small = len(active), local.small
     gradients = local.gradients[[*active, *local.sections]]
@@ -120,6 +121,7 @@ def _analyse_piece(local: Local, piece: Piece, *, higher: bool = True) -> Analys
         decision=None,
         local=local,
     )
+    higher = local.higher != "none"
     if verdict is Verdict.UNDECIDED and higher and curvature.least >= -small_curvature:
         decision = _decide(result, piece, strong, hessian)
         result = replace(result, decision=decision, verdict=decision.verdict)
@@ -234,7 +236,7 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
             small=local.small,
             small_curvature=a.small_curvature,
             nearly=NEARLY_FLAT * a.small_curvature,
-            brief=local.brief,
+            brief=local.higher == "followed",
         )
     )
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
+Higher = Literal["series", "followed", "none"]  # how orders beyond the second are seen
 OPEN = 10  # a product of multiplier and gap beyond so many tolerances is not rounding
 
 
@@ -29,7 +31,7 @@ class Local(Value):
     hessians: Array
     tolerance: float
     rank_tolerance: float
-    brief: bool = False
+    higher: Higher = "series"
 
     @cached_property
     def reference(self) -> float:

@@ -20,11 +20,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.methods import minimise
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import rank
-from polycorner.polyhedra.strata import distances
+from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
 
@@ -138,7 +139,7 @@ class Quotient:
         Near a crossing of loci all curvatures are small: those are flat that change the energy by
         no more than ``slack``.
         """
-        analysis = Certificate(self.problem, p).analysis
+        analysis = analyse(self.problem, p, TOLERANCE, RANK_TOLERANCE, higher="none")
         curvature = analysis.curvature
         level = max(analysis.small_curvature, slack)
         flat = curvature.vectors[:, abs(curvature.values) <= level]

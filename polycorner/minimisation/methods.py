@@ -287,7 +287,7 @@ def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
     if end.failure is None and not far:
         return False
     with np.errstate(all="ignore"):
-        found = analyse(problem, end.point, TOLERANCE, RANK_TOLERANCE, brief=True)
+        found = analyse(problem, end.point, TOLERANCE, RANK_TOLERANCE, higher="followed")
     if end.failure is None:
         return found.verdict is Verdict.UNDECIDED
     if not found.verdict.is_minimum:
