@@ -101,7 +101,9 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     weak_rows = local.gradients[list(weak)]
     curvature = find_curvature(hessian, face.null_space, weak_rows, small_curvature, left)
     if not weak and np.isfinite(hessian).all():
-        curvature = steady(local, active, gradients, multipliers, curvature)
+        curvature = steady(
+            local, active, gradients, multipliers, curvature, NEARLY_FLAT * small_curvature
+        )
     away = distances(local.values[list(active)], gradients[:k])
     verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
     independent = rows.independent and not blind
@@ -112,7 +114,9 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
         gradients=gradients,
         multipliers=multipliers,
         independent=independent,
-        strong_positions=_independent_positions(gradients, seen, positive, k, local),
+        strong_positions=tuple(positive.tolist())
+        if rows.independent
+        else _independent_positions(gradients, seen, positive, k, local),
         weak=weak,
         blind=blind,
         curvature=curvature,
@@ -317,15 +321,10 @@ def _independent_positions(
     gradients: Array, seen: list[int], positive: NDArray[np.int64], k: int, local: Local
 ) -> tuple[int, ...]:
     """Return positions of strongly active functions with independent gradients, greedily."""
-    candidates = positive.tolist()
     sections = [i for i in seen if i >= k]
-    if rank(gradients[[*candidates, *sections]], local.rank_tolerance) == len(candidates) + len(
-        sections
-    ):
-        return tuple(candidates)
     chosen: list[int] = []
     reached = rank(gradients[sections], local.rank_tolerance)
-    for i in candidates:
+    for i in positive.tolist():
         if rank(gradients[[*chosen, i, *sections]], local.rank_tolerance) > reached:
             chosen.append(i)
             reached += 1

@@ -53,10 +53,9 @@ def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int,
 def estimated_scales(problem: Problem, q: Array, multipliers: Array) -> Iterator[Array]:
     """Yield scales ``(n,)`` at ``q``, where the energy's multipliers by row are given."""
     magnitudes = np.maximum(abs(q), problem.scales)
-    _, _, hessians = problem.evaluate(q, 2)
+    bends = problem.evaluate(q, 2)[2].diagonal(axis1=1, axis2=2)
     with np.errstate(all="ignore"):
-        hessian = hessians[-1] - np.tensordot(multipliers, hessians[:-1], 1)
-        sizes = abs(np.diag(hessian)) / problem.scales**2
+        sizes = abs(bends[-1] - multipliers @ bends[:-1]) / problem.scales**2
     if np.isfinite(sizes).all() and sizes.max() > 0:
         flat = sizes <= FLAT * sizes.max()
         yield np.where(flat, magnitudes, np.sqrt(sizes.max() / np.where(flat, 1.0, sizes)))

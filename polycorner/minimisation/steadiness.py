@@ -21,16 +21,18 @@ def steady(
     gradients: Array,
     multipliers: Multipliers,
     curvature: Curvature,
+    nearly: float,
 ) -> Curvature:
     """Count as flat what bends up here and not as much a little further on.
 
     Near an inflection of any order the curvature is positive on one side, however small: a search
-    ends beside it.  Looked at are the direction that bends most and those that bend much less.
+    ends beside it.  Looked at are the direction that bends most and those that bend much less, but
+    more than ``nearly``, up to which all are flat.
     """
     values, vectors = curvature.values, curvature.vectors
     if not len(values) or values[-1] <= 0:
         return curvature
-    tried = (values > 0) & (values <= FAINT * values[-1])
+    tried = (values > nearly) & (values <= FAINT * values[-1])
     tried[-1] = True
     ways = vectors[:, tried].T
     reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
@@ -38,12 +40,14 @@ def steady(
     with np.errstate(all="ignore"):
         points = local.point + reach * np.vstack([ways, -ways]) * local.problem.scales
         hessians = local.problem.evaluate(points, 2)[2]
-        factors = multipliers.values / np.maximum(np.linalg.norm(gradients, axis=1), 1e-300)
-        moved = hessians[:, -1] - np.einsum("kpij,p->kij", hessians[:, numbers], factors)
-        both = np.vstack([ways, ways])
-        bends = np.einsum("ki,kij,kj->k", both, moved, both)
-        changed = abs(bends.reshape(2, -1) - values[tried]) > 0.5 * values[tried]
+        sizes = np.maximum(np.sqrt((gradients * gradients).sum(axis=1)), 1e-300)
+        both = np.vstack([ways, ways])[:, :, None]
+        bends = (both.transpose(0, 2, 1)[:, None] @ hessians @ both[:, None])[:, :, 0, 0]
+        moved = bends[:, -1] - bends[:, numbers] @ (multipliers.values / sizes)
+        changed = abs(moved.reshape(2, -1) - values[tried]) > 0.5 * values[tried]
+    if not changed.any():
+        return curvature
     level = np.zeros(len(values), dtype=np.bool_)
     level[tried] = changed.any(axis=0)
     flat = without(np.hstack([curvature.flat, vectors[:, level]]), np.zeros((len(vectors), 0)))
-    return replace(curvature, flat=flat) if level.any() else curvature
+    return replace(curvature, flat=flat)
