@@ -15,7 +15,8 @@ folder's sources is compiled again whenever any of these files changes::
 
     entry = compiled(sources_digest(__package__))
 
-Only entry points are cached; what they call is compiled into them.
+Only entry points are cached; what they call is linked into them, see
+:func:`polycorner.formulas.linking.linked`.
 """
 
 import hashlib
@@ -28,6 +29,7 @@ from numba import config, types
 from numba.core import cgutils, event
 from numba.extending import intrinsic
 
+from polycorner.formulas import linking
 from polycorner.formulas.cache import cache_folder
 
 LOG = logging.getLogger("polycorner.compilation")
@@ -51,14 +53,15 @@ class Announcement(event.Listener):  # type: ignore[misc]
             LOG.info("compiling %s, once on this machine; this can take minutes", package)
 
     def on_end(self, event: Any) -> None:
-        """Do nothing."""
+        """Give functions that were linked their environments."""
+        linking.set_environments(event.data["dispatcher"].targetctx.codegen())
 
 
 event.register("numba:compile", Announcement())
 
 
 def sources_digest(package: str) -> str:
-    """Return SHA-256 over names and bytes of a package's own Python files, and of this one.
+    """Return SHA-256 over names and bytes of a package's own Python files, and of those here.
 
     Subpackages are not included.
     """
@@ -69,7 +72,7 @@ def sources_digest(package: str) -> str:
     folders = map(Path, spec.submodule_search_locations)
     files = sorted(file for folder in folders for file in folder.glob("*.py"))
     digest = hashlib.sha256()
-    for file in (Path(__file__), *files):
+    for file in (Path(__file__), Path(linking.__file__), *files):
         content = file.read_bytes()
         digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()

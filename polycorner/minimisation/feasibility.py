@@ -142,4 +142,4 @@ class _Violation:
 
     def is_stationary(self, u: Array) -> bool:
         slope, size = abs(self.slope(u)).max(initial=0.0), np.linalg.norm(self.residuals(u))
-        return bool(0.0 < size and slope <= STATIONARY * size)
+        return bool(slope <= STATIONARY * size)

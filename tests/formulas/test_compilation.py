@@ -9,13 +9,21 @@ import pytest
 
 import polycorner
 from polycorner.formulas.compilation import sources_digest
+from polycorner.formulas.linking import linked
 
 LEAF = """
-from numba import njit
+import numpy as np
+from polycorner.formulas.linking import linked
 
-@njit
+@linked()
+def product(x):
+    if x < 0:
+        raise ValueError("negative")
+    return np.prod(np.array([{factor}, x]))
+
+@linked()
 def scaled(x):
-    return {factor} * x
+    return product(x) if x != 0 else 0
 """
 ENTRY = """
 from numba import njit
@@ -33,6 +41,10 @@ entry = compiled(sources_digest("stages"))
 """
 START = """
 from stages.entries import entry
+try:
+    entry(-1)
+except ValueError as error:
+    assert str(error) == "negative"
 print(entry(5), sum(entry.stats.cache_hits.values()))
 """
 
@@ -60,8 +72,9 @@ def start(folder):
         },
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
+    assert not done.returncode, done.stderr
     result, hits = map(int, done.stdout.split())
     return result, hits
 
@@ -72,6 +85,12 @@ def test_an_entry_point_is_compiled_again_when_any_stage_changes(stages):
     (stages / "leaf.py").write_text(LEAF.format(factor=3))
     assert start(stages) == (15, 0)
     assert start(stages) == (15, 1)
+
+
+def test_python_cannot_call_what_is_only_linked():
+    twice = linked()(lambda x: 2 * x)
+    with pytest.raises(SystemError):
+        twice(5)
 
 
 def test_the_digest_depends_on_names_and_bytes(stages, monkeypatch):

@@ -1,15 +1,15 @@
 """Values and derivatives of a problem at a point, its normalised rows and their violation."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import call_kernel, never_inline
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import length
 
 FEASIBLE = 1e-10  # scaled constraint violation allowed during the descent
 
 
-@njit
+@compiled
 def evaluate(problem, u, F, J, H, size, second):
     """Fill values (M,), scaled gradients (M, n) and, if asked, scaled Hessians (M, n, n)."""
     never_inline()
@@ -40,7 +40,7 @@ def evaluate(problem, u, F, J, H, size, second):
     work[0] = 0.0
 
 
-@njit
+@compiled
 def violation(F, J, use, m):
     """Return the largest scaled violation of the constraints in use; infinite off their domain."""
     never_inline()
@@ -55,7 +55,7 @@ def violation(F, J, use, m):
     return worst
 
 
-@njit
+@compiled
 def normalised_rows(F, J, use, m):
     """Return the rows in use, scaled to unit gradients: ``A``, ``b``, row numbers and lengths."""
     never_inline()
@@ -75,7 +75,7 @@ def normalised_rows(F, J, use, m):
     return A, b, keep, sizes
 
 
-@njit
+@compiled
 def lagrangian_hessian(H, lam):
     """Return the Hessian of ``E - sum lam f``."""
     never_inline()
@@ -88,7 +88,7 @@ def lagrangian_hessian(H, lam):
     return L
 
 
-@njit
+@compiled
 def all_finite(J, H, lam, last):
     """Whether all gradients, and the Hessians with a nonzero multiplier, are finite."""
     never_inline()

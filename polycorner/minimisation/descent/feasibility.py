@@ -1,7 +1,6 @@
 """Restoration of feasibility by repeated linearisation; segments that leave the set."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import (
@@ -10,11 +9,12 @@ from polycorner.minimisation.descent.evaluation import (
     normalised_rows,
     violation,
 )
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import identity, largest, plus, solve_truncated
 from polycorner.minimisation.descent.quadratic_programme import solve_quadratic
 
 
-@njit
+@compiled
 def least_violation(A, b, equations):
     """Return a damped Gauss-Newton step for linearised rows without a common solution."""
     never_inline()
@@ -31,7 +31,7 @@ def least_violation(A, b, equations):
     return solve_truncated(G, g, 0.0)
 
 
-@njit
+@compiled
 def project(problem, use, m, u, F, J, H, size, limit):
     """Project ``u`` onto the set by repeated linearisation, in place; return success."""
     never_inline()
@@ -68,7 +68,7 @@ def project(problem, use, m, u, F, J, H, size, limit):
     return worst <= FEASIBLE
 
 
-@njit
+@compiled
 def crosses_wall(problem, use, m, u, d, F, J, H, size):
     """Whether the segment ``u`` to ``u + d`` leaves the set, sampled half a scale unit apart."""
     never_inline()

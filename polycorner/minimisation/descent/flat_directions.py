@@ -1,14 +1,14 @@
 """Change of the energy along directions in which its second order vanishes."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.minimisation.descent.evaluation import FEASIBLE, evaluate, violation
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import largest, plus
 from polycorner.minimisation.descent.newton import polish
 
 
-@njit
+@compiled
 def probe(problem, on, use, m, rows, u, directions, held, steps, size):
     """Follow directions along a face; return the largest change of the energy or its slope.
 

@@ -4,12 +4,12 @@ Loops compile ten times faster here than array expressions.
 """
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import never_inline
+from polycorner.minimisation.descent.jit import compiled
 
 
-@njit
+@compiled
 def add_multiple(y, a, x):
     """Add ``a x`` to ``y`` in place.  Loops compile ten times faster than array expressions."""
     never_inline()
@@ -17,7 +17,7 @@ def add_multiple(y, a, x):
         y[i] += a * x[i]
 
 
-@njit
+@compiled
 def plus(x, a, y):
     """Return ``x + a y``."""
     never_inline()
@@ -27,7 +27,7 @@ def plus(x, a, y):
     return z
 
 
-@njit
+@compiled
 def identity(n):
     """Return the unit matrix."""
     never_inline()
@@ -37,7 +37,7 @@ def identity(n):
     return eye
 
 
-@njit
+@compiled
 def length(v):
     """Return the Euclidean length."""
     total = 0.0
@@ -46,7 +46,7 @@ def length(v):
     return np.sqrt(total)
 
 
-@njit
+@compiled
 def largest(a):
     """Return the largest absolute entry of a vector."""
     never_inline()
@@ -56,7 +56,7 @@ def largest(a):
     return top
 
 
-@njit
+@compiled
 def largest_entry(A):
     """Return the largest absolute entry of a matrix."""
     never_inline()
@@ -67,7 +67,7 @@ def largest_entry(A):
     return top
 
 
-@njit
+@compiled
 def svd(A):
     """Return ``(U, s, V)`` with ``A = U diag(s) V^T``, V square, by one-sided Jacobi rotations."""
     never_inline()
@@ -107,7 +107,7 @@ def svd(A):
     return W, s, V
 
 
-@njit
+@compiled
 def solve_truncated(A, b, cut):
     """Return the shortest least-squares solution of ``A x = b``, singular values below cut zero."""
     never_inline()
@@ -124,7 +124,7 @@ def solve_truncated(A, b, cut):
     return x
 
 
-@njit
+@compiled
 def cholesky(B, L):
     """Factor ``B = L L^T`` in place of L; return whether every pivot is safely positive."""
     never_inline()
@@ -144,7 +144,7 @@ def cholesky(B, L):
     return True
 
 
-@njit
+@compiled
 def forward(L, b):
     """Return the solution of ``L x = b``."""
     never_inline()
@@ -156,7 +156,7 @@ def forward(L, b):
     return x
 
 
-@njit
+@compiled
 def backward(L, b):
     """Return the solution of ``L^T x = b``."""
     never_inline()

@@ -1,10 +1,10 @@
 """Newton's method on the KKT equations of a face."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import evaluate, lagrangian_hessian, normalised_rows
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import (
     add_multiple,
     identity,
@@ -17,7 +17,7 @@ from polycorner.minimisation.descent.linear_algebra import (
 RANK = 1e-8  # singular values below this fraction of the largest count as zero
 
 
-@njit
+@compiled
 def add_tangential_step(d, L, g, V, s, cut, reference):
     """Add to ``d`` the shortest Newton step in the face's tangent space, where ``s <= cut``."""
     never_inline()
@@ -45,7 +45,7 @@ def add_tangential_step(d, L, g, V, s, cut, reference):
         add_multiple(d, p[a], Z[a])
 
 
-@njit
+@compiled
 def polish(problem, on, m, held, u, F, J, H, size):
     """Newton's method on the KKT equations of the face where the rows ``on`` and equations vanish.
 

@@ -1,13 +1,13 @@
 """Strictly convex quadratic programmes by the dual active-set method ([GI])."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import never_inline
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import add_multiple, backward, forward, length
 
 
-@njit
+@compiled
 def project_out(Q, R, count, w):
     """Split ``w`` into ``Q y + rest`` over an orthonormal basis; return ``(rest, R^-1 y, y)``."""
     never_inline()
@@ -28,7 +28,7 @@ def project_out(Q, R, count, w):
     return rest, r, y
 
 
-@njit
+@compiled
 def orthonormalise(W, active, known, count, Q, R):
     """Orthonormalise the active rows of ``W`` by Gram-Schmidt with one reorthogonalisation.
 
@@ -44,7 +44,7 @@ def orthonormalise(W, active, known, count, Q, R):
             Q[k, j] = rest[k] / R[j, j]
 
 
-@njit
+@compiled
 def slack(A, b, x, i):
     """Return ``A_i x + b_i``."""
     total = b[i]
@@ -53,7 +53,7 @@ def slack(A, b, x, i):
     return total
 
 
-@njit
+@compiled
 def most_violated(A, b, x, is_active, start, stop, equations):
     """Return the most violated inactive row among ``start:stop``, or -1."""
     never_inline()
@@ -68,7 +68,7 @@ def most_violated(A, b, x, is_active, start, stop, equations):
     return chosen
 
 
-@njit
+@compiled
 def solve_quadratic(L, g, A, b, equations):
     """Minimise ``g.d + |L^T d|^2 / 2`` subject to ``A d + b >= 0``, the last rows ``= 0``.
 

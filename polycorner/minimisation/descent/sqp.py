@@ -1,7 +1,6 @@
 """Descent by sequential quadratic programming with feasible iterates ([NW] ch. 18)."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import (
@@ -12,6 +11,7 @@ from polycorner.minimisation.descent.evaluation import (
     normalised_rows,
 )
 from polycorner.minimisation.descent.feasibility import crosses_wall, project
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import cholesky, largest, largest_entry, plus
 from polycorner.minimisation.descent.quadratic_programme import solve_quadratic
 from polycorner.minimisation.descent.stationarity import (
@@ -31,7 +31,7 @@ HUGE = 1e250  # derivatives beyond overflow in products
 FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
 
 
-@njit
+@compiled
 def convexified(B, g, A, L):
     """Fill ``L`` with the Cholesky factor of ``B`` made positive definite.
 
@@ -61,7 +61,7 @@ def convexified(B, g, A, L):
             shift *= 8.0
 
 
-@njit
+@compiled
 def leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
     """Move ``v`` off a saddle or a flat point to a lower one; return whether there was one."""
     never_inline()
@@ -70,7 +70,7 @@ def leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
     return outcome == FLAT and leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy)
 
 
-@njit
+@compiled
 def descend(problem, use, m, rows, u, size, limit):
     """Descend from ``u`` inside the piece given by ``use``, never through a wall.
 

@@ -1,7 +1,6 @@
 """Classification of stationary points: minima, saddles and the way off a saddle."""
 
 import numpy as np
-from numba import njit
 
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import (
@@ -12,6 +11,7 @@ from polycorner.minimisation.descent.evaluation import (
     violation,
 )
 from polycorner.minimisation.descent.feasibility import project
+from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import (
     add_multiple,
     identity,
@@ -30,7 +30,7 @@ RADII = (1e-3, 1e-2, 1e-1)  # steps in which flat directions are followed, in sc
 MIXTURES = 4  # mixtures of flat directions to follow, per direction, where there are several
 
 
-@njit
+@compiled
 def least_curvatures(F, J, H, lam, on, m):
     """Return the least relative curvature along the face and the directions of least curvature.
 
@@ -80,7 +80,7 @@ def least_curvatures(F, J, H, lam, on, m):
     return least, ways[:count].copy()
 
 
-@njit
+@compiled
 def classify(problem, use, on, m, u, F, J, H, size, energy):
     """Apply Newton's method on the face to a copy of ``u`` and classify where it ends.
 
@@ -126,7 +126,7 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
     return MINIMUM if least > CURVED else FLAT, v, lam, directions
 
 
-@njit
+@compiled
 def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
     """Move ``v`` off a saddle along ``direction`` to a feasible point below ``energy``.
 
@@ -157,7 +157,7 @@ def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
     return False
 
 
-@njit
+@compiled
 def leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy):
     """Move ``v`` from a point with vanishing second order to a lower one nearby; return success.
 

@@ -1,10 +1,10 @@
 """The band matrix of an island, and its solution."""
 
 from polycorner.formulas.compilation import never_inline
-from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled, inlined
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 
 
-@inlined
+@compiled
 def number_bodies(model, state, work, first, last):
     """Enumerate the bodies of an island; return their number and the half-bandwidth.
 
@@ -107,7 +107,7 @@ def assemble_mass(model, work, n, width):
                 work.band[(at * k + x) * stride + width + y - x] = work.mass[i, x, y]
 
 
-@inlined
+@compiled
 def add_block(model, work, b, width):
     """Add ``J' G J`` of a block to the band matrix.
 
@@ -151,7 +151,7 @@ def add_block(model, work, b, width):
                     work.band[at + y] += value
 
 
-@inlined
+@compiled
 def add_transposed_row(model, work, b, r, value, target):
     """Add ``value J'`` of one row to a vector over the bodies of an island."""
     k = model.dimension
@@ -162,7 +162,7 @@ def add_transposed_row(model, work, b, r, value, target):
                 target[work.number[i] * k + x] += value * work.jacobian[b, r, side * k + x]
 
 
-@inlined
+@compiled
 def row_product(model, work, b, r, vector):
     """Return ``J x`` of one row for a vector over the bodies of an island."""
     k, value = model.dimension, 0.0

@@ -5,13 +5,13 @@ import numpy as np
 from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
-from polycorner.motion.engine.jit import NONE, TWO, ZERO, compiled, inlined
+from polycorner.motion.engine.jit import NONE, TWO, ZERO, compiled
 from polycorner.motion.engine.neighbours import detection_distance, heap_sort, key_of
 
 ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
 
 
-@inlined
+@compiled
 def finish_block(model, work, b):
     """Compute ``M^-1 J'`` and the Delassus matrix of a block, and apply its initial impulse."""
     k = model.dimension
@@ -62,7 +62,7 @@ def least_velocity(gap, before, free, change, bounce, h, scale):
     return -reached / h
 
 
-@inlined
+@compiled
 def new_block(work, b, k, first, second, rows):
     """Initialise a block with a Jacobian of zeros."""
     work.block_bodies[b, 0], work.block_bodies[b, 1], work.block_rows[b] = first, second, rows
@@ -75,7 +75,7 @@ def new_block(work, b, k, first, second, rows):
             work.jacobian[b, r, c] = 0.0
 
 
-@inlined
+@compiled
 def add_body_blocks(model, state, work, i, h, limit, count):
     """Append the blocks of a body's contacts with its surroundings; return the block count."""
     k, m = model.dimension, model.restitution.size
@@ -133,7 +133,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
     return count
 
 
-@inlined
+@compiled
 def add_pair_blocks(model, state, work, contact, h, count):
     """Append the blocks of a contact between two bodies; return the block count."""
     k, scratch = model.dimension, work.scratch
@@ -189,7 +189,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     return count + 2
 
 
-@inlined
+@compiled
 def velocity_of(model, work, b, v, out):
     """Evaluate the velocities ``J v + d`` of a block's rows."""
     k = model.dimension
@@ -204,7 +204,7 @@ def velocity_of(model, work, b, v, out):
         out[r] = value
 
 
-@inlined
+@compiled
 def apply_impulse(model, work, b, r, change):
     """Add an impulse of one row to the velocities of its bodies."""
     k = model.dimension
@@ -218,7 +218,7 @@ def apply_impulse(model, work, b, r, change):
             work.v_new[j, c] += work.response[b, r, k + c] * change
 
 
-@inlined
+@compiled
 def assemble_blocks(model, state, work, h, contacts):
     """Assemble the blocks of all awake bodies and of all contacts detected; return their number."""
     blocks = ZERO

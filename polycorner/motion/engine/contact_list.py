@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
 from polycorner.motion.engine.blocks import velocity_of
-from polycorner.motion.engine.jit import NONE, inlined
+from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import key_of
 
 TOUCHING = 1e-7  # scaled gap up to which a contact is made
@@ -13,7 +13,7 @@ MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
 REST, MOTION, EXIT = np.int64(3), np.int64(4), np.int64(5)
 
 
-@inlined
+@compiled
 def store_impulses(state, work, blocks):
     """Store the impulses: for the next step, or as the start of another round of this one."""
     for b in range(blocks):
@@ -29,7 +29,7 @@ def store_impulses(state, work, blocks):
                 work.contact_impulse[i, 1 + r] = work.impulse[b, r]
 
 
-@inlined
+@compiled
 def store_sticking(model, state, work, blocks):
     """Store which friction contacts between bodies and surroundings stick."""
     for b in range(blocks):
@@ -38,7 +38,7 @@ def store_sticking(model, state, work, blocks):
             state.sticks[i, f] = 1 if sticks(model, work, b, work.slip) else 0
 
 
-@inlined
+@compiled
 def sticks(model, work, b, u):
     """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
     velocity_of(model, work, b, work.v_new, u)
@@ -49,7 +49,7 @@ def sticks(model, work, b, u):
     return slip <= 2.0 * model.tolerance * speed
 
 
-@inlined
+@compiled
 def record(log, count, kind, i, j, which, time, value):
     """Record an event; return the number of events."""
     log.entries[count, 0], log.entries[count, 1] = kind, i
@@ -58,7 +58,7 @@ def record(log, count, kind, i, j, which, time, value):
     return count + 1
 
 
-@inlined
+@compiled
 def classify(work, b, was, gap, h, time, scale, u, out):
     """Compare a contact with what it was; out: whether it touches, the event or -1, its time."""
     closes = work.block_load[b] / h
@@ -74,7 +74,7 @@ def classify(work, b, was, gap, h, time, scale, u, out):
         out[1] = LOST
 
 
-@inlined
+@compiled
 def record_contacts(model, state, work, log, blocks, h, time, count):
     """Record contacts made, lost and bounced; update the list of contacts between bodies."""
     u, out, C = work.slip, work.image, 0
@@ -114,7 +114,7 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
     return count
 
 
-@inlined
+@compiled
 def keep_contacts(model, state, work, log, C, h, time, count):
     """Keep the contacts between two sleepers, record those lost; return list size and events."""
     k, size = model.dimension, 0
@@ -137,7 +137,7 @@ def keep_contacts(model, state, work, log, C, h, time, count):
     return size, count
 
 
-@inlined
+@compiled
 def add_contacts(model, state, work, C, size):
     """Append this step's contacts to the list, with their impulses."""
     k = model.dimension
@@ -163,7 +163,7 @@ def add_contacts(model, state, work, C, size):
     state.counts[CONTACTS] = size
 
 
-@inlined
+@compiled
 def listed(model, work, C, key):
     """Return whether a contact is in this step's list."""
     found = False
@@ -172,7 +172,7 @@ def listed(model, work, C, key):
     return found
 
 
-@inlined
+@compiled
 def sort_contacts(state, size):
     """Sort contacts by key, by insertion: they are nearly sorted already."""
     for s in range(1, size):

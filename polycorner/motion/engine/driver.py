@@ -18,12 +18,12 @@ from polycorner.motion.engine.arrays import (
     SWEEPS,
     UNSOLVED,
     Log,
-    Model,
     Sizes,
     State,
     Work,
     allocate,
     restored,
+    table_of,
 )
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.events import Event, EventKind
@@ -89,15 +89,18 @@ class Engine:
         self.model = model_of(bodies, self._sizes, noise, solver or Solver())
         self.motion = allocate(State, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
-        self.work, self.log = allocate(Work, self._sizes), allocate(Log, self._sizes)
+        self._allocate()
 
     @property
     def _sizes(self) -> Sizes:
         return Sizes.of(self.bodies, self.capacity)
 
-    @property
-    def _records(self) -> tuple[Model, State, Work, Log]:
-        return self.model, self.motion, self.work, self.log
+    def _allocate(self) -> None:
+        """Allocate the workspace, and tell compiled code where everything is."""
+        self.work, self.log = allocate(Work, self._sizes), allocate(Log, self._sizes)
+        records = self.model, self.motion, self.work, self.log
+        self._tables = [table_of(record) for record in records]
+        self._addresses = np.array([table.ctypes.data for table in self._tables])
 
     @property
     def time(self) -> float:
@@ -127,7 +130,7 @@ class Engine:
         compiled = self._compiled()
         events: list[Event] = []
         while steps > 0:
-            why, done, count = compiled.advance(*self._records, self.dt, steps)
+            why, done, count = compiled.advance(self._addresses, self.dt, steps)
             events += self._read(count)
             steps -= done
             if why == compiled.CONTACTS_FULL:
@@ -141,7 +144,7 @@ class Engine:
 
         if not entry_point.advance.overloads:
             with one_at_a_time(f"motion-{entry_point.SOURCES[:16]}"):
-                entry_point.advance(*self._records, self.dt, 0)
+                entry_point.advance(self._addresses, self.dt, 0)
         return entry_point
 
     def _read(self, count: int) -> list[Event]:
@@ -164,7 +167,7 @@ class Engine:
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.motion = restored(State, self._sizes, arrays)
-        self.work, self.log = allocate(Work, self._sizes), allocate(Log, self._sizes)
+        self._allocate()
 
     def energies(self) -> tuple[float, float]:
         """Return kinetic and potential energy of the bodies that have not left."""

@@ -7,6 +7,7 @@ from numba import njit
 from polycorner.formulas.compilation import sources_digest
 from polycorner.motion.engine.arrays import STEPS
 from polycorner.motion.engine.jit import ZERO
+from polycorner.motion.engine.records import log_at, model_at, state_at, work_at
 from polycorner.motion.engine.sleep import stays_asleep
 from polycorner.motion.engine.stepping import step
 
@@ -17,9 +18,11 @@ def _entry_point(sources: str) -> Any:
     """Return the compiled function; it reads ``sources``, which puts it into its cache key."""
 
     @njit(cache=True, error_model="numpy")
-    def advance(model, state, work, log, h, steps):
+    def advance(tables, h, steps):
         """Advance by several steps; return why it stopped, and how many steps and events."""
         _ = sources
+        model, state = model_at(tables[0]), state_at(tables[1])
+        work, log = work_at(tables[2]), log_at(tables[3])
         count = ZERO
         most = 2 * work.contact.shape[0] + model.bodies * (2 + model.restitution.size)
         for done in range(steps):

@@ -13,7 +13,7 @@ from polycorner.motion.engine.band import (
 )
 from polycorner.motion.engine.blocks import velocity_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses
-from polycorner.motion.engine.jit import ONE, ZERO, compiled, inlined
+from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.rest import REST_FACTOR
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
 
@@ -152,7 +152,7 @@ def assemble_interior(model, work, first, last, n, width, speed):
             add_schur_complement(model, work, b, width)
 
 
-@inlined
+@compiled
 def add_schur_complement(model, work, b, width):
     """Add a contact, its friction eliminated, to the matrix and the right-hand side."""
     k, x, schur_row = model.dimension, work.island_vector, work.schur_row

@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.formulas.compilation import call_kernel
-from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import invert
 from polycorner.motion.engine.random import gaussian
 
@@ -57,7 +57,7 @@ def evaluate_body(model, state, work, i, h, time, index):
     evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
 
 
-@inlined
+@compiled
 def evaluate_gaps(model, work, i, q, gap, gradient):
     """Evaluate the gaps between a body and its surroundings, and their gradients."""
     scratch = work.scratch
@@ -78,7 +78,7 @@ def evaluate_gaps(model, work, i, q, gap, gradient):
                     gradient[i, g, model.gap_reads[r0 + a]] += scratch[j0 + o * n + a]
 
 
-@inlined
+@compiled
 def evaluate_pair(model, work, a, b, q):
     """Evaluate the gaps of a pair of bodies and their gradients.
 

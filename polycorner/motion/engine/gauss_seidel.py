@@ -3,11 +3,11 @@
 import numpy as np
 
 from polycorner.motion.engine.blocks import apply_impulse, velocity_of
-from polycorner.motion.engine.jit import ONE, ZERO, compiled, inlined
+from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.sets import contains, project
 
 
-@inlined
+@compiled
 def relax_block(model, work, b, u, out):
     """Solve one block with all others fixed; return its residual, as a speed."""
     pressing = work.pressing[b]
@@ -52,7 +52,7 @@ def relax_block(model, work, b, u, out):
     return far
 
 
-@inlined
+@compiled
 def residual(model, work, first, last, u, out):
     """Return the largest residual of the natural map over the blocks of an island, as a speed."""
     worst = 0.0

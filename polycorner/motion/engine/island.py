@@ -8,7 +8,7 @@ from polycorner.motion.engine.blocks import velocity_of
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
-from polycorner.motion.engine.jit import NONE, compiled, inlined
+from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 
@@ -63,7 +63,7 @@ def iterate(model, state, work, first, last, speed, sweeps):
     return worst
 
 
-@inlined
+@compiled
 def switch_reversed_slips(model, state, work, first, last):
     """Give the static set to contacts whose slip reversed; return whether any was switched.
 
@@ -90,7 +90,7 @@ def switch_reversed_slips(model, state, work, first, last):
     return found
 
 
-@inlined
+@compiled
 def solve_island(model, state, work, first, last):
     """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
 
@@ -134,7 +134,7 @@ def solve_island(model, state, work, first, last):
     return worst / speed
 
 
-@inlined
+@compiled
 def solve_islands(model, state, work, blocks, h):
     """Solve all islands; those in which gaps would close by their curvature, a second time."""
     starts = work.island_start
@@ -146,7 +146,7 @@ def solve_islands(model, state, work, blocks, h):
             break
 
 
-@inlined
+@compiled
 def correct_curvature(model, state, work, blocks, h):
     """Raise the velocity bounds of gaps that close by their curvature; return whether any does.
 

@@ -3,13 +3,13 @@
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
-from polycorner.motion.engine.jit import NONE, compiled, inlined
+from polycorner.motion.engine.jit import NONE, compiled
 
 DETECTION = 1e-2  # scaled gap up to which contacts are detected, at least
 SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
 
 
-@inlined
+@compiled
 def position_of(model, state, i, a, time):
     """Return one component of a body's position, as a length, relative to the moving substrate."""
     c = model.position[a]
@@ -17,7 +17,7 @@ def position_of(model, state, i, a, time):
     return x - model.substrate_speed * time if a == 0 else x
 
 
-@inlined
+@compiled
 def outdated(model, state, work, time):
     """Return whether a body has moved so far that the neighbour list may lack a pair."""
     if work.list_status[1] == 0:
@@ -91,7 +91,7 @@ def list_neighbours(model, state, work, time):
     return True
 
 
-@inlined
+@compiled
 def detect_pair(model, state, work, a, b, limit, count):
     """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full."""
     k, scratch = model.dimension, work.scratch
@@ -117,7 +117,7 @@ def detect_pair(model, state, work, a, b, limit, count):
     return count
 
 
-@inlined
+@compiled
 def detection_distance(model, work, h):
     """Return the gap up to which contacts are detected: any body may be hit by the fastest."""
     fastest = 0.0
@@ -127,7 +127,7 @@ def detection_distance(model, work, h):
     return DETECTION * model.gap_unit + 2.0 * h * fastest
 
 
-@inlined
+@compiled
 def detect_contacts(model, state, work, h, count):
     """Add the small gaps of all pairs with an awake body; return the contact count, or -1."""
     limit = detection_distance(model, work, h)
@@ -162,7 +162,7 @@ def find_contact(state, key):
     return low if low < state.counts[CONTACTS] and state.keys[low] == key else -1
 
 
-@inlined
+@compiled
 def key_of(model, work, slot):
     """Return the key of a contact between bodies: a number that sorts by bodies and gap."""
     a, b, g = work.contact[slot, 0], work.contact[slot, 1], work.contact[slot, 2]

@@ -11,14 +11,14 @@ from polycorner.motion.engine.band import (
 )
 from polycorner.motion.engine.blocks import apply_impulse, velocity_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
-from polycorner.motion.engine.jit import ONE, ZERO, inlined
+from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.sets import project
 
 ROUND_NEWTON_STEPS = 20  # most Newton steps in a round
 IDLE_NEWTON_STEPS = 6  # Newton steps without progress after which a round ends
 
 
-@inlined
+@compiled
 def newton_steps(model, work, first, last, n, width, goal, softness, worst, u, out):
     """Take semismooth Newton steps on the natural map; return their number and the least residual.
 
@@ -59,7 +59,7 @@ def newton_steps(model, work, first, last, n, width, goal, softness, worst, u, o
     return steps, least
 
 
-@inlined
+@compiled
 def update_block(model, work, b, x):
     """Change the impulses of a block by a Newton step; see :func:`newton_steps`."""
     derivative, pressing, rows = work.derivative, work.pressing[b], max(1, work.block_rows[b])
@@ -76,7 +76,7 @@ def update_block(model, work, b, x):
         apply_impulse(model, work, b, r, change)
 
 
-@inlined
+@compiled
 def linearise(model, work, first, last, n, width, softness, u, out):
     """Linearise the natural map of an island; see :func:`newton_steps`.
 
@@ -109,7 +109,7 @@ def linearise(model, work, first, last, n, width, softness, u, out):
             add_transposed_row(model, work, b, r, constant[b, r], x)
 
 
-@inlined
+@compiled
 def linearise_friction(model, work, b, softness, u, out):
     """Linearise the natural map of one friction contact."""
     derivative, rho = work.derivative, work.delassus[b, 3]

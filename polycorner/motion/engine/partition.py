@@ -1,9 +1,9 @@
 """Partition of the blocks of a step into islands of touching bodies."""
 
-from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.jit import compiled
 
 
-@inlined
+@compiled
 def root_of(root, i):
     """Return the representative of a body in the union-find forest."""
     while root[i] != i:
@@ -19,7 +19,7 @@ def island_of(work, b):
     return work.parent[first if work.awake[first] else work.block_bodies[b, 1]]
 
 
-@inlined
+@compiled
 def find_islands(model, work, blocks):
     """Order the blocks by islands of touching bodies, which start at ``work.island_start``."""
     N = model.bodies

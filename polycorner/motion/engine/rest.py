@@ -1,6 +1,6 @@
 """Rest of a single body: its velocity, and the impulses that prove it."""
 
-from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.sets import contains
 
@@ -9,7 +9,7 @@ SLEEP_MARGIN = 0.01  # share of friction left unused by sleepers that need no ch
 REST_FACTOR = 10.0  # multiple of the tolerance up to which a velocity counts as that of rest
 
 
-@inlined
+@compiled
 def load_of(model, work, lam, i, f):
     """Return the normal impulse that presses on a friction contact of a body."""
     if model.pressing_gap[f] < 0:
@@ -143,7 +143,7 @@ def balances(model, state, work, i, others, again, slack):
     return True
 
 
-@inlined
+@compiled
 def comes_to_rest(model, state, work, i, rest):
     """Return whether a body is at rest after the step; then it gets exactly the velocity of rest.
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.jit import compiled
 
 INTERVAL, DISC, ELLIPSE, CUT_DISC, POLYGON = 0, 1, 2, 3, 4  # as in ConvexSet.code
 
 
-@inlined
+@compiled
 def contains(model, shape, x, y, load, slack):
     """Return whether ``(x, y)`` lies in ``load`` times a set, up to a relative slack."""
     kind = model.set_kinds[shape]
@@ -31,7 +31,7 @@ def contains(model, shape, x, y, load, slack):
     return True
 
 
-@inlined
+@compiled
 def project(model, shape, x, y, load, out):
     """Project ``(x, y)`` onto ``load`` times a set; out: the point and its derivative by rows."""
     kind = model.set_kinds[shape]
@@ -128,7 +128,7 @@ def project_polygon(model, shape, x, y, load, out):
                 out[4], out[5] = out[3], ey * ey / square
 
 
-@inlined
+@compiled
 def add_linear_barrier(c0, c1, c2, load, x, y, out):
     """Add the barrier ``-log(c0 load + c1 x + c2 y)`` to a gradient and a Hessian."""
     f = 1.0 / (c0 * load + c1 * x + c2 * y)
@@ -138,7 +138,7 @@ def add_linear_barrier(c0, c1, c2, load, x, y, out):
     out[6], out[7], out[8] = out[6] + c1 * c1, out[7] + c1 * c2, out[8] + c2 * c2
 
 
-@inlined
+@compiled
 def add_quadratic_barrier(a, b, load, x, y, out):
     """Add the barrier ``-log(load^2 - (x / a)^2 - (y / b)^2)`` to a gradient and a Hessian."""
     e, f = 1.0 / (a * a), 1.0 / (b * b)
@@ -149,7 +149,7 @@ def add_quadratic_barrier(a, b, load, x, y, out):
     out[6], out[7], out[8] = out[6] + c1 * c1 + g * e, out[7] + c1 * c2, out[8] + c2 * c2 + g * f
 
 
-@inlined
+@compiled
 def barrier(model, shape, load, x, y, out):
     """Differentiate the logarithmic barrier of the cone over a set, in load, x and y.
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, PAIR_FRICTION, PAIR_GAP, SUBSTRATE_WORK
 from polycorner.motion.engine.evaluation import evaluate_body
-from polycorner.motion.engine.jit import compiled, inlined
+from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.partition import root_of
 from polycorner.motion.engine.rest import SLEEP_MARGIN, comes_to_rest, load_of, remains_at_rest
 from polycorner.motion.engine.sets import contains
@@ -12,7 +12,7 @@ from polycorner.motion.engine.sets import contains
 LONGEST_SLEEP = np.int64(50)  # most steps between two checks of a sleeper
 
 
-@inlined
+@compiled
 def wake(model, state, work, h, time, index):
     """Wake the sleepers whose forces no longer balance; return whether any body is awake.
 
@@ -35,7 +35,7 @@ def wake(model, state, work, h, time, index):
     return any_awake
 
 
-@inlined
+@compiled
 def wake_piles(model, state, work, h, time, index):
     """Wake the whole pile at rest around each body that woke; see :func:`find_equilibrium`."""
     N, root, disturbed, moving = model.bodies, work.parent, work.disturbed, work.cursor
@@ -117,7 +117,7 @@ def next_check(model, state, work, i, h, index):
     return index + 1 + steps
 
 
-@inlined
+@compiled
 def wake_neighbours(model, state, work, blocks, h, time, index):
     """Sum the impulses of neighbours on each body; wake those not at rest under them."""
     k, N = model.dimension, model.bodies
@@ -155,7 +155,7 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
     return woken
 
 
-@inlined
+@compiled
 def settle(model, state, work, h, index):
     """Give bodies that came to rest exactly the velocity of rest; update sleepers."""
     k = model.dimension

@@ -38,13 +38,13 @@ from polycorner.motion.engine.contact_list import (
     store_sticking,
 )
 from polycorner.motion.engine.island import solve_islands
-from polycorner.motion.engine.jit import NONE, ZERO, inlined
+from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
 from polycorner.motion.engine.partition import find_islands
 from polycorner.motion.engine.sleep import settle, wake, wake_neighbours
 
 
-@inlined
+@compiled
 def start_bodies(model, state, work):
     """Set the free velocities, due to forces alone, of awake bodies, and measure all speeds."""
     k = model.dimension
@@ -66,7 +66,7 @@ def start_bodies(model, state, work):
         work.speed[i], work.island_speed[i] = speed, speed
 
 
-@inlined
+@compiled
 def book_work(model, state, work, blocks, h):
     """Book the work done in this step, by cause."""
     k, u = model.dimension, work.slip
@@ -103,7 +103,7 @@ def book_work(model, state, work, blocks, h):
                     state.sums[SUBSTRATE_WORK] -= work.proof_friction[i, f, r] * drift
 
 
-@inlined
+@compiled
 def solve(model, state, work, h, time, index):
     """Solve a step for the bodies that are awake and those that they wake.
 
@@ -136,7 +136,7 @@ def solve(model, state, work, h, time, index):
     return True, blocks
 
 
-@inlined
+@compiled
 def step(model, state, work, log, h, count):
     """Advance by one step; return whether there was room for all contacts, and the event count."""
     k, N = model.dimension, model.bodies

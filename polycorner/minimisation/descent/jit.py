@@ -1,0 +1,5 @@
+"""How the stages of the descent are compiled."""
+
+from polycorner.formulas.linking import linked
+
+compiled = linked()

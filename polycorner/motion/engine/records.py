@@ -1,0 +1,111 @@
+"""Records of arrays as one pointer, for compiled code.
+
+To compiled code a record (:class:`~polycorner.motion.engine.arrays.Model` and the others) is the
+address of a table: for every number its value, for every array its address and its lengths.
+Reading ``record.name`` loads what it needs from there; the loads are marked invariant, since tables
+do not change while compiled code runs.  To call a function so costs one argument for each record,
+not one for each length of some 140 arrays.
+"""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel.models import PrimitiveModel
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import intrinsic, register_model
+
+from polycorner.motion.engine.arrays import Log, Model, State, Work, declarations
+
+ITEMSIZE = 8  # bytes of every number
+
+
+class RecordType(types.Type):  # type: ignore[misc]
+    """The type of a record to compiled code."""
+
+    def __init__(self, record: Any) -> None:
+        self.fields: dict[str, tuple[int, Any]] = {}
+        slot = 0
+        for name, declared in declarations(record).items():
+            kind = types.float64 if declared.kind is np.float64 else types.int64
+            dimensions = len(declared.shape.split())
+            held = types.Array(kind, dimensions, "C") if dimensions else kind
+            self.fields[name] = (slot, held)
+            slot += 1 + dimensions
+        super().__init__(name=f"Record({record.__name__})")
+
+
+@register_model(RecordType)
+class RecordModel(PrimitiveModel):  # type: ignore[misc]
+    """A pointer to the table."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.IntType(64).as_pointer())
+
+
+@infer_getattr
+class RecordAttributes(AttributeTemplate):  # type: ignore[misc]
+    """The entries of a record are its attributes."""
+
+    key = RecordType
+
+    def generic_resolve(self, record: RecordType, name: str) -> Any:
+        """Return the type of an entry."""
+        return record.fields[name][1] if name in record.fields else None
+
+
+@lower_getattr_generic(RecordType)
+def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
+    """Load an entry."""
+    slot, held = record.fields[name]
+    invariant = builder.module.add_metadata([])
+
+    def load(at: int, kind: Any = None) -> Any:
+        place = builder.gep(table, [ir.Constant(ir.IntType(32), at)])
+        if kind is not None:
+            place = builder.bitcast(place, kind.as_pointer())
+        value = builder.load(place)
+        value.set_metadata("invariant.load", invariant)
+        return value
+
+    if not isinstance(held, types.Array):
+        return load(slot, context.get_value_type(held))
+    word = ir.IntType(64)
+    shape = [load(slot + 1 + axis) for axis in range(held.ndim)]
+    strides, stride = [ir.Constant(word, ITEMSIZE)], shape[-1]
+    for length in reversed(shape[:-1]):
+        strides.insert(0, builder.mul(stride, strides[-1]))
+        stride = builder.mul(stride, length)
+    members = {
+        "nitems": stride,
+        "itemsize": strides[-1],
+        "data": load(slot, context.get_data_type(held.dtype).as_pointer()),
+        "shape": cgutils.pack_array(builder, shape, word),
+        "strides": cgutils.pack_array(builder, strides, word),
+    }
+    model = context.data_model_manager[held]
+    array = ir.Constant(model.get_value_type(), None)
+    for member, value in members.items():
+        array = model.set(builder, array, value, member)
+    return array
+
+
+def _reader(kind: RecordType) -> Any:
+    """Return the compiled function that makes a record of the address of its table."""
+
+    @intrinsic
+    def record_at(_: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            return builder.inttoptr(values[0], ir.IntType(64).as_pointer())
+
+        return kind(types.int64), generate
+
+    return record_at
+
+
+model_at, state_at, work_at, log_at = (
+    _reader(RecordType(record)) for record in (Model, State, Work, Log)
+)
