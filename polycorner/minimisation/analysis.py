@@ -14,12 +14,13 @@ from polycorner.minimisation.conditions import (
 )
 from polycorner.minimisation.constancy import symmetric_directions, without
 from polycorner.minimisation.corner_degeneracy import decide
+from polycorner.minimisation.corners import corner, seen_from
 from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
 from polycorner.minimisation.evidence import steepest_descent
 from polycorner.minimisation.findings import OPEN, Analysis, Higher, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
-from polycorner.minimisation.steadiness import steady
+from polycorner.minimisation.steadiness import is_steady, steady
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import Rows, inward_direction, rank, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
@@ -78,8 +79,11 @@ def _without_conditions(local: Local, verdict: Verdict, reason: str) -> Analysis
     return replace(found, verdict=verdict, obstacle=reason, local=local)
 
 
-def _analyse_piece(local: Local, piece: Piece) -> Analysis:
-    """Analyse one piece."""
+def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Analysis:
+    """Analyse one piece.
+
+    A point that is not ``settled`` may lie beside the corner of its active functions.
+    """
     active = tuple(sorted(piece))
     k, small = len(active), local.small
     gradients = local.gradients[[*active, *local.sections]]
@@ -127,14 +131,29 @@ def _analyse_piece(local: Local, piece: Piece) -> Analysis:
     )
     higher = local.higher != "none"
     if verdict is Verdict.UNDECIDED and higher and curvature.least >= -small_curvature:
+        exact = corner(local, active) if weak and independent and not settled else None
+        if exact is not None:
+            return seen_from(result, _analyse_piece(exact, piece, settled=True))
         decision = _decide(result, piece, strong, hessian)
         result = replace(result, decision=decision, verdict=decision.verdict)
-    elif verdict is Verdict.STRICT_MINIMUM and weak:
-        result = replace(result, verdict=Verdict.WEAK_MINIMUM)
+    elif verdict in {Verdict.STRICT_MINIMUM, Verdict.SADDLE} and weak and higher:
+        result = _beside_inflection(result)
     result = _with_blind(result) if blind else result
     if result.verdict is Verdict.NO_MULTIPLIER and higher and _falls_on_set(result):
         return replace(result, verdict=Verdict.NOT_STATIONARY)
     return result
+
+
+def _beside_inflection(a: Analysis) -> Analysis:
+    """Return an analysis to second order with weak functions, where the curvature is steady.
+
+    Beside an inflection the wall may lie on either side of it.
+    """
+    if not is_steady(a.local, a.active, a.gradients, a.multipliers, a.curvature):
+        reason = "the second order changes as much as it is over a tiny distance"
+        return replace(a, verdict=Verdict.UNDECIDED, decision=undecided(len(a.local.point), reason))
+    strict = a.verdict is Verdict.STRICT_MINIMUM
+    return replace(a, verdict=Verdict.WEAK_MINIMUM) if strict else a
 
 
 def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:

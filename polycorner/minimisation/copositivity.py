@@ -22,14 +22,17 @@ MAX_RAYS = 14  # of a cone on which a form is decided, at the cost of 2^14 small
 DEFINITE = 1e-12  # relative size of an eigenvalue that counts as positive
 
 
-def simplex_minimisers(form: Array) -> tuple[Array, Array]:
+def simplex_minimisers(form: Array, nearly: float = 0.0) -> tuple[Array, Array]:
     """Return all minimisers ``(count, k)`` of smallest support on faces, and their values.
 
-    The least of the values is the least value of ``x^T C x`` on ``{x >= 0, sum x = 1}``.
+    The least of the values is the least value of ``x^T C x`` on ``{x >= 0, sum x = 1}``.  Of a form
+    that is positive definite beyond ``nearly`` on all sums of unit rays ``|sum x_i r_i| = 1``, only
+    the corners are returned.
     """
     k = len(form)
     points, values = [np.eye(k)], [np.diag(form)]
-    if k > 1 and np.linalg.eigvalsh(form)[0] > DEFINITE * abs(form).max():
+    firm = max(DEFINITE * abs(form).max(initial=0.0), k * nearly)  # |sum x_i r_i|^2 <= k |x|^2
+    if k > 1 and np.linalg.eigvalsh(form)[0] > firm:
         return points[0], values[0]  # definite: positive on all of the orthant
     for size in range(2, k + 1):
         supports = _supports(k, size)
@@ -121,7 +124,7 @@ def least_directions(
         if rays.shape[1] > MAX_RAYS:
             return np.nan, np.empty((len(form), 0)), False
         if rays.shape[1]:
-            points, _ = simplex_minimisers(rays.T @ form @ rays)
+            points, _ = simplex_minimisers(rays.T @ form @ rays, nearly)
             directions += list(points @ rays.T)
     if not directions:
         return np.inf, np.empty((len(form), 0)), True

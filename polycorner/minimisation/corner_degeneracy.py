@@ -28,6 +28,7 @@ from polycorner.minimisation.degeneracy import (
     order_for,
     symmetric,
     tangent_of,
+    vague,
 )
 from polycorner.minimisation.germs import CLEAR, ROUNDING, reduce_energy
 from polycorner.minimisation.jets import NotAnalyticError
@@ -114,12 +115,16 @@ def _on_ray(s: Situation, closed: tuple[int, ...], way: Array) -> Decision:
     coefficients = germ.coefficients.copy()
     coefficients[1] = 0.0 if abs(coefficients[1]) <= s.small else coefficients[1]
     order, direction = germ.domain.order, tangent_of(germ, np.ones(1))
+    passing = vague(germ, coefficients, s.near(face))
     for degree in range(1, order + 1):
         c, noise = coefficients[degree], germ.noise[degree]
         if abs(c) <= ROUNDING * noise:
             continue
         if abs(c) <= CLEAR * noise or degree == 1:
             return no_decision(s, "the first term cannot be told from rounding", order)
+        firm = coefficients[degree:][~passing[degree:] & (abs(coefficients[degree:]) > 0)]
+        if passing[degree] and len(firm) and firm[0] * c < 0:
+            return no_decision(s, "the first term would vanish a little further on", order)
         verdict = Verdict.WEAK_MINIMUM if c > 0 else Verdict.SADDLE
         if c < 0 and not (s.exact or falls(s, germ, signed(Sign.NEGATIVE, degree, np.ones(1)))):
             return no_decision(s, "the energy decreases on a face that may leave the polyhedron")
@@ -155,7 +160,7 @@ def _decide_opened(s: Situation) -> Decision:
     germ = reduce_energy(s.problem, s.point, s.hessian, face, order_for(face.variables))
     if germ is None:
         return no_decision(s, "the conditions across these directions are singular")
-    found = classify(germ, len(s.weak), s.small)
+    found = classify(germ, len(s.weak), s.small, s.near(face))
     if found.sign is Sign.ZERO and not len(found.zeros):
         unit = np.linalg.lstsq(germ.points[:, 1 : 1 + face.variables], s.flat, rcond=1e-9)[0].T
         unit = np.where(abs(unit) <= 1e-7 * abs(unit).max(axis=1)[:, None], 0.0, unit)

@@ -10,6 +10,7 @@ order, faster than anything changes on it.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.minimisation.constancy import (
     Constancy,
@@ -83,6 +84,12 @@ class Situation(Value):
         """Return an orthonormal basis of the directions tangent to functions."""
         gradients = self.problem.evaluate(self.point, 1)[1]
         return null_space(gradients[list(rows)], 1e-6) if rows else np.eye(len(self.point))
+
+    def near(self, face: Face) -> Array:
+        """Return how much each variable of a face may differ within the tolerance of the point."""
+        opened = self.problem.evaluate(self.point, 1)[1][[face.rows[i] for i in face.opened]]
+        sizes = np.concatenate([np.linalg.norm(opened, axis=1), np.ones(face.moving.shape[1])])
+        return np.asarray(self.small / self.reference * sizes)
 
     def face(self, closed: tuple[int, ...], moving: Array, *, opened: bool = False) -> Face:
         """Return the face on which further functions are closed, or opened as variables."""
@@ -164,7 +171,9 @@ def decide_free(s: Situation, flat: Array) -> Decision:
     germ = reduce_energy(s.problem, s.point, s.hessian, face, order_for(moving.shape[1]))
     if germ is None:
         return no_decision(s, "the conditions across these directions are singular")
-    return concluded(s, face, germ, classify(germ, 0, s.small), locus=bool(still.shape[1]))
+    return concluded(
+        s, face, germ, classify(germ, 0, s.small, s.near(face)), locus=bool(still.shape[1])
+    )
 
 
 def symmetric(flat: Array) -> Decision:
@@ -261,13 +270,14 @@ def falls(s: Situation, germ: Germ, found: Signed) -> bool:
 # --------------------------------------------------------------- zero or not
 
 
-def classify(germ: Germ, half: int, small: float) -> Signed:
+def classify(germ: Germ, half: int, small: float, near: Array) -> Signed:
     """Return the sign of a reduced energy near 0, its first ``half`` variables not negative.
 
     A coefficient counts as zero within the rounding errors propagated to it, and as different
     from zero only clearly beyond.  The degenerate point may have been missed a little: where all
     variables are free, the series is moved to the point at which the terms below those that
-    decide vanish.
+    decide vanish.  Otherwise terms decide nothing that would vanish a little further on, at a
+    distance ``near`` in every variable.
     """
     domain, m = germ.domain, germ.domain.variables
     coefficients, noise = germ.coefficients.copy(), germ.noise
@@ -284,7 +294,7 @@ def classify(germ: Germ, half: int, small: float) -> Signed:
         below = (domain.degrees < degree) & (domain.degrees > 0)
         gone = (abs(moved[0][below]) <= ROUNDING * moved[1][below]).all()
         if gone and (abs(moved[0][here]) > CLEAR * moved[1][here]).any():
-            found.append(_sign(germ, *moved, half))
+            found.append(_sign(germ, *moved, half, near))
     if found:  # near a point of higher degree, a lower one may seem to decide
         agree = len({each.sign for each in found}) == 1
         return found[0] if agree else signed(Sign.UNKNOWN, 0, np.zeros(m))
@@ -293,14 +303,22 @@ def classify(germ: Germ, half: int, small: float) -> Signed:
     return signed(Sign.UNKNOWN, 0, np.zeros(m))
 
 
-def _sign(germ: Germ, coefficients: Array, noise: Array, half: int) -> Signed:
+def vague(germ: Germ, coefficients: Array, near: Array) -> NDArray[np.bool_]:
+    """Return the mask of the coefficients that may vanish where all variables change a little."""
+    sizes = abs(coefficients)
+    return np.asarray(sizes <= germ.domain.shifted(sizes, near) - sizes)
+
+
+def _sign(germ: Germ, coefficients: Array, noise: Array, half: int, near: Array) -> Signed:
     """Return the sign of the terms that are not rounding; uncertain terms must not matter."""
     clear = np.where(abs(coefficients) > CLEAR * noise, coefficients, 0.0)
     possible = np.where(abs(coefficients) > ROUNDING * noise, coefficients, 0.0)
     clear[0] = possible[0] = 0.0
     found = sign_near_zero(germ.domain, clear, half)
-    if (clear != possible).any() and sign_near_zero(germ.domain, possible, half).sign != found.sign:
-        return signed(Sign.UNKNOWN, 0, found.direction)
+    firm = np.where(vague(germ, clear, near), 0.0, clear) if half else clear
+    for other in (possible, firm):
+        if (other != clear).any() and sign_near_zero(germ.domain, other, half).sign != found.sign:
+            return signed(Sign.UNKNOWN, 0, found.direction)
     quadratic = not clear[germ.domain.degrees > 2].any()
     if found.sign is Sign.UNKNOWN and half and quadratic:
         return replace(found, sign=Sign.ZERO, degree=2)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.minimisation.conditions import Curvature, Multipliers
 from polycorner.minimisation.constancy import without
@@ -34,7 +35,37 @@ def steady(
         return curvature
     tried = (values > nearly) & (values <= FAINT * values[-1])
     tried[-1] = True
-    ways = vectors[:, tried].T
+    level = _changes(local, active, gradients, multipliers, curvature, tried)
+    if not level.any():
+        return curvature
+    flat = without(np.hstack([curvature.flat, vectors[:, level]]), np.zeros((len(vectors), 0)))
+    return replace(curvature, flat=flat)
+
+
+def is_steady(
+    local: Local,
+    active: tuple[int, ...],
+    gradients: Array,
+    multipliers: Multipliers,
+    curvature: Curvature,
+) -> bool:
+    """Whether the largest curvature, of either sign, is as much a little further on."""
+    largest = abs(curvature.values) == abs(curvature.values).max(initial=0.0)
+    if not abs(curvature.values).any():
+        return True
+    return not _changes(local, active, gradients, multipliers, curvature, largest).any()
+
+
+def _changes(
+    local: Local,
+    active: tuple[int, ...],
+    gradients: Array,
+    multipliers: Multipliers,
+    curvature: Curvature,
+    tried: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Return the mask of the directions tried in which the curvature changes beside the point."""
+    values, ways = curvature.values[tried], curvature.vectors[:, tried].T
     reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
     numbers = [*active, *local.sections]
     with np.errstate(all="ignore"):
@@ -44,10 +75,7 @@ def steady(
         both = np.vstack([ways, ways])[:, :, None]
         bends = (both.transpose(0, 2, 1)[:, None] @ hessians @ both[:, None])[:, :, 0, 0]
         moved = bends[:, -1] - bends[:, numbers] @ (multipliers.values / sizes)
-        changed = abs(moved.reshape(2, -1) - values[tried]) > 0.5 * values[tried]
-    if not changed.any():
-        return curvature
-    level = np.zeros(len(values), dtype=np.bool_)
+        changed = abs(moved.reshape(2, -1) - values) > 0.5 * abs(values)
+    level = np.zeros(len(tried), dtype=np.bool_)
     level[tried] = changed.any(axis=0)
-    flat = without(np.hstack([curvature.flat, vectors[:, level]]), np.zeros((len(vectors), 0)))
-    return replace(curvature, flat=flat)
+    return level

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from normal_forms import U, V, posed
+from normal_forms import HALF, QUADRANT, U, V, posed
 
 from polycorner import Manifold, Polyhedron, Verdict, certify, minimise
 
@@ -59,20 +59,6 @@ def test_germs_of_known_type(form, is_minimum, setting, seed):
     assert c.verdict is expected(is_minimum)
 
 
-HALF = [  # on U >= 0
-    (U**2 + V**4, True),
-    (U**2 - V**4, False),
-    (U**3 + V**2, True),
-    (-(U**3) + V**2, False),
-    (U**3 + V**4, True),
-    (U * V + U**2 + V**4, False),
-    (U**2 - U * V**2 + V**4, True),
-    (U**2 - 3 * U * V**2 + V**4, False),
-    (U**2 + 3 * U * V**2 + V**4, True),
-    (U**2 + V**5, False),
-]
-
-
 @pytest.mark.parametrize(("form", "is_minimum"), HALF, ids=str)
 @FEW
 @given(seed=seeds)
@@ -87,18 +73,6 @@ def test_germs_beside_a_weak_contact(form, is_minimum, seed):
 def test_zeros_inside_a_half_space_may_be_declined_and_are_never_refuted(form, seed):
     c = posed(form, np.random.default_rng(seed), contacts=(1, 3), push=1.0)
     assert c.verdict in {Verdict.UNDECIDED, Verdict.WEAK_MINIMUM}
-
-
-QUADRANT = [  # on U, V >= 0
-    (U * V + U**3 + V**3, True),
-    (U * V + U**5 + V**7, True),
-    (U * V - U**3, False),
-    (U * V + U**3 - V**6, False),
-    ((U - V) ** 2 + U**3, True),
-    ((U - V) ** 2 - U**3, False),
-    ((U - V) ** 2 + U * V**4, True),
-    (U**2 * V + U * V**2 + U**4 + V**5, True),
-]
 
 
 @pytest.mark.parametrize(("form", "is_minimum"), QUADRANT, ids=str)

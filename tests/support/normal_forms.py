@@ -16,6 +16,30 @@ DEGREE = 10
 POWERS = [(a, b) for a in range(DEGREE + 1) for b in range(DEGREE + 1 - a) if a + b >= 2]
 U, V = sp.symbols("U V")
 
+# Forms, and whether they have a minimum at 0.
+HALF = [  # on U >= 0
+    (U**2 + V**4, True),
+    (U**2 - V**4, False),
+    (U**3 + V**2, True),
+    (-(U**3) + V**2, False),
+    (U**3 + V**4, True),
+    (U * V + U**2 + V**4, False),
+    (U**2 - U * V**2 + V**4, True),
+    (U**2 - 3 * U * V**2 + V**4, False),
+    (U**2 + 3 * U * V**2 + V**4, True),
+    (U**2 + V**5, False),
+]
+QUADRANT = [  # on U, V >= 0
+    (U * V + U**3 + V**3, True),
+    (U * V + U**5 + V**7, True),
+    (U * V - U**3, False),
+    (U * V + U**3 - V**6, False),
+    ((U - V) ** 2 + U**3, True),
+    ((U - V) ** 2 - U**3, False),
+    ((U - V) ** 2 + U * V**4, True),
+    (U**2 * V + U * V**2 + U**4 + V**5, True),
+]
+
 
 @lru_cache
 def family():
@@ -41,7 +65,7 @@ def family():
     return Family.of(expressions, [s.name for s in x], names, definitions)
 
 
-def posed(form, generator, *, contacts=(), equations=(), push=0.0):
+def posed(form, generator, *, contacts=(), equations=(), push=0.0, offset=0.0):
     """Return a certificate of a germ in random bent coordinates.
 
     Parameters
@@ -50,6 +74,8 @@ def posed(form, generator, *, contacts=(), equations=(), push=0.0):
         A polynomial in ``U`` and ``V``; the third coordinate adds ``Z^2`` and ``push Z``.
     contacts, equations : tuple of int
         Which of the bent coordinates 1, 2, 3 are not negative, or zero.
+    offset : float
+        Distance of the point from the germ's centre in a random direction, in scale units.
     """
     scales = 10.0 ** generator.uniform(-2, 2, 3)
     manifold = Manifold(["x1", "x2", "x3"], scales=tuple(scales))
@@ -74,4 +100,6 @@ def posed(form, generator, *, contacts=(), equations=(), push=0.0):
         inequalities = [far]
     held = [member(f"F{i}", f"h{i}") for i in equations]
     polyhedron = Polyhedron(manifold, inequalities, equations=held)
-    return certify(polyhedron, member("energy", "energy"), centre)
+    way = generator.normal(size=3)
+    point = centre + offset * scales * way / np.linalg.norm(way)
+    return certify(polyhedron, member("energy", "energy"), point)
