@@ -14,13 +14,13 @@ from polycorner.minimisation.conditions import (
 )
 from polycorner.minimisation.constancy import symmetric_directions, without
 from polycorner.minimisation.corner_degeneracy import decide
-from polycorner.minimisation.corners import corner, seen_from
+from polycorner.minimisation.corners import beside_inflection, corner, seen_from
 from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
 from polycorner.minimisation.evidence import steepest_descent
 from polycorner.minimisation.findings import OPEN, Analysis, Higher, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
-from polycorner.minimisation.steadiness import is_steady, steady
+from polycorner.minimisation.steadiness import steady
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import Rows, inward_direction, rank, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
@@ -61,8 +61,11 @@ def analyse(
     values, gradients, hessians = problem.evaluate(q, 2)
     local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance, higher)
     pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
-    if not pieces or not np.isfinite(values[-1]):
+    if not pieces:
         return _without_conditions(local, Verdict.OUTSIDE, "")
+    if not np.isfinite(values[-1]):
+        reason = f"{problem.energy.name} has no finite value there"
+        return _without_conditions(local, Verdict.DOMAIN_EDGE, reason)
     reason = obstacle(problem, q, gradients, hessians, frozenset().union(*pieces))
     if reason:
         return _without_conditions(local, Verdict.NOT_SMOOTH, reason)
@@ -137,23 +140,11 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
         decision = _decide(result, piece, strong, hessian)
         result = replace(result, decision=decision, verdict=decision.verdict)
     elif verdict in {Verdict.STRICT_MINIMUM, Verdict.SADDLE} and weak and higher:
-        result = _beside_inflection(result)
+        result = beside_inflection(result)
     result = _with_blind(result) if blind else result
     if result.verdict is Verdict.NO_MULTIPLIER and higher and _falls_on_set(result):
         return replace(result, verdict=Verdict.NOT_STATIONARY)
     return result
-
-
-def _beside_inflection(a: Analysis) -> Analysis:
-    """Return an analysis to second order with weak functions, where the curvature is steady.
-
-    Beside an inflection the wall may lie on either side of it.
-    """
-    if not is_steady(a.local, a.active, a.gradients, a.multipliers, a.curvature):
-        reason = "the second order changes as much as it is over a tiny distance"
-        return replace(a, verdict=Verdict.UNDECIDED, decision=undecided(len(a.local.point), reason))
-    strict = a.verdict is Verdict.STRICT_MINIMUM
-    return replace(a, verdict=Verdict.WEAK_MINIMUM) if strict else a
 
 
 def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""The exact corner of active functions that a point lies beside, within its tolerance."""
+"""Points that lie beside the exact corner of active functions, within the tolerance."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from polycorner.minimisation.degeneracy import undecided
 from polycorner.minimisation.findings import OPEN, Analysis, Local
+from polycorner.minimisation.steadiness import is_steady
 from polycorner.minimisation.verdicts import Verdict
 
 NEWTON = 4  # steps to a corner
@@ -38,3 +39,15 @@ def seen_from(a: Analysis, exact: Analysis) -> Analysis:
         reason = "the exact corner of the active functions beside it is not stationary"
         return replace(a, decision=undecided(len(a.local.point), reason))
     return replace(a, verdict=exact.verdict, decision=exact.decision, curvature=exact.curvature)
+
+
+def beside_inflection(a: Analysis) -> Analysis:
+    """Return an analysis to second order with weak functions, where the curvature is steady.
+
+    Beside an inflection the wall may lie on either side of it.
+    """
+    if not is_steady(a.local, a.active, a.gradients, a.multipliers, a.curvature):
+        reason = "the second order changes as much as it is over a tiny distance"
+        return replace(a, verdict=Verdict.UNDECIDED, decision=undecided(len(a.local.point), reason))
+    strict = a.verdict is Verdict.STRICT_MINIMUM
+    return replace(a, verdict=Verdict.WEAK_MINIMUM) if strict else a

@@ -44,8 +44,11 @@ def domain_edge(problem: Problem, piece: Piece, q: Array) -> DomainEdge | None:
     """Return the edge of a domain at which a search has ended, or None where there is none."""
     rows = [*sorted(piece), *range(problem.inequalities, problem.rows)]
     values, gradients, hessians = problem.evaluate(q, 2)
-    if not np.isfinite(values[rows]).all():
+    if not np.isfinite(values[rows[:-1]]).all():
         return None
+    if not np.isfinite(values[-1]):
+        note = f"The search ended on the edge of the domain of {_named(problem, rows[-1:])}"
+        return DomainEdge(q, f"{note}, where it has no finite value.")
     for derivative, which in ((gradients, "first"), (hessians, "second")):
         rough = [row for row in rows if not np.isfinite(derivative[row]).all()]
         if rough:

@@ -53,7 +53,7 @@ def explanation(
         What the search saw.
     """
     lines = [_headline(verdict, search), note, _position(a, stratum, unit)]
-    if verdict in SEARCHES and a.verdict not in {Verdict.OUTSIDE, Verdict.NOT_STATIONARY}:
+    if search in SEARCHES and a.verdict not in {Verdict.OUTSIDE, Verdict.NOT_STATIONARY}:
         return "\n".join(line for line in lines if line)
     if a.obstacle:
         lines.append(f"The conditions of first and second order do not apply: {a.obstacle}.")
@@ -94,8 +94,6 @@ def _position(a: Analysis, stratum: Stratum, unit: str | None) -> str:
 def _missed(a: Analysis, unit: str | None) -> str:
     """Name the most violated constraint and the size of its violation."""
     d, local = a.local.problem.polyhedron, a.local
-    if not np.isfinite(local.values[-1]):
-        return "The energy is not finite there."
     away = distances(local.values[:-1], local.gradients[:-1])
     m = a.local.problem.inequalities
     if np.isnan(away).any():

@@ -308,4 +308,8 @@ def _diagnosed(problem: Problem, piece: Piece, q: Array, limit: int, end: Endpoi
         note = f"{found.note} {advice(problem, end.point)}".lstrip()
         return end if end.failure is None else replace(end, failure=found.verdict, note=note)
     point = end.point if end.failure is found.verdict else found.point
+    if not np.isfinite(problem.energy.value(point)):
+        edge = domain_edge(problem, piece, point)
+        if edge is not None:
+            return Endpoint(edge.point, end.iterations, Verdict.DOMAIN_EDGE, edge.note)
     return Endpoint(point, end.iterations, found.verdict, found.note)

@@ -232,7 +232,7 @@ def _reason(certificate: Certificate) -> str:
     """Return the reason why the implicit function theorem does not apply, or an empty string."""
     analysis, d = certificate.analysis, certificate.problem.polyhedron
     values, gradients = analysis.local.values, analysis.local.gradients
-    if analysis.verdict is Verdict.OUTSIDE:
+    if analysis.verdict in {Verdict.OUTSIDE, Verdict.DOMAIN_EDGE}:
         return str(analysis.verdict.value)
     if len(local_pieces(d, values[:-1], gradients[:-1], certificate.tolerance)) > 1:
         return "several pieces of the polyhedron meet there"

@@ -6,8 +6,9 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner import Manifold, Polyhedron, SmoothFunction, Verdict, minimise
+from polycorner import Certificate, Manifold, Polyhedron, SmoothFunction, Verdict, minimise
 from polycorner.formulas import Family
+from polycorner.minimisation.problem import pose
 
 METHODS = ("newton", "slsqp", "scp")
 LINE, PLANE = Manifold.euclidean("x"), Manifold.euclidean("x y")
@@ -191,3 +192,31 @@ def test_a_power_at_its_edge_is_never_a_saddle_or_outside(exponent, method):
         Verdict.NOT_SMOOTH,
     }
     assert found.energy < 0.1 or found.verdict is Verdict.NOT_CONVERGED
+
+
+INFINITE = {  # infinite on a face of the quadrant
+    "logarithm": sp.log(x) + y,
+    "distance": -1 / (x**2 + y**2),
+    "radius": sp.log(x**2 + y**2),
+    "quotient": (y - x) / y,
+}
+
+
+@pytest.mark.parametrize("start", [(1.0, 1.0), (0.5, 0.1), (2.0, 0.25)], ids=str)
+@pytest.mark.parametrize("method", ["newton", "slsqp"])
+@pytest.mark.parametrize("kind", INFINITE)
+def test_where_an_energy_is_infinite_is_an_edge_and_not_outside(kind, method, start):
+    D = Polyhedron(PLANE, {"left": x, "floor": y})
+    found = minimise(D, INFINITE[kind], start, method=method)
+    if not np.isfinite(found.energy):
+        assert found.verdict is Verdict.DOMAIN_EDGE
+        assert "the domain of energy" in found.explain()
+    assert found.verdict is not Verdict.OUTSIDE
+    assert found.analysis.verdict is not Verdict.OUTSIDE
+
+
+def test_a_point_of_infinite_energy_is_at_an_edge():
+    D = Polyhedron(PLANE, {"left": x, "floor": y})
+    found = Certificate(pose(D, sp.log(x)), np.array([0.0, 1.0]))
+    assert found.verdict is Verdict.DOMAIN_EDGE
+    assert "energy has no finite value there" in found.explain()
