@@ -7,6 +7,7 @@ warning when it is given.
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 
 class PolycornerError(Exception):
@@ -14,7 +15,15 @@ class PolycornerError(Exception):
 
 
 class SolverError(PolycornerError):
-    """A numerical back end stopped with an error of its own (chained as ``__cause__``)."""
+    """A numerical computation cannot go on; an error of a back end is chained as ``__cause__``.
+
+    Attributes
+    ----------
+    state : State or None
+        Of a simulation the state before the step that cannot be computed.
+    """
+
+    state: Any = None
 
 
 class NonsmoothWarning(UserWarning):

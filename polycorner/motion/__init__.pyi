@@ -1,5 +1,12 @@
 from .checkpoints import Checkpoint
-from .contacts import ContactFamily, Friction, pair_coordinates, pair_velocities, velocities
+from .contacts import (
+    ContactFamily,
+    Friction,
+    pair_coordinates,
+    pair_velocities,
+    time_symbol,
+    velocities,
+)
 from .events import Event, EventKind
 from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
 from .mechanics import MechanicalSystem, State
@@ -30,5 +37,6 @@ __all__ = [
     "pair_velocities",
     "simulate",
     "step",
+    "time_symbol",
     "velocities",
 ]

@@ -8,7 +8,7 @@ from polycorner.checks import instance, mapping, names, real, refuse
 from polycorner.formulas.families import Family
 from polycorner.motion.bodies import PairContacts
 from polycorner.motion.convex_sets import ConvexSet
-from polycorner.motion.formulation import dotted
+from polycorner.motion.formulation import TIME, dotted
 from polycorner.motion.friction import Disc, Interval
 from polycorner.spaces.manifold import Manifold
 from polycorner.values import Value
@@ -24,6 +24,11 @@ PAIR = (1, 2)  # numbers of the two bodies of a pair in names of coordinates
 def velocities(manifold: Manifold) -> "Symbols":
     """Return the velocities as real SymPy symbols: ``x_dot`` for the coordinate ``x``."""
     return _symbols(dotted(name) for name in instance("manifold", manifold, Manifold).names)
+
+
+def time_symbol() -> "sympy.Symbol":
+    """Return the symbol of the time, in s, of which ``forces`` of a system may be functions."""
+    return _symbols([TIME])[0]
 
 
 def pair_coordinates(manifold: Manifold) -> "tuple[Symbols, Symbols]":

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import sympy
 
 
+TIME = "time"  # name of the symbol of the time in applied forces
+
+
 def dotted(name: str) -> str:
     """Return the name of a coordinate's velocity: ``x`` moves with ``x_dot``."""
     return f"{name}_dot"
@@ -32,7 +35,7 @@ class Laws:
     kinetic, potential : sympy.Expr
         ``T(q, v)``, quadratic in the velocities, and ``V(q)``.
     forces : mapping from str to sympy.Expr
-        Applied generalised forces, by coordinate.
+        Applied generalised forces, by coordinate; they may depend on the time.
     slips : tuple of sympy.Expr
         Slip velocities ``s(q, v)``, affine in the velocities.
     loads : tuple of sympy.Expr
@@ -71,15 +74,26 @@ class Formulation:
 
     @classmethod
     def of(cls, coordinates: Sequence[str], parameters: Sequence[str], laws: Laws) -> "Formulation":
-        """Return the formulation of given laws, checking each symbol and the kinetic energy."""
-        found = cls(
-            tuple(coordinates), tuple(parameters), lambda: laws, len(laws.slips), len(laws.loads)
-        )
+        """Return the formulation of given laws, checking each symbol and the kinetic energy.
+
+        Where a force depends on the time, it is a further parameter.
+        """
+        import sympy
+
+        symbols = [sympy.sympify(force).free_symbols for force in laws.forces.values()]
+        driven = sympy.Symbol(TIME, real=True) in set().union(*symbols)
+        known = (*parameters, TIME) if driven else tuple(parameters)
+        found = cls(tuple(coordinates), known, lambda: laws, len(laws.slips), len(laws.loads))
         found.check()
         digest = repr([f.program().digest() for f in (found.forces, found.slip, found.energies)])
         return cls(
             found.coordinates, found.parameters, found.laws, found.slips, found.loads, digest
         )
+
+    @property
+    def time_parameter(self) -> int:
+        """Position of the time among the parameters; -1 if the laws do not depend on it."""
+        return self.parameters.index(TIME) if TIME in self.parameters else -1
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -160,11 +174,23 @@ class Formulation:
         if curved or any(sympy.simplify(term) != 0 for term in lower):
             msg = f"kinetic: expected a quadratic form in {', '.join(map(str, v))}; got {kinetic}"
             raise ValueError(msg)
-        for name, expressions in (("potential", [laws.potential]), ("load", laws.loads)):
+        time = sympy.Symbol(TIME, real=True)
+        steady = {
+            "kinetic": [laws.kinetic],
+            "potential": [laws.potential],
+            "load": laws.loads,
+            "slip": laws.slips,
+        }
+        for name, expressions in steady.items():
             for expression in expressions:
-                moving = sympy.sympify(expression).free_symbols & set(v)
-                if moving:
-                    msg = f"{name}: expected no velocity in it; got {min(map(str, moving))}"
+                found = sympy.sympify(expression).free_symbols
+                if name in {"potential", "load"} and found & set(v):
+                    msg = f"{name}: expected no velocity in it; got {min(map(str, found & set(v)))}"
+                    raise ValueError(msg)
+                if time in found:
+                    msg = (
+                        f"{name}: expected no time in it, only forces may have it; got {expression}"
+                    )
                     raise ValueError(msg)
         for slip in laws.slips:
             curved = sympy.hessian(sympy.sympify(slip), v)

@@ -22,6 +22,11 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
 ``C_b``                                 static set if the contact stuck before, else dynamic
 ======================================  =====================================================
 
+The forces ``F`` are those at ``q_M``, the middle of the step in time, and the mean velocity
+``(v + v+) / 2``: where they depend on the velocity, the step is solved until they do not change.
+Then a force that is at right angles to the velocity does no work, and the scheme is symmetric in
+time, hence of second order also where the mass matrix is not constant ([HLW] sec. II.3, V.1).
+
 Without ``c`` a bead that circles in a ring would leave it, step by step.  Where velocities change
 much within a step it is not the curvature met: where at ``q_M + h v+``, the next half step if
 nothing more happens, a gap is short of what was promised, ``min(0, gap_i + h bound_i + c_i)``, by
@@ -47,9 +52,12 @@ from polycorner import __version__
 from polycorner.checks import instance, names, real, refuse, whole
 from polycorner.errors import SolverError
 from polycorner.interrupts import first_interrupt
+from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.formulation import moment
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import Noise, Solver
 from polycorner.progress import Progress
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from polycorner.motion.checkpoints import Checkpoint, SavedRun
@@ -59,6 +67,9 @@ if TYPE_CHECKING:
 
 FRAMES = 1000  # instants recorded by default
 LONGEST = 1e12  # s
+MOST_STEPS = 10**15
+SHORTEST_STEP = 1e-50  # s, by which gaps are divided
+ROUNDING = 1e-12  # relative, within which a duration is a whole number of steps
 
 
 def simulate(
@@ -85,7 +96,7 @@ def simulate(
     state : State
         See :meth:`System.state`.
     t_end, dt : float
-        End and step, in s.
+        End and longest step, in s.  Steps are equal, and the last ends at ``t_end``.
     every : int, optional
         Record every so many steps; default such that about a thousand instants are recorded.
     noise : Noise, optional
@@ -105,6 +116,8 @@ def simulate(
 
     Raises
     ------
+    SolverError
+        If a force, a mass or a gap is not finite; ``state`` is the state before.
     TypeError, ValueError
         Naming the argument; for ``dt`` with the largest that is stable at the start, for
         ``checkpoint`` with the parameter that differs from those of the saved run.
@@ -123,10 +136,12 @@ def simulate(
     from polycorner.motion.checkpoints import SavedRun
     from polycorner.motion.recorder import Recorder
 
-    noise, solver = noise or Noise(), solver or system_solver(system)
-    engine = start(system, state, dt, noise=noise, solver=solver)
+    noise = Noise() if noise is None else instance("noise", noise, Noise)
+    solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
+    instance("state", state, State, "system.state(q, v)")
     end = real("t_end", t_end, least=state.time, most=LONGEST, unit="s")
-    steps = round((end - state.time) / dt)
+    steps, step = _steps(end - state.time, real("dt", dt, above=0, unit="s"))
+    engine = start(system, state, step, noise=noise, solver=solver)
     stride = max(1, steps // FRAMES) if every is None else whole("every", every, least=1)
     recorder, saved = Recorder(engine), None
     if checkpoint is not None:
@@ -134,10 +149,25 @@ def simulate(
         saved = SavedRun(checkpoint, told)
     if saved is None or not saved.begin(recorder):
         recorder.instant()
-    rate = _follow(recorder, steps, stride, saved, progress)
+    try:
+        rate = _follow(recorder, steps, stride, saved, progress)
+    except SolverError as error:
+        error.state = _present(engine, state)
+        raise
     return recorder.trajectory(
         system, noise=noise, solver=solver, every=stride, t_end=end, steps_per_second=rate
     )
+
+
+def _steps(duration: float, dt: float) -> tuple[int, float]:
+    """Return the number of equal steps of at most ``dt`` that end at the end, and their length."""
+    if duration > MOST_STEPS * dt:
+        refuse("dt", f"at least {duration / MOST_STEPS:.3g} s, for t_end to be reached", dt)
+    steps = round(duration / dt)
+    if abs(steps * dt - duration) <= ROUNDING * duration:
+        return steps, dt
+    steps = math.ceil(duration / dt)
+    return steps, duration / steps
 
 
 def _follow(
@@ -231,19 +261,23 @@ def start(
     """Return the engine of a system at a state, after checking both."""
     from polycorner.motion.engine.driver import Engine
 
-    solver = solver or system_solver(system)
+    solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
     instance("state", state, State, "system.state(q, v)")
     bodies = system.bodies
     shape = (bodies.count, bodies.dimension)
     if state.q.size != shape[0] * shape[1]:
         refuse("state", f"one of {shape[0]} bodies of {shape[1]} coordinates", state.q.shape)
+    frictions = len(bodies.body.friction)
+    if state.sticking.size != shape[0] * frictions:
+        refuse("state", f"one of {frictions} friction contacts a body", state.sticking.shape)
+    _check_mass(bodies, state.q.reshape(shape), state.v.reshape(shape))
     system.check_placement(state.q)
-    real("dt", dt, above=0, unit="s")
+    real("dt", dt, least=SHORTEST_STEP, unit="s")
     largest, why = system.largest_step(state)
     if dt > largest:
         msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
         raise ValueError(msg)
-    noise = noise or Noise()
+    noise = Noise() if noise is None else instance("noise", noise, Noise)
     names("kicks", noise.kicks, bodies.body.formulation.coordinates)
     sticking = np.reshape(state.sticking, (bodies.count, -1))
     return Engine(
@@ -256,6 +290,19 @@ def start(
         noise=noise,
         solver=solver,
     )
+
+
+def _check_mass(bodies: IdenticalBodies, q: Array, v: Array) -> None:
+    body = bodies.body
+    for i in range(bodies.count):
+        mass = moment(body.formulation, body.parameters, q[i], v[i]).mass
+        least = np.linalg.eigvalsh(mass)[0] if np.isfinite(mass).all() else np.nan
+        if not least > 0:
+            msg = (
+                "kinetic: expected a positive definite mass matrix; got one with the eigenvalue "
+                f"{least:.6g} at q = {q[i].tolist()}"
+            )
+            raise ValueError(msg)
 
 
 def step(system: MechanicalSystem, state: State, dt: float) -> State:
@@ -274,10 +321,15 @@ def step(system: MechanicalSystem, state: State, dt: float) -> State:
     if effort.unconverged:
         msg = f"the step was not solved: its residual is {effort.residual:.3g} of the speeds in it"
         raise SolverError(msg)
+    return _present(engine, state)
+
+
+def _present(engine: "Engine", like: State) -> State:
+    """Return the present state, in the shape of another."""
     motion = engine.motion
     return State(
-        state.time + dt,
-        motion.q.reshape(state.q.shape).copy(),
-        motion.v.reshape(state.v.shape).copy(),
-        (motion.sticks != 0).reshape(state.sticking.shape),
+        engine.time,
+        motion.q.reshape(like.q.shape).copy(),
+        motion.v.reshape(like.v.shape).copy(),
+        (motion.sticks != 0).reshape(like.sticking.shape),
     )

@@ -38,7 +38,8 @@ class System(MechanicalSystem):
     potential : sympy.Expr, optional
         ``V(q)``; default 0.
     forces : mapping from str to sympy.Expr, optional
-        Further generalised forces by coordinate, functions of coordinates and velocities.
+        Further generalised forces by coordinate, functions of coordinates, velocities and the
+        time (:func:`time_symbol`).
     friction : sequence of Friction, optional
         Friction with the surroundings.
     restitution : float or mapping from str to float, optional
@@ -191,8 +192,8 @@ class System(MechanicalSystem):
 
     @cached_property
     def parameters(self) -> Array:
-        """Values of the parameters of the laws; here none."""
-        return np.empty(0)
+        """Values of the parameters of the laws: a place for the time, if they depend on it."""
+        return np.zeros(len(self.formulation.parameters))
 
     @cached_property
     def bodies(self) -> IdenticalBodies:
@@ -268,7 +269,7 @@ class System(MechanicalSystem):
             if array.shape != shape or array.size != self.count * self.manifold.dimension:
                 refuse(argument, f"shape ({self.count}, {self.manifold.dimension})", array.shape)
         self.check_placement(places)
-        return State(float(time), places, speeds, self.sticks(places, speeds))
+        return State(real("time", time, unit="s"), places, speeds, self.sticks(places, speeds))
 
     def check_placement(self, q: Array) -> None:
         """Raise ValueError if a contact overlaps, naming the worst."""

@@ -158,7 +158,7 @@ def check(system, state, dt):
     after, normal, friction = compiled_step(system, state, dt)
     turn = partial(turned_back, system)
     try:
-        problem, expected = solved(assemble(system, state, dt), turn)
+        problem, expected = solved(assemble(system, state, dt, after.v), turn)
         if (bent := bent_shut(system, problem, expected.velocity, dt)) is not None:
             problem, expected = solved(bent, turn)
     except SolverError:

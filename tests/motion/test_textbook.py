@@ -276,7 +276,7 @@ def test_rolling_resistance_stops_a_ball():
     def far(dt):
         return np.linalg.norm(end(ball, state, 4.0, dt).q[-1, 0, :2]) - speed**2 / (2 * braking)
 
-    assert between(observed_order(late, 3e-2), FIRST)
+    assert between(observed_order(late, 3e-2, phases=15), FIRST)
     assert between(observed_order(far, 3e-2), SECOND)
     path = end(ball, state, 4.0, 1.3e-2)
     assert path.v[-1].tolist() == [[0, 0, 0, 0]]
@@ -408,8 +408,8 @@ def test_a_bead_goes_round_in_a_ring():
     state = ring.state([0.0, -1.0], [1.0, 0.0])
 
     def lag(dt):
-        (x, y), steps = end(ring, state, 1.5 * math.pi, dt).q[-1, 0], round(1.5 * math.pi / dt)
-        return math.remainder(math.atan2(x, -y) - steps * dt, math.tau)
+        x, y = end(ring, state, 1.5 * math.pi, dt).q[-1, 0]
+        return math.remainder(math.atan2(x, -y) - 1.5 * math.pi, math.tau)
 
     def strayed(dt):
         return end(ring, state, 1.5 * math.pi, dt).max_penetration

@@ -66,11 +66,16 @@ class StepProblem:
     blocks: tuple[FrictionBlock, ...]
 
 
-def assemble(system: System, state: State, dt: float) -> StepProblem:
-    """Return what a step of length ``dt`` from ``state`` asks."""
+def assemble(system: System, state: State, dt: float, after: Array | None = None) -> StepProblem:
+    """Return what a step of length ``dt`` from ``state`` asks.
+
+    Forces that depend on the velocity are those at its mean with the one ``after`` the step.
+    """
     middle = state.q + dt / 2 * state.v
     now = moment(system.formulation, system.parameters, middle, state.v)
-    v_free = state.v + dt * np.linalg.solve(now.mass, now.force)
+    mean = state.v if after is None else (state.v + after) / 2
+    force = moment(system.formulation, system.parameters, middle, mean).force
+    v_free = state.v + dt * np.linalg.solve(now.mass, force)
     gaps, normals = system.polyhedron.bundle.evaluate(middle, 1)
     normals = normals.reshape(gaps.size, middle.size)
     before, free = normals @ state.v, normals @ v_free

@@ -20,6 +20,9 @@ SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = ra
 # Kinds of blocks: contacts with the surroundings, and contacts between bodies.
 OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
 
+# Why compiled code returns.
+DONE, CONTACTS_FULL, EVENTS_FULL, NOT_FINITE = range(4)
+
 MAX_BAND = 192  # columns of the widest band matrix that is solved
 EVENTS = 4096  # events recorded, at least, before the engine returns
 
@@ -155,6 +158,9 @@ class Model(NamedTuple):
     tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
     sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
+    follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
+    time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
+    start: Annotated[Any, real()]  # time of the first state
 
 
 class State(NamedTuple):
@@ -208,6 +214,8 @@ class Work(NamedTuple):
     parent: Annotated[Any, whole("N")]  # in the union-find forest
     v_free: Annotated[Any, real("N k")]  # velocities after forces alone
     v_new: Annotated[Any, real("N k")]  # velocities after the step
+    v_mean: Annotated[Any, real("N k")]  # mean velocities of the step
+    former_force: Annotated[Any, real("N k")]  # `force` with the mean velocities before
     neighbour_impulse: Annotated[Any, real("N k")]
     disturbed: Annotated[Any, whole("N")]  # whether a sleeper's contacts changed
     proof_friction: Annotated[Any, real("N F 2")]  # impulses that prove rest

@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.errors import SolverError
 from polycorner.formulas.cache import one_at_a_time
 from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.engine.arrays import (
     CONTACTS,
+    CONTACTS_FULL,
     ISLANDS,
     NEWTON_STEPS,
+    NOT_FINITE,
     RESIDUAL,
     STEPS,
     SWEEPS,
@@ -27,6 +30,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.events import Event, EventKind
+from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 from polycorner.spaces.manifold import Array
 
@@ -86,7 +90,7 @@ class Engine:
     ) -> None:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
         self.capacity = max(16, CONTACTS_PER_BODY * bodies.count)
-        self.model = model_of(bodies, self._sizes, noise, solver or Solver())
+        self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start)
         self.motion = allocate(State, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
         self._allocate()
@@ -133,10 +137,33 @@ class Engine:
             why, done, count = compiled.advance(self._addresses, self.dt, steps)
             events += self._read(count)
             steps -= done
-            if why == compiled.CONTACTS_FULL:
+            if why == CONTACTS_FULL:
                 self.capacity *= 2
                 self.load(self.save())
+            elif why == NOT_FINITE:
+                raise SolverError(self._what_is_not_finite())
         return events
+
+    def _what_is_not_finite(self) -> str:
+        """Return a sentence on why the next step cannot be computed."""
+        body, motion = self.bodies.body, self.motion
+        names = body.formulation.coordinates
+        for i in np.flatnonzero(motion.alive):
+            q, v = motion.q[i], motion.v[i]
+            which = f" of body {i}" if self.bodies.count > 1 else ""
+            state = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, q, strict=True))
+            where = f"{which} at t = {self.time:.6g}, {state}"
+            middle = q + 0.5 * self.dt * v
+            at = moment(body.formulation, body.parameters, middle, v)
+            if not np.isfinite(at.mass).all() or np.linalg.eigvalsh(at.mass)[0] <= 0:
+                return f"the mass matrix{where} is not positive definite"
+            for name, force in zip(names, at.force, strict=True):
+                if not np.isfinite(force):
+                    return f"the force on {name}{where} is {force}"
+            for name, gap in zip(body.contacts, self.work.gap[i], strict=True):
+                if np.isnan(gap):
+                    return f"the gap {name!r}{where} is not a number"
+        return f"the velocities after t = {self.time:.6g} are not finite"
 
     def _compiled(self) -> ModuleType:
         """Return the compiled code; the first call compiles it, unless another process has."""

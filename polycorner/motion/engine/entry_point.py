@@ -5,13 +5,11 @@ from typing import Any
 from numba import njit
 
 from polycorner.formulas.compilation import sources_digest
-from polycorner.motion.engine.arrays import STEPS
+from polycorner.motion.engine.arrays import DONE, EVENTS_FULL, STEPS
 from polycorner.motion.engine.jit import ZERO
 from polycorner.motion.engine.records import log_at, model_at, state_at, work_at
 from polycorner.motion.engine.sleep import stays_asleep
 from polycorner.motion.engine.stepping import step
-
-DONE, CONTACTS_FULL, EVENTS_FULL = 0, 1, 2  # why `advance` returns
 
 
 def _entry_point(sources: str) -> Any:
@@ -28,10 +26,10 @@ def _entry_point(sources: str) -> Any:
         for done in range(steps):
             if count + most > log.entries.shape[0]:
                 return EVENTS_FULL, done, count
-            fits, count = step(model, state, work, log, h, count)
-            if not fits:
+            why, count = step(model, state, work, log, h, count)
+            if why != DONE:
                 work.list_status[1] = 0
-                return CONTACTS_FULL, done, count
+                return why, done, count
         index = state.counts[STEPS]
         for i in range(model.bodies):
             if state.alive[i] and state.asleep[i] and state.booked_to[i] < index:

@@ -7,16 +7,17 @@ from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import invert
 from polycorner.motion.engine.random import gaussian
 
+# Change of a velocity, relative to the speed, below which forces are those of the step.
+SETTLED = 1e-14
+
 
 @compiled
-def evaluate_body(model, state, work, i, h, time, index):
-    """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, F = model.dimension, model.friction_sets.shape[0]
-    scratch = work.scratch
+def evaluate_forces(model, work, i, v, h):
+    """Evaluate mass and forces of a body at the midpoint; return where its loads are in scratch."""
+    k, scratch = model.dimension, work.scratch
     for c in range(k):
-        work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         scratch[c] = work.q_mid[i, c]
-        scratch[k + c] = state.v[i, c]
+        scratch[k + c] = v[i, c]
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
     f0 = 2 * k
     call_kernel(model.force_kernel, start, base, start + 8 * f0, start, start)
@@ -27,10 +28,21 @@ def evaluate_body(model, state, work, i, h, time, index):
     for c in range(k):
         work.force[i, c] = h * scratch[at + c]
         work.applied[i, c] = h * scratch[at + k + c]
+    return at + 2 * k
+
+
+@compiled
+def evaluate_body(model, state, work, i, h, time, index):
+    """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
+    k, F = model.dimension, model.friction_sets.shape[0]
+    scratch, f0 = work.scratch, 2 * k
+    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    for c in range(k):
+        work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         work.kick[i, c] = 0.0
         if model.kicks[c] > 0.0:
             work.kick[i, c] = model.kicks[c] * np.sqrt(h) * gaussian(model.seed, index, i, 32 + c)
-    at += 2 * k
+    at = evaluate_forces(model, work, i, state.v, h)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))
         for j in range(model.loads):
@@ -55,6 +67,29 @@ def evaluate_body(model, state, work, i, h, time, index):
                 size += abs(slope * state.v[i, c])
             work.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
     evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+
+
+@compiled
+def update_forces(model, state, work, h):
+    """Evaluate forces at the mean velocities of the step; return whether they changed."""
+    k, changed = model.dimension, False
+    for i in range(model.bodies):
+        if not (state.alive[i] and work.awake[i]):
+            continue
+        for c in range(k):
+            work.v_mean[i, c] = 0.5 * (state.v[i, c] + work.v_new[i, c])
+            work.former_force[i, c] = work.force[i, c]
+        evaluate_forces(model, work, i, work.v_mean, h)
+        change, speed = 0.0, 0.0
+        for c in range(k):
+            value = 0.0
+            for a in range(k):
+                difference = work.force[i, a] - work.former_force[i, a]
+                value += work.inverse_mass[i, c, a] * difference
+            change = max(change, abs(value) * model.units[c])
+            speed += (abs(work.v_new[i, c]) + abs(state.v[i, c])) * model.units[c]
+        changed = changed or change > SETTLED * speed
+    return changed
 
 
 @compiled

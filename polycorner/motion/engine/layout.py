@@ -13,7 +13,9 @@ from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 
 
-def model_of(bodies: IdenticalBodies, sizes: Sizes, noise: Noise, solver: Solver) -> Model:
+def model_of(
+    bodies: IdenticalBodies, sizes: Sizes, noise: Noise, solver: Solver, start: float
+) -> Model:
     """Return the model constants of bodies in motion."""
     body, formulation = bodies.body, bodies.body.formulation
     parameters = list(body.parameters)
@@ -36,7 +38,9 @@ def model_of(bodies: IdenticalBodies, sizes: Sizes, noise: Noise, solver: Solver
         "seed": noise.seed,
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,
-        "constant_mass": _mass_is_constant(body),
+        "start": start,
+        "time_parameter": body.formulation.time_parameter,
+        **_dependence(body),
         **_friction(bodies, sets),
         **_gaps(body.gaps, len(body.contacts), parameters),
         **_pairs(bodies, parameters, sets),
@@ -45,12 +49,20 @@ def model_of(bodies: IdenticalBodies, sizes: Sizes, noise: Noise, solver: Solver
     return filled(Model, sizes, {**values, "parameters": [*parameters, 0.0]})
 
 
-def _mass_is_constant(body: Body) -> bool:
-    """Return whether the mass matrix is the same at three random states."""
+def _dependence(body: Body) -> dict[str, bool]:
+    """Return whether masses and forces depend on the state, by comparison at random states."""
     k = len(body.formulation.coordinates)
-    draws = np.random.default_rng(0).normal(size=(3, 2, k))
-    first, *others = (moment(body.formulation, body.parameters, q, v).mass for q, v in draws)
-    return all(np.array_equal(first, other) for other in others)
+    draws = np.random.default_rng(0).normal(size=(3, 3, k))
+    slow, *others = (moment(body.formulation, body.parameters, q, v) for q, v, _ in draws)
+    fast = [moment(body.formulation, body.parameters, q, v) for q, _, v in draws]
+    same = all(
+        np.array_equal(one.force, other.force)
+        for one, other in zip((slow, *others), fast, strict=True)
+    )
+    return {
+        "constant_mass": all(np.array_equal(slow.mass, other.mass) for other in others),
+        "follows_velocity": not same,
+    }
 
 
 def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:

@@ -8,7 +8,10 @@ from polycorner.motion.engine.jit import compiled
 
 @compiled
 def invert(upper, k, mass, out):
-    """Invert a symmetric positive definite matrix, given by its upper triangle row by row."""
+    """Invert a symmetric positive definite matrix, given by its upper triangle row by row.
+
+    The result is not a number where the matrix is not definite.
+    """
     never_inline()
     diagonal = True
     at = 0
@@ -21,10 +24,10 @@ def invert(upper, k, mass, out):
             at += 1
     if diagonal:
         for i in range(k):
-            out[i, i] = 1.0 / out[i, i]
+            out[i, i] = 1.0 / out[i, i] if out[i, i] > 0.0 else np.nan
         return
     for j in range(k):  # Gauss-Jordan in place: a definite matrix has positive pivots
-        pivot = out[j, j]
+        pivot = out[j, j] if out[j, j] > 0.0 else np.nan
         out[j, j] = 1.0
         for c in range(k):
             out[j, c] /= pivot

@@ -16,11 +16,16 @@ the block of the contact that presses on it.  A step (:func:`step`)
 5. records events, books work, and drifts the other half of the step.
 """
 
+import numpy as np
+
 from polycorner.motion.engine.arrays import (
     APPLIED_WORK,
     CONTACTS,
+    CONTACTS_FULL,
     DISSIPATED,
+    DONE,
     NOISE_WORK,
+    NOT_FINITE,
     PAIR_FRICTION,
     RESIDUAL,
     STEPS,
@@ -37,17 +42,23 @@ from polycorner.motion.engine.contact_list import (
     store_impulses,
     store_sticking,
 )
+from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.island import solve_islands
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
 from polycorner.motion.engine.partition import find_islands
 from polycorner.motion.engine.sleep import settle, wake, wake_neighbours
 
+FORCE_ROUNDS = 30  # solutions of a step, at most, with forces at its mean velocity
+
 
 @compiled
 def start_bodies(model, state, work):
-    """Set the free velocities, due to forces alone, of awake bodies, and measure all speeds."""
-    k = model.dimension
+    """Set the free velocities, due to forces alone, of awake bodies, and measure all speeds.
+
+    Return whether these and the gaps are numbers.
+    """
+    k, finite = model.dimension, True
     for i in range(model.bodies):
         if not state.alive[i]:
             continue
@@ -58,12 +69,16 @@ def start_bodies(model, state, work):
                     value += work.inverse_mass[i, c, a] * (work.force[i, a] + work.kick[i, a])
             work.v_free[i, c] = value
             work.v_new[i, c] = value
+            finite = finite and np.isfinite(value)
         speed = 0.0
         for c in range(k):
             carried = model.substrate_speed / model.units[c] if c == model.position[0] else 0.0
             before = abs(state.v[i, c] - carried) * model.units[c]
             speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
         work.speed[i], work.island_speed[i] = speed, speed
+        for g in range(model.restitution.size):
+            finite = finite and not np.isnan(work.gap[i, g])
+    return finite
 
 
 @compiled
@@ -129,25 +144,46 @@ def solve(model, state, work, h, time, index):
         ):
             break
         start_bodies(model, state, work)
-    for i in range(model.bodies):
-        if work.island_start[i + 1] > work.island_start[i]:
-            state.sums[RESIDUAL] = max(state.sums[RESIDUAL], work.island_residual[i])
-            state.counts[UNSOLVED] += 1 if work.island_residual[i] > model.tolerance else 0
     return True, blocks
 
 
 @compiled
+def count_unsolved(model, state, work):
+    """Count the islands whose residual is above the tolerance."""
+    for i in range(model.bodies):
+        if work.island_start[i + 1] > work.island_start[i]:
+            state.sums[RESIDUAL] = max(state.sums[RESIDUAL], work.island_residual[i])
+            state.counts[UNSOLVED] += 1 if work.island_residual[i] > model.tolerance else 0
+
+
+@compiled
 def step(model, state, work, log, h, count):
-    """Advance by one step; return whether there was room for all contacts, and the event count."""
+    """Advance by one step; return why it cannot be done, or DONE, and the event count.
+
+    Forces that depend on the velocity are those of its mean over the step.
+    """
     k, N = model.dimension, model.bodies
     index = state.counts[STEPS]
     time = index * h
+    if model.time_parameter >= 0:
+        model.parameters[model.time_parameter] = model.start + time + 0.5 * h
     blocks, any_awake = ZERO, wake(model, state, work, h, time + 0.5 * h, index)
-    start_bodies(model, state, work)
-    if any_awake:
+    for _ in range(FORCE_ROUNDS):
+        if not start_bodies(model, state, work):
+            return NOT_FINITE, count
+        if not any_awake:
+            break
         fits, blocks = solve(model, state, work, h, time, index)
         if not fits:
-            return False, count
+            return CONTACTS_FULL, count
+        if not (model.follows_velocity and update_forces(model, state, work, h)):
+            break
+    for i in range(N):
+        for c in range(k):
+            if state.alive[i] and not np.isfinite(work.v_new[i, c]):
+                return NOT_FINITE, count
+    if any_awake:
+        count_unsolved(model, state, work)
     book_work(model, state, work, blocks, h)
     if any_awake:
         count = record_contacts(model, state, work, log, blocks, h, time, count)
@@ -175,4 +211,4 @@ def step(model, state, work, log, h, count):
                     state.check_due[pair // N] = state.check_due[pair % N] = 0
                     state.asleep[pair // N] = state.asleep[pair % N] = 0
     state.counts[STEPS] = index + 1
-    return True, count
+    return DONE, count
