@@ -34,13 +34,22 @@ from polycorner.formulas.cache import cache_folder
 
 LOG = logging.getLogger("polycorner.compilation")
 
+# What packages are, and how long they are compiled, in s of processor time.
+LONG = {
+    "polycorner.minimisation.descent": ("the search for minima", 15),
+    "polycorner.motion.engine": ("the engine of motion", 30),
+}
+
 if not config.CACHE_DIR:  # what is cached after this import goes to the one cache folder
     config.CACHE_DIR = str(cache_folder() / "numba")
 
 
 # Numba has no types, so its classes are Any to mypy.
 class Announcement(event.Listener):  # type: ignore[misc]
-    """Logs once for each package that its code is compiled, the cache not holding it."""
+    """Logs once for each package that its code is compiled, the cache not holding it.
+
+    It is a warning, which Python shows without being asked to: the user waits.
+    """
 
     def __init__(self) -> None:
         self.announced: set[str] = set()
@@ -50,7 +59,8 @@ class Announcement(event.Listener):  # type: ignore[misc]
         package = event.data["dispatcher"].py_func.__module__.rpartition(".")[0]
         if package.startswith("polycorner.") and package not in self.announced:
             self.announced.add(package)
-            LOG.info("compiling %s, once on this machine; this can take minutes", package)
+            what, seconds = LONG.get(package, (package, 1))
+            LOG.warning("compiling %s, once on this machine: about %d s", what, seconds)
 
     def on_end(self, event: Any) -> None:
         """Give functions that were linked their environments."""
