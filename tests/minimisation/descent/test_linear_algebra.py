@@ -5,8 +5,20 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from stages import callable_stage
 
 from polycorner.minimisation.descent import linear_algebra
+
+svd, solve_truncated, cholesky, forward, backward = map(
+    callable_stage,
+    (
+        linear_algebra.svd,
+        linear_algebra.solve_truncated,
+        linear_algebra.cholesky,
+        linear_algebra.forward,
+        linear_algebra.backward,
+    ),
+)
 
 real = st.floats(-3, 3).filter(lambda x: x == 0 or abs(x) > 1e-3)
 
@@ -23,7 +35,7 @@ def matrices(draw):
 
 @given(matrices())
 def test_singular_values_are_numpys_and_the_factors_multiply_back(A):
-    U, s, V = linear_algebra.svd(A)
+    U, s, V = svd(A)
     top = max(abs(A).max(), 1e-300)
     assert (U * s) @ V.T / top == pytest.approx(A / top, abs=1e-13)
     assert V.T @ V == pytest.approx(np.eye(A.shape[1]), abs=1e-14)
@@ -40,7 +52,7 @@ def test_truncated_solution_is_the_shortest_least_squares_solution(A, seed):
     # A singular value on the threshold is cut by one and kept by the other.
     assume(not ((singular / top > 1e-12) & (singular / top < 1e-3)).any())
     b = np.random.default_rng(seed).normal(size=len(A))
-    x = linear_algebra.solve_truncated(A, b, 1e-8 * top)
+    x = solve_truncated(A, b, 1e-8 * top)
     expected = np.linalg.lstsq(A, b, rcond=1e-8)[0]
     assert x * top == pytest.approx(expected * top, abs=1e-8 * (1 + abs(expected * top).max()))
 
@@ -51,9 +63,7 @@ def test_cholesky_and_its_triangular_solutions_invert(seed, n):
     root = rng.normal(size=(n, n))
     B, b = root @ root.T + np.eye(n), rng.normal(size=n)
     L = np.zeros((n, n))
-    assert linear_algebra.cholesky(B, L)
-    x = linear_algebra.backward(L, linear_algebra.forward(L, b))
+    assert cholesky(B, L)
+    x = backward(L, forward(L, b))
     assert B @ x == pytest.approx(b, abs=1e-12)
-    assert not linear_algebra.cholesky(
-        B - 2 * np.linalg.eigvalsh(B)[0] * np.eye(n), np.zeros((n, n))
-    )
+    assert not cholesky(B - 2 * np.linalg.eigvalsh(B)[0] * np.eye(n), np.zeros((n, n)))

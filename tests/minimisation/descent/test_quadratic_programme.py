@@ -6,8 +6,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from oracles_minima import quadratic_programme
+from stages import callable_stage
 
-from polycorner.minimisation.descent.quadratic_programme import solve_quadratic
+from polycorner.minimisation.descent import quadratic_programme as stage
+
+solve_quadratic = callable_stage(stage.solve_quadratic)
 
 whole = st.integers(-2, 2).map(float)
 real = st.floats(-3, 3).filter(lambda x: x == 0 or abs(x) > 1e-3)
