@@ -163,7 +163,7 @@ def decide_free(s: Situation, flat: Array) -> Decision:
             s.point,
             face,
             one_sided=False,
-            reference=s.reference,
+            reference=1e-300,  # where an energy decays, its own size tells that it changes
             least=FAR,
         )
         if seen.holds:
