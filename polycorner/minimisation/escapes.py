@@ -149,9 +149,14 @@ def _trace(problem: Problem, piece: Piece, origin: Array) -> Trace:
             points.append(q)
             gone.append(far)
             energies.append(energy)
-        if idle or status in {sqp.CONVERGED, sqp.LEVEL} or far > BEYOND or energy < -DEEP * size:
+        if (
+            idle
+            or status in {sqp.CONVERGED, sqp.LEVEL, sqp.UNEVEN}
+            or far > BEYOND
+            or energy < -DEEP * size
+        ):
             break
-    level, converged = status == sqp.LEVEL, status == sqp.CONVERGED
+    level, converged = status in {sqp.LEVEL, sqp.UNEVEN}, status == sqp.CONVERGED
     ended = np.array(points), np.array(gone), np.array(energies)
     return Trace(*ended, size, q, energy, level, converged)
 

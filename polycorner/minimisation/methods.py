@@ -225,7 +225,7 @@ def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
     from polycorner.minimisation.descent import sqp
 
     status, iterations, point, multipliers = problem.descend(piece, q, limit)
-    if status >= sqp.STALLED:
+    if status in {sqp.STALLED, sqp.UNEVEN}:
         status, iterations, point = rescaled(
             problem, piece, limit, (status, iterations, point, multipliers)
         )
@@ -234,7 +234,7 @@ def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
         sqp.UNBOUNDED: Verdict.UNBOUNDED,
         sqp.STALLED: Verdict.NOT_CONVERGED,
     }
-    return Endpoint(point, iterations, failures.get(status), flat=status == sqp.LEVEL)
+    return Endpoint(point, iterations, failures.get(status), flat=status in {sqp.LEVEL, sqp.UNEVEN})
 
 
 def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:

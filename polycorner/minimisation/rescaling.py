@@ -25,7 +25,7 @@ PATIENCE = 100  # a lower limit on the steps is meant to cut the descent short
 
 
 def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int, int, Array]:
-    """Let a descent that stalled, or ended where it seems flat, go on in estimated scales.
+    """Let a descent go on in estimated scales that stalled, or where it is flat and uneven.
 
     Returns
     -------
@@ -40,12 +40,12 @@ def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int,
         return status, spent, q
     for scales in estimated_scales(problem, q, multipliers):
         even = np.ptp(np.log(scales / problem.scales)) < np.log(UNEVEN)
-        if even and status == sqp.LEVEL:
+        if even and status == sqp.UNEVEN:
             break
         ended, more, point, _ = problem.descend(piece, q, limit, scales)
         spent += more
         lower = problem.energy.value(point) <= problem.energy.value(q)
-        if lower and ended in (sqp.CONVERGED, sqp.LEVEL):
+        if lower and ended in (sqp.CONVERGED, sqp.LEVEL, sqp.UNEVEN):
             return ended, spent, point
     return status, spent, q
 

@@ -24,7 +24,10 @@ from polycorner.minimisation.descent.stationarity import (
     leave_saddle,
 )
 
-CONVERGED, INFEASIBLE, UNBOUNDED, STALLED, LEVEL = 0, 1, 2, 3, 4  # LEVEL: converged, but flat
+# LEVEL: converged, but flat; UNEVEN: the same, and curvatures ask for very different scales.
+CONVERGED, INFEASIBLE, UNBOUNDED, STALLED, LEVEL, UNEVEN = 0, 1, 2, 3, 4, 5
+CURVELESS = 1e-14  # diagonal entry, relative to the largest, below which a coordinate is flat
+SPREAD = 1e3  # ratio of scales beyond which they are uneven
 FIRST_CAP = 0.5  # longest first step, in scale units
 PATIENCE = 20  # steps after which convexification may use the active inequalities, too
 HUGE = 1e250  # derivatives beyond overflow in products
@@ -68,6 +71,24 @@ def leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
     if outcome == SADDLE:
         return leave_saddle(problem, use, on, m, v, ways[0], F, J, H, size, energy)
     return outcome == FLAT and leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy)
+
+
+@compiled
+def is_uneven(problem, v, lam, F, J, H, size):
+    """Return whether the scales that curvatures ask for differ very much; see ``rescaling``."""
+    never_inline()
+    evaluate(problem, v, F, J, H, size, True)
+    L, scales = lagrangian_hessian(H, lam), problem[4]
+    top = 0.0
+    for i in range(v.size):
+        top = max(top, abs(L[i, i]) / scales[i] ** 2)
+    low, high = np.inf, 0.0
+    for i in range(v.size):
+        bend = abs(L[i, i]) / scales[i] ** 2
+        flat = not bend > CURVELESS * top
+        scale = max(1.0, abs(v[i])) if flat else np.sqrt(top / bend) / scales[i]
+        low, high = min(low, scale), max(high, scale)
+    return not high < SPREAD * low
 
 
 @compiled
@@ -129,7 +150,8 @@ def descend(problem, use, m, rows, u, size, limit):
                     u[k] = v[k]
                 continue
             if outcome == FLAT:
-                return LEVEL, iteration, v, exact
+                uneven = is_uneven(problem, v, exact, F, J, H, size)
+                return (UNEVEN if uneven else LEVEL), iteration, v, exact
             if reach < 1e-9:
                 return STALLED, iteration, v if outcome != REJECTED else u, lam
         slope = 0.0

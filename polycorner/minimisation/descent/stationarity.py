@@ -27,6 +27,9 @@ EXACT = 1e-13  # scaled violation allowed after Newton's method
 FLAT, MINIMUM, SADDLE, MOVING, REJECTED = 4, 3, 2, 1, 0  # outcomes of `classify`
 CURVED = 1e-8  # relative curvature beyond which a stationary point is a saddle, or a minimum
 RADII = (1e-3, 1e-2, 1e-1)  # steps in which flat directions are followed, in scale units
+# Relative differences up to which values are the same, and gradients: curvatures above `CURVED`
+# gain less from such a difference than values may differ.
+SAME, PARALLEL = 1e-14, 1e-11
 MIXTURES = 4  # mixtures of flat directions to follow, per direction, where there are several
 
 
@@ -158,16 +161,36 @@ def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
 
 
 @compiled
+def is_constant(problem, v, way, values, slopes, F, J, H, size):
+    """Return whether values and gradients stay what they are at ``v`` along a straight line."""
+    never_inline()
+    reach = 1.0 + largest(v)
+    for radius in RADII:
+        for side in range(2):
+            evaluate(problem, plus(v, radius if side else -radius, way), F, J, H, size, False)
+            for i in range(F.size):
+                scale = abs(values[i]) + reach * largest(slopes[i])
+                if not abs(F[i] - values[i]) <= SAME * scale:
+                    return False
+                for c in range(v.size):
+                    if not abs(J[i, c] - slopes[i, c]) <= PARALLEL * scale:
+                        return False
+    return True
+
+
+@compiled
 def leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy):
     """Move ``v`` from a point with vanishing second order to a lower one nearby; return success.
 
     Along every direction of ``ways``, and mixtures of them, both ways, straight steps are
     projected onto the set, and curved ones keep the energy stationary across the direction, on the
     face.  The energy must not rise on the way: no barrier is crossed.  A decrease counts beyond
-    the rounding error and what a violation within the tolerance can give.
+    the rounding error and what a violation within the tolerance can give.  Nothing is lower along
+    a line on which all values and gradients are what they are at ``v``.
     """
     never_inline()
     evaluate(problem, v, F, J, H, size, True)
+    values, slopes, constant = F.copy(), J.copy(), False
     last = F.size - 1
     noise = 1e-13 * (abs(F[last]) + largest_entry(H[last])) + 10.0 * FEASIBLE * largest(J[last])
     energy = min(energy, F[last])
@@ -181,6 +204,10 @@ def leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy):
                 along[0, i] += np.cos(1.0 + j * np.sqrt(2.0 + c)) * ways[c, i]
         way = along[0] / length(along[0])
         along[0] = way
+        if k % 4 == 0:
+            constant = is_constant(problem, v, way, values, slopes, F, J, H, size)
+        if constant:
+            continue
         lowest, best = energy, v
         for radius in RADII:
             trial = plus(v, radius if k % 2 else -radius, way)
