@@ -149,7 +149,9 @@ def test_only_forces_know_the_time(given):
 # ------------------------------------------------------------------------------------ bad numbers
 
 
-@pytest.mark.parametrize("force", [sp.sqrt(1 - S), -sp.log(1 - S), 1 / sp.Max(0, 1 - S)], ids=str)
+@pytest.mark.parametrize(
+    "force", [sp.sqrt(1 - S), sp.sqrt(0.4 - T), -sp.log(1 - S), 1 / sp.Max(0, 1 - S)], ids=str
+)
 def test_a_force_that_is_not_a_number_stops_the_run_at_the_state_before(force):
     system = free(LINE, VS**2 / 2, x=force)
     with pytest.raises(
@@ -157,7 +159,7 @@ def test_a_force_that_is_not_a_number_stops_the_run_at_the_state_before(force):
     ) as caught:
         simulate(system, system.state([0.5], [1.0]), 5.0, 1e-3)
     state = caught.value.state
-    assert state.q[0] == pytest.approx(1, abs=5e-3)
+    assert state.time == pytest.approx(0.4, abs=2e-3) or state.q[0] == pytest.approx(1, abs=5e-3)
     assert np.isfinite(state.v).all()
     again = simulate(system, system.state([0.5], [1.0]), state.time - 1e-9, 1e-3, every=10**6)
     assert again.q[-1, 0, 0] == pytest.approx(state.q[0], abs=2e-2)

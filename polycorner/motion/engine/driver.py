@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,17 +144,22 @@ class Engine:
                 raise SolverError(self._what_is_not_finite())
         return events
 
+    def __reduce__(self) -> NoReturn:
+        msg = "an engine cannot be copied or pickled: load what it saves into another"
+        raise TypeError(msg)
+
     def _what_is_not_finite(self) -> str:
         """Return a sentence on why the next step cannot be computed."""
         body, motion = self.bodies.body, self.motion
         names = body.formulation.coordinates
+        parameters = self.model.parameters[: len(body.parameters)]  # with the time
         for i in np.flatnonzero(motion.alive):
             q, v = motion.q[i], motion.v[i]
             which = f" of body {i}" if self.bodies.count > 1 else ""
             state = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, q, strict=True))
             where = f"{which} at t = {self.time:.6g}, {state}"
             middle = q + 0.5 * self.dt * v
-            at = moment(body.formulation, body.parameters, middle, v)
+            at = moment(body.formulation, parameters, middle, v)
             if not np.isfinite(at.mass).all() or np.linalg.eigvalsh(at.mass)[0] <= 0:
                 return f"the mass matrix{where} is not positive definite"
             for name, force in zip(names, at.force, strict=True):
