@@ -28,7 +28,7 @@ def scaled(x):
 ENTRY = """
 from numba import njit
 from polycorner.formulas.compilation import sources_digest
-from stages import leaf
+from leaves import leaf
 
 def compiled(sources):
     @njit(cache=True)
@@ -37,10 +37,10 @@ def compiled(sources):
         return leaf.scaled(x)
     return entry
 
-entry = compiled(sources_digest("stages"))
+entry = compiled(sources_digest("leaves"))
 """
 START = """
-from stages.entries import entry
+from leaves.entries import entry
 try:
     entry(-1)
 except ValueError as error:
@@ -52,7 +52,7 @@ print(entry(5), sum(entry.stats.cache_hits.values()))
 @pytest.fixture
 def stages(tmp_path):
     """Write a package of two compiled files."""
-    folder = tmp_path / "stages"
+    folder = tmp_path / "leaves"
     folder.mkdir()
     (folder / "__init__.py").touch()
     (folder / "leaf.py").write_text(LEAF.format(factor=2))
@@ -95,11 +95,11 @@ def test_python_cannot_call_what_is_only_linked():
 
 def test_the_digest_depends_on_names_and_bytes(stages, monkeypatch):
     monkeypatch.syspath_prepend(str(stages.parent))
-    digests = [sources_digest("stages")]
+    digests = [sources_digest("leaves")]
     (stages / "leaf.py").write_text(LEAF.format(factor=4))
-    digests.append(sources_digest("stages"))
+    digests.append(sources_digest("leaves"))
     (stages / "leaf.py").rename(stages / "twig.py")
-    digests.append(sources_digest("stages"))
+    digests.append(sources_digest("leaves"))
     assert len(set(digests)) == 3
 
 

@@ -71,7 +71,11 @@ def evaluate_body(model, state, work, i, h, time, index):
 
 @compiled
 def update_forces(model, state, work, h):
-    """Evaluate forces at the mean velocities of the step; return whether they changed."""
+    """Evaluate forces at the mean velocities of the step; return whether any changed.
+
+    Those of a body that change nothing remain as they are, so that its motion does not depend on
+    how often other bodies are evaluated.
+    """
     k, changed = model.dimension, False
     for i in range(model.bodies):
         if not (state.alive[i] and work.awake[i]):
@@ -88,7 +92,11 @@ def update_forces(model, state, work, h):
                 value += work.inverse_mass[i, c, a] * difference
             change = max(change, abs(value) * model.units[c])
             speed += (abs(work.v_new[i, c]) + abs(state.v[i, c])) * model.units[c]
-        changed = changed or change > SETTLED * speed
+        if change > SETTLED * speed:
+            changed = True
+            continue
+        for c in range(k):
+            work.force[i, c] = work.former_force[i, c]
     return changed
 
 
