@@ -48,7 +48,7 @@ test: .venv/.dev ## tests and doctests, without those marked slow
 
 cores: .venv/.dev ## geometry again, with the linear algebra of an older processor (x86 only)
 	@OPENBLAS_CORETYPE=Haswell $(PYTEST) -n auto -q -m "not slow" \
-	    tests/polyhedra tests/skeletons tests/minimisation
+	    tests/polyhedra tests/skeletons/test_skeleton.py tests/minimisation
 
 thorough: .venv/.dev ## all tests, with many more generated inputs
 	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto

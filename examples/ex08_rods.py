@@ -23,7 +23,7 @@ from polycorner.dumbbells import DumbbellPair, PairAtlas, long_rod_length, pair_
 from polycorner.dumbbells.statics.skeleton_map import PairMap, pair_map
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
-LENGTHS, RODS = np.linspace(2, 5, 5), np.linspace(0.1, 0.9, 4)
+LENGTHS, RODS = np.linspace(2, 5, 4), np.linspace(0.1, 0.9, 3)
 
 
 @dataclass(frozen=True)

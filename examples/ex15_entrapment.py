@@ -77,7 +77,7 @@ def times(wells: Sequence[Well]) -> list[float]:
     return [mean_escape_time(well, kick_of(well, 1.0), cells=40) for well in wells]
 
 
-def draw(path: Path, count: int = 100) -> Path:
+def draw(path: Path, count: int = 40) -> Path:
     """Draw wells, paths, times to escape, capture, and the wells of the dyad."""
     from polycorner.dumbbells.pictures import draw_wells
     from polycorner.models.wells.holding import compare

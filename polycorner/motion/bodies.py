@@ -188,7 +188,8 @@ class IdenticalBodies(Value):
             return least
         family, reads = self.contacts.gaps, self.contacts.reads
         numbers = np.array([*self.contacts.parameters, 0.0])
-        positions = q[:, list(self.position)] * self.body.units[list(self.position)]
+        where = list(dict.fromkeys(self.position))
+        positions = q[:, where] * self.body.units[where]
         for i in range(self.count - 1):
             apart = np.linalg.norm(positions[i + 1 :] - positions[i], axis=1)
             for j in (i + 1 + np.flatnonzero(apart < self.contacts.reach)).tolist():

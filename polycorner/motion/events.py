@@ -13,6 +13,7 @@ class EventKind(IntEnum):
     REST = 3
     MOTION = 4
     EXIT = 5
+    FAILED = 6
 
     @property
     def sentence(self) -> str:
@@ -27,6 +28,7 @@ _SENTENCES = {
     EventKind.REST: "a body came to rest on its substrate",
     EventKind.MOTION: "a body began to move",
     EventKind.EXIT: "a body left",
+    EventKind.FAILED: "a contact was not solved to the tolerance, in however short a step",
 }
 
 
@@ -37,8 +39,9 @@ class Event:
     Attributes
     ----------
     time : float
-        For a contact that closes, the moment at which the gap vanishes if motion goes on as
-        before; otherwise the end or, where motion begins, the start of the step.
+        For a contact that closes, the moment at which the gap vanishes; for one that opens, that
+        at which its force vanishes; otherwise the end or, where motion begins, the start of the
+        step, and its middle where an island is not solved to the tolerance.
     kind : EventKind
     bodies : tuple of int
         Number of the body, or of both.

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from polycorner.checks import mapping, real, whole
+from polycorner.checks import instance, mapping, real, whole
 from polycorner.values import Value
 
 
@@ -15,17 +15,23 @@ class Solver(Value):
     ----------
     tolerance : float, optional
         Largest residual of a step, relative to the speeds in it; default 1e-8.  A step that
-        misses it is counted in ``Effort.unconverged``, with the worst residual.
+        misses it is counted in ``Effort.unconverged``, with the worst residual, and is an event.
     sweeps : int, optional
         Most Gauss-Seidel sweeps over one island of touching bodies; default 2000.
+    refine : bool, optional
+        Whether touching bodies whose step cannot be solved, or is too long for an impact, take it
+        in shorter ones; default true.  Otherwise impacts act up to a step before bodies meet, and
+        bodies that are fast may pass through thin ones.
     """
 
     tolerance: float = 1e-8
     sweeps: int = 2000
+    refine: bool = True
 
     def __post_init__(self) -> None:
         real("tolerance", self.tolerance, above=0, below=1)
         whole("sweeps", self.sweeps, least=1)
+        instance("refine", self.refine, bool)
 
 
 @dataclass(frozen=True)

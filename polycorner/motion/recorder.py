@@ -68,7 +68,7 @@ class Recorder:
             potential=energies[:, 1],
             dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(bodies.causes)},
             work=work,
-            events=tuple(self.events),
+            events=tuple(sorted(self.events, key=lambda event: event.time)),
             max_penetration=float(self.engine.motion.sums[3]),
             effort=self.engine.effort,
             **run,

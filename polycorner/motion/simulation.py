@@ -10,7 +10,8 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
     p_b in L_b C_b   and   -(B_b v+ + d_b) normal to L_b C_b at p_b
 
 ======================================  =====================================================
-``bound_i = -e_i J_i v``                contact ``i`` closes in this step and bounces
+``bound_i = d / 2 - e_i (J_i v          contact ``i`` closes in this step and bounces;
++ d / 2)``                              ``d = J_i (v_free - v)``
 ``bound_i = -(gap_i + c_i) / h``        otherwise: it may just be reached ([StewartTrinkle]);
                                         what overlaps is pushed out no faster than what forces
                                         and curvature do within a step, ``|J_i (v_free - v)|``
@@ -39,6 +40,9 @@ whether it starts again: such a step is solved anew with the static set.
 A contact bounces if it approaches and would leave faster than the forces bring it back within
 the step, ``e |J v| > |J (v_free - v)|``; what bounces more slowly than that is at rest within
 the resolution of the step, and Zeno's infinitely many bounces end there.
+
+Bodies for which such a step is too long, because they meet others on their way, take it in parts
+that end at impacts: :mod:`polycorner.motion.engine.refinement`.
 """
 
 import math
@@ -87,8 +91,8 @@ def simulate(
     """Simulate a system from a state until ``t_end`` by Moreau-Jean time stepping.
 
     Each step solves the inclusion stated in :mod:`polycorner.motion.simulation` ([Moreau], [AB]).
-    Smooth motion is of second order in ``dt``; impacts and the onset of slip are located to
-    first order.
+    Smooth motion, impacts and the loss of contact are of second order in ``dt``; the onset of slip
+    is located to first order.
 
     Parameters
     ----------
@@ -237,6 +241,7 @@ def _parameters(
         "noise.seed": int(noise.seed),
         "solver.tolerance": float(solver.tolerance),
         "solver.sweeps": int(solver.sweeps),
+        "solver.refine": solver.refine,
         "state.time": float(state.time),
         "state.q": fingerprint(state.q),
         "state.v": fingerprint(state.v),

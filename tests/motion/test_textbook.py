@@ -19,6 +19,7 @@ from polycorner.motion.simulation import simulate, start, step
 G = scenes.GRAVITY
 FALL = math.sqrt(2 / G)  # from a height of 1
 FIRST, SECOND = (0.7, 1.3), (1.7, 2.3)
+LOCATED = 1e-8  # s and m, of impacts: about the gap at which bodies touch, in units of length
 
 
 def between(value, limits):
@@ -51,19 +52,18 @@ def end(system, state, t_end, dt):
 def test_a_ball_lands_when_it_has_fallen():
     ball = scenes.bouncing_ball()
     state = ball.state([1.0])
-    assert between(observed_order(lambda dt: times(ball, state, 0.6, dt)[0] - FALL, 4e-3), SECOND)
+    for dt in (0.1, 0.05, 4e-3, 1e-3):
+        assert times(ball, state, 0.6, dt)[0] == pytest.approx(FALL, abs=LOCATED)
 
 
 def test_an_elastic_ball_keeps_its_period():
     ball = scenes.bouncing_ball(1.0)
     state = ball.state([1.0])
 
-    def error(dt):
+    for dt in (0.3, 0.1, 4e-3, 1e-3):
         impacts = times(ball, state, 6.0, dt)
-        return (impacts[-1] - impacts[0]) / (len(impacts) - 1) - 2 * FALL
-
-    assert between(observed_order(error, 4e-3), FIRST)
-    assert abs(error(1e-4)) < 1e-3
+        expected = FALL * np.arange(1, 2 * len(impacts), 2)
+        np.testing.assert_allclose(impacts, expected, atol=LOCATED * len(impacts))
 
 
 def test_an_elastic_ball_keeps_its_energy():
@@ -73,11 +73,11 @@ def test_an_elastic_ball_keeps_its_energy():
     np.testing.assert_allclose(path.kinetic + path.potential, G, rtol=1e-12)
     assert abs(path.dissipated["impact"]).max() <= 1e-12 * G
     assert path.audit < 1e-12
-    assert path.max_penetration == 0
+    assert path.max_penetration < LOCATED
 
 
 def test_a_ball_ends_its_infinitely_many_bounces_in_zenos_time():
-    """Each of the bounces that the step resolves adds an error: ``dt log(1 / dt)``."""
+    """It rests once it would bounce off no faster than it is brought back within a step."""
     e = 0.5
     ball = scenes.bouncing_ball(e)
     state = ball.state([1.0])
@@ -85,7 +85,7 @@ def test_a_ball_ends_its_infinitely_many_bounces_in_zenos_time():
     def error(dt):
         return times(ball, state, 1.5, dt, EventKind.REST)[0] - FALL * (1 + e) / (1 - e)
 
-    assert between(observed_order(lambda dt: error(dt) / math.log(1 / dt), 2e-3, 5), FIRST)
+    assert all(abs(error(dt)) < 5 * dt for dt in (2e-2, 2e-3, 2e-4))
     path = end(ball, state, 1.5, 1e-3)
     assert path.rests[-1].all()
     assert path.v[-1, 0, 0] == 0
@@ -104,7 +104,7 @@ def test_an_impact_costs_one_minus_e_squared_of_the_energy():
         assert path.audit < 1e-12
         return path.dissipated["impact"][-1] - G * (1 - e ** (2 * bounces))
 
-    assert between(observed_order(error, 2e-3), FIRST)
+    assert all(abs(error(dt)) < 10 * G * LOCATED for dt in (0.05, 2e-3, 1e-3))
 
 
 def test_a_plastic_ball_stays_where_it_lands():
@@ -113,18 +113,17 @@ def test_a_plastic_ball_stays_where_it_lands():
     (made,) = path.of_kind(EventKind.MADE)
     assert made.time == pytest.approx(FALL, abs=1e-5)
     assert not path.of_kind(EventKind.LOST)
-    assert path.dissipated["impact"][-1] == pytest.approx(G, rel=1e-12)
-    assert path.q[-1, 0, 0] == pytest.approx(0, abs=1e-12)
+    assert path.dissipated["impact"][-1] == pytest.approx(G, abs=G * LOCATED)
+    assert path.q[-1, 0, 0] == pytest.approx(0, abs=LOCATED)
 
 
 def test_a_plastic_ball_that_starts_on_the_floor_does_not_rebound():
-    """The step begins with half a step of approach; that overlap is not thrown out."""
     ball, speed, dt = scenes.bouncing_ball(0.0), 3.0, 1e-3
     path = simulate(ball, ball.state([0.0], [-speed]), 1.0, dt)
     assert path.v[1:].max() <= G * dt * (1 + 1e-9)
     assert path.q.max() < 1e-12
-    assert path.max_penetration == pytest.approx(speed * dt / 2)
-    assert path.q[-1, 0, 0] == pytest.approx(0, abs=1e-12)
+    assert path.max_penetration < LOCATED
+    assert path.q[-1, 0, 0] == pytest.approx(0, abs=LOCATED)
     assert path.dissipated["impact"][-1] == pytest.approx(speed**2 / 2, rel=1e-9)
 
 
@@ -376,7 +375,7 @@ def test_a_pendulum_between_its_top_and_a_wall():
         return times(pendulum, state, 2 * half, dt)[0] - half
 
     assert between(observed_order(first, 8e-3), SECOND)
-    assert between(observed_order(period, 8e-3), FIRST)
+    assert between(observed_order(period, 8e-3), SECOND)
     assert between(observed_order(lambda dt: end(pendulum, state, 2.0, dt).audit, 8e-3), SECOND)
     assert abs(period(5e-4)) < 2e-3
 
@@ -398,8 +397,8 @@ def test_a_pendulum_loses_height_at_a_wall():
         path = end(pendulum, state, last + rise, dt)
         return path.dissipated["impact"][-1] - energy * (1 - e ** (2 * impacts))
 
-    assert between(observed_order(late, 8e-3), FIRST)
-    assert between(observed_order(loss, 8e-3), FIRST)
+    assert between(observed_order(late, 8e-3), SECOND)
+    assert between(observed_order(loss, 8e-3), SECOND)
 
 
 def test_a_bead_goes_round_in_a_ring():
@@ -508,7 +507,8 @@ def test_a_rocking_block_keeps_its_angular_momentum_about_the_new_foot():
         assert path.q[-1, 0, 2] < 0
         return path.dissipated["impact"][-1] - energy * (1 - left)
 
-    assert between(observed_order(error, 4e-3), FIRST)
+    for dt in (4e-3, 1e-3, 2.5e-4):
+        assert abs(error(dt)) < dt * energy
     path = end(box, state, 0.6, 1e-4)
     (lost,) = path.of_kind(EventKind.LOST)
     assert lost.contact == "foot1"
@@ -530,4 +530,5 @@ def test_a_rimless_wheel_rolls_at_a_steady_pace():
         turns = path.v[len(path) // 2 :, 0, 2]
         return -turns.min() - fastest
 
-    assert between(observed_order(error, 8e-3, 3, 3), FIRST)
+    for dt in (8e-3, 2e-3, 5e-4):  # instants recorded come up to a step before the impact
+        assert abs(error(dt)) < 5 * dt

@@ -105,7 +105,8 @@ def _bounds(
     reached = gaps + bends
     depth = np.where((reached < 0) & (reached > -CLOSED * length_scale(system)), 0.0, reached)
     limit = np.where(depth < 0, np.abs(free - before) + np.abs(bends) / dt, np.inf)
-    return np.where(bounces, -e * before, np.minimum(-depth / dt, limit))
+    half = (free - before) / 2  # forces act before and after the bounce
+    return np.where(bounces, half - e * (before + half), np.minimum(-depth / dt, limit))
 
 
 def turned_back(system: System, problem: StepProblem, velocity: Array) -> StepProblem | None:

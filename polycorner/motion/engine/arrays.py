@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from polycorner.motion.bodies import IdenticalBodies
 
 # Indices into `State.counts` and `State.sums`; the dissipation by cause follows DISSIPATED.
-CONTACTS, STEPS, UNSOLVED, SWEEPS, NEWTON_STEPS, ISLANDS = range(6)
+CONTACTS, STEPS, UNSOLVED, SWEEPS, NEWTON_STEPS, ISLANDS, PARTS = range(7)
 SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = range(6)
 
 # Kinds of blocks: contacts with the surroundings, and contacts between bodies.
@@ -57,7 +57,7 @@ class Sizes(NamedTuple):
         shapes = [(len(f.names), len(f.variables)) for f in families]
         shapes += [(len(call.family.names), len(call.reads)) for call in body.gaps]
         kernels = [m * (1 + k) + k for m, k in shapes]
-        pairs = min(N * (N - 1) // 2, 64 * N) if N > 1 else 0
+        pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
         return cls(
             N=N,
             k=k,
@@ -157,10 +157,13 @@ class Model(NamedTuple):
     seed: Annotated[Any, whole()]
     tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
     sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island
+    refines: Annotated[Any, whole()]  # whether bodies take shorter steps where they need them
+    near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
     start: Annotated[Any, real()]  # time of the first state
+    step: Annotated[Any, real()]  # length of a whole step
 
 
 class State(NamedTuple):
@@ -172,6 +175,8 @@ class State(NamedTuple):
     friction: Annotated[Any, real("N F 2")]  # its impulse
     normal: Annotated[Any, real("N m")]  # normal impulses of contacts with the surroundings
     touches: Annotated[Any, whole("N m")]  # whether they touch
+    pressed: Annotated[Any, real("N m")]  # normal impulse before the last
+    release: Annotated[Any, real("N m")]  # when it would vanish, as it fell last
     alive: Annotated[Any, whole("N", initial=1)]  # whether a body has not left
     rests: Annotated[Any, whole("N")]  # whether it has exactly the velocity of rest
     asleep: Annotated[Any, whole("N")]  # whether its rest is proved and it is not solved for
@@ -181,8 +186,12 @@ class State(NamedTuple):
     neighbour_impulse: Annotated[Any, real("N k")]  # generalised impulses from other bodies
     keys: Annotated[Any, whole("C")]  # contacts between bodies, in ascending order
     pair_impulse: Annotated[Any, real("C 3")]  # their impulses: normal, friction
+    pair_release: Annotated[Any, real("C")]  # when the normal impulse would vanish
     pair_action: Annotated[Any, real("C 2*k")]  # generalised impulses on both bodies
     pair_flags: Annotated[Any, whole("C 2")]  # whether they stick, whether they touch
+    cluster: Annotated[Any, whole("N", initial=-1)]  # bodies that need shorter steps: with which
+    elapsed: Annotated[Any, real("N")]  # how much of the step these have done
+    watched: Annotated[Any, whole("N")]  # whether the way to the next midpoint was examined
     counts: Annotated[Any, whole("8")]
     sums: Annotated[Any, real("D+5")]
 
@@ -205,6 +214,12 @@ class Work(NamedTuple):
     gap_next: Annotated[Any, real("N m")]  # gaps there
     gradient_next: Annotated[Any, real("N m k")]
     pair_gap_next: Annotated[Any, real("G")]
+    q_path: Annotated[Any, real("N k")]  # coordinates on the way
+    gap_path: Annotated[Any, real("N m")]  # gaps there
+    gradient_path: Annotated[Any, real("N m k")]
+    waits: Annotated[Any, whole("N")]  # whether a body is left as it is for the time being
+    joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
+    located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
     awake: Annotated[Any, whole("N")]
     evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
     speed: Annotated[Any, real("N")]
@@ -228,6 +243,7 @@ class Work(NamedTuple):
     list_status: Annotated[Any, whole("2")]  # number of neighbours, whether the list is valid
     examined: Annotated[Any, whole("P")]  # whether a pair was examined in this step
     listed_position: Annotated[Any, real("N 2")]  # positions when the list was made
+    listed_travel: Annotated[Any, real("1")]  # how far bodies may move in a step, as listed
     contact: Annotated[Any, whole("C 3")]  # body, body, gap
     contact_gap: Annotated[Any, real("C")]
     contact_before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
@@ -247,6 +263,8 @@ class Work(NamedTuple):
     order: Annotated[Any, whole("B")]  # blocks, island after island
     mass: Annotated[Any, real("N k k")]
     reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
+    bounces: Annotated[Any, whole("B")]  # whether a contact bounces
+    release: Annotated[Any, real("B")]  # when its normal impulse would vanish
     best: Annotated[Any, real("B 2")]  # impulses of the least residual; Newton direction
     initial: Annotated[Any, real("B 2")]  # impulses before an equilibrium was sought
     carries: Annotated[Any, real("B")]  # whether a block can carry load at rest

@@ -5,10 +5,10 @@ import numpy as np
 from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
-from polycorner.motion.engine.jit import NONE, TWO, ZERO, compiled
-from polycorner.motion.engine.neighbours import detection_distance, heap_sort, key_of
+from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
+from polycorner.motion.engine.neighbours import ZERO_GAP, detection_distance, heap_sort, key_of
 
-ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
+ELASTIC = 1e-6  # scaled travel in a step up to which an impact that bounces is slow
 
 
 @compiled
@@ -50,16 +50,37 @@ def curvature_change(gap, before, following, h, scale):
 
 
 @compiled
-def least_velocity(gap, before, free, change, bounce, h, scale):
-    """Return the least normal velocity that a contact allows after the step."""
-    if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(free - before):
-        return -bounce * before
+def is_slow(model, before, bounce):
+    """Return whether a gap closes at a velocity at which impacts need not be located."""
+    return -before * model.step <= (model.near if bounce == 0.0 else ELASTIC) * model.gap_unit
+
+
+@compiled
+def acts(model, gap, before, bounce, closed):
+    """Return whether a contact acts in a located step: it is closed, or about to close slowly."""
+    if closed or gap <= ZERO_GAP * model.gap_unit:
+        return True
+    near = model.near if bounce == 0.0 else ELASTIC
+    return gap <= near * model.gap_unit and is_slow(model, before, bounce)
+
+
+@compiled
+def least_velocity(model, work, gap, closed, before, free, change, bounce, h):
+    """Return the least normal velocity that a contact allows after the step; whether it bounces.
+
+    Forces act for half of the step before a bounce, and for half of it afterwards.
+    """
+    if work.located[0] and (closed or gap <= ZERO_GAP * model.gap_unit):
+        gap = min(gap, 0.0)
+    forced = free - before
+    if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(forced) * (model.step / h):
+        return 0.5 * (forced - bounce * (free + before)), ONE
     reached = gap + change
-    if -ZERO_GAP * scale < reached < 0.0:
-        return 0.0
+    if -ZERO_GAP * model.gap_unit < reached < 0.0:
+        return 0.0, ZERO
     if reached < 0.0:  # separated no faster than by forces and curvature within a step
-        return min(-reached / h, abs(free - before) + abs(change) / h)
-    return -reached / h
+        return min(-reached / h, abs(forced) + abs(change) / h), ZERO
+    return -reached / (model.step if work.located[0] else h), ZERO
 
 
 @compiled
@@ -78,7 +99,7 @@ def new_block(work, b, k, first, second, rows):
 @compiled
 def add_body_blocks(model, state, work, i, h, limit, count):
     """Append the blocks of a body's contacts with its surroundings; return the block count."""
-    k, m = model.dimension, model.restitution.size
+    k, m, share = model.dimension, model.restitution.size, h / model.step
     block_of, predicted = work.own_block, False
     for g in range(m):
         block_of[g] = -1
@@ -87,9 +108,12 @@ def add_body_blocks(model, state, work, i, h, limit, count):
             before += work.gradient[i, g, c] * state.v[i, c]
             free += work.gradient[i, g, c] * work.v_free[i, c]
         gap = work.gap[i, g]
+        closed = state.touches[i, g] != 0
         close = gap + h * min(before, free, 0.0) < limit
-        if not close and not state.touches[i, g]:
-            state.normal[i, g] = 0.0
+        if work.located[0]:
+            close = acts(model, gap, before, model.restitution[g], closed)
+        if not close and not closed:
+            state.normal[i, g], state.pressed[i, g] = 0.0, 0.0
             continue
         if not predicted:
             evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
@@ -100,13 +124,16 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         new_block(work, b, k, i, NONE, ZERO)
         for c in range(k):
             work.jacobian[b, 0, c] = work.gradient[i, g, c]
-        change = curvature_change(gap, before, work.gap_next[i, g], h, model.gap_unit)
-        work.offset[b, 0] = -least_velocity(
-            gap, before, free, change, model.restitution[g], h, model.gap_unit
+        change = 0.0
+        if closed or not work.located[0]:
+            change = curvature_change(gap, before, work.gap_next[i, g], h, model.gap_unit)
+        least, work.bounces[b] = least_velocity(
+            model, work, gap, closed, before, free, change, model.restitution[g], h
         )
+        work.offset[b, 0] = -least
         work.block_load[b] = -change
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
-        work.impulse[b, 0] = state.normal[i, g]
+        work.impulse[b, 0] = state.normal[i, g] * share
         finish_block(model, work, b)
     for f in range(model.friction_sets.shape[0]):
         pressing = model.pressing_gap[f]
@@ -120,7 +147,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         new_block(work, b, k, i, NONE, model.slip_start[f + 1] - first)
         for r in range(work.block_rows[b]):
             work.offset[b, r] = work.slip_offset[i, first + r]
-            work.impulse[b, r] = state.friction[i, f, r]
+            work.impulse[b, r] = state.friction[i, f, r] * share
             for c in range(k):
                 work.jacobian[b, r, c] = work.slip_rows[i, first + r, c]
         work.block_set[b] = model.friction_sets[f, 0 if state.sticks[i, f] else 1]
@@ -144,16 +171,21 @@ def add_pair_blocks(model, state, work, contact, h, count):
         before += work.contact_gradient[contact, k + c] * state.v[j, c]
         free += work.contact_gradient[contact, c] * work.v_free[i, c]
         free += work.contact_gradient[contact, k + c] * work.v_free[j, c]
-    index = work.contact_before[contact]
+    index, gap = work.contact_before[contact], work.contact_gap[contact]
+    closed = index >= 0 and state.pair_flags[index, 1] != 0
+    if work.located[0] and not acts(model, gap, before, model.pair_restitution, closed):
+        return count
     n = count
     new_block(work, n, k, i, j, ZERO)
     for c in range(2 * k):
         work.jacobian[n, 0, c] = work.contact_gradient[contact, c]
-    gap = work.contact_gap[contact]
-    change = curvature_change(gap, before, work.pair_gap_next[g], h, model.gap_unit)
-    work.offset[n, 0] = -least_velocity(
-        gap, before, free, change, model.pair_restitution, h, model.gap_unit
+    change = 0.0
+    if closed or not work.located[0]:
+        change = curvature_change(gap, before, work.pair_gap_next[g], h, model.gap_unit)
+    least, work.bounces[n] = least_velocity(
+        model, work, gap, closed, before, free, change, model.pair_restitution, h
     )
+    work.offset[n, 0] = -least
     work.block_load[n] = -change
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]

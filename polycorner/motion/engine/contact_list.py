@@ -8,23 +8,38 @@ from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import key_of
 
 TOUCHING = 1e-7  # scaled gap up to which a contact is made
-PARTING = 100.0 * TOUCHING  # scaled gap beyond which it is lost
+PARTING = 100.0 * TOUCHING  # scaled gap beyond which a contact is lost
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
-REST, MOTION, EXIT = np.int64(3), np.int64(4), np.int64(5)
+INSTANT = 1e-9  # of a step: the shortest part, for an impact
+REST, MOTION, EXIT, FAILED = np.int64(3), np.int64(4), np.int64(5), np.int64(6)
 
 
 @compiled
-def store_impulses(state, work, blocks):
-    """Store the impulses: for the next step, or as the start of another round of this one."""
+def takes_part(work, b):
+    """Return whether a block acts on a body that is solved for."""
+    j = work.block_bodies[b, 1]
+    return work.awake[work.block_bodies[b, 0]] or (j >= 0 and work.awake[j])
+
+
+@compiled
+def store_impulses(model, state, work, blocks, h):
+    """Store the impulses: for the next step, or as the start of another round of this one.
+
+    Those of a shorter step are stored as what they would be in a whole one, those of an instant
+    not at all.
+    """
+    share = h / model.step
+    if share <= INSTANT:
+        return
     for b in range(blocks):
         kind, i, f = work.origin[b, 0], work.origin[b, 1], work.origin[b, 2]
         if kind == OWN_GAP:
-            state.normal[i, f] = work.impulse[b, 0]
+            state.normal[i, f] = work.impulse[b, 0] / share
         elif kind == PAIR_GAP:
             work.contact_impulse[i, 0] = work.impulse[b, 0]
         for r in range(work.block_rows[b]):
             if kind == OWN_FRICTION:
-                state.friction[i, f, r] = work.impulse[b, r]
+                state.friction[i, f, r] = work.impulse[b, r] / share
             else:
                 work.contact_impulse[i, 1 + r] = work.impulse[b, r]
 
@@ -33,7 +48,7 @@ def store_impulses(state, work, blocks):
 def store_sticking(model, state, work, blocks):
     """Store which friction contacts between bodies and surroundings stick."""
     for b in range(blocks):
-        if work.origin[b, 0] == OWN_FRICTION:
+        if work.origin[b, 0] == OWN_FRICTION and takes_part(work, b):
             i, f = work.origin[b, 1], work.origin[b, 2]
             state.sticks[i, f] = 1 if sticks(model, work, b, work.slip) else 0
 
@@ -62,11 +77,11 @@ def record(log, count, kind, i, j, which, time, value):
 def classify(work, b, was, gap, h, time, scale, u, out):
     """Compare a contact with what it was; out: whether it touches, the event or -1, its time."""
     closes = work.block_load[b] / h
-    bounces = work.offset[b, 0] + closes < 0.0 < gap
     after = u[0] - work.offset[b, 0] - closes
-    touches = gap + h * after <= (PARTING if was else TOUCHING) * scale
+    strikes = work.impulse[b, 0] > 0.0 and work.bounces[b]
+    touches = gap + h * after <= (PARTING if was else TOUCHING) * scale and not strikes
     out[0], out[1], out[2] = 1.0 if touches else 0.0, -1.0, time + h
-    if work.impulse[b, 0] > 0.0 and bounces and not touches and not was:
+    if strikes and not was:
         out[1] = IMPACT
     elif touches and not was:
         out[1] = MADE
@@ -75,12 +90,22 @@ def classify(work, b, was, gap, h, time, scale, u, out):
 
 
 @compiled
+def release_time(before, now, release, h, time):
+    """Return when a normal impulse vanishes if it falls on as from the last step to this one."""
+    if now <= 0.0:
+        return release
+    if before <= now:
+        return time + (h if before > 0.0 else 0.5 * h)
+    return time + min(0.5 * h + h * now / (before - now), 1.5 * h)
+
+
+@compiled
 def record_contacts(model, state, work, log, blocks, h, time, count):
     """Record contacts made, lost and bounced; update the list of contacts between bodies."""
-    u, out, C = work.slip, work.image, 0
+    u, out, C, share = work.slip, work.image, 0, h / model.step
     for b in range(blocks):
         kind = work.origin[b, 0]
-        if work.block_rows[b] > 0:
+        if work.block_rows[b] > 0 or not takes_part(work, b):
             continue
         i, g = work.origin[b, 1], work.origin[b, 2]
         velocity_of(model, work, b, state.v, u)
@@ -88,28 +113,41 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
         velocity_of(model, work, b, work.v_new, u)
         if kind == OWN_GAP:
             gap, was = work.gap[i, g], state.touches[i, g]
-            j = NONE
+            j, pressed, release = NONE, state.pressed[i, g], state.release[i, g]
         else:
             work.sort_keys[C] = b
             C += 1
             gap = work.contact_gap[i]
             j, index = work.contact[i, 1], work.contact_before[i]
             was = index >= 0 and state.pair_flags[index, 1]
+            pressed = state.pair_impulse[index, 0] if index >= 0 else 0.0
+            release = state.pair_release[index] if index >= 0 else time
             i = work.contact[i, 0]
         state.sums[PENETRATION] = max(state.sums[PENETRATION], -gap)
         classify(work, b, was, gap, h, time, model.gap_unit, u, out)
+        release = release_time(pressed * share, work.impulse[b, 0], release, h, time)
         if out[1] >= 0.0:
             when = out[2]
-            if out[1] != LOST and before < 0.0 and gap > 0.0:
+            if out[1] == LOST:
+                when = min(release, when)
+            elif before < 0.0 and gap > 0.0:
                 when = min(time + 0.5 * h + gap / -before, time + 1.5 * h)
+            elif work.located[0]:
+                when = time + 0.5 * h
+            if out[1] == MADE and work.impulse[b, 0] <= 0.0:
+                release = when
             count = record(log, count, int(out[1]), i, j, g, when, work.impulse[b, 0])
         if kind == OWN_GAP:
             state.touches[i, g] = 1 if out[0] > 0.0 else 0
+            state.release[i, g] = release
+            if share > INSTANT:
+                state.pressed[i, g] = work.impulse[b, 0] / share
         else:
             work.origin[b, 3] = 1 if out[0] > 0.0 else 0
+            work.release[b] = release
     if model.pair_kernel != 0:
         size, count = keep_contacts(model, state, work, log, C, h, time, count)
-        add_contacts(model, state, work, C, size)
+        add_contacts(model, state, work, C, size, share)
         sort_contacts(state, state.counts[CONTACTS])
     return count
 
@@ -126,7 +164,7 @@ def keep_contacts(model, state, work, log, C, h, time, count):
                 g = state.keys[s] % model.pair_gaps
                 count = record(log, count, LOST, i, j, g, time + h, 0.0)
             continue
-        state.keys[size] = state.keys[s]
+        state.keys[size], state.pair_release[size] = state.keys[s], state.pair_release[s]
         for a in range(3):
             state.pair_impulse[size, a] = state.pair_impulse[s, a]
         for a in range(2):
@@ -138,23 +176,25 @@ def keep_contacts(model, state, work, log, C, h, time, count):
 
 
 @compiled
-def add_contacts(model, state, work, C, size):
+def add_contacts(model, state, work, C, size, share):
     """Append this step's contacts to the list, with their impulses."""
     k = model.dimension
     for s in range(C):
         b = work.sort_keys[s]
         state.keys[size] = key_of(model, work, work.origin[b, 1])
-        state.pair_impulse[size, 0] = work.impulse[b, 0]
+        state.pair_release[size] = work.release[b]
+        lasting = 1.0 / share if share > INSTANT else 0.0
+        state.pair_impulse[size, 0] = work.impulse[b, 0] * lasting
         state.pair_impulse[size, 1] = state.pair_impulse[size, 2] = 0.0
         state.pair_flags[size, 0] = 0
         for a in range(2 * k):
-            state.pair_action[size, a] = work.jacobian[b, 0, a] * work.impulse[b, 0]
+            state.pair_action[size, a] = work.jacobian[b, 0, a] * state.pair_impulse[size, 0]
         if model.pair_slips.shape[0] > 0:
             f = b + 1
             state.pair_flags[size, 0] = 1 if sticks(model, work, f, work.slip) else 0
             shift = 0 if work.block_bodies[f, 0] == work.block_bodies[b, 0] else k
             for r in range(2):
-                p = work.impulse[f, r]
+                p = work.impulse[f, r] * lasting
                 state.pair_impulse[size, 1 + r] = p
                 for a in range(2 * k):
                     state.pair_action[size, (a + shift) % (2 * k)] += work.jacobian[f, r, a] * p
@@ -179,6 +219,9 @@ def sort_contacts(state, size):
         t = s
         while t > 0 and state.keys[t - 1] > state.keys[t]:
             state.keys[t - 1], state.keys[t] = state.keys[t], state.keys[t - 1]
+            x = state.pair_release[t]
+            state.pair_release[t] = state.pair_release[t - 1]
+            state.pair_release[t - 1] = x
             for a in range(3):
                 x = state.pair_impulse[t, a]
                 state.pair_impulse[t, a] = state.pair_impulse[t - 1, a]

@@ -90,7 +90,7 @@ class Engine:
     ) -> None:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
         self.capacity = max(16, CONTACTS_PER_BODY * bodies.count)
-        self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start)
+        self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
         self.motion = allocate(State, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
         self._allocate()
@@ -134,7 +134,7 @@ class Engine:
         compiled = self._compiled()
         events: list[Event] = []
         while steps > 0:
-            why, done, count = compiled.advance(self._addresses, self.dt, steps)
+            why, done, count = compiled.advance(self._addresses, steps)
             events += self._read(count)
             steps -= done
             if why == CONTACTS_FULL:
@@ -176,7 +176,7 @@ class Engine:
 
         if not entry_point.advance.overloads:
             with one_at_a_time(f"motion-{entry_point.SOURCES[:16]}"):
-                entry_point.advance(self._addresses, self.dt, 0)
+                entry_point.advance(self._addresses, 0)
         return entry_point
 
     def _read(self, count: int) -> list[Event]:

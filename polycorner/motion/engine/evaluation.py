@@ -41,7 +41,8 @@ def evaluate_body(model, state, work, i, h, time, index):
         work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         work.kick[i, c] = 0.0
         if model.kicks[c] > 0.0:
-            work.kick[i, c] = model.kicks[c] * np.sqrt(h) * gaussian(model.seed, index, i, 32 + c)
+            draw = gaussian(model.seed, index, i, 32 + c) * (h / model.step)
+            work.kick[i, c] = model.kicks[c] * np.sqrt(model.step) * draw
     at = evaluate_forces(model, work, i, state.v, h)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))

@@ -11,12 +11,12 @@ from polycorner.motion.engine.gauss_seidel import relax_block, residual
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
+from polycorner.motion.engine.paths import CURVATURE_DEPTH
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in the first round, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; the next rounds multiply this by powers of three
 CYCLE_ROUNDS = 3
 ROUND_SWEEPS = 10
-CURVATURE_DEPTH = 1e-4  # scaled depth to which a gap may close by its curvature within a step
 
 
 @compiled

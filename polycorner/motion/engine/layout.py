@@ -12,9 +12,17 @@ from polycorner.motion.engine.arrays import Model, Sizes, filled
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 
+NEAR, KICKED = 1e-6, 1e-3  # scaled travel in a step of a slow impact, without and with kicks
+SHARE = 0.01  # that between bodies, over their reach
+
 
 def model_of(
-    bodies: IdenticalBodies, sizes: Sizes, noise: Noise, solver: Solver, start: float
+    bodies: IdenticalBodies,
+    sizes: Sizes,
+    noise: Noise,
+    solver: Solver,
+    start: float,
+    step: float,
 ) -> Model:
     """Return the model constants of bodies in motion."""
     body, formulation = bodies.body, bodies.body.formulation
@@ -38,7 +46,10 @@ def model_of(
         "seed": noise.seed,
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,
+        "refines": solver.refine,
+        "near": _near(bodies, noise),
         "start": start,
+        "step": step,
         "time_parameter": body.formulation.time_parameter,
         **_dependence(body),
         **_friction(bodies, sets),
@@ -47,6 +58,14 @@ def model_of(
         **sets.values(),
     }
     return filled(Model, sizes, {**values, "parameters": [*parameters, 0.0]})
+
+
+def _near(bodies: IdenticalBodies, noise: Noise) -> float:
+    """Return the scaled travel in a step up to which a plastic impact is slow."""
+    near = KICKED if any(noise.kicks.values()) else NEAR
+    if bodies.contacts is None or bodies.count < 2:
+        return near
+    return max(near, SHARE * bodies.contacts.reach / bodies.body.gap_unit)
 
 
 def _dependence(body: Body) -> dict[str, bool]:

@@ -5,22 +5,28 @@ from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
 from polycorner.motion.engine.jit import NONE, compiled
 
+ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
 DETECTION = 1e-2  # scaled gap up to which contacts are detected, at least
 SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
 
 
 @compiled
 def position_of(model, state, i, a, time):
-    """Return one component of a body's position, as a length, relative to the moving substrate."""
+    """Return one component of a body's position, as a length, relative to the moving substrate.
+
+    The first one is zero where a single coordinate is the position.
+    """
     c = model.position[a]
+    if a == 0 and model.position[1] == c:
+        return 0.0
     x = state.q[i, c] * model.units[c]
     return x - model.substrate_speed * time if a == 0 else x
 
 
 @compiled
-def outdated(model, state, work, time):
+def outdated(model, state, work, h, time):
     """Return whether a body has moved so far that the neighbour list may lack a pair."""
-    if work.list_status[1] == 0:
+    if work.list_status[1] == 0 or travel(model, work, h) > work.listed_travel[0]:
         return True
     limit = (0.25 * SKIN * model.reach) ** 2
     for i in range(model.bodies):
@@ -54,13 +60,16 @@ def heap_sort(values, count):
 
 
 @compiled
-def list_neighbours(model, state, work, time):
+def list_neighbours(model, state, work, h, time):
     """List the pairs of bodies that may meet soon, ascending; return whether there was room."""
     N = model.bodies
+    work.listed_travel[0] = max(0.125 * SKIN * model.reach, 2.0 * travel(model, work, h))
     for i in range(N):
         for a in range(2):
             work.listed_position[i, a] = position_of(model, state, i, a, time)
-    far = model.reach * (1.0 + SKIN)
+    far = model.reach * (1.0 + SKIN) + max(
+        0.0, 2.0 * work.listed_travel[0] - 0.25 * SKIN * model.reach
+    )
     found, ordered, position = work.sort_keys, work.parent, work.listed_position
     for i in range(N):
         t = i
@@ -92,7 +101,7 @@ def list_neighbours(model, state, work, time):
 
 
 @compiled
-def detect_pair(model, state, work, a, b, limit, count):
+def detect_pair(model, state, work, a, b, limit, share, count):
     """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full."""
     k, scratch = model.dimension, work.scratch
     n, m = model.pair_reads.shape[0], model.pair_gaps
@@ -107,7 +116,8 @@ def detect_pair(model, state, work, a, b, limit, count):
             index = find_contact(state, (a * model.bodies + b) * m + g)
             work.contact_before[count] = index
             for c in range(3):
-                work.contact_impulse[count, c] = state.pair_impulse[index, c] if index >= 0 else 0.0
+                before = state.pair_impulse[index, c] if index >= 0 else 0.0
+                work.contact_impulse[count, c] = before * share
             for c in range(2 * k):
                 work.contact_gradient[count, c] = 0.0
             for r in range(n):
@@ -118,13 +128,19 @@ def detect_pair(model, state, work, a, b, limit, count):
 
 
 @compiled
-def detection_distance(model, work, h):
-    """Return the gap up to which contacts are detected: any body may be hit by the fastest."""
+def travel(model, work, h):
+    """Return how far the fastest body may move in a step."""
     fastest = 0.0
     for i in range(model.bodies):
         if work.awake[i]:
             fastest = max(fastest, work.speed[i])
-    return DETECTION * model.gap_unit + 2.0 * h * fastest
+    return h * fastest
+
+
+@compiled
+def detection_distance(model, work, h):
+    """Return the gap up to which contacts are detected: any body may be hit by the fastest."""
+    return DETECTION * model.gap_unit + 2.0 * travel(model, work, h)
 
 
 @compiled
@@ -139,11 +155,11 @@ def detect_contacts(model, state, work, h, count):
         if not (state.alive[a] and state.alive[b]):
             continue
         far = 0.0
-        for d in range(2):
+        for d in range(0 if model.position[0] != model.position[1] else 1, 2):
             c = model.position[d]
             far += ((work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]) ** 2
         if far < (model.reach + limit) ** 2:
-            count = detect_pair(model, state, work, a, b, limit, count)
+            count = detect_pair(model, state, work, a, b, limit, h / model.step, count)
             if count < 0:
                 return NONE
     return count

@@ -167,6 +167,7 @@ def comes_to_rest(model, state, work, i, rest):
     still = old <= 1e-13 * size
     for c in range(k):
         work.v_new[i, c] = state.v[i, c] if still else rest[c]
-    if still and remains_at_rest(model, state, work, i, work.neighbour_impulse):
+    others = work.neighbour_impulse
+    if still and not work.located[0] and remains_at_rest(model, state, work, i, others):
         state.asleep[i] = 1
     return True

@@ -1,12 +1,13 @@
-"""One time step of all bodies.
+"""A step of the bodies that are awake: its solution, and what follows from it.
 
 There are ``N`` identical bodies with ``k`` coordinates each; a system that is not repeated is one
 body.  Their equations of motion, gaps and slip velocities are kernels called by address.  The
 unknowns of a step are impulses in *blocks*: a unilateral contact is a block of one row, a friction
 contact one of one or two.  Each block knows the bodies it acts on, its Jacobian and, for friction,
-the block of the contact that presses on it.  A step (:func:`step`)
+the block of the contact that presses on it.  A step
 
-1. drifts half a step, evaluates the bodies, and wakes those that can no longer remain at rest;
+1. drifts half a step, evaluates the bodies, and wakes those that can no longer remain at rest
+   (:mod:`~polycorner.motion.engine.sleep`);
 2. assembles the blocks of the awake bodies and of the contacts between them, and partitions them
    into islands;
 3. solves each island by Gauss-Seidel sweeps over the blocks and Newton's method on the natural map
@@ -14,6 +15,8 @@ the block of the contact that presses on it.  A step (:func:`step`)
 4. gives bodies at rest within the solver's accuracy exactly the velocity of rest; a body at rest
    whose impulses are in balance and in their sets falls asleep, and is only checked thereafter;
 5. records events, books work, and drifts the other half of the step.
+
+Bodies for which this does not do take shorter steps: :mod:`polycorner.motion.engine.refinement`.
 """
 
 import numpy as np
@@ -27,10 +30,7 @@ from polycorner.motion.engine.arrays import (
     NOISE_WORK,
     NOT_FINITE,
     PAIR_FRICTION,
-    RESIDUAL,
-    STEPS,
     SUBSTRATE_WORK,
-    UNSOLVED,
 )
 from polycorner.motion.engine.blocks import assemble_blocks, velocity_of
 from polycorner.motion.engine.contact_list import (
@@ -41,13 +41,14 @@ from polycorner.motion.engine.contact_list import (
     record_contacts,
     store_impulses,
     store_sticking,
+    takes_part,
 )
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.island import solve_islands
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
 from polycorner.motion.engine.partition import find_islands
-from polycorner.motion.engine.sleep import settle, wake, wake_neighbours
+from polycorner.motion.engine.sleep import settle, wake_neighbours
 
 FORCE_ROUNDS = 30  # solutions of a step, at most, with forces at its mean velocity
 
@@ -86,6 +87,8 @@ def book_work(model, state, work, blocks, h):
     """Book the work done in this step, by cause."""
     k, u = model.dimension, work.slip
     for b in range(blocks):
+        if not takes_part(work, b):
+            continue
         kind = work.origin[b, 0]
         if work.block_rows[b] == 0:
             velocity_of(model, work, b, state.v, u)
@@ -126,7 +129,9 @@ def solve(model, state, work, h, time, index):
     """
     contacts, blocks = ZERO, ZERO
     if model.pair_kernel != 0:
-        if outdated(model, state, work, time) and not list_neighbours(model, state, work, time):
+        if outdated(model, state, work, h, time) and not list_neighbours(
+            model, state, work, h, time
+        ):
             return False, blocks
         for s in range(work.list_status[0]):
             work.examined[s] = 0
@@ -138,7 +143,7 @@ def solve(model, state, work, h, time, index):
         blocks = assemble_blocks(model, state, work, h, contacts)
         find_islands(model, work, blocks)
         solve_islands(model, state, work, blocks, h)
-        store_impulses(state, work, blocks)
+        store_impulses(model, state, work, blocks, h)
         if model.pair_kernel == 0 or not wake_neighbours(
             model, state, work, blocks, h, time + 0.5 * h, index
         ):
@@ -148,42 +153,34 @@ def solve(model, state, work, h, time, index):
 
 
 @compiled
-def count_unsolved(model, state, work):
-    """Count the islands whose residual is above the tolerance."""
-    for i in range(model.bodies):
-        if work.island_start[i + 1] > work.island_start[i]:
-            state.sums[RESIDUAL] = max(state.sums[RESIDUAL], work.island_residual[i])
-            state.counts[UNSOLVED] += 1 if work.island_residual[i] > model.tolerance else 0
+def attempt(model, state, work, h, time, index, any_awake):
+    """Solve a step for the velocities of the bodies that are awake, which have been evaluated.
 
-
-@compiled
-def step(model, state, work, log, h, count):
-    """Advance by one step; return why it cannot be done, or DONE, and the event count.
-
-    Forces that depend on the velocity are those of its mean over the step.
+    Forces that depend on the velocity are those of its mean over the step.  Return why it cannot be
+    done, or DONE, and the number of blocks.
     """
-    k, N = model.dimension, model.bodies
-    index = state.counts[STEPS]
-    time = index * h
-    if model.time_parameter >= 0:
-        model.parameters[model.time_parameter] = model.start + time + 0.5 * h
-    blocks, any_awake = ZERO, wake(model, state, work, h, time + 0.5 * h, index)
+    blocks = ZERO
     for _ in range(FORCE_ROUNDS):
         if not start_bodies(model, state, work):
-            return NOT_FINITE, count
+            return NOT_FINITE, blocks
         if not any_awake:
             break
         fits, blocks = solve(model, state, work, h, time, index)
         if not fits:
-            return CONTACTS_FULL, count
+            return CONTACTS_FULL, blocks
         if not (model.follows_velocity and update_forces(model, state, work, h)):
             break
-    for i in range(N):
-        for c in range(k):
+    for i in range(model.bodies):
+        for c in range(model.dimension):
             if state.alive[i] and not np.isfinite(work.v_new[i, c]):
-                return NOT_FINITE, count
-    if any_awake:
-        count_unsolved(model, state, work)
+                return NOT_FINITE, blocks
+    return DONE, blocks
+
+
+@compiled
+def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
+    """Book, record and make a step that was solved; return the number of events."""
+    k, N = model.dimension, model.bodies
     book_work(model, state, work, blocks, h)
     if any_awake:
         count = record_contacts(model, state, work, log, blocks, h, time, count)
@@ -192,7 +189,7 @@ def step(model, state, work, log, h, count):
         work.rested[i] = state.rests[i]
     settle(model, state, work, h, index)
     for i in range(N):
-        if not state.alive[i]:
+        if not state.alive[i] or work.waits[i]:
             continue
         if work.awake[i] and state.rests[i] != work.rested[i]:
             kind = REST if state.rests[i] else MOTION
@@ -210,5 +207,4 @@ def step(model, state, work, log, h, count):
                 if i in (pair // N, pair % N):
                     state.check_due[pair // N] = state.check_due[pair % N] = 0
                     state.asleep[pair // N] = state.asleep[pair % N] = 0
-    state.counts[STEPS] = index + 1
-    return DONE, count
+    return count

@@ -88,7 +88,7 @@ def test_constants_are_brought_to_their_type_and_shape():
 def test_a_body_without_friction_has_arrays():
     M = Manifold.euclidean("x")
     bodies = System(Polyhedron(M, {"floor": M.symbols[0]}), velocities(M)[0] ** 2 / 2).bodies
-    model = model_of(bodies, Sizes.of(bodies, 1), Noise(), Solver(), 0.0)
+    model = model_of(bodies, Sizes.of(bodies, 1), Noise(), Solver(), 0.0, 1e-3)
     assert model.load_sources.shape == (0, 1)
     assert model.slip_start.tolist() == [0]
     assert model.gap_calls.shape == (1, 6)

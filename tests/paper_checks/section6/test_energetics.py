@@ -97,6 +97,7 @@ def test_without_names_there_is_one_component_each():
     assert energetics.half_lines(components=1, ordered=False).verdict is Verdict.HOLDS
 
 
+@pytest.mark.slow
 def test_a_limit_below_the_critical_one_holds_and_one_above_does_not():
     critical = energetics.critical_formula()
     assert energetics.minimum_below(critical * 0.99).verdict is Verdict.HOLDS
