@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
 from polycorner import Manifold, Polyhedron, System, velocities
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.motion import ContactFamily, EventKind, Noise, Solver, pair_coordinates, simulate
 
 G = 9.81
@@ -193,3 +195,25 @@ def test_kicked_bodies_bounce_where_they_are():
     assert path.max_penetration < 1e-3
     assert path.of_kind(EventKind.IMPACT)
     assert path.audit < 1e-10
+
+
+def test_what_is_not_solved_is_an_event():
+    """A tolerance below rounding cannot be met."""
+    drum = DumbbellDrum(count=5, floor=True)
+    state, strict = drum.state(bunch(drum, np.random.default_rng(3))), Solver(tolerance=1e-17)
+    path = simulate(drum, state, 0.05, 1e-3, noise=Noise(chatter=0.3), solver=strict)
+    failed = path.of_kind(EventKind.FAILED)
+    assert len(failed) == path.effort.unconverged > 0
+    assert not path.converged
+    assert {event.contact for event in failed} <= {*drum.bodies.contact_names, ""}
+    assert all(set(event.bodies) <= set(range(5)) and event.bodies for event in failed)
+
+
+def test_a_step_of_more_events_than_there_is_room_for_is_taken_up_where_it_was_left():
+    """Thousands of bounces within one step."""
+    walls = {"left": S, "right": sp.Rational(1, 100) - S}
+    box = System(Polyhedron(LINE, walls), VS**2 / 2, restitution=1.0)
+    path = simulate(box, box.state([0.0025], [1.0]), 100.0, 100.0)
+    times = [event.time for event in path.of_kind(EventKind.IMPACT)]
+    np.testing.assert_allclose(times, 0.0075 + 0.01 * np.arange(10_000), atol=1e-4)
+    assert path.effort.unconverged == 0

@@ -48,8 +48,8 @@ from polycorner.motion.engine.stepping import attempt, commit
 
 LARGE = 128  # blocks of an island beyond which it takes whole steps
 SHORTEST_SOLVED = 1.0 / 16.0  # of a step, to which parts are halved to be solved
-MOST_PARTS = 5000  # of one step, beyond which the rest is done at once
-MOST_SWEEPS = 1000  # over the islands in them, the same
+MOST_PARTS = 100_000  # of one step, beyond which the rest is done at once
+MOST_SWEEPS, MEAN_SWEEPS = 1000, 50  # over islands, in all and for each part more, the same
 MOST_TRIES = 100  # of one part
 
 
@@ -278,7 +278,11 @@ def refine(model, state, work, log, root, index, count):
             exact = False
         count = commit(model, state, work, log, blocks, h, time, index, True, count)
         parts += 1
-        exact = exact and parts < MOST_PARTS and state.counts[SWEEPS] - spent < MOST_SWEEPS
+        allowed = MOST_SWEEPS + MEAN_SWEEPS * parts
+        if exact and (parts == MOST_PARTS or state.counts[SWEEPS] - spent > allowed):
+            exact = False
+            state.counts[UNSOLVED] += 1
+            count = record(log, count, FAILED, root, NONE, NONE, time + h, 0.0)
         state.counts[PARTS] += 1
         state.elapsed[root] = H if h >= rest else state.elapsed[root] + h
         next_length = 2.0 * h if halved else H
