@@ -16,6 +16,7 @@ from polycorner.motion.engine.arrays import (
     ISLANDS,
     NEWTON_STEPS,
     NOT_FINITE,
+    PARTS,
     RESIDUAL,
     STEPS,
     SWEEPS,
@@ -49,6 +50,8 @@ class Effort:
         Islands left with a residual above the tolerance.
     residual : float
         The worst residual, relative to the speeds in its island.
+    parts : int
+        Shorter steps that islands took.
     """
 
     steps: int
@@ -57,6 +60,7 @@ class Effort:
     newton_steps: int
     unconverged: int
     residual: float
+    parts: int = 0
 
 
 class Engine:
@@ -127,6 +131,7 @@ class Engine:
             newton_steps=counts[NEWTON_STEPS],
             unconverged=counts[UNSOLVED],
             residual=float(sums[RESIDUAL]),
+            parts=counts[PARTS],
         )
 
     def advance(self, steps: int) -> list[Event]:
