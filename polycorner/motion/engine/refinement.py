@@ -30,7 +30,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.blocks import is_slow
 from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
-from polycorner.motion.engine.evaluation import evaluate_body
+from polycorner.motion.engine.evaluation import evaluate_body, evaluate_gaps
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP, travel
@@ -40,7 +40,6 @@ from polycorner.motion.engine.paths import (
     acceptable_length,
     gap_at,
     may_vanish,
-    sinks,
     touching,
 )
 from polycorner.motion.engine.sleep import stays_asleep, wake
@@ -124,45 +123,69 @@ def strikes_early(model, state, work, b):
 
 
 @compiled
-def misses(model, work, i, j, g, f, rate, h):
-    """Return whether bodies cross the boundary of an open gap on their way to the next midpoint."""
-    if f <= ZERO_GAP * model.gap_unit:
-        return False
-    out, slack = work.image, 2.0 * CURVATURE_DEPTH * model.gap_unit
-    gap_at(model, work, work.q_mid, work.v_new, i, j, g, h, out)
-    return may_vanish(f, rate, out[0], out[1], h, slack)
+def rate_of(model, gradient, v, i, g):
+    """Return the rate of a gap of a body at a velocity."""
+    rate = 0.0
+    for c in range(model.dimension):
+        rate += gradient[i, g, c] * v[i, c]
+    return rate
 
 
 @compiled
-def met_before(model, state, work, i, j, g, h):
-    """Return whether bodies cross the boundary of an open gap before the midpoint.
+def body_misses(model, state, work, i, h):
+    """Return whether a body crosses the boundary of an open gap, or sinks into a closed one.
 
-    After a whole step this was examined then.
+    The way is that to the next midpoint; that to this one was examined in the step before, if this
+    was a whole step.
     """
-    out = work.image
+    deep, unit = 2.0 * CURVATURE_DEPTH * model.gap_unit, model.gap_unit
+    for c in range(model.dimension):
+        work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
+    evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
+    if not state.watched[i]:
+        evaluate_gaps(model, work, i, state.q, work.gap_path, work.gradient_path)
+    for g in range(model.restitution.size):
+        f, following = work.gap[i, g], work.gap_next[i, g]
+        if state.touches[i, g]:
+            if following < -deep:
+                return True
+            continue
+        rate = rate_of(model, work.gradient, work.v_new, i, g)
+        after = rate_of(model, work.gradient_next, work.v_new, i, g)
+        if f > ZERO_GAP * unit and may_vanish(f, rate, following, after, h, deep):
+            return True
+        if not state.watched[i] and work.gap_path[i, g] > 0.0:
+            before = rate_of(model, work.gradient_path, state.v, i, g)
+            rate = rate_of(model, work.gradient, state.v, i, g)
+            if may_vanish(work.gap_path[i, g], before, f, rate, 0.5 * h, ZERO_GAP * unit):
+                return True
+    return False
+
+
+@compiled
+def pair_misses(model, state, work, i, j, g, h):
+    """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`."""
+    out, unit = work.image, model.gap_unit
+    gap_at(model, work, work.q_mid, work.v_new, i, j, g, 0.0, out)
+    f, rate = out[0], out[1]
+    gap_at(model, work, work.q_mid, work.v_new, i, j, g, h, out)
+    deep = 2.0 * CURVATURE_DEPTH * unit
+    if f > ZERO_GAP * unit and may_vanish(f, rate, out[0], out[1], h, deep):
+        return True
+    if state.watched[i] and state.watched[j]:
+        return False
     gap_at(model, work, state.q, state.v, i, j, g, 0.0, out)
     f, rate = out[0], out[1]
     gap_at(model, work, state.q, state.v, i, j, g, 0.5 * h, out)
-    return f > 0.0 and may_vanish(f, rate, out[0], out[1], 0.5 * h, ZERO_GAP * model.gap_unit)
+    return f > 0.0 and may_vanish(f, rate, out[0], out[1], 0.5 * h, ZERO_GAP * unit)
 
 
 @compiled
 def mark_misses(model, state, work, left, h):
     """Mark the islands with bodies that cross the boundary of a gap on their way."""
-    for i in range(model.bodies):
-        if not (state.alive[i] and work.awake[i]):
-            continue
-        for g in range(model.restitution.size):
-            if state.touches[i, g]:
-                if sinks(model, work, i, NONE, g, h, work.image):
-                    left[work.parent[i]] = 1
-                continue
-            rate = 0.0
-            for c in range(model.dimension):
-                rate += work.gradient[i, g, c] * work.v_new[i, c]
-            if misses(model, work, i, NONE, g, work.gap[i, g], rate, h) or (
-                not state.watched[i] and met_before(model, state, work, i, NONE, g, h)
-            ):
+    if model.restitution.size > 0:
+        for i in range(model.bodies):
+            if state.alive[i] and work.awake[i] and body_misses(model, state, work, i, h):
                 left[work.parent[i]] = 1
     slow = model.near * model.gap_unit
     if model.pair_kernel == 0 or 2.0 * travel(model, work, h) <= slow:
@@ -174,13 +197,7 @@ def mark_misses(model, state, work, left, h):
         if h * (work.speed[i] + work.speed[j]) <= slow:
             continue
         for g in range(model.pair_gaps):
-            if touching(model, state, i, j, g):
-                continue
-            gap_at(model, work, work.q_mid, work.v_new, i, j, g, 0.0, work.image)
-            if misses(model, work, i, j, g, work.image[0], work.image[1], h) or (
-                not (state.watched[i] and state.watched[j])
-                and met_before(model, state, work, i, j, g, h)
-            ):
+            if not touching(model, state, i, j, g) and pair_misses(model, state, work, i, j, g, h):
                 left[work.parent[i]] = left[work.parent[j]] = 1
 
 
@@ -220,9 +237,8 @@ def gather(model, state, work, root, time, index):
             state.watched[i] = 0
         work.waits[i], work.evaluated[i], work.disturbed[i] = 0 if inside else 1, 0, 0
         if inside and state.asleep[i]:
-            stays_asleep(
-                model, state, work, i, state.neighbour_impulse, model.step, time, index
-            )  # which books its work
+            others = state.neighbour_impulse
+            stays_asleep(model, state, work, i, others, model.step, time, index)  # books its work
             state.asleep[i] = 0
         work.awake[i] = 1 if inside else 0
         if not inside:
@@ -254,14 +270,16 @@ def refine(model, state, work, log, root, index, count):
         rest, time = H - state.elapsed[root], begin + state.elapsed[root]
         h, halved = min(next_length, rest), False
         blocks, island, worst = ZERO, NONE, 0.0
-        for _ in range(MOST_TRIES):
+        tries = 0
+        while True:
             if rest - h <= INSTANT * H:
                 h = rest
             why, blocks = solve_part(model, state, work, h, time, index)
             if why != DONE:
                 return why, count
             island, worst = worst_island(model, work)
-            if not exact:
+            tries += 1
+            if not exact or tries == MOST_TRIES:
                 break
             if worst > model.tolerance and h > SHORTEST_SOLVED * H:
                 h, halved = 0.5 * h, True
