@@ -72,5 +72,5 @@ if __name__ == "__main__":
         kinds = ", ".join(kind for kind, _ in signature.pattern.corners)
         print(f"{word}: {kinds}; corners, edges and faces {signature.pattern.counts}")
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
-    for path in draw(result, pair_map(LENGTHS, RODS, tolerance=1e-2), folder):
+    for path in draw(result, pair_map(LENGTHS, RODS, tolerance=0.1), folder):
         print(f"wrote {path}")
