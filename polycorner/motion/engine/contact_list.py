@@ -10,7 +10,7 @@ from polycorner.motion.engine.neighbours import key_of
 TOUCHING = 1e-7  # scaled gap up to which a contact is made
 PARTING = 100.0 * TOUCHING  # scaled gap beyond which a contact is lost
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
-INSTANT = 1e-11  # of a step: the shortest part, for an impact
+INSTANT = 1e-9  # of a step: the shortest part, for an impact
 REST, MOTION, EXIT, FAILED = np.int64(3), np.int64(4), np.int64(5), np.int64(6)
 
 

@@ -45,7 +45,7 @@ from polycorner.motion.engine.paths import (
 from polycorner.motion.engine.sleep import stays_asleep, wake
 from polycorner.motion.engine.stepping import attempt, commit
 
-LARGE = 128  # blocks of an island beyond which it takes whole steps
+LARGE = 48  # blocks of an island beyond which it takes whole steps
 SHORTEST_SOLVED = 1.0 / 16.0  # of a step, to which parts are halved to be solved
 MOST_PARTS = 100_000  # of one step, beyond which the rest is done at once
 MOST_SWEEPS, MEAN_SWEEPS = 1000, 50  # over islands, in all and for each part more, the same
