@@ -27,7 +27,7 @@ class FrictionContact(Value):
     static, dynamic : ConvexSet
         Admissible forces per unit load while it sticks and while it slips.
     gap : int
-        Number of the unilateral contact whose normal force is the load, or -1: the load is known.
+        Number of the contact or equation whose force is the load, or -1: the load is known.
     loads : tuple of int
         Numbers of the known loads whose sum is the load; empty if a contact presses.
     cause : str
@@ -55,7 +55,7 @@ class Body(Value):
     gaps : sequence of Call
         Kernels of the gaps between the body and its surroundings.
     contacts : tuple of str
-        Names of these gaps.
+        Names of these gaps, of the equations last.
     restitution : (m,) array
         Coefficient of restitution of each of them.
     units : (k,) array
@@ -63,6 +63,8 @@ class Body(Value):
         be compared.
     gap_unit : float
         Length by which gaps are scaled.
+    equations : int
+        How many of the gaps are equations: they remain zero, by forces of either sign.
     """
 
     formulation: Formulation
@@ -73,6 +75,7 @@ class Body(Value):
     restitution: Array
     units: Array
     gap_unit: float
+    equations: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,8 +69,8 @@ class Friction(Value):
     static : ConvexSet
         Forces per unit load that may hold it, of as many dimensions as ``slip``.
     load : str, sympy.Expr or sequence of sympy.Expr
-        The unilateral contact whose force presses, by name; or the known normal force as a
-        function of the coordinates (several: their sum).
+        The contact whose force presses, by name, or the equation, whose force presses with its
+        magnitude; or the known normal force as a function of the coordinates (several: their sum).
     dynamic : ConvexSet, optional
         Forces per unit load while it slips, inside ``static``; default ``static``.
     kind : str, optional
@@ -238,3 +238,24 @@ def _slip_family(rows: "tuple[sympy.Expr, ...]", variables: tuple[str, ...]) -> 
 def _plane(shape: ConvexSet) -> ConvexSet:
     """Return a set of two dimensions, of which the second is not used if there was but one."""
     return Disc(shape.upper) if isinstance(shape, Interval) else shape
+
+
+def position_of(
+    manifold: Manifold,
+    between: ContactFamily | None,
+    substrate: Mapping[str, float],
+    *,
+    several: bool,
+) -> tuple[int, int]:
+    """Return the two coordinates of a position; the first is that of the substrate."""
+    known, n = manifold.names, manifold.dimension
+    given = () if between is None else between.position
+    chosen = [known.index(name) for name in given] or list(range(min(2, n)))
+    moving = [known.index(name) for name in substrate]
+    if moving and moving[0] not in chosen:
+        if between is not None and several:
+            expected = f"a coordinate of the position, {', '.join(known[c] for c in chosen)}"
+            refuse("substrate", expected, next(iter(substrate)))
+        chosen = [moving[0]]
+    chosen.sort(key=lambda c: c not in moving)
+    return chosen[0], chosen[-1]

@@ -18,8 +18,9 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
                                         and ``|c_i| / h``
 ``c_i = gap_i(q_M + h v)``              what curvature adds to a gap where bodies slide or roll
 ``- gap_i - h J_i v``                   along each other, ``h |J_i v| <= 4 |c_i|``; else 0
+``J_j v+ = -(h_j(q_M) + c_j) / h``      an equation ``h_j = 0``, with ``lam_j`` of either sign
 ``L_b = h N_b(q_M)``                    known normal force
-``L_b = lam_i``                         friction on the unilateral contact ``i``
+``L_b = lam_i, |lam_j|``                friction on the contact ``i``, on the equation ``j``
 ``C_b``                                 static set if the contact stuck before, else dynamic
 ======================================  =====================================================
 
@@ -33,6 +34,11 @@ much within a step it is not the curvature met: where at ``q_M + h v+``, the nex
 nothing more happens, a gap is short of what was promised, ``min(0, gap_i + h bound_i + c_i)``, by
 more than ``BEND``, the step is solved once more with the bound raised by what is missing, a step
 of Newton's method for the gap itself.
+
+Equations are solved for until they hold at ``q_M + h v+``: on the midpoints of steps the scheme is
+SHAKE, symmetric and symplectic where forces have a potential and masses are constant ([HLW] sec.
+VII.1).  Where a step is shorter than the one before, or the first, ``q_M`` is moved onto the
+equations.  Of equations that follow from others, the later ones carry no force.
 
 Slip that reverses within a step was zero within it, and there it is the static set that decides
 whether it starts again: such a step is solved anew with the static set.

@@ -1,4 +1,4 @@
-"""Mechanical systems written in SymPy: energies, contacts, friction, any number of bodies."""
+"""Mechanical systems written in SymPy: energies, contacts, joints, friction, several bodies."""
 
 import math
 from collections.abc import Mapping
@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import instance, mapping, names, real, refuse, whole
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
-from polycorner.motion.contacts import ContactFamily, Friction
+from polycorner.motion.contacts import ContactFamily, Friction, position_of
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
 from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
+from polycorner.motion.placements import check_contacts, check_equations, check_velocities
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 
@@ -31,8 +32,9 @@ class System(MechanicalSystem):
     Parameters
     ----------
     polyhedron : Polyhedron
-        The placements of a body without overlap: an intersection of ``f_i(q) >= 0``.  Each
-        ``f_i`` is the gap of one contact with the surroundings.
+        The placements of a body without overlap: an intersection of ``f_i(q) >= 0``, the gaps of
+        its contacts with the surroundings, and of ``h_j(q) = 0``, its joints and rails.  Forces
+        of equations have either sign; that of ``h`` acts along its gradient.
     kinetic : sympy.Expr
         ``T(q, v)`` of a body, a quadratic form in the velocities (:func:`velocities`).
     potential : sympy.Expr, optional
@@ -71,10 +73,19 @@ class System(MechanicalSystem):
     >>> ball.state([0.0, 1.0], [1.0, 0.0]).v.tolist()
     [1.0, 0.0]
 
-    Three discs of radius 1 between two walls, the third on top of the others:
+    A bead on a wire, an equation; the force is that of the wire, along its gradient:
 
     >>> import sympy
-    >>> from polycorner.motion import ContactFamily, pair_coordinates, simulate
+    >>> from polycorner.motion import simulate
+    >>> wire = Polyhedron(M, {"wall": 1 - x}, equations={"wire": y - x**2})
+    >>> bead = System(wire, (vx**2 + vy**2) / 2, 9.81 * y)
+    >>> path = simulate(bead, bead.state([0.0, 0.0], [2.0, 0.0]), 0.001, 0.001)
+    >>> [(name, round(force, 1)) for _, name, force in path.touching[-1]]  # m (g + v^2 y'')
+    [('wire', 17.8)]
+
+    Three discs of radius 1 between two walls, the third on top of the others:
+
+    >>> from polycorner.motion import ContactFamily, pair_coordinates
     >>> (x1, y1), (x2, y2) = pair_coordinates(M)
     >>> distance = sympy.sqrt((x2 - x1) ** 2 + (y2 - y1) ** 2)
     >>> tray = Polyhedron(M, {"floor": y - 1, "left": x - 1, "right": 4 - x})
@@ -106,19 +117,16 @@ class System(MechanicalSystem):
 
     def __post_init__(self) -> None:
         instance("polyhedron", self.polyhedron, Polyhedron)
-        if self.polyhedron.equations or self.polyhedron.is_union:
-            msg = (
-                "polyhedron: expected an intersection of inequalities; got one with equations or "
-                "unions: choose coordinates without equations, or a convex piece"
-            )
-            raise ValueError(msg)
+        if self.polyhedron.is_union:
+            expected = "an intersection of inequalities and equations, such as a convex piece"
+            refuse("polyhedron", expected, self.polyhedron)
         object.__setattr__(self, "friction", tuple(self.friction))
         for friction in self.friction:
             if not isinstance(friction, Friction):
                 refuse("friction", "Friction values", friction, TypeError)
-            if isinstance(friction.load, str) and friction.load not in self.contacts:
+            if isinstance(friction.load, str) and friction.load not in self._normals:
                 expected = (
-                    f"one of the contacts {', '.join(self.contacts)} or an expression for "
+                    f"one of the contacts {', '.join(self._normals)} or an expression for "
                     f"friction {friction.name!r}"
                 )
                 refuse("load", expected, friction.load)
@@ -151,6 +159,11 @@ class System(MechanicalSystem):
         """Names of the unilateral contacts of a body with its surroundings."""
         return tuple(f.name for f in self.polyhedron.functions)
 
+    @property
+    def _normals(self) -> tuple[str, ...]:
+        """Names of all normal forces: of contacts, then of equations."""
+        return (*self.contacts, *self.polyhedron.equation_names)
+
     @cached_property
     def restitutions(self) -> Array:
         """Coefficient of restitution of each contact, ``(m,)``."""
@@ -178,9 +191,9 @@ class System(MechanicalSystem):
 
     @cached_property
     def owners(self) -> tuple[int, ...]:
-        """For each friction contact the unilateral contact that presses on it, or -1."""
+        """For each friction contact the contact, or else equation, that presses on it, or -1."""
         return tuple(
-            self.contacts.index(f.load) if isinstance(f.load, str) else -1 for f in self.friction
+            self._normals.index(f.load) if isinstance(f.load, str) else -1 for f in self.friction
         )
 
     @cached_property
@@ -208,14 +221,15 @@ class System(MechanicalSystem):
             self.parameters,
             friction,
             self.polyhedron.bundle.calls,
-            self.contacts,
-            self.restitutions,
+            self._normals,
+            np.append(self.restitutions, np.zeros(len(self.polyhedron.equations))),
             1 / scales,
             float(scales.min()),
+            len(self.polyhedron.equations),
         )
-        position, contacts = self._position(), None
-        if self.between is not None and self.count > 1:
-            contacts = self.between.compiled(self.manifold)
+        between = self.between if self.count > 1 else None
+        position = position_of(self.manifold, self.between, self.substrate, several=self.count > 1)
+        contacts = None if between is None else between.compiled(self.manifold)
         speed = sum(v / scales[coordinates.index(x)] for x, v in self.substrate.items())
         leaving = [(coordinates.index(x), limit) for x, limit in self.exits.items()]
         exit_at, limit = leaving[0] if leaving else (-1, 0.0)
@@ -223,26 +237,12 @@ class System(MechanicalSystem):
             body, self.count, contacts, position, float(speed), exit_at, float(limit)
         )
 
-    def _position(self) -> tuple[int, int]:
-        """Return the two coordinates of a position; the first is that of the substrate."""
-        known, n = self.manifold.names, self.manifold.dimension
-        given = () if self.between is None else self.between.position
-        chosen = [known.index(name) for name in given] or list(range(min(2, n)))
-        moving = [known.index(name) for name in self.substrate]
-        if moving and moving[0] not in chosen:
-            if self.between is not None and self.count > 1:
-                expected = f"a coordinate of the position, {', '.join(known[c] for c in chosen)}"
-                refuse("substrate", expected, next(iter(self.substrate)))
-            chosen = [moving[0]]
-        chosen.sort(key=lambda c: c not in moving)
-        return chosen[0], chosen[-1]
-
     # -------------------------------------------------------------------------------------- states
 
     def state(
         self, q: ArrayLike | Mapping[str, float], v: ArrayLike | None = None, time: float = 0.0
     ) -> State:
-        """Return a state, after checking that nothing overlaps.
+        """Return a state, after checking that nothing overlaps and that equations hold.
 
         A friction contact sticks where its slip is exactly zero.
 
@@ -251,7 +251,7 @@ class System(MechanicalSystem):
         q : (n,) or (count, n) array, or mapping from str to float
             Placement of the body, or of all bodies.
         v : array of the same shape, optional
-            Velocities; default those of the substrate.
+            Velocities, along all equations; default those of the substrate.
         time : float, optional
         """
         if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
@@ -269,20 +269,14 @@ class System(MechanicalSystem):
             if array.shape != shape or array.size != self.count * self.manifold.dimension:
                 refuse(argument, f"shape ({self.count}, {self.manifold.dimension})", array.shape)
         self.check_placement(places)
+        check_velocities(self.polyhedron, places, speeds)
         return State(real("time", time, unit="s"), places, speeds, self.sticks(places, speeds))
 
     def check_placement(self, q: Array) -> None:
-        """Raise ValueError if a contact overlaps, naming the worst."""
-        gaps = self.polyhedron.values(q).reshape(-1, len(self.contacts))
+        """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
+        check_contacts(self.polyhedron, q)
+        check_equations(self.polyhedron, q)
         deep = -OVERLAP * min(self.manifold.scales)
-        body, contact = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
-        if gaps[body, contact] < deep:
-            which = f" of body {body}" if self.count > 1 else ""
-            msg = (
-                f"q: expected a placement without overlap; contact {self.contacts[contact]!r}"
-                f"{which} overlaps by {-gaps[body, contact]:.6g}"
-            )
-            raise ValueError(msg)
         gap, (i, j), name = self.bodies.least_pair_gap(q.reshape(self.count, -1))
         if gap < deep:
             msg = (
@@ -338,6 +332,7 @@ class System(MechanicalSystem):
         }
         told |= {f"force {name}": str(force) for name, force in self.forces.items()}
         told |= {f"gap {f.name}": str(f.expression) for f in self.polyhedron.functions}
+        told |= {f"equation {h.name}": str(h.expression) for h in self.polyhedron.equations}
         told |= {
             f"friction {f.name}": f"{f.slip}, {f.static}, {f.moving}, {f.load}, {f.kind}"
             for f in self.friction

@@ -40,7 +40,8 @@ class Trajectory(Value, Printed):
     rests, present : (T, N) array of bool
         Which bodies are at rest on their substrate, and which have not left.
     touching : tuple of T tuples
-        Contacts that touch at each instant: bodies, name, and the force that presses.
+        Contacts that touch at each instant, and all equations: bodies, name, and the force, along
+        the gradient of the gap or equation.
     kinetic, potential : (T,) array
         Energies of the bodies that are present.
     dissipated : mapping from str to (T,) array

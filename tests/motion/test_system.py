@@ -27,7 +27,7 @@ from discs import (
 )
 from kept_files import same_motion as same
 
-from polycorner import Manifold, Polyhedron
+from polycorner import AnyOf, Manifold, Polyhedron
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.files import load_trajectory, save_trajectory
 from polycorner.motion import (
@@ -163,7 +163,7 @@ def run(**changes):
     return simulate(**given)
 
 
-UNION = Polyhedron(M, {"h": Y}, equations={"line": X})
+UNION = Polyhedron(M, AnyOf(X, Y))
 WRONG = [
     (lambda: floor(slip=(VX, VY)), ValueError, "slip"),
     (lambda: floor(static=0.5), TypeError, "static"),

@@ -136,6 +136,7 @@ class Model(NamedTuple):
     gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call
     gap_rows: Annotated[Any, whole("*")]  # gap of each output, or -1
     restitution: Annotated[Any, real("m")]  # of a body's contacts with its surroundings
+    unilateral: Annotated[Any, whole()]  # number of these contacts; further gaps are equations
     pair_kernel: Annotated[Any, whole()]  # address: gaps of a pair, or 0
     pair_parameters: Annotated[Any, whole()]  # their first parameter
     pair_reads: Annotated[Any, whole("* 2")]  # body 0 or 1, coordinate
@@ -237,6 +238,7 @@ class Work(NamedTuple):
     proof_normal: Annotated[Any, real("N m")]
     rested: Annotated[Any, whole("N")]  # `State.rests` before the step
     own_block: Annotated[Any, whole("m")]  # block of each gap of the body at hand, or -1
+    equation_rows: Annotated[Any, real("m k")]  # their gradients, made orthonormal with M^-1
     island_start: Annotated[Any, whole("N+1")]  # in `order`, for the body that represents it
     cursor: Annotated[Any, whole("N+1")]
     neighbours: Annotated[Any, whole("P 2")]
@@ -251,6 +253,7 @@ class Work(NamedTuple):
     contact_gradient: Annotated[Any, real("C 2*k")]
     block_bodies: Annotated[Any, whole("B 2")]  # the second is -1 for the surroundings
     block_rows: Annotated[Any, whole("B")]  # rows of friction; 0 for a unilateral contact
+    bilateral: Annotated[Any, whole("B")]  # whether a block is an equation
     pressing: Annotated[Any, whole("B")]  # block of the contact that presses, or -1
     block_set: Annotated[Any, whole("B")]  # set of admissible friction
     origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches

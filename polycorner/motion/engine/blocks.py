@@ -1,4 +1,4 @@
-"""Blocks of a step: the rows of contacts and of friction, their velocities and impulses."""
+"""Blocks of a step: the rows of contacts, equations and friction, their velocities and impulses."""
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP, detection_distance, heap_sort, key_of
 
 ELASTIC = 1e-6  # scaled travel in a step up to which an impact that bounces is slow
+DEPENDENT = 1e-4  # sine of the angle to other equations below which one follows from them
+STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothing
 
 
 @compiled
@@ -84,10 +86,50 @@ def least_velocity(model, work, gap, closed, before, free, change, bounce, h):
 
 
 @compiled
+def equation_offset(model, gap, change, h):
+    """Return ``d`` of the velocity ``J v + d = 0`` that keeps an equation where it is.
+
+    The midpoint is on it already: the equation holds at the next one if all steps are equal.
+    """
+    return change / h + gap / model.step
+
+
+@compiled
+def is_independent(model, work, i, g):
+    """Return whether an equation of a body does not follow from those before it.
+
+    The gradients of those that do not are made orthonormal with the inverse mass matrix.
+    """
+    k, row = model.dimension, work.equation_rows[g]
+    square, left = 0.0, 0.0
+    for c in range(k):
+        row[c] = work.gradient[i, g, c]
+    for other in range(model.unilateral, g + 1):
+        product = 0.0
+        base = work.equation_rows[other]
+        for c in range(k):
+            for a in range(k):
+                product += base[c] * work.inverse_mass[i, c, a] * row[a]
+        if other == g:
+            left = product
+        elif work.own_block[other] >= 0:
+            for c in range(k):
+                row[c] -= product * base[c]
+    for c in range(k):
+        for a in range(k):
+            square += work.gradient[i, g, c] * work.inverse_mass[i, c, a] * work.gradient[i, g, a]
+    if not left > DEPENDENT**2 * square:
+        return False
+    for c in range(k):
+        row[c] /= np.sqrt(left)
+    return True
+
+
+@compiled
 def new_block(work, b, k, first, second, rows):
     """Initialise a block with a Jacobian of zeros."""
     work.block_bodies[b, 0], work.block_bodies[b, 1], work.block_rows[b] = first, second, rows
-    work.pressing[b] = -1
+    work.bilateral[b], work.pressing[b] = ZERO, -1
     work.block_load[b] = 0.0
     for r in range(2):
         work.offset[b, r] = 0.0
@@ -112,6 +154,8 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         close = gap + h * min(before, free, 0.0) < limit
         if work.located[0]:
             close = acts(model, gap, before, model.restitution[g], closed)
+        if g >= model.unilateral:
+            close = closed = is_independent(model, work, i, g)
         if not close and not closed:
             state.normal[i, g], state.pressed[i, g] = 0.0, 0.0
             continue
@@ -125,12 +169,18 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         for c in range(k):
             work.jacobian[b, 0, c] = work.gradient[i, g, c]
         change = 0.0
-        if closed or not work.located[0]:
-            change = curvature_change(gap, before, work.gap_next[i, g], h, model.gap_unit)
-        least, work.bounces[b] = least_velocity(
-            model, work, gap, closed, before, free, change, model.restitution[g], h
-        )
-        work.offset[b, 0] = -least
+        if g >= model.unilateral:
+            if h > STRAIGHT * model.step:
+                change = work.gap_next[i, g] - gap - h * before
+            work.offset[b, 0] = equation_offset(model, gap, change, h)
+            work.bilateral[b], work.bounces[b] = ONE, ZERO
+        else:
+            if closed or not work.located[0]:
+                change = curvature_change(gap, before, work.gap_next[i, g], h, model.gap_unit)
+            least, work.bounces[b] = least_velocity(
+                model, work, gap, closed, before, free, change, model.restitution[g], h
+            )
+            work.offset[b, 0] = -least
         work.block_load[b] = -change
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
         work.impulse[b, 0] = state.normal[i, g] * share
@@ -234,6 +284,16 @@ def velocity_of(model, work, b, v, out):
             for c in range(k):
                 value += work.jacobian[b, r, k + c] * v[j, c]
         out[r] = value
+
+
+@compiled
+def load_on(work, b):
+    """Return the load on a friction contact: known, or an impulse, of an equation its magnitude."""
+    pressing = work.pressing[b]
+    if pressing < 0:
+        return work.block_load[b]
+    p = work.impulse[pressing, 0]
+    return abs(p) if work.bilateral[pressing] else p
 
 
 @compiled

@@ -105,7 +105,7 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
     u, out, C, share = work.slip, work.image, 0, h / model.step
     for b in range(blocks):
         kind = work.origin[b, 0]
-        if work.block_rows[b] > 0 or not takes_part(work, b):
+        if work.block_rows[b] > 0 or work.bilateral[b] or not takes_part(work, b):
             continue
         i, g = work.origin[b, 1], work.origin[b, 2]
         velocity_of(model, work, b, state.v, u)

@@ -97,6 +97,7 @@ class Engine:
         self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
         self.motion = allocate(State, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
+        self.motion.touches[:, self.model.unilateral :] = 1
         self._allocate()
 
     @property
@@ -222,7 +223,7 @@ class Engine:
         return values
 
     def touching(self) -> list[tuple[tuple[int, ...], str, float]]:
-        """Return the contacts that touch: bodies, name, and normal force."""
+        """Return the contacts that touch, and all equations: bodies, name, and normal force."""
         motion, h = self.motion, self.dt
         own: list[tuple[tuple[int, ...], str, float]] = [
             ((int(i),), self.bodies.body.contacts[g], float(motion.normal[i, g]) / h)

@@ -11,7 +11,7 @@ from polycorner.motion.engine.band import (
     row_product,
     solve_band,
 )
-from polycorner.motion.engine.blocks import velocity_of
+from polycorner.motion.engine.blocks import load_on, velocity_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.rest import REST_FACTOR
@@ -48,6 +48,13 @@ def find_interior_start(model, state, work, first, last, speed, goal):
                 work.carries[b] = 1.0
                 work.offset[b, 0] -= u[0]
             least = TARGET_PRESSURE * work.delassus[b, 3] * speed
+            if work.bilateral[b]:
+                if u[0] > REST_FACTOR * goal:
+                    return False
+                work.impulse[b, 0] = np.copysign(
+                    max(abs(work.impulse[b, 0]), least), work.impulse[b, 0]
+                )
+                continue
             work.impulse[b, 0] = max(work.impulse[b, 0], least) * work.carries[b]
             continue
         work.carries[b] = 1.0
@@ -60,7 +67,7 @@ def find_interior_start(model, state, work, first, last, speed, goal):
             work.block_rows[b] == 2 and abs(u[1]) > REST_FACTOR * goal
         ):
             return False
-        load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+        load = load_on(work, b)
         if model.set_kinds[shape] == INTERVAL or work.block_rows[b] == 1:
             work.impulse[b, 1] = 0.0
         tries = 0
@@ -97,7 +104,11 @@ def assemble_interior(model, work, first, last, n, width, speed):
         if work.block_rows[b] == 0 and work.carries[b] > 0.0:
             p = work.impulse[b, 0]
             slope = 1.0 / (TARGET_PRESSURE * work.delassus[b, 3] * speed) - 1.0 / p
-            derivative[b, 0], constant[b, 0], constant[b, 1] = 1.0 / (p * p), slope, slope
+            derivative[b, 0] = 1.0 / (p * p)
+            if work.bilateral[b]:  # the term of an equation in the sum is (n / n_0)^2 / 2
+                derivative[b, 0] = (TARGET_PRESSURE * work.delassus[b, 3] * speed) ** -2.0
+                slope = p * derivative[b, 0]
+            constant[b, 0], constant[b, 1] = slope, slope
             for c in range(2 * k):
                 work.schur_row[b, c] = work.jacobian[b, 0, c]
     for s in range(first, last):
@@ -105,8 +116,10 @@ def assemble_interior(model, work, first, last, n, width, speed):
         pressing, rows = work.pressing[b], work.block_rows[b]
         if rows == 0 or work.carries[b] == 0.0:
             continue
-        load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+        load = load_on(work, b)
         barrier(model, work.block_set[b], load, work.impulse[b, 0], work.impulse[b, 1], out)
+        if pressing >= 0 and work.impulse[pressing, 0] < 0.0:  # an equation that pulls
+            out[0], out[4], out[5] = -out[0], -out[4], -out[5]
         flat = rows == 1 or model.set_kinds[work.block_set[b]] == INTERVAL
         if flat:
             x00, x01, x11 = 1.0 / out[6], 0.0, 0.0
@@ -219,12 +232,17 @@ def in_interior(model, work, first, last, share):
             continue
         x = p[b, 0] + share * best[b, 0]
         if work.block_rows[b] == 0:
-            if x <= INTERIOR_MARGIN * p[b, 0]:
+            if not work.bilateral[b] and x <= INTERIOR_MARGIN * p[b, 0]:
                 return False
             continue
         pressing = work.pressing[b]
         y = p[b, 1] + share * best[b, 1]
-        load = work.block_load[b] if pressing < 0 else p[pressing, 0] + share * best[pressing, 0]
+        load = work.block_load[b]
+        if pressing >= 0:  # which keeps its sign
+            load = p[pressing, 0] + share * best[pressing, 0]
+            load = load if p[pressing, 0] > 0.0 else -load
+        if load <= 0.0:
+            return False
         if not contains(model, work.block_set[b], x, y, load, -INTERIOR_MARGIN):
             return False
     return True
@@ -293,8 +311,9 @@ def find_equilibrium(model, state, work, first, last, speed):
     impulses in the sets that balance the forces?  They are sought in the interior, at the minimum
     of ``sum n / n_0 - sum log(distance from the boundary)`` over the balanced ones, by Newton's
     method from an infeasible start ([BV] sec. 10.3; the first sum excludes forces that grow without
-    bound in a jam).  Impulses far from the boundary can still balance when the loads change a
-    little, so that the pile can sleep.
+    bound in a jam; an equation has ``(n / n_0)^2 / 2`` instead, and its ``n`` keeps its sign where
+    friction depends on it).  Impulses far from the boundary can still balance when the loads change
+    a little, so that the pile can sleep.
     """
     k = model.dimension
     n, width = number_bodies(model, state, work, first, last)

@@ -4,11 +4,14 @@ import numpy as np
 
 from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.engine.jit import compiled
-from polycorner.motion.engine.linear_algebra import invert
+from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
 from polycorner.motion.engine.random import gaussian
 
 # Change of a velocity, relative to the speed, below which forces are those of the step.
 SETTLED = 1e-14
+ON_EQUATIONS = 1e-10  # scaled distance up to which a body is on its equations
+MOST_APPROACHES = 8  # Newton steps onto them
+BENDING = 1e-8  # weight of the change of place, relative to the equations
 
 
 @compiled
@@ -43,6 +46,8 @@ def evaluate_body(model, state, work, i, h, time, index):
         if model.kicks[c] > 0.0:
             draw = gaussian(model.seed, index, i, 32 + c) * (h / model.step)
             work.kick[i, c] = model.kicks[c] * np.sqrt(model.step) * draw
+    if model.unilateral < model.restitution.size:
+        approach_equations(model, work, i)
     at = evaluate_forces(model, work, i, state.v, h)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))
@@ -68,6 +73,36 @@ def evaluate_body(model, state, work, i, h, time, index):
                 size += abs(slope * state.v[i, c])
             work.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
     evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+
+
+@compiled
+def approach_equations(model, work, i):
+    """Move the midpoint of a body onto its equations, if it is not there.
+
+    After equal steps it is: this is needed at the start, and after shorter steps.  The steps are
+    Gauss and Newton's, of least length in scaled coordinates; equations may be redundant.
+    """
+    k, A, x = model.dimension, work.body_matrix, work.body_vector
+    for _ in range(MOST_APPROACHES):
+        evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+        worst = 0.0
+        for c in range(k):
+            x[c] = 0.0
+            for a in range(k):
+                A[c, a] = BENDING * model.units[c] ** 2 if a == c else 0.0
+        for g in range(model.unilateral, model.restitution.size):
+            row, size = work.gradient[i, g], 0.0
+            for c in range(k):
+                size += (row[c] / model.units[c]) ** 2
+            if size > 0.0:
+                worst = max(worst, abs(work.gap[i, g]) / np.sqrt(size))
+                add_square(A, row, 1.0 / size, k)
+                for c in range(k):
+                    x[c] -= work.gap[i, g] / size * row[c]
+        if not worst > ON_EQUATIONS or not solve_spd(A, x, k):
+            return
+        for c in range(k):
+            work.q_mid[i, c] += x[c]
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from polycorner.motion.engine.blocks import apply_impulse, velocity_of
+from polycorner.motion.engine.blocks import apply_impulse, load_on, velocity_of
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.sets import contains, project
 
@@ -13,7 +13,7 @@ def relax_block(model, work, b, u, out):
     pressing = work.pressing[b]
     if (
         pressing >= 0
-        and work.impulse[pressing, 0] <= 0.0
+        and load_on(work, b) <= 0.0
         and work.impulse[b, 0] == 0.0
         and work.impulse[b, 1] == 0.0
     ):
@@ -22,12 +22,14 @@ def relax_block(model, work, b, u, out):
     rho = work.delassus[b, 3]
     if work.block_rows[b] == 0:
         p = work.impulse[b, 0]
-        new = max(0.0, p - u[0] * rho)
+        new = p - u[0] * rho
+        if not work.bilateral[b]:
+            new = max(0.0, new)
         if new != p:
             apply_impulse(model, work, b, ZERO, new - p)
             work.impulse[b, 0] = new
         return abs(new - p) / rho
-    load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+    load = load_on(work, b)
     shape = work.block_set[b]
     x, y = work.impulse[b, 0], work.impulse[b, 1]
     if work.block_rows[b] == 1:
@@ -60,11 +62,12 @@ def residual(model, work, first, last, u, out):
         b = work.order[s]
         velocity_of(model, work, b, work.v_new, u)
         rho = work.delassus[b, 3]
-        if work.block_rows[b] == 0:
+        if work.bilateral[b]:
+            far = abs(u[0])
+        elif work.block_rows[b] == 0:
             far = abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
         else:
-            pressing = work.pressing[b]
-            load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+            load = load_on(work, b)
             y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0
             project(model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load, out)
             far = abs(out[0] - work.impulse[b, 0]) / rho

@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
 from polycorner.motion.engine.band import number_bodies
-from polycorner.motion.engine.blocks import velocity_of
+from polycorner.motion.engine.blocks import STRAIGHT, equation_offset, velocity_of
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
@@ -16,6 +16,8 @@ from polycorner.motion.engine.paths import CURVATURE_DEPTH
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in the first round, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; the next rounds multiply this by powers of three
 CYCLE_ROUNDS = 3
+MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
+MISSED = 1e-12  # scaled gap up to which an equation holds
 ROUND_SWEEPS = 10
 
 
@@ -136,13 +138,17 @@ def solve_island(model, state, work, first, last):
 
 @compiled
 def solve_islands(model, state, work, blocks, h):
-    """Solve all islands; those in which gaps would close by their curvature, a second time."""
+    """Solve all islands; those in which gaps would close by their curvature, a second time.
+
+    Equations are solved for until they hold at the next midpoint.
+    """
     starts = work.island_start
-    for attempt in range(2):
+    most = 2 if model.unilateral == model.restitution.size else MOST_CORRECTIONS
+    for attempt in range(most):
         for i in range(model.bodies):
             if starts[i + 1] > starts[i] and (attempt == 0 or work.curves_shut[i]):
                 work.island_residual[i] = solve_island(model, state, work, starts[i], starts[i + 1])
-        if attempt == 1 or not correct_curvature(model, state, work, blocks, h):
+        if attempt == most - 1 or not correct_curvature(model, state, work, blocks, h):
             break
 
 
@@ -182,6 +188,9 @@ def correct_curvature(model, state, work, blocks, h):
             first, second = i, j
             gap = work.contact_gap[work.origin[b, 1]]
             following = work.scratch[model.pair_reads.shape[0] + g]
+        if work.bilateral[b]:
+            found = bend_equation(model, work, b, gap, following, h) or found
+            continue
         target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
         if following < target - CURVATURE_DEPTH * model.gap_unit:
             velocity_of(model, work, b, work.v_new, u)
@@ -190,3 +199,19 @@ def correct_curvature(model, state, work, blocks, h):
             work.curves_shut[island_of(work, b)] = 1
             found = True
     return found
+
+
+@compiled
+def bend_equation(model, work, b, gap, following, h):
+    """Correct an equation that does not hold at the next midpoint; return whether it does not."""
+    if h <= STRAIGHT * model.step:
+        return False
+    u, speed = work.slip, work.island_speed[work.block_bodies[b, 0]]
+    missed = abs(following - gap + h * gap / model.step)
+    if missed <= MISSED * model.gap_unit + model.tolerance * h * speed:
+        return False
+    velocity_of(model, work, b, work.v_new, u)
+    work.block_load[b] = gap + h * (u[0] - work.offset[b, 0]) - following
+    work.offset[b, 0] = equation_offset(model, gap, -work.block_load[b], h)
+    work.curves_shut[island_of(work, b)] = 1
+    return True

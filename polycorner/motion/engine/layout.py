@@ -39,6 +39,7 @@ def model_of(
         "exit_coordinate": bodies.exit_coordinate,
         "exit_limit": bodies.exit_limit,
         "restitution": body.restitution,
+        "unilateral": len(body.contacts) - body.equations,
         "gap_unit": body.gap_unit,
         "chatter": noise.chatter,
         "correlation_time": noise.correlation_time,

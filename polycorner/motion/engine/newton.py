@@ -9,7 +9,7 @@ from polycorner.motion.engine.band import (
     row_product,
     solve_band,
 )
-from polycorner.motion.engine.blocks import apply_impulse, velocity_of
+from polycorner.motion.engine.blocks import apply_impulse, load_on, velocity_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.sets import project
@@ -92,17 +92,16 @@ def linearise(model, work, first, last, n, width, softness, u, out):
         rho = work.delassus[b, 3]
         if work.block_rows[b] == 0:
             p = work.impulse[b, 0]
-            if p - rho * u[0] <= 0.0:
+            if p - rho * u[0] <= 0.0 and not work.bilateral[b]:
                 derivative[b, 4], constant[b, 0] = 0.0, -p
             else:
                 derivative[b, 4], constant[b, 0] = rho / softness, -rho * u[0] / softness
         else:
             linearise_friction(model, work, b, softness, u, out)
-        pressing = work.pressing[b]
         if work.block_rows[b] == 0:
             loaded = derivative[b, 4] > 0.0
         else:
-            loaded = pressing < 0 or work.impulse[pressing, 0] > 0.0
+            loaded = work.pressing[b] < 0 or load_on(work, b) > 0.0
         if loaded:
             add_block(model, work, b, width)
         for r in range(max(1, work.block_rows[b])):
@@ -114,7 +113,7 @@ def linearise_friction(model, work, b, softness, u, out):
     """Linearise the natural map of one friction contact."""
     derivative, rho = work.derivative, work.delassus[b, 3]
     d, pressing = work.block_rows[b], work.pressing[b]
-    load = work.block_load[b] if pressing < 0 else work.impulse[pressing, 0]
+    load = load_on(work, b)
     px, py = work.impulse[b, 0], work.impulse[b, 1] if d == 2 else 0.0
     zx, zy = px - rho * u[0], py - rho * u[1] if d == 2 else 0.0
     project(model, work.block_set[b], zx, zy, load, out)
@@ -123,12 +122,13 @@ def linearise_friction(model, work, b, softness, u, out):
     if d == 1:
         d01 = d10 = d11 = 0.0
     if pressing >= 0 and load > 0.0:  # the load changes as well
-        change = work.constant[pressing, 0] / load
+        per_load = load if work.impulse[pressing, 0] > 0.0 else -load
+        change = work.constant[pressing, 0] / per_load
         ex = out[0] - d00 * zx - d01 * zy
         ey = out[1] - d10 * zx - d11 * zy if d == 2 else 0.0
         fx -= ex * change
         fy -= ey * change
-        stiff = derivative[pressing, 4] / load
+        stiff = derivative[pressing, 4] / per_load
         ex *= stiff
         ey *= stiff
     else:

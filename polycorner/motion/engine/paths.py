@@ -118,9 +118,10 @@ def first_in_gap(model, state, work, i, j, g, acting, h, out):
 
 @compiled
 def sinks(model, work, i, j, g, h, out):
-    """Return whether a contact that presses is overlapped at the next midpoint."""
+    """Return whether a contact overlaps, or an equation does not hold, at the next midpoint."""
     gap_at(model, work, work.q_mid, work.v_new, i, j, g, h, out)
-    return out[0] < -2.0 * CURVATURE_DEPTH * model.gap_unit
+    deep = 2.0 * CURVATURE_DEPTH * model.gap_unit
+    return out[0] < -deep or (j < 0 and g >= model.unilateral and out[0] > deep)
 
 
 @compiled

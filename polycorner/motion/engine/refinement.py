@@ -147,7 +147,7 @@ def body_misses(model, state, work, i, h):
     for g in range(model.restitution.size):
         f, following = work.gap[i, g], work.gap_next[i, g]
         if state.touches[i, g]:
-            if following < -deep:
+            if following < -deep or (g >= model.unilateral and following > deep):
                 return True
             continue
         rate = rate_of(model, work.gradient, work.v_new, i, g)

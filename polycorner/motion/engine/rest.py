@@ -12,9 +12,34 @@ REST_FACTOR = 10.0  # multiple of the tolerance up to which a velocity counts as
 @compiled
 def load_of(model, work, lam, i, f):
     """Return the normal impulse that presses on a friction contact of a body."""
-    if model.pressing_gap[f] < 0:
+    pressing = model.pressing_gap[f]
+    if pressing < 0:
         return work.load[i, f]
-    return lam[i, model.pressing_gap[f]]
+    return abs(lam[i, pressing]) if pressing >= model.unilateral else lam[i, pressing]
+
+
+@compiled
+def holds(model, lam, i, g):
+    """Return whether a gap of a body remains zero at rest: it is pressed, or an equation."""
+    return g >= model.unilateral or lam[i, g] > 0.0
+
+
+@compiled
+def compliance(model, work, lam, i, g):
+    """Return the weight of a normal impulse in the least change that restores balance.
+
+    It is the impulse squared; for an equation at least that of the impulse that would take the
+    kinetic energy of all forces.
+    """
+    k, square, weight = model.dimension, 0.0, 0.0
+    if g < model.unilateral:
+        return lam[i, g] ** 2
+    for c in range(k):
+        for a in range(k):
+            entry = work.inverse_mass[i, c, a]
+            weight += work.gradient[i, g, c] * entry * work.gradient[i, g, a]
+            square += work.force[i, c] * entry * work.force[i, a]
+    return max(lam[i, g] ** 2, square / weight if weight > 0.0 else 0.0)
 
 
 @compiled
@@ -27,7 +52,7 @@ def find_rest_velocity(model, work, lam, i, out):
         for a in range(k):
             A[c, a] = 0.0
     for g in range(model.restitution.size):
-        if lam[i, g] > 0.0:
+        if holds(model, lam, i, g):
             add_square(A, work.gradient[i, g], 1.0, k)
     for f in range(F):
         if load_of(model, work, lam, i, f) > 0.0:
@@ -51,7 +76,7 @@ def keeps_contacts(model, work, lam, i, v):
     """Return whether no loaded contact of a body slips or opens at a velocity."""
     k = model.dimension
     for g in range(model.restitution.size):
-        if lam[i, g] > 0.0:
+        if holds(model, lam, i, g):
             value, size = 0.0, 0.0
             for c in range(k):
                 value += work.gradient[i, g, c] * v[c]
@@ -102,8 +127,8 @@ def balances(model, state, work, i, others, again, slack):
             A[c, a] = 0.0
     for g in range(m):
         lam[i, g] = state.normal[i, g]
-        if lam[i, g] > 0.0:
-            add_square(A, work.gradient[i, g], lam[i, g] ** 2, k)
+        if holds(model, lam, i, g):
+            add_square(A, work.gradient[i, g], compliance(model, work, lam, i, g), k)
             for c in range(k):
                 r[c] -= lam[i, g] * work.gradient[i, g, c]
     for f in range(F):
@@ -119,12 +144,12 @@ def balances(model, state, work, i, others, again, slack):
     if not keeps_contacts(model, work, state.normal, i, state.v[i]) or not solve_spd(A, r, k):
         return False
     for g in range(m):
-        if lam[i, g] > 0.0:
+        if holds(model, lam, i, g):
             change = 0.0
             for c in range(k):
                 change += work.gradient[i, g, c] * r[c]
-            lam[i, g] += state.normal[i, g] ** 2 * change
-            if lam[i, g] < 0.0:
+            lam[i, g] += compliance(model, work, state.normal, i, g) * change
+            if lam[i, g] < 0.0 and g < model.unilateral:
                 return False
     for f in range(F):
         before = load_of(model, work, state.normal, i, f)

@@ -6,7 +6,13 @@ from polycorner.motion.engine.arrays import CONTACTS, PAIR_FRICTION, PAIR_GAP, S
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.partition import root_of
-from polycorner.motion.engine.rest import SLEEP_MARGIN, comes_to_rest, load_of, remains_at_rest
+from polycorner.motion.engine.rest import (
+    SLEEP_MARGIN,
+    comes_to_rest,
+    holds,
+    load_of,
+    remains_at_rest,
+)
 from polycorner.motion.engine.sets import contains
 
 LONGEST_SLEEP = np.int64(50)  # most steps between two checks of a sleeper
@@ -110,7 +116,7 @@ def next_check(model, state, work, i, h, index):
         if model.kicks[c] > 0.0:
             return index + 1
     for g in range(model.restitution.size):
-        if work.proof_normal[i, g] > 0.0:
+        if holds(model, work.proof_normal, i, g):
             return index + 1
     if model.chatter > 0.0:  # the next draw comes at a known time
         now = np.floor((index + 0.5) * h / model.correlation_time)

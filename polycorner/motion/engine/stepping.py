@@ -2,12 +2,12 @@
 
 There are ``N`` identical bodies with ``k`` coordinates each; a system that is not repeated is one
 body.  Their equations of motion, gaps and slip velocities are kernels called by address.  The
-unknowns of a step are impulses in *blocks*: a unilateral contact is a block of one row, a friction
-contact one of one or two.  Each block knows the bodies it acts on, its Jacobian and, for friction,
-the block of the contact that presses on it.  A step
+unknowns of a step are impulses in *blocks*: a unilateral contact or an equation is a block of one
+row, a friction contact one of one or two.  Each block knows the bodies it acts on, its Jacobian
+and, for friction, the block of the contact that presses on it.  A step
 
-1. drifts half a step, evaluates the bodies, and wakes those that can no longer remain at rest
-   (:mod:`~polycorner.motion.engine.sleep`);
+1. drifts half a step, onto the equations, evaluates the bodies, and wakes those that can no longer
+   remain at rest (:mod:`~polycorner.motion.engine.sleep`);
 2. assembles the blocks of the awake bodies and of the contacts between them, and partitions them
    into islands;
 3. solves each island by Gauss-Seidel sweeps over the blocks and Newton's method on the natural map
@@ -90,6 +90,8 @@ def book_work(model, state, work, blocks, h):
         if not takes_part(work, b):
             continue
         kind = work.origin[b, 0]
+        if work.bilateral[b]:
+            continue
         if work.block_rows[b] == 0:
             velocity_of(model, work, b, state.v, u)
             x = u[0]
