@@ -6,6 +6,8 @@ from polycorner.motion.mechanics import OVERLAP
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
 
+STEPS = 4  # onto equations that nearly hold
+
 
 def check_contacts(polyhedron: Polyhedron, q: Array) -> None:
     """Raise ValueError if a contact overlaps, naming the worst.
@@ -65,6 +67,15 @@ def check_velocities(polyhedron: Polyhedron, q: Array, v: Array) -> None:
                 f"{_which(at)}; they change it at the rate {rates[at]:.6g}"
             )
             raise ValueError(msg)
+
+
+def onto_equations(polyhedron: Polyhedron, q: Array) -> Array:
+    """Return the place ``(n,)`` on the equations to which Gauss and Newton's steps lead."""
+    scales = polyhedron.manifold.scale_array
+    for _ in range(STEPS if polyhedron.equations else 0):
+        step = np.linalg.lstsq(_slopes(polyhedron, q), polyhedron.equation_values(q), rcond=None)[0]
+        q = q - scales * step
+    return q
 
 
 def _slopes(polyhedron: Polyhedron, q: Array) -> Array:

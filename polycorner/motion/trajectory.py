@@ -12,6 +12,7 @@ from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.mechanics import MechanicalSystem
 from polycorner.motion.noise import Noise, Solver
+from polycorner.motion.placements import onto_equations
 from polycorner.motion.system import System
 from polycorner.printing import Printed, Sheet, Table, facts, listed, number, titled
 from polycorner.spaces.manifold import Array
@@ -172,7 +173,7 @@ class Trajectory(Value, Printed):
         return [event for event in self.events if event.kind == kind]
 
     def stratum(self, index: int, *, tolerance: float = 1e-6) -> "Stratum":
-        """Return the face of the polyhedron at a recorded instant.
+        """Return the face of the polyhedron at a recorded instant, moved onto the equations.
 
         Only for a :class:`~polycorner.motion.system.System` of one body.
         """
@@ -181,7 +182,8 @@ class Trajectory(Value, Printed):
         if not isinstance(self.system, System) or self.q.shape[1] != 1:
             msg = f"stratum: expected the trajectory of a System of one body; got {self!r}"
             raise TypeError(msg)
-        return stratum_at(self.system.polyhedron, self.q[index, 0], tolerance=tolerance)
+        place = onto_equations(self.system.polyhedron, self.q[index, 0])
+        return stratum_at(self.system.polyhedron, place, tolerance=tolerance)
 
     def at(self, time: float) -> int:
         """Return the index of the last recorded instant that is not after ``time``."""

@@ -11,11 +11,26 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_step import solve_step
 from scipy.integrate import solve_ivp
+from scipy.linalg import null_space
+from step_inclusion import assemble
 
 from polycorner import AnyOf, Friction, Manifold, Polyhedron, System, velocities
 from polycorner.files.trajectories import load_trajectory, save_trajectory
-from polycorner.motion import Checkpoint, Disc, EventKind, Interval, Solver, simulate
+from polycorner.motion import (
+    Checkpoint,
+    Disc,
+    EventKind,
+    Interval,
+    Noise,
+    Solver,
+    simulate,
+    time_symbol,
+)
+from polycorner.motion.engine.driver import Engine
+from polycorner.motion.mechanics import State
+from polycorner.motion.placements import onto_equations
 
 G = 9.81
 PLANE, LINK = Manifold.euclidean("x y"), Manifold.euclidean("x y a")
@@ -468,6 +483,135 @@ def test_several_bodies_each_have_their_rail():
     for i, start in enumerate(starts):
         alone = simulate(system, system.state(*start), 1.0, 1e-3)
         assert np.array_equal(alone.q[:, 0], together.q[:, i])
+
+
+# -------------------------------------------------------------------- one step, noise and sleep
+
+
+def constrained(seed):
+    """A random system with curved equations, contacts and friction, and the same without the first.
+
+    Mass matrices depend on the place, forces on the velocity.
+    """
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 6))
+    M = Manifold.euclidean(" ".join(f"q{i}" for i in range(n)))
+    q, v = sp.Matrix(M.symbols), sp.Matrix(velocities(M))
+
+    def linear(of):
+        return (sp.Matrix(rng.normal(size=n).round(3)).T * of)[0]
+
+    root = sp.Matrix(rng.normal(size=(n, n)).round(2))
+    kinetic = (v.T * (root * root.T + sp.eye(n)) * v)[0] / 2 + v[0] ** 2 * sp.cos(q[1]) / 3
+    equations = {f"h{j}": linear(q) + linear(q) ** 2 / 3 for j in range(rng.integers(1, n - 1))}
+    gaps = {f"g{i}": linear(q) for i in range(2)}
+    friction = (
+        Friction("pressed", [linear(v)], Interval(0.3), load="g0"),
+        Friction("known", [linear(v), linear(v) - 0.1], Disc(0.4), load=3 + sp.sin(q[0])),
+    )
+    rest = (kinetic, 3 * linear(q), {"q1": -v[1] / 5}, friction, 0.5)
+    joined = System(Polyhedron(M, gaps, equations=equations), *rest)
+    return joined, System(Polyhedron(M, gaps), *rest), rng
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_step_solves_the_inclusion_in_the_tangent_space(seed):
+    """The convex programme, in velocities ``v0 + N y`` that keep the equations."""
+    system, loose, rng = constrained(seed)
+    dt, n, m = 1e-3, system.manifold.dimension, len(system.contacts)
+    places = (onto_equations(system.polyhedron, dt * rng.normal(size=n)) for _ in range(100))
+    middle = next(place for place in places if system.polyhedron.values(place).min() >= 0)
+    rows = system.polyhedron.bundle.evaluate(middle, 1)[1][m:]
+    v = null_space(rows) @ rng.normal(size=n - len(rows))
+    state = State(0.0, middle - dt / 2 * v, v, np.zeros(2, dtype=bool))
+    engine = Engine(
+        system.bodies,
+        state.q[None],
+        v[None],
+        state.sticking[None],
+        dt,
+        noise=Noise(),
+        solver=Solver(1e-11, refine=False),
+    )
+    engine.advance(1)
+    after, normal = engine.motion.v[0], engine.motion.normal[0]
+    assert abs(system.polyhedron.equation_values(middle + dt * after)).max() < 1e-11
+    base, tangent = np.linalg.pinv(rows) @ rows @ after, null_space(rows)
+    problem = assemble(loose, state, dt, after)
+    mass = tangent.T @ problem.mass @ tangent
+    blocks = tuple(
+        replace(b, matrix=b.matrix @ tangent, drift=b.drift + b.matrix @ base)
+        for b in problem.blocks
+    )
+    smaller = replace(
+        problem,
+        mass=mass,
+        v_free=np.linalg.solve(mass, tangent.T @ problem.mass @ (problem.v_free - base)),
+        normals=problem.normals @ tangent,
+        bounds=problem.bounds - problem.normals @ base,
+        blocks=blocks,
+    )
+    expected = base + tangent @ solve_step(smaller).velocity
+    assert after == pytest.approx(expected, abs=1e-8)
+    impulse = np.vstack([problem.normals, rows]).T @ normal
+    for block, p in zip(problem.blocks, engine.motion.friction[0], strict=True):
+        impulse += block.matrix.T @ p[: len(block.matrix)]
+    assert problem.mass @ (after - problem.v_free) == pytest.approx(impulse, abs=1e-8)
+
+
+def test_random_kicks_remain_on_the_equations():
+    system = pendulum(1.0)
+    kicks = Noise(kicks={"x": 0.5, "y": 0.3}, seed=3)
+    begin = system.state(*on_circle(1.0, 1.0, 2.0))
+    path = simulate(system, begin, 3.0, 1e-3, noise=kicks, every=1)
+    assert path.converged
+    assert holds_at_midpoints(path)
+    assert path.work["noise"][-1] != 0
+    assert path.audit < 1e-5
+
+
+@pytest.mark.parametrize("rate", [1.0, -3.0])
+def test_a_growing_force_starts_a_bead_that_sleeps_on_a_rail(rate):
+    """At ``|rate| t = mu m g``."""
+    rub = Friction("rub", [VX], Interval(0.2), load="rail")
+    rail = Polyhedron(PLANE, {}, equations={"rail": Y})
+    system = System(rail, FREE, G * Y, {"x": rate * time_symbol()}, friction=(rub,))
+    path = simulate(system, system.state([0, 0]), 2.5, 1e-3)
+    (begun,) = path.of_kind(EventKind.MOTION)
+    assert begun.time == pytest.approx(0.2 * G / abs(rate), abs=2e-3)
+    late = 2.5 - 0.2 * G / abs(rate)
+    assert path.v[-1, 0] == pytest.approx([rate * late**2 / 2, 0], abs=5e-3)
+
+
+def test_a_guided_block_sleeps_on_its_belt():
+    """An equation along the belt: it is carried, at rest; one across it lets it slide."""
+    M = Manifold.euclidean("x y z")
+    (x, y, z), (u, v, w) = M.symbols, velocities(M)
+    rub = Friction("rub", [u - 2, v], Disc(0.5), load="floor")
+    kinetic = (u**2 + v**2 + w**2) / 2
+    for slope in (0.0, 0.2):
+        guide = Polyhedron(M, {"floor": z}, equations={"guide": y - slope * x})
+        system = System(guide, kinetic, G * z, friction=(rub,), substrate={"x": 2.0})
+        path = simulate(system, system.state([0, 0, 0], [0, 0, 0] if slope else None), 3.0, 1e-3)
+        pace = 2 / (1 + slope**2)  # at which the slip is across the guide
+        assert path.v[-1, 0] == pytest.approx([pace, slope * pace, 0], abs=1e-9)
+        assert path.rests[-1, 0] == (slope == 0)
+        assert path.audit < 1e-9
+        assert forces(path)["floor"] == pytest.approx(G)
+        across = 0.5 * G / math.sqrt(1 + slope**2) if slope else 0.0
+        assert forces(path)["guide"] == pytest.approx(across, abs=1e-4)
+        if slope == 0:
+            assert path.effort.islands < 5
+
+
+def test_the_stratum_of_an_instant_is_on_the_equations():
+    system = System(
+        Polyhedron(PLANE, {"wall": X + 2}, equations={"rod": X**2 + Y**2 - 1}), FREE, G * Y
+    )
+    path = simulate(system, system.state(*on_circle(1.0, 1.0, 2.0)), 0.5, 0.01)
+    found = path.stratum(-1)
+    assert (found.dimension, found.active) == (1, ())
+    assert "OUTSIDE" not in str(found)
 
 
 # -------------------------------------------------------------------------- input, files, resume
