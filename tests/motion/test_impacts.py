@@ -200,7 +200,7 @@ def test_kicked_bodies_bounce_where_they_are():
 def test_what_is_not_solved_is_an_event():
     """A tolerance below rounding cannot be met."""
     drum = DumbbellDrum(count=5, floor=True)
-    state, strict = drum.state(bunch(drum, np.random.default_rng(3))), Solver(tolerance=1e-17)
+    state, strict = drum.state(bunch(drum, np.random.default_rng(3))), Solver(tolerance=1e-19)
     path = simulate(drum, state, 0.05, 1e-3, noise=Noise(chatter=0.3), solver=strict)
     failed = path.of_kind(EventKind.FAILED)
     assert len(failed) == path.effort.unconverged > 0

@@ -230,6 +230,7 @@ class Work(NamedTuple):
     parent: Annotated[Any, whole("N")]  # in the union-find forest
     v_free: Annotated[Any, real("N k")]  # velocities after forces alone
     v_new: Annotated[Any, real("N k")]  # velocities after the step
+    v_rest: Annotated[Any, real("N k")]  # velocities of bodies at which they would be at rest
     v_mean: Annotated[Any, real("N k")]  # mean velocities of the step
     former_force: Annotated[Any, real("N k")]  # `force` with the mean velocities before
     neighbour_impulse: Annotated[Any, real("N k")]
@@ -258,6 +259,7 @@ class Work(NamedTuple):
     block_set: Annotated[Any, whole("B")]  # set of admissible friction
     origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches
     block_load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
+    is_error: Annotated[Any, whole("B")]  # whether a gap is so small that it may be left as it is
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
     jacobian: Annotated[Any, real("B 2 2*k")]  # J
     response: Annotated[Any, real("B 2 2*k")]  # M^-1 J'
@@ -270,6 +272,8 @@ class Work(NamedTuple):
     release: Annotated[Any, real("B")]  # when its normal impulse would vanish
     best: Annotated[Any, real("B 2")]  # impulses of the least residual; Newton direction
     initial: Annotated[Any, real("B 2")]  # impulses before an equilibrium was sought
+    rigid: Annotated[Any, real("B 2")]  # impulses before a continuation
+    loaded: Annotated[Any, real("B 2")]  # impulses for known loads
     carries: Annotated[Any, real("B")]  # whether a block can carry load at rest
     derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows
     constant: Annotated[Any, real("B 2")]  # a of the Newton step dp = a - G J dv

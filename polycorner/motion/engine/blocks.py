@@ -6,7 +6,13 @@ from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, detection_distance, heap_sort, key_of
+from polycorner.motion.engine.neighbours import (
+    TOUCHING,
+    ZERO_GAP,
+    detection_distance,
+    heap_sort,
+    key_of,
+)
 
 ELASTIC = 1e-6  # scaled travel in a step up to which an impact that bounces is slow
 DEPENDENT = 1e-4  # sine of the angle to other equations below which one follows from them
@@ -172,6 +178,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         if g >= model.unilateral:
             if h > STRAIGHT * model.step:
                 change = work.gap_next[i, g] - gap - h * before
+            work.is_error[b] = ZERO
             work.offset[b, 0] = equation_offset(model, gap, change, h)
             work.bilateral[b], work.bounces[b] = ONE, ZERO
         else:
@@ -181,6 +188,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
                 model, work, gap, closed, before, free, change, model.restitution[g], h
             )
             work.offset[b, 0] = -least
+            work.is_error[b] = closed and abs(gap + change) < TOUCHING * model.gap_unit
         work.block_load[b] = -change
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
         work.impulse[b, 0] = state.normal[i, g] * share
@@ -237,6 +245,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     )
     work.offset[n, 0] = -least
     work.block_load[n] = -change
+    work.is_error[n] = closed and abs(gap + change) < TOUCHING * model.gap_unit
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]
     finish_block(model, work, n)

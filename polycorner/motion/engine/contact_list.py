@@ -5,9 +5,8 @@ import numpy as np
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
 from polycorner.motion.engine.blocks import velocity_of
 from polycorner.motion.engine.jit import NONE, compiled
-from polycorner.motion.engine.neighbours import key_of
+from polycorner.motion.engine.neighbours import TOUCHING, key_of
 
-TOUCHING = 1e-7  # scaled gap up to which a contact is made
 PARTING = 100.0 * TOUCHING  # scaled gap beyond which a contact is lost
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
 INSTANT = 1e-9  # of a step: the shortest part, for an impact

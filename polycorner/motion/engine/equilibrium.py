@@ -14,6 +14,7 @@ from polycorner.motion.engine.band import (
 from polycorner.motion.engine.blocks import load_on, velocity_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import TOUCHING
 from polycorner.motion.engine.rest import REST_FACTOR
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
 
@@ -27,24 +28,27 @@ REGULARISATION = 1e-13  # weight of the mass matrix, relative to the stiffest bl
 
 
 @compiled
-def find_interior_start(model, state, work, first, last, speed, goal):
+def find_interior_start(model, work, first, last, speed, goal):
     """Find impulses in the interior of their sets; return whether rest is possible.
 
     ``work.carries`` gets which blocks can carry load at rest: those of contacts that neither open
-    nor close.  None may slip or have to open.  Bounds within a few tolerances of what rest requires
-    are moved there, whatever the outcome: otherwise piles missed the tolerance a third more often,
-    and one jam twitched for seconds.
+    nor close, where gaps below ``TOUCHING`` count as zero.  None may slip or have to open.  Bounds
+    close to what rest requires are moved there, whatever the outcome: otherwise piles missed the
+    tolerance a third more often, and one jam twitched for seconds.
     """
     u, out = work.slip, work.image
     for s in range(first, last):
         b = work.order[s]
         pressing, shape = work.pressing[b], work.block_set[b]
-        velocity_of(model, work, b, state.v, u)
+        velocity_of(model, work, b, work.v_rest, u)
         if work.block_rows[b] == 0:
-            if u[0] < -REST_FACTOR * goal:
+            near = REST_FACTOR * goal
+            if not work.bilateral[b]:
+                near = max(near, TOUCHING * model.gap_unit / model.step)
+            if u[0] < -near:
                 return False
             work.carries[b] = 0.0
-            if u[0] <= REST_FACTOR * goal:  # closed
+            if u[0] <= near:  # closed
                 work.carries[b] = 1.0
                 work.offset[b, 0] -= u[0]
             least = TARGET_PRESSURE * work.delassus[b, 3] * speed
@@ -260,7 +264,7 @@ def interior_point_steps(model, state, work, first, last, n, width, speed, goal)
             for c in range(k):
                 value = 0.0
                 for a in range(k):
-                    value += work.mass[i, c, a] * (state.v[i, a] - work.v_free[i, a])
+                    value += work.mass[i, c, a] * (work.v_rest[i, a] - work.v_free[i, a])
                 x[at * k + c] = value
         for s in range(first, last):
             b = work.order[s]
@@ -305,15 +309,16 @@ def interior_point_steps(model, state, work, first, last, n, width, speed, goal)
 
 @compiled
 def find_equilibrium(model, state, work, first, last, speed):
-    """Return whether an island at rest remains so; then its impulses are the proof.
+    """Return whether an island can be at rest after the step; then its impulses are the proof.
 
-    At rest nothing slips, so that De Saxce's term vanishes and the problem is convex: are there
-    impulses in the sets that balance the forces?  They are sought in the interior, at the minimum
-    of ``sum n / n_0 - sum log(distance from the boundary)`` over the balanced ones, by Newton's
-    method from an infeasible start ([BV] sec. 10.3; the first sum excludes forces that grow without
-    bound in a jam; an equation has ``(n / n_0)^2 / 2`` instead, and its ``n`` keeps its sign where
-    friction depends on it).  Impulses far from the boundary can still balance when the loads change
-    a little, so that the pile can sleep.
+    The velocities of rest are in ``work.v_rest``.  At rest nothing slips, so that De Saxce's term
+    vanishes and the problem is convex: are there impulses in the sets that balance the forces?
+    They are sought in the interior, at the minimum of ``sum n / n_0 - sum log(distance from the
+    boundary)`` over the balanced ones, by Newton's method from an infeasible start ([BV] sec. 10.3;
+    the first sum excludes forces that grow without bound in a jam; an equation has
+    ``(n / n_0)^2 / 2`` instead, and its ``n`` keeps its sign where friction depends on it).
+    Impulses far from the boundary can still balance when the loads change a little, so that the
+    pile can sleep.
     """
     k = model.dimension
     n, width = number_bodies(model, state, work, first, last)
@@ -322,7 +327,7 @@ def find_equilibrium(model, state, work, first, last, speed):
     goal = model.tolerance * speed
     copy_impulses(work, first, last, work.impulse, work.initial)
     proved = False
-    if find_interior_start(model, state, work, first, last, speed, goal):
+    if find_interior_start(model, work, first, last, speed, goal):
         proved = interior_point_steps(model, state, work, first, last, n, width, speed, goal)
     if not proved:
         copy_impulses(work, first, last, work.initial, work.impulse)
@@ -330,5 +335,5 @@ def find_equilibrium(model, state, work, first, last, speed):
     for at in range(n):
         i = work.members[at]
         for c in range(k):
-            work.v_new[i, c] = state.v[i, c]
+            work.v_new[i, c] = work.v_rest[i, c]
     return True

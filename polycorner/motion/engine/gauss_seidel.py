@@ -55,12 +55,21 @@ def relax_block(model, work, b, u, out):
 
 
 @compiled
-def residual(model, work, first, last, u, out):
+def yielding_velocity(model, work, b, compliance, u):
+    """Evaluate ``J v + d + c p / rho``: the velocities of rows that yield to their impulses."""
+    velocity_of(model, work, b, work.v_new, u)
+    if compliance > 0.0:
+        for r in range(max(1, work.block_rows[b])):
+            u[r] += compliance * work.impulse[b, r] / work.delassus[b, 3]
+
+
+@compiled
+def residual(model, work, first, last, compliance, u, out):
     """Return the largest residual of the natural map over the blocks of an island, as a speed."""
     worst = 0.0
     for s in range(first, last):
         b = work.order[s]
-        velocity_of(model, work, b, work.v_new, u)
+        yielding_velocity(model, work, b, compliance, u)
         rho = work.delassus[b, 3]
         if work.bilateral[b]:
             far = abs(u[0])

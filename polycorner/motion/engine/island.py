@@ -5,6 +5,7 @@ import numpy as np
 from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
 from polycorner.motion.engine.band import number_bodies
 from polycorner.motion.engine.blocks import STRAIGHT, equation_offset, velocity_of
+from polycorner.motion.engine.continuation import continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
@@ -12,57 +13,73 @@ from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
+from polycorner.motion.engine.rest import find_rest_velocity
 
-FIRST_SOFTNESS = 1e2  # relative softness of contacts in the first round, over the tolerance
-MAX_SOFTNESS = 1e-2  # its largest value; the next rounds multiply this by powers of three
+FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
+MAX_SOFTNESS = 1e-2  # its largest value; further rounds multiply this by powers of three
 CYCLE_ROUNDS = 3
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 MISSED = 1e-12  # scaled gap up to which an equation holds
-ROUND_SWEEPS = 10
+FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
+SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
 @compiled
 def iterate(model, state, work, first, last, speed, sweeps):
-    """Alternate Gauss-Seidel sweeps and Newton steps on an island; return the residual.
+    """Solve an island by rounds of Gauss-Seidel sweeps and Newton steps; return the residual.
 
-    Contacts are made softer from round to round, and hard again after the last of a cycle.  It ends
-    when the residual has reached its goal, when ``sweeps`` are done, or when a cycle has not halved
-    the residual of its first round.
+    Where a round does not do, the small errors of closed gaps are left as they are: contacts that
+    stick in closed loops cannot correct all of them, and would jam.  Where the next does not do
+    either, the solution is continued from that of simpler problems.  After that contacts are made
+    softer from round to round, and hard again.  It ends when the residual has reached its goal,
+    when ``sweeps`` are done, or when a cycle of rounds has not halved the residual.
     """
     u, out = work.slip, work.image
     goal = model.tolerance * speed
-    worst = residual(model, work, first, last, u, out)
+    worst = residual(model, work, first, last, 0.0, u, out)
     if worst <= goal:
         return worst
+    hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
     n, width = number_bodies(model, state, work, first, last)
-    done, cycle, former = 0, 0, np.inf
-    while True:
-        for _ in range(2 if done == 0 else ROUND_SWEEPS):
+    rounds, done, former = 0, 0, np.inf
+    while worst > goal and done < sweeps:
+        if rounds == 1:
+            leave_errors(work, first, last)
+        for _ in range(FIRST_SWEEPS if rounds == 0 else ROUND_SWEEPS):
             worst = 0.0
             for s in range(first, last):
                 worst = max(worst, relax_block(model, work, work.order[s], u, out))
             done += 1
             if worst <= goal:
                 break
-        worst = residual(model, work, first, last, u, out)
+        worst = residual(model, work, first, last, 0.0, u, out)
         if worst > goal and n > 0:
-            softness = MAX_SOFTNESS * 3.0**cycle
-            if cycle == 0:
-                softness = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
+            phase = rounds % CYCLE_ROUNDS
+            softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
             steps, worst = newton_steps(
-                model, work, first, last, n, width, goal, softness, worst, u, out
+                model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
             )
             state.counts[NEWTON_STEPS] += steps
-        if worst <= goal or done >= sweeps:
-            break
-        if n > 0:
-            if cycle == 0:
+            if worst > goal and rounds == 1:
+                worst = continue_island(
+                    model, state, work, first, last, n, width, goal, hard, u, out
+                )
+            if phase == CYCLE_ROUNDS - 1:
+                if worst > 0.5 * former:
+                    break
                 former = worst
-            elif cycle == CYCLE_ROUNDS - 1 and worst > 0.5 * former:
-                break
-            cycle = (cycle + 1) % CYCLE_ROUNDS
+        rounds += 1
     state.counts[SWEEPS] += done
     return worst
+
+
+@compiled
+def leave_errors(work, first, last):
+    """Let small errors of closed gaps be."""
+    for s in range(first, last):
+        b = work.order[s]
+        if work.block_rows[b] == 0 and work.is_error[b]:
+            work.offset[b, 0] = 0.0
 
 
 @compiled
@@ -125,15 +142,47 @@ def solve_island(model, state, work, first, last):
                     for c in range(model.dimension):
                         work.v_new[i, c] = work.v_free[i, c]
         return 0.0
-    if at_rest and find_equilibrium(model, state, work, first, last, speed):
-        return residual(model, work, first, last, u, work.image) / speed
+    if at_rest and rests(model, state, work, first, last, speed):
+        return residual(model, work, first, last, 0.0, u, work.image) / speed
     while True:
         worst = iterate(model, state, work, first, last, speed, model.sweeps)
         if worst > model.tolerance * speed or not switch_reversed_slips(
             model, state, work, first, last
         ):
             break
+    if (
+        worst > model.tolerance * speed
+        and not at_rest
+        and rests(model, state, work, first, last, speed)
+    ):
+        worst = residual(model, work, first, last, 0.0, u, work.image)
     return worst / speed
+
+
+@compiled
+def rests(model, state, work, first, last, speed):
+    """Return whether an island that hardly moves can be at rest after the step; then it is.
+
+    Where it sticks in closed loops, the errors of its gaps cannot all be corrected at once without
+    forces that grow without bound: nothing but rest solves the step.
+    """
+    k, v, rest = model.dimension, work.v_rest, work.rest_velocity
+    for s in range(first, last):
+        for side in range(2):
+            i = work.block_bodies[work.order[s], side]
+            if i < 0:
+                continue
+            for c in range(k):
+                v[i, c] = state.v[i, c]
+            if not work.awake[i] or state.rests[i]:
+                continue
+            if not find_rest_velocity(model, work, state.normal, i, rest):
+                return False
+            for c in range(k):
+                if abs(work.v_new[i, c] - rest[c]) * model.units[c] > SLOW * speed:
+                    return False
+                v[i, c] = rest[c]
+    return find_equilibrium(model, state, work, first, last, speed)
 
 
 @compiled

@@ -5,6 +5,7 @@ from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
 from polycorner.motion.engine.jit import NONE, compiled
 
+TOUCHING = 1e-7  # scaled gap up to which a contact is made, and kept as it is
 ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
 DETECTION = 1e-2  # scaled gap up to which contacts are detected, at least
 SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies

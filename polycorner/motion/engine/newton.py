@@ -9,8 +9,13 @@ from polycorner.motion.engine.band import (
     row_product,
     solve_band,
 )
-from polycorner.motion.engine.blocks import apply_impulse, load_on, velocity_of
-from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
+from polycorner.motion.engine.blocks import apply_impulse, load_on
+from polycorner.motion.engine.gauss_seidel import (
+    copy_impulses,
+    recompute_velocities,
+    residual,
+    yielding_velocity,
+)
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.sets import project
 
@@ -19,7 +24,7 @@ IDLE_NEWTON_STEPS = 6  # Newton steps without progress after which a round ends
 
 
 @compiled
-def newton_steps(model, work, first, last, n, width, goal, softness, worst, u, out):
+def newton_steps(model, work, first, last, n, width, goal, softness, compliance, worst, u, out):
     """Take semismooth Newton steps on the natural map; return their number and the least residual.
 
     The map is ``p - proj(p - rho u)`` with the velocities ``u = J v + d`` of the rows; its
@@ -27,8 +32,8 @@ def newton_steps(model, work, first, last, n, width, goal, softness, worst, u, o
     The steps ``dp = a - G J dv`` of the blocks are substituted into ``M dv = J' dp``: the system
     that is solved is as large as the velocities, not as the impulses.  All contacts are slightly
     softened, so that redundant ones have a solution; this also damps the steps, as in the method of
-    multipliers, of which this is one step ([Rockafellar76]): softer contacts converge where hard
-    ones cycle.  The impulses of the least residual are kept.
+    multipliers, of which this is one step ([Rockafellar76]).  The impulses of the least residual
+    are kept.  With a ``compliance`` the contacts yield; see :func:`yielding_velocity`.
     """
     size, x = n * model.dimension, work.island_vector
     least, former, steps, idle = np.inf, np.inf, ZERO, 0
@@ -41,18 +46,18 @@ def newton_steps(model, work, first, last, n, width, goal, softness, worst, u, o
         if (
             settled
             or worst <= 1e-2 * goal
-            or idle == IDLE_NEWTON_STEPS
+            or (idle == IDLE_NEWTON_STEPS and compliance == 0.0)
             or steps == ROUND_NEWTON_STEPS
         ):
             break
         former = worst
-        linearise(model, work, first, last, n, width, softness, u, out)
+        linearise(model, work, first, last, n, width, softness, compliance, u, out)
         if not solve_band(work.band, x, size, width, work.envelope):
             break
         for s in range(first, last):
             update_block(model, work, work.order[s], x)
         steps += ONE
-        worst = residual(model, work, first, last, u, out)
+        worst = residual(model, work, first, last, compliance, u, out)
     if worst > least:
         copy_impulses(work, first, last, work.best, work.impulse)
         recompute_velocities(model, work, first, last)
@@ -77,7 +82,7 @@ def update_block(model, work, b, x):
 
 
 @compiled
-def linearise(model, work, first, last, n, width, softness, u, out):
+def linearise(model, work, first, last, n, width, softness, compliance, u, out):
     """Linearise the natural map of an island; see :func:`newton_steps`.
 
     ``work.derivative`` and ``work.constant`` get ``G`` and ``a`` of each block.
@@ -88,7 +93,7 @@ def linearise(model, work, first, last, n, width, softness, u, out):
         x[c] = 0.0
     for s in range(first, last):
         b = work.order[s]
-        velocity_of(model, work, b, work.v_new, u)
+        yielding_velocity(model, work, b, compliance, u)
         rho = work.delassus[b, 3]
         if work.block_rows[b] == 0:
             p = work.impulse[b, 0]

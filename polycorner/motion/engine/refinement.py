@@ -60,13 +60,13 @@ def leave_out(model, state, work, blocks, h):
     for i in range(N):
         left[i] = 0
         if work.island_start[i + 1] > work.island_start[i]:
-            left[i] = 1 if work.island_residual[i] > model.tolerance else 0
+            left[i] = 2 if work.island_residual[i] > model.tolerance else 0
     for b in range(blocks):
         if work.block_rows[b] == 0 and strikes_early(model, state, work, b):
-            left[island_of(work, b)] = 1
+            left[island_of(work, b)] |= 1
     mark_misses(model, state, work, left, h)
     for i in range(N):
-        if work.island_start[i + 1] - work.island_start[i] > LARGE:
+        if work.island_start[i + 1] - work.island_start[i] > LARGE and left[i] == 1:
             left[i] = 0
         found = found or left[i]
     if not found:
@@ -186,7 +186,7 @@ def mark_misses(model, state, work, left, h):
     if model.restitution.size > 0:
         for i in range(model.bodies):
             if state.alive[i] and work.awake[i] and body_misses(model, state, work, i, h):
-                left[work.parent[i]] = 1
+                left[work.parent[i]] |= 1
     slow = model.near * model.gap_unit
     if model.pair_kernel == 0 or 2.0 * travel(model, work, h) <= slow:
         return
@@ -198,7 +198,8 @@ def mark_misses(model, state, work, left, h):
             continue
         for g in range(model.pair_gaps):
             if not touching(model, state, i, j, g) and pair_misses(model, state, work, i, j, g, h):
-                left[work.parent[i]] = left[work.parent[j]] = 1
+                left[work.parent[i]] |= 1
+                left[work.parent[j]] |= 1
 
 
 @compiled
@@ -216,7 +217,7 @@ def record_failure(model, work, log, island, time, count):
     """Record where an island was not solved; return the number of events."""
     worst, place = -1.0, NONE
     for s in range(work.island_start[island], work.island_start[island + 1]):
-        far = residual(model, work, s, s + 1, work.slip, work.image)
+        far = residual(model, work, s, s + 1, 0.0, work.slip, work.image)
         if far > worst:
             worst, place = far, work.order[s]
     b = work.pressing[place] if work.pressing[place] >= 0 else place

@@ -5,7 +5,7 @@ import numpy as np
 from polycorner.motion.engine.arrays import CONTACTS, PAIR_FRICTION, PAIR_GAP, SUBSTRATE_WORK
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.jit import compiled
-from polycorner.motion.engine.partition import root_of
+from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.rest import (
     SLEEP_MARGIN,
     comes_to_rest,
@@ -127,7 +127,10 @@ def next_check(model, state, work, i, h, index):
 
 @compiled
 def wake_neighbours(model, state, work, blocks, h, time, index):
-    """Sum the impulses of neighbours on each body; wake those not at rest under them."""
+    """Sum the impulses of neighbours on each body; wake those not at rest under them.
+
+    Sleepers on which an island acts that is not solved wake up, too.
+    """
     k, N = model.dimension, model.bodies
     for i in range(N):
         work.disturbed[i] = 0
@@ -146,7 +149,8 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
         if work.origin[b, 0] in (PAIR_GAP, PAIR_FRICTION):
             for side in range(2):
                 i = work.block_bodies[b, side]
-                work.disturbed[i] = 1
+                solved = work.island_residual[island_of(work, b)] <= model.tolerance
+                work.disturbed[i] |= 1 if solved else 2
                 for r in range(max(1, work.block_rows[b])):
                     for c in range(k):
                         work.neighbour_impulse[i, c] += (
@@ -157,7 +161,9 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
         if work.disturbed[i] and state.alive[i] and not work.awake[i]:
             if not work.evaluated[i]:
                 stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index)
-            if not remains_at_rest(model, state, work, i, work.neighbour_impulse):
+            if work.disturbed[i] & 2 or not remains_at_rest(
+                model, state, work, i, work.neighbour_impulse
+            ):
                 work.awake[i] = 1
                 woken = True
     return woken

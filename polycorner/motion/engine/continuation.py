@@ -1,0 +1,131 @@
+"""Islands that neither sweeps nor Newton steps solve: paths from simpler problems.
+
+Both start where the solution is not in doubt.  Compliant contacts are each for itself nearly, and
+contacts whose friction has a known load are a convex problem, with one solution for the velocities
+([Acary]).
+"""
+
+import numpy as np
+
+from polycorner.motion.engine.arrays import NEWTON_STEPS
+from polycorner.motion.engine.blocks import load_on
+from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
+from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.newton import newton_steps
+
+FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and at its end
+FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path
+EASY_STEPS = 8  # Newton steps up to which the next factor is smaller
+LOAD_ROUNDS = 20  # convex problems that are solved, at most
+LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
+
+
+@compiled
+def continue_island(model, state, work, first, last, n, width, goal, softness, u, out):
+    """Solve an island by continuation; return the residual.
+
+    First the loads of friction are iterated; else the compliance of the contacts is taken from
+    ``FIRST_COMPLIANCE`` to zero, from the impulses at hand; else from one to zero, from no
+    impulses.  If none of these leads to a solution, the impulses remain what they were.
+    """
+    copy_impulses(work, first, last, work.impulse, work.rigid)
+    for attempt in range(3):
+        if attempt == 0:
+            iterate_loads(model, state, work, first, last, n, width, goal, softness, u, out)
+        elif attempt == 1:
+            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE, u, out)
+        else:
+            for s in range(first, last):
+                work.impulse[work.order[s], 0] = work.impulse[work.order[s], 1] = 0.0
+            recompute_velocities(model, work, first, last)
+            follow(model, state, work, first, last, n, width, goal, 1.0, u, out)
+        worst = residual(model, work, first, last, 0.0, u, out)
+        if worst <= goal:
+            return worst
+        copy_impulses(work, first, last, work.rigid, work.impulse)
+        recompute_velocities(model, work, first, last)
+    return residual(model, work, first, last, 0.0, u, out)
+
+
+@compiled
+def follow(model, state, work, first, last, n, width, goal, compliance, u, out):
+    """Solve an island for a compliance, and follow the solution to rigid contacts.
+
+    Contacts yield by ``c p / rho``.  The compliance ``c`` is divided by more or less, as Newton's
+    method converges.  Rigid contacts in closed loops leave impulses open, or nearly so: the path
+    leads to those that a small compliance selects.
+    """
+    factor, reached, trial = FIRST_FACTOR, np.inf, compliance
+    while factor < LEAST_FACTOR:
+        worst = residual(model, work, first, last, trial, u, out)
+        steps, worst = newton_steps(
+            model, work, first, last, n, width, goal, trial, trial, worst, u, out
+        )
+        state.counts[NEWTON_STEPS] += steps
+        if worst <= goal:
+            reached = trial
+            copy_impulses(work, first, last, work.impulse, work.initial)
+            if residual(model, work, first, last, 0.0, u, out) <= goal or reached <= RIGID:
+                return
+            if steps < EASY_STEPS:
+                factor = max(MOST_FACTOR, factor**1.5)
+        elif reached == np.inf:
+            return
+        else:
+            copy_impulses(work, first, last, work.initial, work.impulse)
+            recompute_velocities(model, work, first, last)
+            factor = np.sqrt(factor)
+        trial = factor * reached
+
+
+@compiled
+def iterate_loads(model, state, work, first, last, n, width, goal, softness, u, out):
+    """Solve an island with known loads of friction, again and again with the loads that result.
+
+    Where the loads go to and fro, only a share of their change is taken over.
+    """
+    share, former = 1.0, np.inf
+    for _ in range(LOAD_ROUNDS):
+        detach_loads(work, first, last, 1.0 if former == np.inf else share)
+        worst = residual(model, work, first, last, 0.0, u, out)
+        steps, worst = newton_steps(
+            model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
+        )
+        state.counts[NEWTON_STEPS] += steps
+        if worst > goal:
+            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE, u, out)
+        attach_loads(work, first, last)
+        worst = residual(model, work, first, last, 0.0, u, out)
+        if worst > goal:
+            copy_impulses(work, first, last, work.impulse, work.loaded)
+            steps, worst = newton_steps(
+                model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
+            )
+            state.counts[NEWTON_STEPS] += steps
+        if worst <= goal:
+            return
+        copy_impulses(work, first, last, work.loaded, work.impulse)
+        recompute_velocities(model, work, first, last)
+        if worst > 0.5 * former:
+            share = max(LEAST_CHANGE, 0.7 * share)
+        former = worst
+
+
+@compiled
+def detach_loads(work, first, last, share):
+    """Turn the impulses that press on friction into known loads, a share of them newly."""
+    for s in range(first, last):
+        b = work.order[s]
+        if work.pressing[b] >= 0:
+            change = max(0.0, load_on(work, b)) - work.block_load[b]
+            work.block_load[b] += share * change
+            work.pressing[b] = -2 - work.pressing[b]
+
+
+@compiled
+def attach_loads(work, first, last):
+    """Undo :func:`detach_loads`."""
+    for s in range(first, last):
+        b = work.order[s]
+        if work.pressing[b] <= -2:
+            work.pressing[b] = -2 - work.pressing[b]
