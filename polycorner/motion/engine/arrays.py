@@ -9,7 +9,6 @@ from math import prod
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polycorner.motion.bodies import IdenticalBodies
 
@@ -337,18 +336,3 @@ def restored(record: type[Record], sizes: Sizes, saved: Mapping[str, Any]) -> Re
     for name, array in arrays._asdict().items():
         array[: len(saved[name])] = saved[name]
     return arrays
-
-
-def table_of(record: Any) -> NDArray[np.int64]:
-    """Return the table by which compiled code finds a record: numbers, addresses and lengths.
-
-    Arrays have to be kept as long as it is used.
-    """
-    entries: list[int] = []
-    for name, declared in declarations(record).items():
-        value = getattr(record, name)
-        if declared.shape:
-            entries += [value.ctypes.data, *value.shape]
-        else:
-            entries.append(int(np.array(value, dtype=declared.kind).view(np.int64)))
-    return np.array(entries, dtype=np.int64)

@@ -26,8 +26,8 @@ from polycorner.motion.engine.arrays import (
     State,
     Work,
     allocate,
+    declarations,
     restored,
-    table_of,
 )
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.events import Event, EventKind
@@ -236,3 +236,18 @@ class Engine:
             bodies = divmod(pair, self.bodies.count)
             own.append((bodies, names[g], float(motion.pair_impulse[s, 0]) / h))
         return own
+
+
+def table_of(record: Any) -> NDArray[np.int64]:
+    """Return the table by which compiled code finds a record: numbers, addresses and lengths.
+
+    Arrays have to be kept as long as it is used.
+    """
+    entries: list[int] = []
+    for name, declared in declarations(record).items():
+        value = getattr(record, name)
+        if declared.shape:
+            entries += [value.ctypes.data, *value.shape]
+        else:
+            entries.append(int(np.array(value, dtype=declared.kind).view(np.int64)))
+    return np.array(entries, dtype=np.int64)

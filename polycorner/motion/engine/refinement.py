@@ -1,24 +1,15 @@
 """A whole step of all bodies; those for which it is too long take shorter ones.
 
-After a step was solved, an island is left out of it (:func:`leave_out`)
-
-- whose residual is above the tolerance;
-- in which an impact that is not slow acts where the bodies are not;
-- whose bodies cross the boundary of a gap on their way, in and perhaps out again.
-
-Islands of more than ``LARGE`` blocks take whole steps: in a dense heap there is always an impact,
-and the parts, each solved for the whole heap, would cost more than shorter steps for all.
-
-Its bodies then do the same step in parts (:func:`refine`), in which a contact acts only if it is
-closed.  A part ends where another contact closes, and an impact is a part of no length.  A part
-that is not solved to the tolerance, or in which a contact sinks in, is halved.  The parts of an
-island do not depend on other bodies.
+After a step was solved, some islands are left out of it
+(:mod:`~polycorner.motion.engine.left_out`).  They then do the same step in parts (:func:`refine`),
+in which a contact acts only if it is closed.  A part ends where another contact closes, and an
+impact is a part of no length.  A part that is not solved to the tolerance, or in which a contact
+sinks in, is halved.  The parts of an island do not depend on other bodies.
 """
 
 import numpy as np
 
 from polycorner.motion.engine.arrays import (
-    CONTACTS,
     DONE,
     EVENTS_FULL,
     OWN_GAP,
@@ -28,178 +19,19 @@ from polycorner.motion.engine.arrays import (
     SWEEPS,
     UNSOLVED,
 )
-from polycorner.motion.engine.blocks import is_slow
 from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
-from polycorner.motion.engine.evaluation import evaluate_body, evaluate_gaps
+from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, travel
-from polycorner.motion.engine.partition import island_of, root_of
-from polycorner.motion.engine.paths import (
-    CURVATURE_DEPTH,
-    acceptable_length,
-    gap_at,
-    may_vanish,
-    touching,
-)
+from polycorner.motion.engine.left_out import leave_out
+from polycorner.motion.engine.paths import acceptable_length
 from polycorner.motion.engine.sleep import stays_asleep, wake
 from polycorner.motion.engine.stepping import attempt, commit
 
-LARGE = 48  # blocks of an island beyond which it takes whole steps
 SHORTEST_SOLVED = 1.0 / 16.0  # of a step, to which parts are halved to be solved
 MOST_PARTS = 100_000  # of one step, beyond which the rest is done at once
 MOST_SWEEPS, MEAN_SWEEPS = 1000, 50  # over islands, in all and for each part more, the same
 MOST_TRIES = 100  # of one part
-
-
-@compiled
-def leave_out(model, state, work, blocks, h):
-    """Leave out of a step the islands for which it does not do; return whether there are any."""
-    N, joined, left = model.bodies, work.joined, work.cursor
-    found = False
-    for i in range(N):
-        left[i] = 0
-        if work.island_start[i + 1] > work.island_start[i]:
-            left[i] = 2 if work.island_residual[i] > model.tolerance else 0
-    for b in range(blocks):
-        if work.block_rows[b] == 0 and strikes_early(model, state, work, b):
-            left[island_of(work, b)] |= 1
-    mark_misses(model, state, work, left, h)
-    for i in range(N):
-        if work.island_start[i + 1] - work.island_start[i] > LARGE and left[i] == 1:
-            left[i] = 0
-        found = found or left[i]
-    if not found:
-        return False
-    for i in range(N):
-        state.cluster[i], joined[i] = NONE, work.parent[i] if left[work.parent[i]] else i
-    for b in range(blocks):
-        i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-        if j >= 0 and left[island_of(work, b)]:
-            join(joined, i, j)
-    for s in range(state.counts[CONTACTS]):  # piles of sleepers
-        pair = state.keys[s] // model.pair_gaps
-        i, j = pair // N, pair % N
-        if state.pair_flags[s, 1] and not work.awake[i] and not work.awake[j]:
-            join(joined, i, j)
-    for i in range(N):
-        work.waits[i] = 0
-    for i in range(N):
-        if left[work.parent[i]] and work.awake[i]:
-            work.waits[root_of(joined, i)] = 1
-    for i in range(N):
-        r = root_of(joined, i)
-        if work.waits[r] and state.alive[i]:
-            state.cluster[i], state.elapsed[i] = r, 0.0
-    for i in range(N):
-        work.waits[i] = 0
-        if state.cluster[i] >= 0:
-            work.waits[i] = 1
-            work.awake[i], work.evaluated[i], work.disturbed[i] = 0, 0, 0
-    return True
-
-
-@compiled
-def join(forest, i, j):
-    """Unite the sets of two bodies in a union-find forest."""
-    x, y = root_of(forest, i), root_of(forest, j)
-    forest[max(x, y)] = min(x, y)
-
-
-@compiled
-def strikes_early(model, state, work, b):
-    """Return whether an open contact is pressed, and not slowly, where the bodies are not."""
-    g = work.origin[b, 2]
-    if work.origin[b, 0] == OWN_GAP:
-        i = work.origin[b, 1]
-        gap, closed, bounce = work.gap[i, g], state.touches[i, g] != 0, model.restitution[g]
-    else:
-        index, bounce = work.contact_before[work.origin[b, 1]], model.pair_restitution
-        gap = work.contact_gap[work.origin[b, 1]]
-        closed = index >= 0 and state.pair_flags[index, 1] != 0
-    if closed or abs(gap) <= ZERO_GAP * model.gap_unit:
-        return False
-    return not is_slow(model, -work.impulse[b, 0] * work.delassus[b, 0], bounce)
-
-
-@compiled
-def rate_of(model, gradient, v, i, g):
-    """Return the rate of a gap of a body at a velocity."""
-    rate = 0.0
-    for c in range(model.dimension):
-        rate += gradient[i, g, c] * v[i, c]
-    return rate
-
-
-@compiled
-def body_misses(model, state, work, i, h):
-    """Return whether a body crosses the boundary of an open gap, or sinks into a closed one.
-
-    The way is that to the next midpoint; that to this one was examined in the step before, if this
-    was a whole step.
-    """
-    deep, unit = 2.0 * CURVATURE_DEPTH * model.gap_unit, model.gap_unit
-    for c in range(model.dimension):
-        work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
-    evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
-    if not state.watched[i]:
-        evaluate_gaps(model, work, i, state.q, work.gap_path, work.gradient_path)
-    for g in range(model.restitution.size):
-        f, following = work.gap[i, g], work.gap_next[i, g]
-        if state.touches[i, g]:
-            if following < -deep or (g >= model.unilateral and following > deep):
-                return True
-            continue
-        rate = rate_of(model, work.gradient, work.v_new, i, g)
-        after = rate_of(model, work.gradient_next, work.v_new, i, g)
-        if f > ZERO_GAP * unit and may_vanish(f, rate, following, after, h, deep):
-            return True
-        if not state.watched[i] and work.gap_path[i, g] > 0.0:
-            before = rate_of(model, work.gradient_path, state.v, i, g)
-            rate = rate_of(model, work.gradient, state.v, i, g)
-            if may_vanish(work.gap_path[i, g], before, f, rate, 0.5 * h, ZERO_GAP * unit):
-                return True
-    return False
-
-
-@compiled
-def pair_misses(model, state, work, i, j, g, h):
-    """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`."""
-    out, unit = work.image, model.gap_unit
-    gap_at(model, work, work.q_mid, work.v_new, i, j, g, 0.0, out)
-    f, rate = out[0], out[1]
-    gap_at(model, work, work.q_mid, work.v_new, i, j, g, h, out)
-    deep = 2.0 * CURVATURE_DEPTH * unit
-    if f > ZERO_GAP * unit and may_vanish(f, rate, out[0], out[1], h, deep):
-        return True
-    if state.watched[i] and state.watched[j]:
-        return False
-    gap_at(model, work, state.q, state.v, i, j, g, 0.0, out)
-    f, rate = out[0], out[1]
-    gap_at(model, work, state.q, state.v, i, j, g, 0.5 * h, out)
-    return f > 0.0 and may_vanish(f, rate, out[0], out[1], 0.5 * h, ZERO_GAP * unit)
-
-
-@compiled
-def mark_misses(model, state, work, left, h):
-    """Mark the islands with bodies that cross the boundary of a gap on their way."""
-    if model.restitution.size > 0:
-        for i in range(model.bodies):
-            if state.alive[i] and work.awake[i] and body_misses(model, state, work, i, h):
-                left[work.parent[i]] |= 1
-    slow = model.near * model.gap_unit
-    if model.pair_kernel == 0 or 2.0 * travel(model, work, h) <= slow:
-        return
-    for s in range(work.list_status[0]):
-        i, j = work.neighbours[s, 0], work.neighbours[s, 1]
-        if not (state.alive[i] and state.alive[j] and (work.awake[i] or work.awake[j])):
-            continue
-        if h * (work.speed[i] + work.speed[j]) <= slow:
-            continue
-        for g in range(model.pair_gaps):
-            if not touching(model, state, i, j, g) and pair_misses(model, state, work, i, j, g, h):
-                left[work.parent[i]] |= 1
-                left[work.parent[j]] |= 1
 
 
 @compiled
