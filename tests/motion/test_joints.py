@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from reference_step import solve_step
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
+from scipy.optimize import linprog
 from step_inclusion import assemble
 
 from polycorner import AnyOf, Friction, Manifold, Polyhedron, System, velocities
@@ -581,6 +582,51 @@ def test_a_growing_force_starts_a_bead_that_sleeps_on_a_rail(rate):
     assert begun.time == pytest.approx(0.2 * G / abs(rate), abs=2e-3)
     late = 2.5 - 0.2 * G / abs(rate)
     assert path.v[-1, 0] == pytest.approx([rate * late**2 / 2, 0], abs=5e-3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rest_lasts_as_long_as_forces_can_be_balanced(seed):
+    """The last time is that of a linear programme in the time and all impulses."""
+    rng = np.random.default_rng(seed)
+    M = Manifold.euclidean("q0 q1 q2")
+    q, v = sp.Matrix(M.symbols), sp.Matrix(velocities(M))
+    joints, normal, slips = (rng.normal(size=(count, 3)) for count in (rng.integers(1, 3), 1, 2))
+    inner = (rng.normal(size=len(joints)), rng.uniform(1, 2, 1), 0.2 * rng.uniform(-1, 1, 2))
+    constant = -sum(rows.T @ p for rows, p in zip((joints, normal, slips), inner, strict=True))
+    growing = rng.normal(size=3)
+    unknown = np.column_stack([growing, joints.T, normal.T, slips.T])  # time, impulses
+    free, load = (None, None), len(joints) + 1
+    cone = np.zeros((2, unknown.shape[1]))
+    cone[:, load], cone[:, load + 2] = -0.4, (1, -1)
+    found = linprog(
+        -np.eye(unknown.shape[1])[0],
+        A_ub=cone,
+        b_ub=np.zeros(2),
+        A_eq=unknown,
+        b_eq=-constant,
+        bounds=[(0, 5), *[free] * len(joints), (0, None), (-1, 1), free],
+    )
+    lasts = found.x[0]
+    system = System(
+        Polyhedron(
+            M,
+            {"floor": (sp.Matrix(normal) * q)[0]},
+            equations={f"h{j}": (sp.Matrix(row).T * q)[0] for j, row in enumerate(joints)},
+        ),
+        (v.T * v)[0] / 2,
+        forces={f"q{i}": constant[i] + growing[i] * time_symbol() for i in range(3)},
+        friction=(
+            Friction("known", [(sp.Matrix(slips[0]).T * v)[0]], Interval(0.5), load=2.0),
+            Friction("pressed", [(sp.Matrix(slips[1]).T * v)[0]], Interval(0.4), load="floor"),
+        ),
+    )
+    dt = lasts / 500
+    path = simulate(system, system.state([0, 0, 0]), min(1.2 * lasts, 5.0), dt)
+    begun = [event.time for event in path.of_kind(EventKind.MOTION)][:1]
+    assert begun == ([pytest.approx(lasts, abs=2 * dt)] if lasts < 4.99 else [])
+    assert not path.q[: path.at(lasts - 3 * dt) + 1].any()
+    # Once it moves, there may be no solution: friction may jam ([AB]).
+    assert all(e.time >= lasts - dt for e in path.of_kind(EventKind.FAILED))
 
 
 def test_a_guided_block_sleeps_on_its_belt():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from polycorner.formulas.compilation import call_kernel
+from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
@@ -106,6 +106,7 @@ def is_independent(model, work, i, g):
 
     The gradients of those that do not are made orthonormal with the inverse mass matrix.
     """
+    never_inline()
     k, row = model.dimension, work.equation_rows[g]
     square, left = 0.0, 0.0
     for c in range(k):
@@ -302,7 +303,7 @@ def load_on(work, b):
     if pressing < 0:
         return work.block_load[b]
     p = work.impulse[pressing, 0]
-    return abs(p) if work.bilateral[pressing] else p
+    return -p if p < 0.0 and work.bilateral[pressing] else p
 
 
 @compiled

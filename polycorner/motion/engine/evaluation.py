@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from polycorner.formulas.compilation import call_kernel
+from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
 from polycorner.motion.engine.random import gaussian
@@ -82,6 +82,7 @@ def approach_equations(model, work, i):
     After equal steps it is: this is needed at the start, and after shorter steps.  The steps are
     Gauss and Newton's, of least length in scaled coordinates; equations may be redundant.
     """
+    never_inline()
     k, A, x = model.dimension, work.body_matrix, work.body_vector
     for _ in range(MOST_APPROACHES):
         evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)

@@ -23,8 +23,8 @@ def relax_block(model, work, b, u, out):
     if work.block_rows[b] == 0:
         p = work.impulse[b, 0]
         new = p - u[0] * rho
-        if not work.bilateral[b]:
-            new = max(0.0, new)
+        if not (new > 0.0 or work.bilateral[b]):
+            new = 0.0
         if new != p:
             apply_impulse(model, work, b, ZERO, new - p)
             work.impulse[b, 0] = new
@@ -71,10 +71,10 @@ def residual(model, work, first, last, compliance, u, out):
         b = work.order[s]
         yielding_velocity(model, work, b, compliance, u)
         rho = work.delassus[b, 3]
-        if work.bilateral[b]:
+        if work.block_rows[b] == 0:
             far = abs(u[0])
-        elif work.block_rows[b] == 0:
-            far = abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
+            if not work.bilateral[b]:
+                far = abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
         else:
             load = load_on(work, b)
             y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
 from polycorner.motion.engine.band import number_bodies
 from polycorner.motion.engine.blocks import STRAIGHT, equation_offset, velocity_of
@@ -253,6 +254,7 @@ def correct_curvature(model, state, work, blocks, h):
 @compiled
 def bend_equation(model, work, b, gap, following, h):
     """Correct an equation that does not hold at the next midpoint; return whether it does not."""
+    never_inline()
     if h <= STRAIGHT * model.step:
         return False
     u, speed = work.slip, work.island_speed[work.block_bodies[b, 0]]

@@ -90,9 +90,9 @@ def book_work(model, state, work, blocks, h):
         if not takes_part(work, b):
             continue
         kind = work.origin[b, 0]
-        if work.bilateral[b]:
-            continue
         if work.block_rows[b] == 0:
+            if work.bilateral[b]:
+                continue
             velocity_of(model, work, b, state.v, u)
             x = u[0]
             velocity_of(model, work, b, work.v_new, u)
