@@ -254,15 +254,39 @@ def energies(
 
 
 def highest_square(
-    formulation: Formulation, parameters: Array, scales: Array, q: Array, v: Array
+    formulation: Formulation,
+    parameters: Array,
+    scales: Array,
+    q: Array,
+    v: Array,
+    equations: tuple[Array, Array] | None = None,
 ) -> float:
-    """Return the square of the highest frequency of small motions about a placement."""
-    stiffness = np.empty((len(scales), len(scales)))
+    """Return the square of the highest frequency of small motions about a placement.
+
+    With equations they are those in the tangent space, of the stiffness ``K - sum_j lam_j H_j``,
+    where the forces ``lam_j`` balance the others across the equations; ``equations`` has gradients
+    ``(j, k)`` and Hessians ``(j, k, k)``.
+    """
+    now = moment(formulation, parameters, q, v)
+    mass, stiffness = now.mass, np.empty((len(scales), len(scales)))
+    if not np.isfinite(now.force).all():
+        return 0.0  # the first step says what is wrong
     for i, scale in enumerate(scales):
         change = np.zeros(len(scales))
         change[i] = 1e-5 * scale
         forth = moment(formulation, parameters, q + change, v).force
         back = moment(formulation, parameters, q - change, v).force
         stiffness[:, i] = -(forth - back) / (2 * change[i])
-    mass = moment(formulation, parameters, q, v).mass
-    return float(np.abs(np.linalg.eigvals(np.linalg.solve(mass, stiffness))).max())
+    if not np.isfinite(stiffness).all():
+        return 0.0  # at the edge of where the force is defined
+    if equations is not None:
+        rows, bends = equations
+        answer = np.linalg.solve(mass, np.column_stack([rows.T, now.force]))
+        balance = np.linalg.lstsq(rows @ answer[:, :-1], -rows @ answer[:, -1], rcond=None)[0]
+        _, sizes, directions = np.linalg.svd(rows * scales)
+        rank = int((sizes > 1e-10 * sizes.max(initial=0)).sum())
+        tangent = scales[:, None] * directions[rank:].T
+        mass = tangent.T @ mass @ tangent
+        stiffness = tangent.T @ (stiffness - np.tensordot(balance, bends, 1)) @ tangent
+    squares = np.abs(np.linalg.eigvals(np.linalg.solve(mass, stiffness)))
+    return float(squares.max(initial=0.0))

@@ -69,6 +69,15 @@ def check_velocities(polyhedron: Polyhedron, q: Array, v: Array) -> None:
             raise ValueError(msg)
 
 
+def bends(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array] | None:
+    """Return the gradients ``(k, n)`` and Hessians ``(k, n, n)`` of the equations, if any."""
+    if not polyhedron.equations:
+        return None
+    _, gradients, hessians = polyhedron.bundle.evaluate(q, 2)
+    first = len(polyhedron.functions)
+    return gradients[first:], hessians[first:]
+
+
 def onto_equations(polyhedron: Polyhedron, q: Array) -> Array:
     """Return the place ``(n,)`` on the equations to which Gauss and Newton's steps lead."""
     scales = polyhedron.manifold.scale_array

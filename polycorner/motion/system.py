@@ -15,7 +15,7 @@ from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
 from polycorner.motion.contacts import ContactFamily, Friction, position_of
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
 from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
-from polycorner.motion.placements import check_contacts, check_equations, check_velocities
+from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 
@@ -309,8 +309,9 @@ class System(MechanicalSystem):
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
         n, scales = self.manifold.dimension, self.manifold.scale_array
+        law, known, held = self.formulation, self.parameters, self.polyhedron
         squared = max(
-            highest_square(self.formulation, self.parameters, scales, q, v)
+            highest_square(law, known, scales, q, v, bends(held, q))
             for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
         )
         return (2 / math.sqrt(squared) if squared > 1e-12 else math.inf), UNSTABLE

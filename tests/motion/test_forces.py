@@ -165,6 +165,23 @@ def test_a_force_that_is_not_a_number_stops_the_run_at_the_state_before(force):
     assert again.q[-1, 0, 0] == pytest.approx(state.q[0], abs=2e-2)
 
 
+@pytest.mark.parametrize("equations", [{}, {"rail": Y}])
+@pytest.mark.parametrize("force", [1 / X, sp.log(X), sp.sqrt(X - 1)])
+def test_a_force_that_is_not_finite_at_the_start_is_named(force, equations):
+    far = Polyhedron(PLANE, {"far": FAR - X}, equations=equations)
+    system = System(far, (VX**2 + VY**2) / 2, forces={"x": force})
+    with pytest.raises(SolverError, match=r"the force on x at t = 0, x = 0, y = 0 is"):
+        simulate(system, system.state([0, 0]), 1.0, 1e-2)
+
+
+@pytest.mark.parametrize("equations", [{}, {"rail": Y}])
+def test_a_start_at_the_edge_of_the_forces_moves(equations):
+    far = Polyhedron(PLANE, {"far": FAR - X}, equations=equations)
+    system = System(far, (VX**2 + VY**2) / 2, forces={"x": sp.sqrt(X)})
+    path = simulate(system, system.state([0, 0], [1, 0]), 1.0, 1e-3)
+    assert path.v[-1, 0, 0] > 1
+
+
 def test_a_gap_that_is_not_a_number_stops_the_run():
     walls = Polyhedron(LINE, {"root": 2 - sp.sqrt(1 - S)})
     system = System(walls, VS**2 / 2)

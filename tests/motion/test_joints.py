@@ -662,6 +662,18 @@ def test_the_stratum_of_an_instant_is_on_the_equations():
 
 # -------------------------------------------------------------------------- input, files, resume
 
+
+@given(length=st.floats(1e-3, 10), angle=st.floats(-0.3, 0.3))
+@settings(max_examples=10, deadline=None)
+def test_the_largest_step_is_that_of_motions_along_the_equations(length, angle):
+    """``2 / omega`` with ``omega^2 = g cos a / l``; a stiffness across them is none."""
+    system = pendulum(length)
+    largest, _ = system.largest_step(system.state(on_circle(length, angle, 0)[0]))
+    assert largest == pytest.approx(2 / math.sqrt(G * math.cos(angle) / length), rel=1e-4)
+    stiff = System(Polyhedron(PLANE, {}, equations={"rail": Y}), FREE, 1e9 * Y**2 + 2 * X**2)
+    assert stiff.largest_step(stiff.state([0, 0]))[0] == pytest.approx(1.0, rel=1e-4)
+
+
 CIRCLE = {"rod": X**2 + Y**2 - 1}
 WRONG = [
     (lambda: pendulum(1.0).state([1.1, 0]), "q: expected equation 'rod' to hold; .* 0.21"),
