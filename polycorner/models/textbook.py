@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from polycorner.motion.contacts import Friction, velocities
+from polycorner.motion.contacts import ContactFamily, Friction, pair_coordinates, velocities
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.system import System
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -166,6 +166,40 @@ def row_of_balls(masses: Sequence[float] = (1.0, 1.0, 1.0), restitution: float =
     gaps = {f"{a.name}{b.name}": b - a - 1 for a, b in pairwise(M.symbols)}
     kinetic = sum(m * v**2 for m, v in zip(masses, velocities(M), strict=True)) / 2
     return System(Polyhedron(M, gaps), kinetic, restitution=restitution)
+
+
+def newtons_cradle(balls: int, restitution: float = 1.0) -> System:
+    """Return equal balls of diameter 1 in a row, any two of which may meet; ``x`` of each.
+
+    Unlike :func:`row_of_balls` these are bodies of one system, with a family of contacts.  Balls
+    that are apart, however little, meet one pair after another, and an elastic pair exchanges its
+    velocities: where ``k`` balls come in, ``k`` go out.
+    """
+    import sympy
+
+    M = Manifold.euclidean("x")
+    (x,), (v,) = M.symbols, velocities(M)
+    (x1,), (x2,) = pair_coordinates(M)
+    apart = ContactFamily({"balls": sympy.Abs(x2 - x1) - 1}, reach=1.0, restitution=restitution)
+    ends = Polyhedron(M, {"left": END + x, "right": END - x})
+    return System(ends, v**2 / 2, sympy.Integer(0), count=balls, between=apart)
+
+
+def dispersing_billiard(radius: float = 0.5) -> System:
+    """Return a point in the square ``|x|, |y| <= 1`` about a ``disc``, elastic and without forces.
+
+    Almost every motion fills the table ([Sinai]): places are distributed uniformly, the angle of
+    incidence with the density ``cos(angle) / 2``, and the mean path between impacts is
+    ``pi A / P``, with the area ``A`` and the perimeter ``P`` of the table, disc included
+    ([Chernov]).
+    """
+    import sympy
+
+    M = Manifold.euclidean("x y")
+    (x, y), (vx, vy) = M.symbols, velocities(M)
+    walls = {"left": 1 + x, "right": 1 - x, "bottom": 1 + y, "top": 1 - y}
+    table = Polyhedron(M, walls | {"disc": sympy.sqrt(x**2 + y**2) - radius})
+    return System(table, (vx**2 + vy**2) / 2, sympy.Integer(0), restitution=1.0)
 
 
 def body_on_plane(
