@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 
 from polycorner.atomic import write_atomically
@@ -89,6 +90,28 @@ def source_key(*modules: str) -> str:
     digest = hashlib.sha256()
     for name in modules:
         digest.update(Path(str(sys.modules[name].__file__)).read_bytes())
+    return digest.hexdigest()
+
+
+def sources_digest(package: str, *, without: tuple[str, ...] = ()) -> str:
+    """Return SHA-256 over names and text of a package's own Python files, and of the linker's.
+
+    Subpackages are not included, nor are files that are not compiled: ``without``.  Ends of lines
+    do not matter.
+    """
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        msg = f"package: expected the name of an importable package; got {package!r}"
+        raise ValueError(msg)
+    folders = map(Path, spec.submodule_search_locations)
+    files = sorted(file for folder in folders for file in folder.glob("*.py"))
+    digest = hashlib.sha256()
+    here = Path(__file__)
+    for file in (here.with_name("compilation.py"), here.with_name("linking.py"), *files):
+        if file.name in without:
+            continue
+        content = file.read_bytes().replace(b"\r\n", b"\n")
+        digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -19,10 +19,7 @@ Only entry points are cached; what they call is linked into them, see
 :func:`polycorner.formulas.linking.linked`.
 """
 
-import hashlib
 import logging
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from numba import config, types
@@ -68,24 +65,6 @@ class Announcement(event.Listener):  # type: ignore[misc]
 
 
 event.register("numba:compile", Announcement())
-
-
-def sources_digest(package: str) -> str:
-    """Return SHA-256 over names and bytes of a package's own Python files, and of those here.
-
-    Subpackages are not included.
-    """
-    spec = find_spec(package)
-    if spec is None or not spec.submodule_search_locations:
-        msg = f"package: expected the name of an importable package; got {package!r}"
-        raise ValueError(msg)
-    folders = map(Path, spec.submodule_search_locations)
-    files = sorted(file for folder in folders for file in folder.glob("*.py"))
-    digest = hashlib.sha256()
-    for file in (Path(__file__), Path(linking.__file__), *files):
-        content = file.read_bytes()
-        digest.update(f"{file.name} {len(content)}\n".encode() + content)
-    return digest.hexdigest()
 
 
 @intrinsic

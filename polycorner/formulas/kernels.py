@@ -5,27 +5,23 @@ address from Numba as well as from Python.  Batches run in explicit vectors of `
 """
 
 import ctypes
-import ctypes.util
 import hashlib
 import logging
-import os
 from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Any
 
-import llvmlite
 import numpy as np
-from llvmlite import binding as llvm
 from llvmlite import ir
 
 from polycorner.formulas import adjoints, batches, emit, programs, translate
 from polycorner.formulas.batches import emit_lanes, emit_points
 from polycorner.formulas.cache import read_code, source_key, write_code
+from polycorner.formulas.machine_code import load_code, machine_code, machine_key
 from polycorner.formulas.programs import Polynomial, Program
 from polycorner.spaces.manifold import Array
 
 LOG = logging.getLogger("polycorner.compilation")
-OPTIMISATION = 2
 MANY = 64  # points from which on they are evaluated in lanes
 
 
@@ -121,9 +117,9 @@ class CompiledKernel:
             )
             module = ir.Module(name=name)
             emitted(module, kernel.program, self.order, name)
-            code = _machine_code(module)
+            code = machine_code(str(module))
             write_code(name, code)
-        return *_load(code, [f"{name}_{entry}" for entry in entries]), origin
+        return *load_code(code, [f"{name}_{entry}" for entry in entries]), origin
 
     @cached_property
     def _lanes(self) -> Any:
@@ -167,57 +163,12 @@ def address(array: Array) -> int:
 
 
 @lru_cache(maxsize=1)
-def _prepare() -> None:
-    """Set up code generation for this machine, and say where the C mathematics library is."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "ucrtbase")
-    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY):
-        function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
-        llvm.add_symbol(name, function.value)
-
-
-def _target_machine() -> Any:
-    """Return a new target machine; an execution engine takes over the one it is made with."""
-    _prepare()
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(),
-        features=llvm.get_host_cpu_features().flatten(),
-        opt=OPTIMISATION,
-        reloc="pic",
-        codemodel="jitdefault",
-        jit=True,
-    )
-
-
-@lru_cache(maxsize=1)
 def _generator_key() -> str:
-    machine = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
     rooms = (programs, translate, adjoints, emit, batches)
     code = source_key(*(room.__name__ for room in rooms), __name__)
-    return repr((code, llvmlite.__version__, machine))
+    return repr((code, machine_key()))
 
 
 def _symbol(key: str, order: int) -> str:
     digest = hashlib.sha256(repr((key, order, _generator_key())).encode()).hexdigest()
     return f"polycorner_{digest[:32]}_{order}"
-
-
-def _load(code: bytes, entries: list[str]) -> tuple[Any, list[int]]:
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
-    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return engine, [engine.get_function_address(entry) for entry in entries]
-
-
-def _machine_code(module: ir.Module) -> bytes:
-    module.triple = llvm.get_default_triple()
-    parsed = llvm.parse_assembly(str(module))
-    parsed.verify()
-    target = _target_machine()
-    options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION)
-    options.loop_vectorization = True
-    builder = llvm.create_pass_builder(target, options)
-    builder.getModulePassManager().run(parsed, builder)
-    code: bytes = target.emit_object(parsed)
-    return code

@@ -26,6 +26,21 @@ def linked(**options: Any) -> Any:
     )
 
 
+def whole_module(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str]:
+    """Return a linked function, with all that it calls, as a module of its own, and its name there.
+
+    The function can be called from outside by the name, all others cannot.
+    """
+    function.compile(arguments)
+    overload = function.overloads[arguments]
+    module: Any = overload.library.whole_module()
+    name: str = overload.fndesc.llvm_func_name
+    for part in (*module.functions, *module.global_variables):
+        if not part.is_declaration:
+            part.linkage = Linkage.external if part.name == name else Linkage.internal
+    return module, name
+
+
 class LinkedCompiler(CompilerBase):  # type: ignore[misc]
     """Numba's compiler, with a library of our own."""
 
@@ -60,8 +75,11 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._ensure_finalized()
         return NO_CODE
 
-    def _get_module_for_linking(self) -> Any:
+    def whole_module(self) -> Any:
         """Return the code with all that it calls."""
+        return self._get_module_for_linking().clone()
+
+    def _get_module_for_linking(self) -> Any:
         self._ensure_finalized()
         whole = self._shared_module
         if whole is None:

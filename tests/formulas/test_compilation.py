@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import polycorner
-from polycorner.formulas.compilation import sources_digest
+from polycorner.formulas.cache import sources_digest
 from polycorner.formulas.linking import linked
 
 LEAF = """
@@ -27,7 +27,7 @@ def scaled(x):
 """
 ENTRY = """
 from numba import njit
-from polycorner.formulas.compilation import sources_digest
+from polycorner.formulas.cache import sources_digest
 from leaves import leaf
 
 def compiled(sources):

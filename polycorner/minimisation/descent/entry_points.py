@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from polycorner.formulas.compilation import sources_digest
+from polycorner.formulas.cache import sources_digest
 from polycorner.minimisation.descent import flat_directions, newton, sqp
 from polycorner.minimisation.descent.feasibility import project
 

@@ -252,8 +252,8 @@ def add_pair_blocks(model, state, work, contact, h, count):
     finish_block(model, work, n)
     if model.pair_slips.shape[0] == 0:
         return count + 1
-    address, exchanged, p0 = model.pair_slips[g]
-    first, second = (j, i) if exchanged else (i, j)
+    address, p0 = model.pair_slips[g, 0], model.pair_slips[g, 2]
+    first, second = (j, i) if model.pair_slips[g, 1] else (i, j)
     reads = model.pair_reads.shape[0]
     for a in range(reads):
         body = first if model.pair_reads[a, 0] == 0 else second

@@ -1,14 +1,12 @@
 """The engine: bodies in motion, advanced step by step by compiled code."""
 
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.errors import SolverError
-from polycorner.formulas.cache import one_at_a_time
 from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.engine.arrays import (
     CONTACTS,
@@ -29,6 +27,7 @@ from polycorner.motion.engine.arrays import (
     declarations,
     restored,
 )
+from polycorner.motion.engine.intermediate import compiled_advance
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.formulation import moment
@@ -137,10 +136,10 @@ class Engine:
 
     def advance(self, steps: int) -> list[Event]:
         """Advance by so many steps and return the events in them."""
-        compiled = self._compiled()
+        advance = compiled_advance()  # compiles the engine, unless the cache has it
         events: list[Event] = []
         while steps > 0:
-            why, done, count = compiled.advance(self._addresses, steps)
+            why, done, count = advance(self._addresses, steps)
             events += self._read(count)
             steps -= done
             if why == CONTACTS_FULL:
@@ -175,15 +174,6 @@ class Engine:
                 if np.isnan(gap):
                     return f"the gap {name!r}{where} is not a number"
         return f"the velocities after t = {self.time:.6g} are not finite"
-
-    def _compiled(self) -> ModuleType:
-        """Return the compiled code; the first call compiles it, unless another process has."""
-        from polycorner.motion.engine import entry_point
-
-        if not entry_point.advance.overloads:
-            with one_at_a_time(f"motion-{entry_point.SOURCES[:16]}"):
-                entry_point.advance(self._addresses, 0)
-        return entry_point
 
     def _read(self, count: int) -> list[Event]:
         contacts, names = self.bodies.body.contacts, self.bodies.pair_contacts

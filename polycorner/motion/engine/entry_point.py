@@ -1,43 +1,52 @@
-"""Entry point of the compiled engine, cached under a key over the sources of all stages."""
+"""Entry point of the engine, and its intermediate code."""
 
-from typing import Any
+import re
 
-from numba import njit
+from numba import types
 
-from polycorner.formulas.compilation import sources_digest
+from polycorner.formulas.linking import whole_module
+from polycorner.formulas.machine_code import portable_code
 from polycorner.motion.engine.arrays import DONE, EVENTS_FULL, STEPS
-from polycorner.motion.engine.jit import ZERO
+from polycorner.motion.engine.jit import ZERO, compiled
 from polycorner.motion.engine.records import log_at, model_at, state_at, work_at
 from polycorner.motion.engine.refinement import step
 from polycorner.motion.engine.sleep import stays_asleep
 
-
-def _entry_point(sources: str) -> Any:
-    """Return the compiled function; it reads ``sources``, which puts it into its cache key."""
-
-    @njit(cache=True, error_model="numpy")
-    def advance(tables, steps):
-        """Advance by several steps; return why it stopped, and how many steps and events."""
-        _ = sources
-        model, state = model_at(tables[0]), state_at(tables[1])
-        work, log = work_at(tables[2]), log_at(tables[3])
-        count = ZERO
-        most = 2 * work.contact.shape[0] + model.bodies * (3 + model.restitution.size)
-        for done in range(steps):
-            if count + most > log.entries.shape[0]:
-                return EVENTS_FULL, done, count
-            why, count = step(model, state, work, log, count)
-            if why != DONE:
-                work.list_status[1] = 0
-                return why, done, count
-        index, h = state.counts[STEPS], model.step
-        for i in range(model.bodies):
-            if state.alive[i] and state.asleep[i] and state.booked_to[i] < index:
-                stays_asleep(model, state, work, i, state.neighbour_impulse, h, index * h, index)
-        return DONE, steps, count
-
-    return advance
+NEW = r" (captures|range)\([^)]*\)"  # properties of arguments that older versions do not know
 
 
-SOURCES = sources_digest(__package__)
-advance = _entry_point(SOURCES)
+@compiled
+def advance(model_table, state_table, work_table, log_table, steps):
+    """Advance by several steps; return why it stopped, and how many steps and events."""
+    model, state = model_at(model_table), state_at(state_table)
+    work, log = work_at(work_table), log_at(log_table)
+    count = ZERO
+    most = 2 * work.contact.shape[0] + model.bodies * (3 + model.restitution.size)
+    for done in range(steps):
+        if count + most > log.entries.shape[0]:
+            return EVENTS_FULL, done, count
+        why, count = step(model, state, work, log, count)
+        if why != DONE:
+            work.list_status[1] = 0
+            return why, done, count
+    index, h = state.counts[STEPS], model.step
+    for i in range(model.bodies):
+        if state.alive[i] and state.asleep[i] and state.booked_to[i] < index:
+            stays_asleep(model, state, work, i, state.neighbour_impulse, h, index * h, index)
+    return DONE, steps, count
+
+
+def intermediate_code(entry: str) -> str:
+    """Return the engine as intermediate code for any processor, all stages linked into one.
+
+    Words that only one version of LLVM knows are left out: once code is optimised, they matter
+    little.
+    """
+    module, name = whole_module(advance, (types.int64,) * 5)
+    text = portable_code(str(module).replace(name, entry))
+    for words in (r"^(attributes #|source_filename|; ModuleID|target ).*\n", r" #\d+(?=\s|$)", NEW):
+        text = re.sub(words, "", text, flags=re.MULTILINE)
+    if ".const." in text:
+        msg = "the engine raises an exception, which holds the path of a file"
+        raise ValueError(msg)
+    return text

@@ -143,7 +143,8 @@ def evaluate_gaps(model, work, i, q, gap, gradient):
     scratch = work.scratch
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
     for call in range(model.gap_calls.shape[0]):
-        address, n, m, r0, w0, p0 = model.gap_calls[call]
+        address, n, m = model.gap_calls[call, 0], model.gap_calls[call, 1], model.gap_calls[call, 2]
+        r0, w0, p0 = model.gap_calls[call, 3], model.gap_calls[call, 4], model.gap_calls[call, 5]
         for a in range(n):
             scratch[a] = q[i, model.gap_reads[r0 + a]]
         j0 = n + m

@@ -4,8 +4,8 @@ import numpy as np
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
-from polycorner.formulas.compilation import sources_digest
-from polycorner.motion.engine import driver, entry_point
+from polycorner.motion.engine import driver
+from polycorner.motion.engine.intermediate import ENTRY, HEAD, engine_sources, shipped_code
 from polycorner.motion.simulation import start
 
 
@@ -24,14 +24,44 @@ def test_room_for_contacts_grows(monkeypatch):
     assert narrow.capacity > 16
 
 
-def test_the_cache_key_covers_all_stages():
-    (cell,) = (
-        cell
-        for name, cell in zip(
-            entry_point.advance.py_func.__code__.co_freevars,
-            entry_point.advance.py_func.__closure__,
-            strict=True,
-        )
-        if name == "sources"
-    )
-    assert cell.cell_contents == sources_digest("polycorner.motion.engine")
+def test_the_package_contains_the_engine_as_it_is():
+    """After a change of a stage, `make engine` makes it anew."""
+    assert shipped_code().startswith(HEAD + engine_sources() + "\n")
+
+
+def test_what_the_package_contains_names_no_file():
+    code = shipped_code()
+    assert "/" not in code
+    assert f"@{ENTRY}(" in code
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("content", [None, b"", b"not compressed"])
+def test_without_it_numba_makes_the_same_engine(tmp_path, content):
+    """Another version of LLVM may not understand it either."""
+    run = """
+import sys
+from pathlib import Path
+from polycorner.models.textbook import bouncing_ball
+from polycorner.motion import simulate
+from polycorner.motion.engine import intermediate
+if len(sys.argv) > 1:
+    intermediate.FILE = sys.argv[1]
+ball = bouncing_ball(0.7)
+path = simulate(ball, ball.state([1.0]), 2.0, 1e-2)
+print(path.q.tobytes().hex())
+"""
+    other = tmp_path / "engine.ll.xz"
+    if content is not None:
+        other.write_bytes(content)
+    results = {
+        subprocess.run(
+            [sys.executable, "-c", run, *arguments],
+            env={**os.environ, "POLYCORNER_CACHE_DIR": str(tmp_path / str(len(arguments)))},
+            capture_output=True,
+            check=True,
+            text=True,
+        ).stdout
+        for arguments in ([], [str(other)])
+    }
+    assert len(results) == 1

@@ -1,0 +1,91 @@
+"""Machine code for this processor, from LLVM's intermediate code."""
+
+import ctypes
+import ctypes.util
+import os
+from functools import lru_cache
+from typing import Any
+
+import llvmlite
+from llvmlite import binding as llvm
+
+from polycorner.formulas import emit
+from polycorner.formulas.cache import source_key
+
+OPTIMISATION = 2
+
+
+def machine_key() -> str:
+    """Return what machine code depends on, beside the code that it is made from."""
+    machine = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+    return repr((source_key(__name__), llvmlite.__version__, machine))
+
+
+def machine_code(text: str, *, optimise: bool = True) -> bytes:
+    """Return the machine code of intermediate code, as an object file.
+
+    Code that :func:`portable_code` returns need not be optimised again.
+
+    Raises
+    ------
+    RuntimeError
+        If this version of LLVM does not understand the text.
+    """
+    target = _target_machine()
+    parsed = llvm.parse_assembly(text)
+    parsed.triple, parsed.data_layout = llvm.get_default_triple(), str(target.target_data)
+    parsed.verify()
+    if optimise:
+        options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION)
+        options.loop_vectorization = True
+        _run_passes(parsed, target, options)
+    code: bytes = target.emit_object(parsed)
+    return code
+
+
+def portable_code(text: str) -> str:
+    """Return intermediate code, optimised as far as that does not depend on the processor."""
+    _prepare()
+    target = llvm.Target.from_default_triple().create_target_machine()
+    parsed = llvm.parse_assembly(text)
+    options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION)
+    options.loop_vectorization = options.slp_vectorization = False
+    _run_passes(parsed, target, options)
+    return str(parsed)
+
+
+def load_code(code: bytes, entries: list[str]) -> tuple[Any, list[int]]:
+    """Return an engine that holds an object file, and the addresses of functions in it."""
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return engine, [engine.get_function_address(entry) for entry in entries]
+
+
+def _run_passes(parsed: Any, target: Any, options: Any) -> None:
+    builder = llvm.create_pass_builder(target, options)
+    builder.getModulePassManager().run(parsed, builder)
+
+
+@lru_cache(maxsize=1)
+def _prepare() -> None:
+    """Set up code generation for this machine, and say where the C mathematics library is."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "ucrtbase")
+    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY, "sqrt", "floor"):
+        function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
+        llvm.add_symbol(name, function.value)
+
+
+def _target_machine() -> Any:
+    """Return a new target machine; an execution engine takes over the one it is made with."""
+    _prepare()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(),
+        features=llvm.get_host_cpu_features().flatten(),
+        opt=OPTIMISATION,
+        reloc="pic",
+        codemodel="jitdefault",
+        jit=True,
+    )
