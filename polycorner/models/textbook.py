@@ -16,7 +16,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from polycorner.motion.contacts import ContactFamily, Friction, pair_coordinates, velocities
+from polycorner.motion.contacts import (
+    ContactFamily,
+    Friction,
+    pair_coordinates,
+    time_symbol,
+    velocities,
+)
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.system import System
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -200,6 +206,66 @@ def dispersing_billiard(radius: float = 0.5) -> System:
     walls = {"left": 1 + x, "right": 1 - x, "bottom": 1 + y, "top": 1 - y}
     table = Polyhedron(M, walls | {"disc": sympy.sqrt(x**2 + y**2) - radius})
     return System(table, (vx**2 + vy**2) / 2, sympy.Integer(0), restitution=1.0)
+
+
+def shaken_stack(blocks: int, amplitude: float, frequency: float) -> System:
+    """Return blocks of height 1 on each other, ``y1`` to ``yn``, seen from a floor that is shaken.
+
+    The floor is at ``A sin(w t)``, so that the weight of a block is ``g - A w^2 sin(w t)``.  While
+    this is positive, the contact under block ``k``, ``floor`` or ``on<k - 1>``, carries it
+    ``n - k + 1`` times.  When it vanishes, the whole stack leaves the floor.
+    """
+    import sympy
+
+    M = Manifold.euclidean(" ".join(f"y{k + 1}" for k in range(blocks)))
+    y, v = M.symbols, velocities(M)
+    gaps = {"floor": y[0]} | {f"on{k + 1}": b - a - 1 for k, (a, b) in enumerate(pairwise(y))}
+    lift = amplitude * frequency**2 * sympy.sin(frequency * time_symbol())
+    return System(
+        Polyhedron(M, gaps),
+        sum(w**2 for w in v) / 2,
+        GRAVITY * sum(y),
+        forces=dict.fromkeys(M.names, lift),
+    )
+
+
+def block_in_wedge(half_angle: float, friction: ConvexSet, pull: Point) -> System:
+    """Return a block of mass 1 in a groove, under the force ``pull``; it starts at the apex ``0``.
+
+    The faces, ``right`` and ``left``, are ``half_angle`` off the axis ``y``.  Rest at the apex is
+    possible where the opposite of ``pull`` is a sum of forces in the two friction cones.  Where the
+    angle of friction exceeds ``half_angle``, the cones contain each other's apex: rest is possible
+    whatever pulls the block, with forces that are indeterminate.  A pull out of the groove then has
+    two answers, since rigid faces that do not press let it go.
+    """
+    M = Manifold.euclidean("x y")
+    (x, y), (vx, vy) = M.symbols, velocities(M)
+    s, c = math.sin(half_angle), math.cos(half_angle)
+    faces = {"right": s * y - c * x, "left": s * y + c * x}
+    rough = (
+        Friction("right grip", (s * vx + c * vy,), friction, "right"),
+        Friction("left grip", (-s * vx + c * vy,), friction, "left"),
+    )
+    force = -pull[0] * x - pull[1] * y
+    return System(Polyhedron(M, faces), (vx**2 + vy**2) / 2, force, friction=rough)
+
+
+def bead_on_hoop(spin: float, friction: ConvexSet) -> System:
+    """Return a bead of mass 1 on a rough ``hoop`` of radius 1 that turns about its diameter ``y``.
+
+    Seen from the hoop, in its plane, ``V = g y - spin^2 x^2 / 2``; the sides that push the bead
+    round are smooth.  At the angle ``a`` from the lowest place the force along the hoop is
+    ``(spin^2 cos(a) - g) sin(a)``, and across it ``spin^2 sin(a)^2 + g cos(a)``: the bead may stick
+    where the first is at most ``mu`` times the second, and slides elsewhere.
+    """
+    import sympy
+
+    M = Manifold.euclidean("x y")
+    (x, y), (vx, vy) = M.symbols, velocities(M)
+    hoop = Polyhedron(M, {}, equations={"hoop": sympy.sqrt(x**2 + y**2) - 1})
+    rough = Friction("grip", (x * vy - y * vx,), friction, "hoop")
+    potential = GRAVITY * y - spin**2 * x**2 / 2
+    return System(hoop, (vx**2 + vy**2) / 2, potential, friction=(rough,))
 
 
 def body_on_plane(

@@ -6,6 +6,7 @@ from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAI
 from polycorner.motion.engine.blocks import velocity_of
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import TOUCHING, key_of
+from polycorner.motion.engine.paths import release_time
 
 PARTING = 100.0 * TOUCHING  # scaled gap beyond which a contact is lost
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
@@ -89,16 +90,6 @@ def classify(work, b, was, gap, h, time, scale, u, out):
 
 
 @compiled
-def release_time(before, now, release, h, time):
-    """Return when a normal impulse vanishes if it falls on as from the last step to this one."""
-    if now <= 0.0:
-        return release
-    if before <= now:
-        return time + (h if before > 0.0 else 0.5 * h)
-    return time + min(0.5 * h + h * now / (before - now), 1.5 * h)
-
-
-@compiled
 def record_contacts(model, state, work, log, blocks, h, time, count):
     """Record contacts made, lost and bounced; update the list of contacts between bodies."""
     u, out, C, share = work.slip, work.image, 0, h / model.step
@@ -163,7 +154,7 @@ def keep_contacts(model, state, work, log, C, h, time, count):
                 g = state.keys[s] % model.pair_gaps
                 count = record(log, count, LOST, i, j, g, time + h, 0.0)
             continue
-        state.keys[size], state.pair_release[size] = state.keys[s], state.pair_release[s]
+        state.keys[size], state.pair_release[size] = state.keys[s], time + 0.5 * h
         for a in range(3):
             state.pair_impulse[size, a] = state.pair_impulse[s, a]
         for a in range(2):

@@ -155,3 +155,13 @@ def acceptable_length(model, state, work, h, out):
     if sunk and h > SHORTEST_PART * model.step:
         length = min(length, 0.5 * h)
     return length
+
+
+@compiled
+def release_time(before, now, release, h, time):
+    """Return when a normal impulse vanishes if it falls on as from the last step to this one."""
+    if now <= 0.0:
+        return release
+    if before <= now:
+        return time + (h if before > 0.0 else 0.5 * h)
+    return time + min(0.5 * h + h * now / (before - now), 1.5 * h)

@@ -6,6 +6,7 @@ from polycorner.motion.engine.arrays import CONTACTS, PAIR_FRICTION, PAIR_GAP, S
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.partition import island_of, root_of
+from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rest import (
     SLEEP_MARGIN,
     comes_to_rest,
@@ -195,4 +196,7 @@ def settle(model, state, work, h, index):
                     state.friction[i, f, r] = work.proof_friction[i, f, r]
                     state.booked_friction[i, f, r] = work.proof_friction[i, f, r]
             for g in range(model.restitution.size):
-                state.normal[i, g] = work.proof_normal[i, g]
+                before, now = state.normal[i, g], work.proof_normal[i, g]
+                release = release_time(before, now, state.release[i, g], h, index * h)
+                state.normal[i, g], state.pressed[i, g] = now, now
+                state.release[i, g] = release
