@@ -7,7 +7,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import nnls
 
-from polycorner.models.textbook import GRAVITY, bead_on_hoop, block_in_wedge, shaken_stack
+from polycorner.models.textbook import (
+    GRAVITY,
+    bead_on_hoop,
+    block_in_wedge,
+    body_on_plane,
+    shaken_stack,
+)
 from polycorner.motion.events import EventKind
 from polycorner.motion.friction import Interval
 from polycorner.motion.simulation import simulate
@@ -146,3 +152,39 @@ def test_a_bead_slides_on_a_turning_hoop(spin, angle, speed):
         errors.append(math.hypot(*(path.q[-1, 0] - at_angle(expected))))
     assert errors[0] < 1e-3
     assert errors[1] < 0.4 * errors[0]
+
+
+def painleve(theta, mu, way):
+    """Row of the gap and of the slip, and the gap's acceleration per force while it slides."""
+    normal = np.array([0.0, 1.0, math.cos(theta)])
+    tangent = np.array([1.0, 0.0, -math.sin(theta)])
+    inverse = np.diag([1.0, 1.0, 3.0])  # of a rod of mass 1 and half-length 1
+    return normal, tangent, float(normal @ inverse @ (normal - mu * way * tangent))
+
+
+@pytest.mark.parametrize("mu", [1.2, 2.0, 3.0])
+@pytest.mark.parametrize("theta", [-0.9, -math.atan(2), -1.3, math.atan(2)])
+def test_a_rod_that_cannot_slide_on_is_stopped_by_an_impulse(mu, theta):
+    """Painleve's paradox: no finite force keeps the sliding end of the rod on the floor.
+
+    Where the acceleration per force is negative (for some angle beyond mu = 4/3), the end is
+    stopped at once, without a collision and without a gain of energy; elsewhere forces are finite.
+    """
+    dt, way, slip = 1e-4, 1.0, 3.0
+    rod = body_on_plane([(1.0, 0.0)], 1 / 3, Interval(mu))
+    normal, tangent, per_force = painleve(theta, mu, way)
+    place, start = np.array([0.0, -math.sin(theta), theta]), np.array([slip, 0.0, 0.0])
+    path = simulate(rod, rod.state(place, start), 5 * dt, dt)
+    assert path.converged
+    change = path.v[1, 0] - start + [0.0, GRAVITY * dt, 0.0]
+    change[2] /= 3.0  # the momentum that contacts gave
+    rows = np.array([normal, tangent])
+    impulse, missed, *_ = np.linalg.lstsq(rows.T, change, rcond=None)
+    assert float(missed.sum()) < 1e-10
+    assert impulse[0] >= 0
+    assert abs(impulse[1]) <= mu * impulse[0] * (1 + 1e-6) + 1e-9
+    energy = path.kinetic + path.potential
+    assert float(energy.max()) <= float(energy[0]) * (1 + 1e-9) + 1e-6
+    stopped = abs(path.v[1, 0] @ tangent) < 1e-3
+    assert stopped == (per_force < 0)
+    assert (impulse[0] > 0.1) == (per_force < 0)

@@ -17,6 +17,7 @@ FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and 
 FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path
 EASY_STEPS = 8  # Newton steps up to which the next factor is smaller
 LOAD_ROUNDS = 20  # convex problems that are solved, at most
+GRIP = 1e3  # speed of slip that first loads stop, over that of the island
 LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
 
 
@@ -26,12 +27,14 @@ def continue_island(model, state, work, first, last, n, width, goal, softness, u
 
     First the loads of friction are iterated; else the compliance of the contacts is taken from
     ``FIRST_COMPLIANCE`` to zero, from the impulses at hand; else from one to zero, from no
-    impulses.  If none of these leads to a solution, the impulses remain what they were.
+    impulses; else loads are iterated from those under which everything sticks.  If none of these
+    leads to a solution, the impulses remain what they were.
     """
     copy_impulses(work, first, last, work.impulse, work.rigid)
-    for attempt in range(3):
-        if attempt == 0:
-            iterate_loads(model, state, work, first, last, n, width, goal, softness, u, out)
+    for attempt in range(4):
+        if attempt in (0, 3):
+            grip = GRIP * goal / model.tolerance if attempt == 3 else 0.0
+            iterate_loads(model, state, work, first, last, n, width, goal, softness, grip, u, out)
         elif attempt == 1:
             follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE, u, out)
         else:
@@ -79,14 +82,21 @@ def follow(model, state, work, first, last, n, width, goal, compliance, u, out):
 
 
 @compiled
-def iterate_loads(model, state, work, first, last, n, width, goal, softness, u, out):
+def iterate_loads(model, state, work, first, last, n, width, goal, softness, grip, u, out):
     """Solve an island with known loads of friction, again and again with the loads that result.
 
-    Where the loads go to and fro, only a share of their change is taken over.
+    The first loads are those at hand, or stop a slip of the speed ``grip`` if it is not zero.  In
+    Painleve's paradox only this start leads to the impulse that stops the slip.  Where the loads
+    go to and fro, only a share of their change is taken over.
     """
     share, former = 1.0, np.inf
     for _ in range(LOAD_ROUNDS):
         detach_loads(work, first, last, 1.0 if former == np.inf else share)
+        if former == np.inf and grip > 0.0:
+            for s in range(first, last):
+                b = work.order[s]
+                if work.pressing[b] <= -2:
+                    work.block_load[b] = grip * work.delassus[b, 3]
         worst = residual(model, work, first, last, 0.0, u, out)
         steps, worst = newton_steps(
             model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
