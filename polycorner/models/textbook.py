@@ -14,7 +14,6 @@ turns in the plane  positive anticlockwise, from ``x`` to ``y``
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from polycorner.motion.contacts import (
     ContactFamily,
@@ -27,9 +26,6 @@ from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.system import System
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
-
-if TYPE_CHECKING:
-    pass
 
 GRAVITY = 9.81  # m/s^2
 END = 1000.0  # where planes end, in m
