@@ -260,6 +260,9 @@ class Work(NamedTuple):
     block_load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
     is_error: Annotated[Any, whole("B")]  # whether a gap is so small that it may be left as it is
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
+    before: Annotated[Any, real("B 2")]  # J v before the step
+    free: Annotated[Any, real("B 2")]  # J v after forces alone
+    after: Annotated[Any, real("B 2")]  # u after the step, as of the last residual
     jacobian: Annotated[Any, real("B 2 2*k")]  # J
     response: Annotated[Any, real("B 2 2*k")]  # M^-1 J'
     delassus: Annotated[Any, real("B 4")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm of W

@@ -20,26 +20,36 @@ STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothi
 
 
 @compiled
-def finish_block(model, work, b):
-    """Compute ``M^-1 J'`` and the Delassus matrix of a block, and apply its initial impulse."""
+def finish_block(model, state, work, b):
+    """Compute ``M^-1 J'``, the Delassus matrix and ``J v``, and apply the initial impulse."""
     k = model.dimension
     rows = max(1, work.block_rows[b])
-    for r in range(rows):
-        for side in range(2):
-            i = work.block_bodies[b, side]
-            for c in range(k):
-                value = 0.0
-                if i >= 0 and work.awake[i]:
-                    for a in range(k):
-                        value += work.inverse_mass[i, c, a] * work.jacobian[b, r, side * k + a]
-                    work.v_new[i, c] += value * work.impulse[b, r]
-                work.response[b, r, side * k + c] = value
     d00 = d01 = d11 = 0.0
-    for c in range(2 * k):
-        d00 += work.jacobian[b, 0, c] * work.response[b, 0, c]
-        if rows == 2:
-            d01 += work.jacobian[b, 0, c] * work.response[b, 1, c]
-            d11 += work.jacobian[b, 1, c] * work.response[b, 1, c]
+    for r in range(rows):
+        work.before[b, r] = work.free[b, r] = 0.0
+    for side in range(2):
+        i = work.block_bodies[b, side]
+        if i < 0:
+            continue
+        for r in range(rows):
+            row, response, p = work.jacobian[b, r], work.response[b, r], work.impulse[b, r]
+            before, free = 0.0, 0.0
+            for c in range(k):
+                before += row[side * k + c] * state.v[i, c]
+                free += row[side * k + c] * work.v_free[i, c]
+                value = 0.0
+                if work.awake[i]:
+                    for a in range(k):
+                        value += work.inverse_mass[i, c, a] * row[side * k + a]
+                    work.v_new[i, c] += value * p
+                response[side * k + c] = value
+            work.before[b, r] += before
+            work.free[b, r] += free
+        for c in range(side * k, side * k + k):
+            d00 += work.jacobian[b, 0, c] * work.response[b, 0, c]
+            if rows == 2:
+                d01 += work.jacobian[b, 0, c] * work.response[b, 1, c]
+                d11 += work.jacobian[b, 1, c] * work.response[b, 1, c]
     half = 0.5 * (d00 + d11)
     top = half + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
     if rows == 1:
@@ -193,7 +203,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         work.block_load[b] = -change
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
         work.impulse[b, 0] = state.normal[i, g] * share
-        finish_block(model, work, b)
+        finish_block(model, state, work, b)
     for f in range(model.friction_sets.shape[0]):
         pressing = model.pressing_gap[f]
         if (pressing < 0 and work.load[i, f] <= 0.0) or (pressing >= 0 and block_of[pressing] < 0):
@@ -215,7 +225,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         else:
             work.block_load[b] = work.load[i, f]
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_FRICTION, i, f
-        finish_block(model, work, b)
+        finish_block(model, state, work, b)
     return count
 
 
@@ -249,7 +259,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     work.is_error[n] = closed and abs(gap + change) < TOUCHING * model.gap_unit
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]
-    finish_block(model, work, n)
+    finish_block(model, state, work, n)
     if model.pair_slips.shape[0] == 0:
         return count + 1
     address, p0 = model.pair_slips[g, 0], model.pair_slips[g, 2]
@@ -277,7 +287,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     work.block_set[b] = model.pair_sets[0 if stuck else 1]
     work.pressing[b] = n
     work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = PAIR_FRICTION, contact, g
-    finish_block(model, work, b)
+    finish_block(model, state, work, b)
     return count + 2
 
 

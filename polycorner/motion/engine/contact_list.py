@@ -3,7 +3,6 @@
 import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
-from polycorner.motion.engine.blocks import velocity_of
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import TOUCHING, key_of
 from polycorner.motion.engine.paths import release_time
@@ -50,14 +49,13 @@ def store_sticking(model, state, work, blocks):
     for b in range(blocks):
         if work.origin[b, 0] == OWN_FRICTION and takes_part(work, b):
             i, f = work.origin[b, 1], work.origin[b, 2]
-            state.sticks[i, f] = 1 if sticks(model, work, b, work.slip) else 0
+            state.sticks[i, f] = 1 if sticks(model, work, b) else 0
 
 
 @compiled
-def sticks(model, work, b, u):
+def sticks(model, work, b):
     """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
-    velocity_of(model, work, b, work.v_new, u)
-    slip = abs(u[0]) + (abs(u[1]) if work.block_rows[b] == 2 else 0.0)
+    slip = abs(work.after[b, 0]) + (abs(work.after[b, 1]) if work.block_rows[b] == 2 else 0.0)
     speed = work.island_speed[work.block_bodies[b, 0]]
     if work.block_bodies[b, 1] >= 0:
         speed = max(speed, work.island_speed[work.block_bodies[b, 1]])
@@ -74,10 +72,10 @@ def record(log, count, kind, i, j, which, time, value):
 
 
 @compiled
-def classify(work, b, was, gap, h, time, scale, u, out):
+def classify(work, b, was, gap, h, time, scale, out):
     """Compare a contact with what it was; out: whether it touches, the event or -1, its time."""
     closes = work.block_load[b] / h
-    after = u[0] - work.offset[b, 0] - closes
+    after = work.after[b, 0] - work.offset[b, 0] - closes
     strikes = work.impulse[b, 0] > 0.0 and work.bounces[b]
     touches = gap + h * after <= (PARTING if was else TOUCHING) * scale and not strikes
     out[0], out[1], out[2] = 1.0 if touches else 0.0, -1.0, time + h
@@ -92,15 +90,13 @@ def classify(work, b, was, gap, h, time, scale, u, out):
 @compiled
 def record_contacts(model, state, work, log, blocks, h, time, count):
     """Record contacts made, lost and bounced; update the list of contacts between bodies."""
-    u, out, C, share = work.slip, work.image, 0, h / model.step
+    out, C, share = work.image, 0, h / model.step
     for b in range(blocks):
         kind = work.origin[b, 0]
         if work.block_rows[b] > 0 or work.bilateral[b] or not takes_part(work, b):
             continue
         i, g = work.origin[b, 1], work.origin[b, 2]
-        velocity_of(model, work, b, state.v, u)
-        before = u[0] - work.offset[b, 0]
-        velocity_of(model, work, b, work.v_new, u)
+        before = work.before[b, 0]
         if kind == OWN_GAP:
             gap, was = work.gap[i, g], state.touches[i, g]
             j, pressed, release = NONE, state.pressed[i, g], state.release[i, g]
@@ -114,7 +110,7 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
             release = state.pair_release[index] if index >= 0 else time
             i = work.contact[i, 0]
         state.sums[PENETRATION] = max(state.sums[PENETRATION], -gap)
-        classify(work, b, was, gap, h, time, model.gap_unit, u, out)
+        classify(work, b, was, gap, h, time, model.gap_unit, out)
         release = release_time(pressed * share, work.impulse[b, 0], release, h, time)
         if out[1] >= 0.0:
             when = out[2]
@@ -181,7 +177,7 @@ def add_contacts(model, state, work, C, size, share):
             state.pair_action[size, a] = work.jacobian[b, 0, a] * state.pair_impulse[size, 0]
         if model.pair_slips.shape[0] > 0:
             f = b + 1
-            state.pair_flags[size, 0] = 1 if sticks(model, work, f, work.slip) else 0
+            state.pair_flags[size, 0] = 1 if sticks(model, work, f) else 0
             shift = 0 if work.block_bodies[f, 0] == work.block_bodies[b, 0] else k
             for r in range(2):
                 p = work.impulse[f, r] * lasting

@@ -55,21 +55,28 @@ def relax_block(model, work, b, u, out):
 
 
 @compiled
-def yielding_velocity(model, work, b, compliance, u):
-    """Evaluate ``J v + d + c p / rho``: the velocities of rows that yield to their impulses."""
-    velocity_of(model, work, b, work.v_new, u)
-    if compliance > 0.0:
-        for r in range(max(1, work.block_rows[b])):
+def yielding_velocity(work, b, compliance, u):
+    """Evaluate ``J v + d + c p / rho``: the velocities of rows that yield to their impulses.
+
+    ``work.after`` must be ``J v + d``.
+    """
+    for r in range(max(1, work.block_rows[b])):
+        u[r] = work.after[b, r]
+        if compliance > 0.0:
             u[r] += compliance * work.impulse[b, r] / work.delassus[b, 3]
 
 
 @compiled
 def residual(model, work, first, last, compliance, u, out):
-    """Return the largest residual of the natural map over the blocks of an island, as a speed."""
+    """Return the largest residual of the natural map over the blocks of an island, as a speed.
+
+    The velocities of the blocks' rows are left in ``work.after``.
+    """
     worst = 0.0
     for s in range(first, last):
         b = work.order[s]
-        yielding_velocity(model, work, b, compliance, u)
+        velocity_of(model, work, b, work.v_new, work.after[b])
+        yielding_velocity(work, b, compliance, u)
         rho = work.delassus[b, 3]
         if work.block_rows[b] == 0:
             far = abs(u[0])

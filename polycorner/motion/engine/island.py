@@ -5,7 +5,7 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
 from polycorner.motion.engine.band import number_bodies
-from polycorner.motion.engine.blocks import STRAIGHT, equation_offset, velocity_of
+from polycorner.motion.engine.blocks import STRAIGHT, equation_offset
 from polycorner.motion.engine.continuation import continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
@@ -91,15 +91,13 @@ def switch_reversed_slips(model, state, work, first, last):
     contact slips again.
     """
     found = False
-    u = work.slip
     for s in range(first, last):
         b = work.order[s]
         if work.block_rows[b] == 0 or work.reversed[b]:
             continue
-        velocity_of(model, work, b, state.v, u)
-        x, y = u[0], u[1] if work.block_rows[b] == 2 else 0.0
-        velocity_of(model, work, b, work.v_new, u)
-        along = x * u[0] + (y * u[1] if work.block_rows[b] == 2 else 0.0)
+        along = 0.0
+        for r in range(work.block_rows[b]):
+            along += (work.before[b, r] + work.offset[b, r]) * work.after[b, r]
         if along < 0.0:
             work.reversed[b] = 1
             kind, f = work.origin[b, 0], work.origin[b, 2]
@@ -121,9 +119,8 @@ def solve_island(model, state, work, first, last):
     for s in range(first, last):
         b = work.order[s]
         work.reversed[b] = 0
-        velocity_of(model, work, b, work.v_free, u)
         for r in range(max(1, work.block_rows[b])):
-            speed = max(speed, abs(u[r]))
+            speed = max(speed, abs(work.free[b, r] + work.offset[b, r]))
     for s in range(first, last):
         for side in range(2):
             i = work.block_bodies[work.order[s], side]
@@ -135,7 +132,7 @@ def solve_island(model, state, work, first, last):
     if speed == 0.0:  # no motion and no force
         for s in range(first, last):
             for r in range(2):
-                work.impulse[work.order[s], r] = 0.0
+                work.impulse[work.order[s], r] = work.after[work.order[s], r] = 0.0
         for s in range(first, last):
             for side in range(2):
                 i = work.block_bodies[work.order[s], side]
@@ -209,7 +206,7 @@ def correct_curvature(model, state, work, blocks, h):
     The linearised gap misses what curvature adds within the step.  The bound becomes that of
     Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough.
     """
-    k, u, found = model.dimension, work.slip, False
+    k, found = model.dimension, False
     for i in range(model.bodies):
         work.curves_shut[i] = 0
         speed = 0.0
@@ -243,8 +240,7 @@ def correct_curvature(model, state, work, blocks, h):
             continue
         target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
         if following < target - CURVATURE_DEPTH * model.gap_unit:
-            velocity_of(model, work, b, work.v_new, u)
-            work.block_load[b] = gap + h * (u[0] - work.offset[b, 0]) - following
+            work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
             work.offset[b, 0] = (gap - work.block_load[b] - target) / h
             work.curves_shut[island_of(work, b)] = 1
             found = True
@@ -257,12 +253,11 @@ def bend_equation(model, work, b, gap, following, h):
     never_inline()
     if h <= STRAIGHT * model.step:
         return False
-    u, speed = work.slip, work.island_speed[work.block_bodies[b, 0]]
+    speed = work.island_speed[work.block_bodies[b, 0]]
     missed = abs(following - gap + h * gap / model.step)
     if missed <= MISSED * model.gap_unit + model.tolerance * h * speed:
         return False
-    velocity_of(model, work, b, work.v_new, u)
-    work.block_load[b] = gap + h * (u[0] - work.offset[b, 0]) - following
+    work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
     work.offset[b, 0] = equation_offset(model, gap, -work.block_load[b], h)
     work.curves_shut[island_of(work, b)] = 1
     return True

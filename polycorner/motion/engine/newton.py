@@ -33,7 +33,8 @@ def newton_steps(model, work, first, last, n, width, goal, softness, compliance,
     that is solved is as large as the velocities, not as the impulses.  All contacts are slightly
     softened, so that redundant ones have a solution; this also damps the steps, as in the method of
     multipliers, of which this is one step ([Rockafellar76]).  The impulses of the least residual
-    are kept.  With a ``compliance`` the contacts yield; see :func:`yielding_velocity`.
+    are kept.  The residual must have been evaluated before.  With a ``compliance`` the contacts
+    yield; see :func:`yielding_velocity`.
     """
     size, x = n * model.dimension, work.island_vector
     least, former, steps, idle = np.inf, np.inf, ZERO, 0
@@ -61,6 +62,7 @@ def newton_steps(model, work, first, last, n, width, goal, softness, compliance,
     if worst > least:
         copy_impulses(work, first, last, work.best, work.impulse)
         recompute_velocities(model, work, first, last)
+        least = residual(model, work, first, last, compliance, u, out)
     return steps, least
 
 
@@ -93,7 +95,7 @@ def linearise(model, work, first, last, n, width, softness, compliance, u, out):
         x[c] = 0.0
     for s in range(first, last):
         b = work.order[s]
-        yielding_velocity(model, work, b, compliance, u)
+        yielding_velocity(work, b, compliance, u)
         rho = work.delassus[b, 3]
         if work.block_rows[b] == 0:
             p = work.impulse[b, 0]

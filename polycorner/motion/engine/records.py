@@ -28,12 +28,14 @@ class RecordType(types.Type):  # type: ignore[misc]
 
     def __init__(self, record: Any) -> None:
         self.fields: dict[str, tuple[int, Any]] = {}
+        self.shapes: dict[str, list[str]] = {}
         slot = 0
         for name, declared in declarations(record).items():
             kind = types.float64 if declared.kind is np.float64 else types.int64
             dimensions = len(declared.shape.split())
             held = types.Array(kind, dimensions, "C") if dimensions else kind
             self.fields[name] = (slot, held)
+            self.shapes[name] = declared.shape.split()
             slot += 1 + dimensions
         super().__init__(name=f"Record({record.__name__})")
 
@@ -74,7 +76,10 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
     if not isinstance(held, types.Array):
         return load(slot, context.get_value_type(held))
     word = ir.IntType(64)
-    shape = [load(slot + 1 + axis) for axis in range(held.ndim)]
+    shape = [
+        ir.Constant(word, int(length)) if length.isdigit() else load(slot + 1 + axis)
+        for axis, length in enumerate(record.shapes[name])
+    ]
     strides, stride = [ir.Constant(word, ITEMSIZE)], shape[-1]
     for length in reversed(shape[:-1]):
         strides.insert(0, builder.mul(stride, strides[-1]))

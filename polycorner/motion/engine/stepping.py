@@ -32,7 +32,7 @@ from polycorner.motion.engine.arrays import (
     PAIR_FRICTION,
     SUBSTRATE_WORK,
 )
-from polycorner.motion.engine.blocks import assemble_blocks, velocity_of
+from polycorner.motion.engine.blocks import assemble_blocks
 from polycorner.motion.engine.contact_list import (
     EXIT,
     MOTION,
@@ -85,7 +85,7 @@ def start_bodies(model, state, work):
 @compiled
 def book_work(model, state, work, blocks, h):
     """Book the work done in this step, by cause."""
-    k, u = model.dimension, work.slip
+    k = model.dimension
     for b in range(blocks):
         if not takes_part(work, b):
             continue
@@ -93,19 +93,15 @@ def book_work(model, state, work, blocks, h):
         if work.block_rows[b] == 0:
             if work.bilateral[b]:
                 continue
-            velocity_of(model, work, b, state.v, u)
-            x = u[0]
-            velocity_of(model, work, b, work.v_new, u)
-            state.sums[DISSIPATED] -= work.impulse[b, 0] * (0.5 * (x + u[0]) - work.offset[b, 0])
+            after = work.after[b, 0] - work.offset[b, 0]
+            state.sums[DISSIPATED] -= work.impulse[b, 0] * 0.5 * (work.before[b, 0] + after)
             continue
         cause = (
             model.pair_cause if kind == PAIR_FRICTION else model.friction_causes[work.origin[b, 2]]
         )
         for r in range(work.block_rows[b]):
-            velocity_of(model, work, b, state.v, u)
-            x = u[r]
-            velocity_of(model, work, b, work.v_new, u)
-            state.sums[DISSIPATED + cause] -= work.impulse[b, r] * 0.5 * (x + u[r])
+            slip = 0.5 * (work.before[b, r] + work.offset[b, r] + work.after[b, r])
+            state.sums[DISSIPATED + cause] -= work.impulse[b, r] * slip
             state.sums[SUBSTRATE_WORK] -= work.impulse[b, r] * work.offset[b, r]
     for i in range(model.bodies):
         if not state.alive[i]:
