@@ -1,3 +1,4 @@
+from .accelerations import Accelerations, Consistency, accelerations
 from .checkpoints import Checkpoint
 from .contacts import (
     ContactFamily,
@@ -16,8 +17,10 @@ from .system import System
 from .trajectory import Trajectory
 
 __all__ = [
+    "Accelerations",
     "Checkpoint",
     "ContactFamily",
+    "Consistency",
     "ConvexPolygon",
     "ConvexSet",
     "CutDisc",
@@ -33,6 +36,7 @@ __all__ = [
     "State",
     "System",
     "Trajectory",
+    "accelerations",
     "pair_coordinates",
     "pair_velocities",
     "simulate",
