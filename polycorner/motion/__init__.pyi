@@ -19,8 +19,8 @@ from .trajectory import Trajectory
 __all__ = [
     "Accelerations",
     "Checkpoint",
-    "ContactFamily",
     "Consistency",
+    "ContactFamily",
     "ConvexPolygon",
     "ConvexSet",
     "CutDisc",
