@@ -242,6 +242,7 @@ def correct_curvature(model, state, work, blocks, h):
         if following < target - CURVATURE_DEPTH * model.gap_unit:
             work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
             work.offset[b, 0] = (gap - work.block_load[b] - target) / h
+            work.is_error[b] = 0
             work.curves_shut[island_of(work, b)] = 1
             found = True
     return found

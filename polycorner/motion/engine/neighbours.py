@@ -146,14 +146,17 @@ def detection_distance(model, work, h):
 
 @compiled
 def detect_contacts(model, state, work, h, count):
-    """Add the small gaps of all pairs with an awake body; return the contact count, or -1."""
+    """Add the small gaps of all pairs with an awake body; return the contact count, or -1.
+
+    Bodies that wait are where they were, or already where they will be: nothing meets them.
+    """
     limit = detection_distance(model, work, h)
     for s in range(work.list_status[0]):
         a, b = work.neighbours[s, 0], work.neighbours[s, 1]
         if work.examined[s] or not (work.awake[a] or work.awake[b]):
             continue
         work.examined[s] = 1
-        if not (state.alive[a] and state.alive[b]):
+        if not (state.alive[a] and state.alive[b]) or work.waits[a] or work.waits[b]:
             continue
         far = 0.0
         for d in range(0 if model.position[0] != model.position[1] else 1, 2):

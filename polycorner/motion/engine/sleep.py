@@ -159,7 +159,7 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
                         )
     woken = False
     for i in range(N):
-        if work.disturbed[i] and state.alive[i] and not work.awake[i]:
+        if work.disturbed[i] and state.alive[i] and not (work.awake[i] or work.waits[i]):
             if not work.evaluated[i]:
                 stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index)
             if work.disturbed[i] & 2 or not remains_at_rest(
