@@ -278,6 +278,7 @@ class Work(NamedTuple):
     loaded: Annotated[Any, real("B 2")]  # impulses for known loads
     carries: Annotated[Any, real("B")]  # whether a block can carry load at rest
     derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows
+    projection: Annotated[Any, real("B 6")]  # of the natural map, and its derivative by rows
     constant: Annotated[Any, real("B 2")]  # a of the Newton step dp = a - G J dv
     schur_row: Annotated[Any, real("B 2*k")]  # normal after elimination of friction
     load_slope: Annotated[Any, real("B 2")]  # change of friction with its load
@@ -296,6 +297,13 @@ class Work(NamedTuple):
     island_vector: Annotated[Any, real("N*k")]
     envelope: Annotated[Any, whole("N*k")]  # end of each row of the band matrix
     band: Annotated[Any, real("M")]  # the band matrix, row by row
+    first_row: Annotated[Any, whole("B")]  # of a block, in a small island
+    small_jacobian: Annotated[Any, real("512")]  # of a small island: rows of eight
+    small_response: Annotated[Any, real("512")]  # M^-1 J', likewise
+    small_offset: Annotated[Any, real("64")]  # of its rows
+    small_matrix: Annotated[Any, real("64")]
+    small_vector: Annotated[Any, real("8")]
+    small_velocity: Annotated[Any, real("8")]
 
 
 class Log(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 from polycorner.motion.engine.arrays import NEWTON_STEPS
 from polycorner.motion.engine.blocks import load_on
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
-from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.jit import ZERO, compiled
 from polycorner.motion.engine.newton import newton_steps
 
 FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and at its end
@@ -22,7 +22,7 @@ LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
 
 
 @compiled
-def continue_island(model, state, work, first, last, n, width, goal, softness, u, out):
+def continue_island(model, state, work, first, last, n, width, goal, softness):
     """Solve an island by continuation; return the residual.
 
     First the loads of friction are iterated; else the compliance of the contacts is taken from
@@ -34,24 +34,24 @@ def continue_island(model, state, work, first, last, n, width, goal, softness, u
     for attempt in range(4):
         if attempt in (0, 3):
             grip = GRIP * goal / model.tolerance if attempt == 3 else 0.0
-            iterate_loads(model, state, work, first, last, n, width, goal, softness, grip, u, out)
+            iterate_loads(model, state, work, first, last, n, width, goal, softness, grip)
         elif attempt == 1:
-            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE, u, out)
+            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE)
         else:
             for s in range(first, last):
                 work.impulse[work.order[s], 0] = work.impulse[work.order[s], 1] = 0.0
             recompute_velocities(model, work, first, last)
-            follow(model, state, work, first, last, n, width, goal, 1.0, u, out)
-        worst = residual(model, work, first, last, 0.0, u, out)
+            follow(model, state, work, first, last, n, width, goal, 1.0)
+        worst = residual(model, work, first, last, 0.0)
         if worst <= goal:
             return worst
         copy_impulses(work, first, last, work.rigid, work.impulse)
         recompute_velocities(model, work, first, last)
-    return residual(model, work, first, last, 0.0, u, out)
+    return residual(model, work, first, last, 0.0)
 
 
 @compiled
-def follow(model, state, work, first, last, n, width, goal, compliance, u, out):
+def follow(model, state, work, first, last, n, width, goal, compliance):
     """Solve an island for a compliance, and follow the solution to rigid contacts.
 
     Contacts yield by ``c p / rho``.  The compliance ``c`` is divided by more or less, as Newton's
@@ -60,15 +60,15 @@ def follow(model, state, work, first, last, n, width, goal, compliance, u, out):
     """
     factor, reached, trial = FIRST_FACTOR, np.inf, compliance
     while factor < LEAST_FACTOR:
-        worst = residual(model, work, first, last, trial, u, out)
+        worst = residual(model, work, first, last, trial)
         steps, worst = newton_steps(
-            model, work, first, last, n, width, goal, trial, trial, worst, u, out
+            model, work, first, last, n, width, goal, trial, trial, worst, ZERO
         )
         state.counts[NEWTON_STEPS] += steps
         if worst <= goal:
             reached = trial
             copy_impulses(work, first, last, work.impulse, work.initial)
-            if residual(model, work, first, last, 0.0, u, out) <= goal or reached <= RIGID:
+            if residual(model, work, first, last, 0.0) <= goal or reached <= RIGID:
                 return
             if steps < EASY_STEPS:
                 factor = max(MOST_FACTOR, factor**1.5)
@@ -82,7 +82,7 @@ def follow(model, state, work, first, last, n, width, goal, compliance, u, out):
 
 
 @compiled
-def iterate_loads(model, state, work, first, last, n, width, goal, softness, grip, u, out):
+def iterate_loads(model, state, work, first, last, n, width, goal, softness, grip):
     """Solve an island with known loads of friction, again and again with the loads that result.
 
     The first loads are those at hand, or stop a slip of the speed ``grip`` if it is not zero.  In
@@ -97,19 +97,19 @@ def iterate_loads(model, state, work, first, last, n, width, goal, softness, gri
                 b = work.order[s]
                 if work.pressing[b] <= -2:
                     work.block_load[b] = grip * work.delassus[b, 3]
-        worst = residual(model, work, first, last, 0.0, u, out)
+        worst = residual(model, work, first, last, 0.0)
         steps, worst = newton_steps(
-            model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
+            model, work, first, last, n, width, goal, softness, 0.0, worst, ZERO
         )
         state.counts[NEWTON_STEPS] += steps
         if worst > goal:
-            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE, u, out)
+            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE)
         attach_loads(work, first, last)
-        worst = residual(model, work, first, last, 0.0, u, out)
+        worst = residual(model, work, first, last, 0.0)
         if worst > goal:
             copy_impulses(work, first, last, work.impulse, work.loaded)
             steps, worst = newton_steps(
-                model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
+                model, work, first, last, n, width, goal, softness, 0.0, worst, ZERO
             )
             state.counts[NEWTON_STEPS] += steps
         if worst <= goal:

@@ -8,8 +8,9 @@ from polycorner.motion.engine.sets import contains, project
 
 
 @compiled
-def relax_block(model, work, b, u, out):
+def relax_block(model, work, b):
     """Solve one block with all others fixed; return its residual, as a speed."""
+    u, out = work.slip, work.image
     pressing = work.pressing[b]
     if (
         pressing >= 0
@@ -67,7 +68,30 @@ def yielding_velocity(work, b, compliance, u):
 
 
 @compiled
-def residual(model, work, first, last, compliance, u, out):
+def block_residual(model, work, b, compliance):
+    """Return the residual of a block's natural map, as a speed, from ``work.after``.
+
+    For friction, ``work.projection`` gets the projection and its derivative.
+    """
+    u, rho = work.slip, work.delassus[b, 3]
+    yielding_velocity(work, b, compliance, u)
+    if work.block_rows[b] == 0:
+        if work.bilateral[b]:
+            return abs(u[0])
+        return abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
+    out = work.projection[b]
+    y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0
+    project(
+        model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load_on(work, b), out
+    )
+    far = abs(out[0] - work.impulse[b, 0]) / rho
+    if work.block_rows[b] == 2:
+        far = max(far, abs(out[1] - work.impulse[b, 1]) / rho)
+    return far
+
+
+@compiled
+def residual(model, work, first, last, compliance):
     """Return the largest residual of the natural map over the blocks of an island, as a speed.
 
     The velocities of the blocks' rows are left in ``work.after``.
@@ -76,20 +100,7 @@ def residual(model, work, first, last, compliance, u, out):
     for s in range(first, last):
         b = work.order[s]
         velocity_of(model, work, b, work.v_new, work.after[b])
-        yielding_velocity(work, b, compliance, u)
-        rho = work.delassus[b, 3]
-        if work.block_rows[b] == 0:
-            far = abs(u[0])
-            if not work.bilateral[b]:
-                far = abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
-        else:
-            load = load_on(work, b)
-            y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0
-            project(model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load, out)
-            far = abs(out[0] - work.impulse[b, 0]) / rho
-            if work.block_rows[b] == 2:
-                far = max(far, abs(out[1] - work.impulse[b, 1]) / rho)
-        worst = max(worst, far)
+        worst = max(worst, block_residual(model, work, b, compliance))
     return worst
 
 

@@ -15,6 +15,7 @@ from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
 from polycorner.motion.engine.rest import find_rest_velocity
+from polycorner.motion.engine.small_islands import is_small
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; further rounds multiply this by powers of three
@@ -35,36 +36,36 @@ def iterate(model, state, work, first, last, speed, sweeps):
     softer from round to round, and hard again.  It ends when the residual has reached its goal,
     when ``sweeps`` are done, or when a cycle of rounds has not halved the residual.
     """
-    u, out = work.slip, work.image
-    goal = model.tolerance * speed
-    worst = residual(model, work, first, last, 0.0, u, out)
-    if worst <= goal:
-        return worst
-    hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
+    goal, worst = model.tolerance * speed, np.inf
     n, width = number_bodies(model, state, work, first, last)
+    small = is_small(model, work, first, last, n)
+    if not small:
+        worst = residual(model, work, first, last, 0.0)
+        if worst <= goal:
+            return worst
+    hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
     rounds, done, former = 0, 0, np.inf
     while worst > goal and done < sweeps:
         if rounds == 1:
             leave_errors(work, first, last)
-        for _ in range(FIRST_SWEEPS if rounds == 0 else ROUND_SWEEPS):
-            worst = 0.0
-            for s in range(first, last):
-                worst = max(worst, relax_block(model, work, work.order[s], u, out))
-            done += 1
-            if worst <= goal:
-                break
-        worst = residual(model, work, first, last, 0.0, u, out)
+        if not small or rounds > 0:
+            for _ in range(FIRST_SWEEPS if rounds == 0 else ROUND_SWEEPS):
+                worst = 0.0
+                for s in range(first, last):
+                    worst = max(worst, relax_block(model, work, work.order[s]))
+                done += 1
+                if worst <= goal:
+                    break
+            worst = residual(model, work, first, last, 0.0)
         if worst > goal and n > 0:
             phase = rounds % CYCLE_ROUNDS
             softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
             steps, worst = newton_steps(
-                model, work, first, last, n, width, goal, softness, 0.0, worst, u, out
+                model, work, first, last, n, width, goal, softness, 0.0, worst, small
             )
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
-                worst = continue_island(
-                    model, state, work, first, last, n, width, goal, hard, u, out
-                )
+                worst = continue_island(model, state, work, first, last, n, width, goal, hard)
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:
                     break
@@ -114,7 +115,6 @@ def solve_island(model, state, work, first, last):
 
     For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
     """
-    u = work.slip
     speed, at_rest = 0.0, True
     for s in range(first, last):
         b = work.order[s]
@@ -141,7 +141,7 @@ def solve_island(model, state, work, first, last):
                         work.v_new[i, c] = work.v_free[i, c]
         return 0.0
     if at_rest and rests(model, state, work, first, last, speed):
-        return residual(model, work, first, last, 0.0, u, work.image) / speed
+        return residual(model, work, first, last, 0.0) / speed
     while True:
         worst = iterate(model, state, work, first, last, speed, model.sweeps)
         if worst > model.tolerance * speed or not switch_reversed_slips(
@@ -153,7 +153,7 @@ def solve_island(model, state, work, first, last):
         and not at_rest
         and rests(model, state, work, first, last, speed)
     ):
-        worst = residual(model, work, first, last, 0.0, u, work.image)
+        worst = residual(model, work, first, last, 0.0)
     return worst / speed
 
 

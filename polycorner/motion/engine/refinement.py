@@ -49,7 +49,7 @@ def record_failure(model, work, log, island, time, count):
     """Record where an island was not solved; return the number of events."""
     worst, place = -1.0, NONE
     for s in range(work.island_start[island], work.island_start[island + 1]):
-        far = residual(model, work, s, s + 1, 0.0, work.slip, work.image)
+        far = residual(model, work, s, s + 1, 0.0)
         if far > worst:
             worst, place = far, work.order[s]
     b = work.pressing[place] if work.pressing[place] >= 0 else place
