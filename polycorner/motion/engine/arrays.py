@@ -137,6 +137,7 @@ class Model(NamedTuple):
     restitution: Annotated[Any, real("m")]  # of a body's contacts with its surroundings
     unilateral: Annotated[Any, whole()]  # number of these contacts; further gaps are equations
     pair_kernel: Annotated[Any, whole()]  # address: gaps of a pair, or 0
+    pair_values: Annotated[Any, whole()]  # address: gaps without gradients
     pair_parameters: Annotated[Any, whole()]  # their first parameter
     pair_reads: Annotated[Any, whole("* 2")]  # body 0 or 1, coordinate
     pair_gaps: Annotated[Any, whole()]  # number of gaps of a pair
@@ -160,6 +161,7 @@ class Model(NamedTuple):
     refines: Annotated[Any, whole()]  # whether bodies take shorter steps where they need them
     near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
+    diagonal_mass: Annotated[Any, whole()]  # whether it is diagonal everywhere
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
     start: Annotated[Any, real()]  # time of the first state

@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
-from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
+from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.neighbours import (
     TOUCHING,
@@ -39,8 +39,11 @@ def finish_block(model, state, work, b):
                 free += row[side * k + c] * work.v_free[i, c]
                 value = 0.0
                 if work.awake[i]:
-                    for a in range(k):
-                        value += work.inverse_mass[i, c, a] * row[side * k + a]
+                    if model.diagonal_mass:
+                        value = work.inverse_mass[i, c, c] * row[side * k + c]
+                    else:
+                        for a in range(k):
+                            value += work.inverse_mass[i, c, a] * row[side * k + a]
                     work.v_new[i, c] += value * p
                 response[side * k + c] = value
             work.before[b, r] += before
@@ -50,10 +53,9 @@ def finish_block(model, state, work, b):
             if rows == 2:
                 d01 += work.jacobian[b, 0, c] * work.response[b, 1, c]
                 d11 += work.jacobian[b, 1, c] * work.response[b, 1, c]
-    half = 0.5 * (d00 + d11)
-    top = half + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
-    if rows == 1:
-        top = d00
+    top = d00
+    if rows == 2:
+        top = 0.5 * (d00 + d11) + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
     work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2] = d00, d01, d11
     work.delassus[b, 3] = 1.0 / top if top > 0.0 else 1.0
 
@@ -350,7 +352,7 @@ def assemble_blocks(model, state, work, h, contacts):
         contact = keys[s] % contacts
         if work.contact[contact, 0] != first or work.contact[contact, 1] != second:
             first, second = work.contact[contact, 0], work.contact[contact, 1]
-            evaluate_pair(model, work, first, second, work.q_next)
+            evaluate_pair_gaps(model, work, first, second, work.q_next)
             for g in range(model.pair_gaps):
                 work.pair_gap_next[g] = work.scratch[model.pair_reads.shape[0] + g]
         blocks = add_pair_blocks(model, state, work, contact, h, blocks)

@@ -8,7 +8,7 @@ from polycorner.formulas.linking import whole_module
 from polycorner.formulas.machine_code import portable_code
 from polycorner.motion.engine.arrays import DONE, EVENTS_FULL, STEPS
 from polycorner.motion.engine.jit import ZERO, compiled
-from polycorner.motion.engine.records import log_at, model_at, state_at, work_at
+from polycorner.motion.engine.records import readers
 from polycorner.motion.engine.refinement import step
 from polycorner.motion.engine.sleep import stays_asleep
 
@@ -16,10 +16,8 @@ NEW = r" (captures|range)\([^)]*\)"  # properties of arguments that older versio
 
 
 @compiled
-def advance(model_table, state_table, work_table, log_table, steps):
+def advance(model, state, work, log, steps):
     """Advance by several steps; return why it stopped, and how many steps and events."""
-    model, state = model_at(model_table), state_at(state_table)
-    work, log = work_at(work_table), log_at(log_table)
     count = ZERO
     most = 2 * work.contact.shape[0] + model.bodies * (3 + model.restitution.size)
     for done in range(steps):
@@ -36,13 +34,21 @@ def advance(model_table, state_table, work_table, log_table, steps):
     return DONE, steps, count
 
 
-def intermediate_code(entry: str) -> str:
+def intermediate_code(entry: str, dimension: int) -> str:
     """Return the engine as intermediate code for any processor, all stages linked into one.
+
+    It is for bodies of ``dimension`` coordinates, or of any number if that is 0.
 
     Words that only one version of LLVM knows are left out: once code is optimised, they matter
     little.
     """
-    module, name = whole_module(advance, (types.int64,) * 5)
+    model_at, state_at, work_at, log_at = readers(dimension)
+
+    @compiled
+    def enter(model, state, work, log, steps):
+        return advance(model_at(model), state_at(state), work_at(work), log_at(log), steps)
+
+    module, name = whole_module(enter, (types.int64,) * 5)
     text = portable_code(str(module).replace(name, entry))
     for words in (r"^(attributes #|source_filename|; ModuleID|target ).*\n", r" #\d+(?=\s|$)", NEW):
         text = re.sub(words, "", text, flags=re.MULTILINE)

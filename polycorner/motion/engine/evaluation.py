@@ -165,10 +165,22 @@ def evaluate_pair(model, work, a, b, q):
 
     The scratch array gets the coordinates that the gaps read, the gaps, and their gradients.
     """
+    call_pair_kernel(model, work, model.pair_kernel, a, b, q)
+
+
+@compiled
+def evaluate_pair_gaps(model, work, a, b, q):
+    """Evaluate the gaps of a pair of bodies alone, where :func:`evaluate_pair` leaves them."""
+    call_pair_kernel(model, work, model.pair_values, a, b, q)
+
+
+@compiled
+def call_pair_kernel(model, work, kernel, a, b, q):
+    """Call a kernel for two bodies."""
     scratch, n, m = work.scratch, model.pair_reads.shape[0], model.pair_gaps
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
     for r in range(n):
         body = a if model.pair_reads[r, 0] == 0 else b
         scratch[r] = q[body, model.pair_reads[r, 1]]
     j0, p0 = n + m, model.pair_parameters
-    call_kernel(model.pair_kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
+    call_kernel(kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)

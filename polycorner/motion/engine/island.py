@@ -8,14 +8,14 @@ from polycorner.motion.engine.band import number_bodies
 from polycorner.motion.engine.blocks import STRAIGHT, equation_offset
 from polycorner.motion.engine.continuation import continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
-from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
+from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
-from polycorner.motion.engine.jit import NONE, compiled
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
 from polycorner.motion.engine.rest import find_rest_velocity
-from polycorner.motion.engine.small_islands import is_small
+from polycorner.motion.engine.small_islands import number_few
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; further rounds multiply this by powers of three
@@ -37,9 +37,10 @@ def iterate(model, state, work, first, last, speed, sweeps):
     when ``sweeps`` are done, or when a cycle of rounds has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
-    n, width = number_bodies(model, state, work, first, last)
-    small = is_small(model, work, first, last, n)
-    if not small:
+    n, width, small = number_few(model, work, first, last), ZERO, ONE
+    if n == 0:
+        n, width = number_bodies(model, state, work, first, last)
+        small = ZERO
         worst = residual(model, work, first, last, 0.0)
         if worst <= goal:
             return worst
@@ -231,7 +232,7 @@ def correct_curvature(model, state, work, blocks, h):
             if work.speed[i] + work.speed[j] <= fast:
                 continue
             if i != first or j != second:
-                evaluate_pair(model, work, i, j, work.q_next)
+                evaluate_pair_gaps(model, work, i, j, work.q_next)
             first, second = i, j
             gap = work.contact_gap[work.origin[b, 1]]
             following = work.scratch[model.pair_reads.shape[0] + g]

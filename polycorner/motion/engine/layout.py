@@ -79,7 +79,9 @@ def _dependence(body: Body) -> dict[str, bool]:
         np.array_equal(one.force, other.force)
         for one, other in zip((slow, *others), fast, strict=True)
     )
+    masses = [slow.mass, *(other.mass for other in others)]
     return {
+        "diagonal_mass": all(np.count_nonzero(m - np.diag(np.diag(m))) == 0 for m in masses),
         "constant_mass": all(np.array_equal(slow.mass, other.mass) for other in others),
         "follows_velocity": not same,
     }
@@ -124,7 +126,7 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
     """Return the entries of the contacts between bodies; their parameters are appended."""
     family = bodies.contacts
     if family is None or bodies.count < 2:
-        numbers = ("pair_kernel", "pair_parameters", "pair_gaps", "pair_cause", "pair_restitution")
+        numbers = ("pair_kernel", "pair_values", "pair_parameters", "pair_gaps", "pair_cause", "pair_restitution")
         empty = {"pair_reads": [], "pair_slips": [], "pair_sets": [0, 0]}
         return {**dict.fromkeys(numbers, 0), "reach": 0.0, **empty}
     first = len(parameters)
@@ -135,6 +137,7 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
         parameters += values
     return {
         "pair_kernel": family.gaps.kernel.compiled(1).point,
+        "pair_values": family.gaps.kernel.compiled(0).point,
         "pair_parameters": first,
         "pair_reads": family.reads,
         "pair_gaps": len(family.gaps.names),

@@ -5,6 +5,9 @@ address of a table: for every number its value, for every array its address and 
 Reading ``record.name`` loads what it needs from there; the loads are marked invariant, since tables
 do not change while compiled code runs.  To call a function so costs one argument for each record,
 not one for each length of some 140 arrays.
+
+The number of a body's coordinates may be known when code is compiled: then it is a constant, and so
+are the lengths that follow from it, and loops over coordinates are unrolled.
 """
 
 from typing import Any
@@ -22,11 +25,11 @@ from polycorner.motion.engine.arrays import Log, Model, State, Work, declaration
 
 ITEMSIZE = 8  # bytes of every number
 
-
 class RecordType(types.Type):  # type: ignore[misc]
-    """The type of a record to compiled code."""
+    """The type of a record to compiled code, for bodies of so many coordinates."""
 
-    def __init__(self, record: Any) -> None:
+    def __init__(self, record: Any, dimension: int) -> None:
+        self.known = {"k": dimension, "2*k": 2 * dimension} if dimension else {}
         self.fields: dict[str, tuple[int, Any]] = {}
         self.shapes: dict[str, list[str]] = {}
         slot = 0
@@ -37,7 +40,7 @@ class RecordType(types.Type):  # type: ignore[misc]
             self.fields[name] = (slot, held)
             self.shapes[name] = declared.shape.split()
             slot += 1 + dimensions
-        super().__init__(name=f"Record({record.__name__})")
+        super().__init__(name=f"Record({record.__name__}, {dimension})")
 
 
 @register_model(RecordType)
@@ -63,6 +66,8 @@ class RecordAttributes(AttributeTemplate):  # type: ignore[misc]
 def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
     """Load an entry."""
     slot, held = record.fields[name]
+    if name == "dimension" and record.known:
+        return ir.Constant(ir.IntType(64), record.known["k"])
     invariant = builder.module.add_metadata([])
 
     def load(at: int, kind: Any = None) -> Any:
@@ -76,9 +81,10 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
     if not isinstance(held, types.Array):
         return load(slot, context.get_value_type(held))
     word = ir.IntType(64)
+    known = [record.known.get(length, length) for length in record.shapes[name]]
     shape = [
-        ir.Constant(word, int(length)) if length.isdigit() else load(slot + 1 + axis)
-        for axis, length in enumerate(record.shapes[name])
+        ir.Constant(word, int(length)) if str(length).isdigit() else load(slot + 1 + axis)
+        for axis, length in enumerate(known)
     ]
     strides, stride = [ir.Constant(word, ITEMSIZE)], shape[-1]
     for length in reversed(shape[:-1]):
@@ -111,6 +117,9 @@ def _reader(kind: RecordType) -> Any:
     return record_at
 
 
-model_at, state_at, work_at, log_at = (
-    _reader(RecordType(record)) for record in (Model, State, Work, Log)
-)
+def readers(dimension: int) -> list[Any]:
+    """Return the functions that make model, state, work and log of the addresses of their tables.
+
+    ``dimension`` is the number of coordinates of a body, or 0 for any.
+    """
+    return [_reader(RecordType(record, dimension)) for record in (Model, State, Work, Log)]

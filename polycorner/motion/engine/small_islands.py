@@ -12,12 +12,26 @@ ROWS = 64  # of a small island, at most
 
 
 @compiled
-def is_small(model, work, first, last, n):
-    """Return 1 if an island of ``n`` bodies is small, else 0."""
-    rows = ZERO
+def number_few(model, work, first, last):
+    """Enumerate the bodies of an island if it is small; return their number, else 0."""
+    n, rows = ZERO, ZERO
     for s in range(first, last):
-        rows += max(ONE, work.block_rows[work.order[s]])
-    return ONE if 0 < n and n * model.dimension <= WIDTH and rows <= ROWS else ZERO
+        b = work.order[s]
+        rows += max(ONE, work.block_rows[b])
+        for side in range(2):
+            i = work.block_bodies[b, side]
+            if i < 0 or not work.awake[i]:
+                continue
+            known = False
+            for at in range(n):
+                known = known or work.members[at] == i
+            if known:
+                continue
+            if (n + 1) * model.dimension > WIDTH:
+                return ZERO
+            work.members[n], work.number[i] = i, n
+            n += ONE
+    return n if rows <= ROWS else ZERO
 
 
 @compiled
@@ -150,13 +164,14 @@ def solve(matrix, b, n):
         pivot = matrix[WIDTH * j + j]
         if not abs(pivot) > 0.0:
             return False
-        line = load(matrix, j)
+        line, inverse = load(matrix, j), 1.0 / pivot
+        matrix[WIDTH * j + j] = inverse
         for i in range(j + 1, n):
-            f = matrix[WIDTH * i + j] / pivot
+            f = matrix[WIDTH * i + j] * inverse
             store(matrix, i, load(matrix, i) - f * line)
             b[i] -= f * b[j]
     for j in range(n - 1, -1, -1):
-        b[j] /= matrix[WIDTH * j + j]
+        b[j] *= matrix[WIDTH * j + j]
         for i in range(j):
             b[i] -= matrix[WIDTH * i + j] * b[j]
     return True
