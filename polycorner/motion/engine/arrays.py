@@ -23,6 +23,7 @@ OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
 DONE, CONTACTS_FULL, EVENTS_FULL, NOT_FINITE = range(4)
 
 MAX_BAND = 192  # columns of the widest band matrix that is solved
+PADDING = 8  # zeros at the end of its rows
 EVENTS = 4096  # events recorded, at least, before the engine returns
 
 
@@ -36,6 +37,7 @@ class Sizes(NamedTuple):
     L: int  # known loads of a body, at least 1
     m: int  # gaps between a body and its surroundings
     G: int  # gaps between two bodies
+    Y: int  # gaps of a body or of two, whichever are more
     D: int  # causes of dissipation
     C: int  # contacts between bodies for which there is room
     P: int  # pairs of neighbours for which there is room
@@ -65,6 +67,7 @@ class Sizes(NamedTuple):
             L=max(1, body.formulation.loads),
             m=m,
             G=len(bodies.pair_contacts),
+            Y=max(m, len(bodies.pair_contacts)),
             D=len(bodies.causes),
             C=contacts,
             P=pairs,
@@ -72,7 +75,7 @@ class Sizes(NamedTuple):
             E=EVENTS + 4 * contacts,
             S=max(contacts, pairs, 1),
             W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
-            M=N * k * min(2 * N * k, MAX_BAND),
+            M=N * k * (min(2 * N * k, MAX_BAND) + PADDING),
         )
 
 
@@ -219,6 +222,8 @@ class Work(NamedTuple):
     q_path: Annotated[Any, real("N k")]  # coordinates on the way
     gap_path: Annotated[Any, real("N m")]  # gaps there
     gradient_path: Annotated[Any, real("N m k")]
+    way_gap: Annotated[Any, real("6 Y")]  # gaps of a body or of two, at places on the way
+    way_rate: Annotated[Any, real("6 Y")]  # their rates
     waits: Annotated[Any, whole("N")]  # whether a body is left as it is for the time being
     joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are

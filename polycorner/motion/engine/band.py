@@ -1,7 +1,9 @@
 """The band matrix of an island, and its solution."""
 
 from polycorner.formulas.compilation import never_inline
+from polycorner.motion.engine.arrays import PADDING
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.vectors import WIDTH, load, store
 
 
 @compiled
@@ -43,9 +45,15 @@ def number_bodies(model, state, work, first, last):
         if i >= 0 and j >= 0 and work.awake[i] and work.awake[j]:
             reach = max(reach, abs(local[i] - local[j]))
     width = (reach + 1) * k - 1
-    if n * k * (2 * width + 1) > work.band.size:
+    if n * k * row_length(width) > work.band.size:
         n = ZERO
     return n, width
+
+
+@compiled
+def row_length(width):
+    """Return the length of a row of the band matrix: the band, and zeros for the last vector."""
+    return 2 * width + 1 + PADDING
 
 
 @compiled
@@ -53,37 +61,25 @@ def solve_band(A, b, n, width, reach):
     """Solve ``A x = b`` in place for a band matrix; row ``i`` starts with column ``i - width``.
 
     The symmetric part of ``A`` is definite or nearly so, hence rows are not exchanged.  The array
-    ``envelope`` is filled in: row ``j`` ends before ``envelope[j]``, and so does column ``j`` below
-    the diagonal.
+    ``reach`` is filled in: row ``j`` ends before ``reach[j]``, and so does column ``j`` below the
+    diagonal.
     """
     never_inline()
-    stride = 2 * width + 1
-    for i in range(n):
-        at = i * stride + width - i
-        last = min(n, i + width + 1)
-        while last > i + 1 and A[at + last - 1] == 0.0:
-            last -= 1
-        reach[i] = last
-        first = max(0, i - width)
-        while first < i and A[at + first] == 0.0:
-            first += 1
-        for j in range(first, i):
-            reach[j] = max(reach[j], i + 1)
+    find_envelope(A, n, width, reach)
+    stride = row_length(width)
     for j in range(n):
         pivot = A[j * stride + width]
         if not abs(pivot) > 0.0:
             return False
-        last = reach[j]
-        at = j * stride + width - j
-        above = A[at + j + 1 : at + last]
+        last, inverse = reach[j], 1.0 / pivot
+        above = j * stride + width - j
         for i in range(j + 1, last):
-            at = i * stride + width - i
-            f = A[at + j] / pivot
+            below = i * stride + width - i
+            f = A[below + j] * inverse
             reach[i] = max(reach[i], last)
             if f != 0.0:
-                below = A[at + j + 1 : at + last]
-                for c in range(above.size):
-                    below[c] -= f * above[c]
+                for c in range(j + 1, last, WIDTH):
+                    store(A, below + c, load(A, below + c) - f * load(A, above + c))
                 b[i] -= f * b[j]
     for i in range(n - 1, -1, -1):
         at = i * stride + width - i
@@ -95,9 +91,26 @@ def solve_band(A, b, n, width, reach):
 
 
 @compiled
+def find_envelope(A, n, width, reach):
+    """Find where the rows and columns of a band matrix end; see :func:`solve_band`."""
+    stride = row_length(width)
+    for i in range(n):
+        at = i * stride + width - i
+        last = min(n, i + width + 1)
+        while last > i + 1 and A[at + last - 1] == 0.0:
+            last -= 1
+        reach[i] = last
+        first = max(0, i - width)
+        while first < i and A[at + first] == 0.0:
+            first += 1
+        for j in range(first, i):
+            reach[j] = max(reach[j], i + 1)
+
+
+@compiled
 def assemble_mass(model, work, n, width):
     """Set the band matrix of an island to the mass matrices of its bodies."""
-    k, stride = model.dimension, 2 * width + 1
+    k, stride = model.dimension, row_length(width)
     for a in range(n * k * stride):
         work.band[a] = 0.0
     for at in range(n):
@@ -112,9 +125,9 @@ def add_block(model, work, b, width):
     """Add ``J' G J`` of a block to the band matrix.
 
     ``G`` stands in ``work.derivative``, row by row, for three rows: that of the contact that
-    presses on the block, and the block's own.
+    presses on the block, which is zero, and the block's own.
     """
-    k, stride = model.dimension, 2 * width + 1
+    k, stride = model.dimension, row_length(width)
     stacked, weighted = work.stacked, work.weighted
     derivative, pressing = work.derivative, work.pressing[b]
     sides = 2 if work.block_bodies[b, 1] >= 0 else 1
@@ -127,7 +140,7 @@ def add_block(model, work, b, width):
     for r in range(rows):
         for x in range(sides * k):
             stacked[1 + r, x] = work.jacobian[b, r, x]
-    for r in range(start, 1 + rows):
+    for r in range(1, 1 + rows):
         for x in range(sides * k):
             value = 0.0
             for c in range(start, 1 + rows):
@@ -146,7 +159,7 @@ def add_block(model, work, b, width):
                 at = row * stride + width - row + work.number[j] * k
                 for y in range(k):
                     value = 0.0
-                    for r in range(start, 1 + rows):
+                    for r in range(1, 1 + rows):
                         value += stacked[r, side * k + x] * weighted[r, other * k + y]
                     work.band[at + y] += value
 

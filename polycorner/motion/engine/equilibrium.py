@@ -8,6 +8,7 @@ from polycorner.motion.engine.band import (
     add_transposed_row,
     assemble_mass,
     number_bodies,
+    row_length,
     row_product,
     solve_band,
 )
@@ -151,7 +152,7 @@ def assemble_interior(model, work, first, last, n, width, speed):
         if work.block_rows[b] == 0 and work.carries[b] > 0.0:
             stiffest = max(stiffest, 1.0 / (derivative[b, 0] * work.delassus[b, 3]))
     assemble_mass(model, work, n, width)
-    for a in range(n * k * (2 * width + 1)):
+    for a in range(n * k * row_length(width)):
         work.band[a] *= REGULARISATION * stiffest
     for s in range(first, last):
         b = work.order[s]
@@ -173,7 +174,7 @@ def assemble_interior(model, work, first, last, n, width, speed):
 def add_schur_complement(model, work, b, width):
     """Add a contact, its friction eliminated, to the matrix and the right-hand side."""
     k, x, schur_row = model.dimension, work.island_vector, work.schur_row
-    stride, share = 2 * width + 1, 1.0 / work.derivative[b, 0]
+    stride, share = row_length(width), 1.0 / work.derivative[b, 0]
     for side in range(2):
         i = work.block_bodies[b, side]
         if i < 0 or not work.awake[i]:

@@ -17,7 +17,17 @@ from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP, travel
 from polycorner.motion.engine.partition import island_of, root_of
-from polycorner.motion.engine.paths import CURVATURE_DEPTH, gap_at, may_vanish, touching
+from polycorner.motion.engine.paths import (
+    CURVATURE_DEPTH,
+    FULL,
+    MIDDLE,
+    NEXT,
+    START,
+    gaps_at,
+    may_vanish,
+    stay_apart,
+    touching,
+)
 
 LARGE = 48  # blocks of an island beyond which impacts need not be located
 
@@ -133,21 +143,24 @@ def body_misses(model, state, work, i, h):
 
 
 @compiled
-def pair_misses(model, state, work, i, j, g, h):
+def pair_misses(model, state, work, i, j, h):
     """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`."""
-    out, unit = work.image, model.gap_unit
-    gap_at(model, work, work.q_mid, work.v_new, i, j, g, 0.0, out)
-    f, rate = out[0], out[1]
-    gap_at(model, work, work.q_mid, work.v_new, i, j, g, h, out)
-    deep = 2.0 * CURVATURE_DEPTH * unit
-    if f > ZERO_GAP * unit and may_vanish(f, rate, out[0], out[1], h, deep):
-        return True
-    if state.watched[i] and state.watched[j]:
-        return False
-    gap_at(model, work, state.q, state.v, i, j, g, 0.0, out)
-    f, rate = out[0], out[1]
-    gap_at(model, work, state.q, state.v, i, j, g, 0.5 * h, out)
-    return f > 0.0 and may_vanish(f, rate, out[0], out[1], 0.5 * h, ZERO_GAP * unit)
+    gap, rate, zero = work.way_gap, work.way_rate, ZERO_GAP * model.gap_unit
+    deep, watched = 2.0 * CURVATURE_DEPTH * model.gap_unit, state.watched[i] and state.watched[j]
+    gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.0, NEXT)
+    gaps_at(model, work, work.q_mid, work.v_new, i, j, h, FULL)
+    if not watched:
+        gaps_at(model, work, state.q, state.v, i, j, 0.0, START)
+        gaps_at(model, work, state.q, state.v, i, j, 0.5 * h, MIDDLE)
+    for g in range(model.pair_gaps):
+        f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
+        misses = f0 > zero and may_vanish(f0, rate0, f1, rate1, h, deep)
+        if not watched and not misses:
+            f0, rate0, f1, rate1 = gap[START, g], rate[START, g], gap[MIDDLE, g], rate[MIDDLE, g]
+            misses = f0 > 0.0 and may_vanish(f0, rate0, f1, rate1, 0.5 * h, zero)
+        if misses and not touching(model, state, i, j, g):
+            return True
+    return False
 
 
 @compiled
@@ -166,7 +179,8 @@ def mark_misses(model, state, work, left, h):
             continue
         if h * (work.speed[i] + work.speed[j]) <= slow:
             continue
-        for g in range(model.pair_gaps):
-            if not touching(model, state, i, j, g) and pair_misses(model, state, work, i, j, g, h):
-                left[work.parent[i]] |= 1
-                left[work.parent[j]] |= 1
+        if not stay_apart(model, state, work, i, j, h) and pair_misses(
+            model, state, work, i, j, h
+        ):
+            left[work.parent[i]] |= 1
+            left[work.parent[j]] |= 1

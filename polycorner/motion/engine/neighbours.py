@@ -145,6 +145,16 @@ def detection_distance(model, work, h):
 
 
 @compiled
+def square_distance(model, work, a, b):
+    """Return the squared distance of two bodies' positions at the midpoint."""
+    far = 0.0
+    for d in range(0 if model.position[0] != model.position[1] else 1, 2):
+        c = model.position[d]
+        far += ((work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]) ** 2
+    return far
+
+
+@compiled
 def detect_contacts(model, state, work, h, count):
     """Add the small gaps of all pairs with an awake body; return the contact count, or -1.
 
@@ -158,11 +168,7 @@ def detect_contacts(model, state, work, h, count):
         work.examined[s] = 1
         if not (state.alive[a] and state.alive[b]) or work.waits[a] or work.waits[b]:
             continue
-        far = 0.0
-        for d in range(0 if model.position[0] != model.position[1] else 1, 2):
-            c = model.position[d]
-            far += ((work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]) ** 2
-        if far < (model.reach + limit) ** 2:
+        if square_distance(model, work, a, b) < (model.reach + limit) ** 2:
             count = detect_pair(model, state, work, a, b, limit, h / model.step, count)
             if count < 0:
                 return NONE

@@ -16,35 +16,50 @@ import numpy as np
 from polycorner.motion.engine.blocks import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, find_contact
+from polycorner.motion.engine.neighbours import ZERO_GAP, find_contact, square_distance
 
 CURVATURE_DEPTH = 1e-4  # scaled depth to which a gap may close by its curvature within a step
 SHORTEST_PART = 1.0 / 4096.0  # of a step, to which parts are halved
 MOST_SEARCH = 80  # evaluations in the search for one contact
 NEVER = np.inf
 
+# Rows of what is evaluated on the way: at the start and at the midpoint with the velocity before; at
+# the midpoint, half a step later and at the next midpoint with that after; in a search.
+START, MIDDLE, NEXT, HALF, FULL, SEARCH = range(6)
+
 
 @compiled
-def gap_at(model, work, base, velocity, i, j, g, t, out):
-    """Evaluate a gap, and its rate, at a time along straight paths; ``j < 0``: surroundings."""
-    k = model.dimension
+def gaps_at(model, work, base, velocity, i, j, t, row):
+    """Evaluate all gaps, and their rates, at a time along straight paths; ``j < 0``: surroundings.
+
+    They are left in a row of ``work.way_gap`` and ``work.way_rate``.
+    """
+    k, gap, rate = model.dimension, work.way_gap[row], work.way_rate[row]
     for c in range(k):
         work.q_path[i, c] = base[i, c] + t * velocity[i, c]
-    out[1] = 0.0
     if j < 0:
         evaluate_gaps(model, work, i, work.q_path, work.gap_path, work.gradient_path)
-        out[0] = work.gap_path[i, g]
-        for c in range(k):
-            out[1] += work.gradient_path[i, g, c] * velocity[i, c]
+        for g in range(model.restitution.size):
+            gap[g], rate[g] = work.gap_path[i, g], 0.0
+            for c in range(k):
+                rate[g] += work.gradient_path[i, g, c] * velocity[i, c]
         return
     for c in range(k):
         work.q_path[j, c] = base[j, c] + t * velocity[j, c]
     evaluate_pair(model, work, i, j, work.q_path)
     n, m = model.pair_reads.shape[0], model.pair_gaps
-    out[0] = work.scratch[n + g]
-    for r in range(n):
-        body = i if model.pair_reads[r, 0] == 0 else j
-        out[1] += work.scratch[n + m + g * n + r] * velocity[body, model.pair_reads[r, 1]]
+    for g in range(m):
+        gap[g], rate[g] = work.scratch[n + g], 0.0
+        for r in range(n):
+            body = i if model.pair_reads[r, 0] == 0 else j
+            rate[g] += work.scratch[n + m + g * n + r] * velocity[body, model.pair_reads[r, 1]]
+
+
+@compiled
+def gap_at(model, work, base, velocity, i, j, g, t, out):
+    """Evaluate one gap and its rate; see :func:`gaps_at`."""
+    gaps_at(model, work, base, velocity, i, j, t, SEARCH)
+    out[0], out[1] = work.way_gap[SEARCH, g], work.way_rate[SEARCH, g]
 
 
 @compiled
@@ -108,50 +123,80 @@ def touching(model, state, i, j, g):
 
 @compiled
 def first_in_gap(model, state, work, i, j, g, acting, h, out):
-    """Return when in a step an open gap vanishes; one that acts may do so after its middle."""
-    slack, half = ZERO_GAP * model.gap_unit, 0.5 * h
-    t = first_zero(model, work, state.q, state.v, i, j, g, half, slack, out)
-    if t == NEVER and not acting:
+    """Return when in a step an open gap vanishes; one that acts may do so after its middle.
+
+    Its values on the way, as in :func:`look_ahead`, exclude most gaps at once.
+    """
+    slack, half, t = ZERO_GAP * model.gap_unit, 0.5 * h, NEVER
+    if may_meet(work, g, START, MIDDLE, half, slack):
+        t = first_zero(model, work, state.q, state.v, i, j, g, half, slack, out)
+    if t == NEVER and not acting and may_meet(work, g, NEXT, HALF, half, slack):
         t = half + first_zero(model, work, work.q_mid, work.v_new, i, j, g, half, slack, out)
     return t
 
 
 @compiled
-def sinks(model, work, i, j, g, h, out):
-    """Return whether a contact overlaps, or an equation does not hold, at the next midpoint."""
-    gap_at(model, work, work.q_mid, work.v_new, i, j, g, h, out)
-    deep = 2.0 * CURVATURE_DEPTH * model.gap_unit
-    return out[0] < -deep or (j < 0 and g >= model.unilateral and out[0] > deep)
+def may_meet(work, g, first, last, duration, slack):
+    """Return whether a gap may vanish between two rows, or does so at the first."""
+    gap, rate = work.way_gap, work.way_rate
+    f0, rate0, f1, rate1 = gap[first, g], rate[first, g], gap[last, g], rate[last, g]
+    return f0 <= slack or may_vanish(f0, rate0, f1, rate1, duration, slack)
+
+
+@compiled
+def look_ahead(model, state, work, i, j, h):
+    """Evaluate gaps at the start, the midpoint and the end of the step, and at the next midpoint."""
+    gaps_at(model, work, state.q, state.v, i, j, 0.0, START)
+    gaps_at(model, work, state.q, state.v, i, j, 0.5 * h, MIDDLE)
+    gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.0, NEXT)
+    gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.5 * h, HALF)
+    gaps_at(model, work, work.q_mid, work.v_new, i, j, h, FULL)
+
+
+@compiled
+def stay_apart(model, state, work, i, j, h):
+    """Return whether two bodies are too far apart to meet on the way to the next midpoint."""
+    far = model.reach
+    for d in range(0 if model.position[0] != model.position[1] else 1, 2):
+        c = model.position[d]
+        before = 0.5 * abs(state.v[i, c] - state.v[j, c])
+        far += h * max(before, abs(work.v_new[i, c] - work.v_new[j, c])) * model.units[c]
+    return square_distance(model, work, i, j) > far * far
 
 
 @compiled
 def acceptable_length(model, state, work, h, out):
     """Return how long a part of a step may be: to the first contact, or half of it if one sinks."""
-    length, sunk = h, False
+    length = h
     for i in range(model.bodies):
-        if not (state.alive[i] and work.awake[i]):
-            continue
-        for g in range(model.restitution.size):
-            closed = state.touches[i, g] != 0
-            gap_at(model, work, work.q_mid, state.v, i, NONE, g, 0.0, out)
-            acting = acts(model, out[0], out[1], model.restitution[g], closed)
-            if not closed:
-                t = first_in_gap(model, state, work, i, NONE, g, acting, h, out)
-                length = min(length, t)
-            if acting:
-                sunk = sunk or sinks(model, work, i, NONE, g, h, out)
+        if state.alive[i] and work.awake[i] and model.restitution.size > 0:
+            length = min(length, acceptable_to(model, state, work, i, NONE, h, out))
     for s in range(work.list_status[0] if model.pair_kernel != 0 else ZERO):
         i, j = work.neighbours[s, 0], work.neighbours[s, 1]
         if not (work.awake[i] and work.awake[j] and state.alive[i] and state.alive[j]):
             continue
-        for g in range(model.pair_gaps):
-            closed = touching(model, state, i, j, g)
-            gap_at(model, work, work.q_mid, state.v, i, j, g, 0.0, out)
-            acting = acts(model, out[0], out[1], model.pair_restitution, closed)
-            if not closed:
-                length = min(length, first_in_gap(model, state, work, i, j, g, acting, h, out))
-            if acting:
-                sunk = sunk or sinks(model, work, i, j, g, h, out)
+        if not stay_apart(model, state, work, i, j, h):
+            length = min(length, acceptable_to(model, state, work, i, j, h, out))
+    return length
+
+
+@compiled
+def acceptable_to(model, state, work, i, j, h, out):
+    """Return how long a part of a step may be for the gaps of a body or of a pair."""
+    deep, length, sunk = 2.0 * CURVATURE_DEPTH * model.gap_unit, h, False
+    look_ahead(model, state, work, i, j, h)
+    for g in range(model.restitution.size if j < 0 else model.pair_gaps):
+        if j < 0:
+            closed, bounce = state.touches[i, g] != 0, model.restitution[g]
+        else:
+            closed, bounce = touching(model, state, i, j, g), model.pair_restitution
+        acting = acts(model, work.way_gap[NEXT, g], work.way_rate[MIDDLE, g], bounce, closed)
+        if not closed:
+            length = min(length, first_in_gap(model, state, work, i, j, g, acting, h, out))
+        if acting:
+            following = work.way_gap[FULL, g]
+            sunk = sunk or following < -deep
+            sunk = sunk or (j < 0 and g >= model.unilateral and following > deep)
     if sunk and h > SHORTEST_PART * model.step:
         length = min(length, 0.5 * h)
     return length

@@ -50,8 +50,8 @@ def gather(model, work, first, last, n):
         b = work.order[s]
         work.first_row[b] = row
         for r in range(max(1, work.block_rows[b])):
-            store(jacobian, row, zeros())
-            store(response, row, zeros())
+            store(jacobian, WIDTH * row, zeros())
+            store(response, WIDTH * row, zeros())
             offset = work.offset[b, r]
             for side in range(2):
                 i = work.block_bodies[b, side]
@@ -86,7 +86,7 @@ def small_residual(model, work, first, last, compliance):
         b = work.order[s]
         row = work.first_row[b]
         for r in range(max(1, work.block_rows[b])):
-            product = dot(load(work.small_jacobian, row + r), v)
+            product = dot(load(work.small_jacobian, WIDTH * (row + r)), v)
             work.after[b, r] = product + work.small_offset[row + r]
         worst = max(worst, block_residual(model, work, b, compliance))
     return worst
@@ -105,14 +105,14 @@ def small_step(model, work, first, last, n):
         row, pressing = work.first_row[b], work.pressing[b]
         normal = across = 0.0
         if pressing >= 0:
-            normal = dot(load(work.small_jacobian, work.first_row[pressing]), x)
-        along = dot(load(work.small_jacobian, row), x)
+            normal = dot(load(work.small_jacobian, WIDTH * work.first_row[pressing]), x)
+        along = dot(load(work.small_jacobian, WIDTH * row), x)
         if work.block_rows[b] == 2:
-            across = dot(load(work.small_jacobian, row + 1), x)
+            across = dot(load(work.small_jacobian, WIDTH * (row + 1)), x)
         change_impulses(work, b, normal, along, across, change)
-        v = v + change[0] * load(work.small_response, row)
+        v = v + change[0] * load(work.small_response, WIDTH * row)
         if work.block_rows[b] == 2:
-            v = v + change[1] * load(work.small_response, row + 1)
+            v = v + change[1] * load(work.small_response, WIDTH * (row + 1))
     store(work.small_velocity, 0, v)
     return True
 
@@ -125,7 +125,7 @@ def assemble(model, work, first, last, n):
     """
     k, matrix, rows, G = model.dimension, work.small_matrix, work.small_jacobian, work.derivative
     for x in range(WIDTH):
-        store(matrix, x, zeros())
+        store(matrix, WIDTH * x, zeros())
     for at in range(n):
         i = work.members[at]
         for x in range(k):
@@ -135,25 +135,25 @@ def assemble(model, work, first, last, n):
     for s in range(first, last):
         b = work.order[s]
         row, pressing, two = work.first_row[b], work.pressing[b], work.block_rows[b] == 2
-        one = load(rows, row)
+        one = load(rows, WIDTH * row)
         total = total + work.constant[b, 0] * one
         if two:
-            total = total + work.constant[b, 1] * load(rows, row + 1)
+            total = total + work.constant[b, 1] * load(rows, WIDTH * (row + 1))
         if not is_loaded(work, b):
             continue
         along, across = G[b, 4] * one, zeros()
         if two:
-            along = along + G[b, 5] * load(rows, row + 1)
-            across = G[b, 7] * one + G[b, 8] * load(rows, row + 1)
+            along = along + G[b, 5] * load(rows, WIDTH * (row + 1))
+            across = G[b, 7] * one + G[b, 8] * load(rows, WIDTH * (row + 1))
         if pressing >= 0:
-            presses = load(rows, work.first_row[pressing])
+            presses = load(rows, WIDTH * work.first_row[pressing])
             along = along + G[b, 3] * presses
             across = across + G[b, 6] * presses
         for x in range(n * k):
-            line = load(matrix, x) + rows[WIDTH * row + x] * along
+            line = load(matrix, WIDTH * x) + rows[WIDTH * row + x] * along
             if two:
                 line = line + rows[WIDTH * (row + 1) + x] * across
-            store(matrix, x, line)
+            store(matrix, WIDTH * x, line)
     store(work.small_vector, 0, total)
 
 
@@ -164,11 +164,11 @@ def solve(matrix, b, n):
         pivot = matrix[WIDTH * j + j]
         if not abs(pivot) > 0.0:
             return False
-        line, inverse = load(matrix, j), 1.0 / pivot
+        line, inverse = load(matrix, WIDTH * j), 1.0 / pivot
         matrix[WIDTH * j + j] = inverse
         for i in range(j + 1, n):
             f = matrix[WIDTH * i + j] * inverse
-            store(matrix, i, load(matrix, i) - f * line)
+            store(matrix, WIDTH * i, load(matrix, WIDTH * i) - f * line)
             b[i] -= f * b[j]
     for j in range(n - 1, -1, -1):
         b[j] *= matrix[WIDTH * j + j]

@@ -1,6 +1,6 @@
 """Vectors of eight reals, for compiled code: one instruction where the processor has it.
 
-They are read from and written to flat arrays.  LLVM turns them into what the processor has, of two,
+They are read from and written to arrays at any place.  LLVM turns them into what the processor has, of two,
 four or eight reals; products are not contracted with sums, and sums are taken in one fixed order,
 so the results are the same on all of them.
 """
@@ -79,26 +79,26 @@ def zeros(_: Any) -> Any:
 
 
 @intrinsic
-def load(_: Any, array: Any, row: Any) -> Any:
-    """Return row number ``row`` of a flat array of rows of eight."""
+def load(_: Any, array: Any, at: Any) -> Any:
+    """Return the eight numbers of an array that begin with number ``at``."""
 
     def generate(context: Any, builder: Any, kind: Any, values: Any) -> Any:
         place = _place(context, builder, kind.args[0], *values)
         return builder.load(place, align=ITEMSIZE)
 
-    return VECTOR(array, row), generate
+    return VECTOR(array, at), generate
 
 
 @intrinsic
-def store(_: Any, array: Any, row: Any, vector: Any) -> Any:
-    """Write row number ``row`` of a flat array of rows of eight."""
+def store(_: Any, array: Any, at: Any, vector: Any) -> Any:
+    """Write the eight numbers of an array that begin with number ``at``."""
 
     def generate(context: Any, builder: Any, kind: Any, values: Any) -> Any:
         place = _place(context, builder, kind.args[0], *values[:2])
         builder.store(values[2], place, align=ITEMSIZE)
         return context.get_dummy_value()
 
-    return types.void(array, row, vector), generate
+    return types.void(array, at, vector), generate
 
 
 @intrinsic
@@ -120,9 +120,8 @@ def dot(_: Any, first: Any, second: Any) -> Any:
     return types.float64(first, second), generate
 
 
-def _place(context: Any, builder: Any, kind: Any, array: Any, row: Any) -> Any:
+def _place(context: Any, builder: Any, kind: Any, array: Any, at: Any) -> Any:
     data = context.make_array(kind)(context, builder, array).data
-    at = builder.mul(row, ir.Constant(row.type, WIDTH))
     return builder.bitcast(builder.gep(data, [at]), REALS.as_pointer())
 
 
