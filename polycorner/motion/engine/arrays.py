@@ -251,6 +251,7 @@ class Work(NamedTuple):
     neighbours: Annotated[Any, whole("P 2")]
     list_status: Annotated[Any, whole("2")]  # number of neighbours, whether the list is valid
     examined: Annotated[Any, whole("P")]  # whether a pair was examined in this step
+    least_gap: Annotated[Any, real("P")]  # of a pair at the midpoint; 0: not known
     listed_position: Annotated[Any, real("N 2")]  # positions when the list was made
     listed_travel: Annotated[Any, real("1")]  # how far bodies may move in a step, as listed
     contact: Annotated[Any, whole("C 3")]  # body, body, gap

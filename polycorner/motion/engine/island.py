@@ -11,6 +11,7 @@ from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
@@ -210,12 +211,9 @@ def correct_curvature(model, state, work, blocks, h):
     k, found = model.dimension, False
     for i in range(model.bodies):
         work.curves_shut[i] = 0
-        speed = 0.0
         for c in range(k):
             work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
-            carried = model.substrate_speed if c == model.position[0] else 0.0
-            speed += abs(work.v_new[i, c] * model.units[c] - carried)
-        work.speed[i] = speed
+        work.speed[i] = speed_of(model, work.v_new, i)
     fast = np.sqrt(0.5 * CURVATURE_DEPTH) * model.gap_unit / h
     first, second = NONE, NONE
     for b in range(blocks):

@@ -15,7 +15,7 @@ from polycorner.motion.engine.arrays import CONTACTS, OWN_GAP
 from polycorner.motion.engine.blocks import is_slow
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.jit import NONE, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, travel
+from polycorner.motion.engine.neighbours import ZERO_GAP, speed_of, travel
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import (
     CURVATURE_DEPTH,
@@ -177,7 +177,11 @@ def mark_misses(model, state, work, left, h):
         i, j = work.neighbours[s, 0], work.neighbours[s, 1]
         if not (state.alive[i] and state.alive[j] and (work.awake[i] or work.awake[j])):
             continue
-        if h * (work.speed[i] + work.speed[j]) <= slow:
+        way = h * (work.speed[i] + work.speed[j])
+        if way <= slow:
+            continue
+        way = max(way, 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j)))
+        if work.least_gap[s] > 2.0 * way:
             continue
         if not stay_apart(model, state, work, i, j, h) and pair_misses(
             model, state, work, i, j, h

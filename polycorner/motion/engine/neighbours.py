@@ -1,5 +1,7 @@
 """Neighbour lists, and detection of contacts between bodies."""
 
+import numpy as np
+
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
@@ -102,12 +104,17 @@ def list_neighbours(model, state, work, h, time):
 
 
 @compiled
-def detect_pair(model, state, work, a, b, limit, share, count):
-    """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full."""
+def detect_pair(model, state, work, slot, limit, share, count):
+    """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full.
+
+    The least of all its gaps is kept.
+    """
+    a, b, least = work.neighbours[slot, 0], work.neighbours[slot, 1], np.inf
     k, scratch = model.dimension, work.scratch
     n, m = model.pair_reads.shape[0], model.pair_gaps
     evaluate_pair(model, work, a, b, work.q_mid)
     for g in range(m):
+        least = min(least, scratch[n + g])
         if scratch[n + g] < limit:
             # contacts between sleepers, which are kept, need room as well
             if count + state.counts[CONTACTS] >= work.contact.shape[0]:
@@ -125,7 +132,18 @@ def detect_pair(model, state, work, a, b, limit, share, count):
                 c = model.pair_reads[r, 0] * k + model.pair_reads[r, 1]
                 work.contact_gradient[count, c] = scratch[n + m + g * n + r]
             count += 1
+    work.least_gap[slot] = least
     return count
+
+
+@compiled
+def speed_of(model, v, i):
+    """Return a bound of the speed of a body's points, relative to the moving substrate."""
+    speed = 0.0
+    for c in range(model.dimension):
+        carried = model.substrate_speed if c == model.position[0] else 0.0
+        speed += abs(v[i, c] * model.units[c] - carried)
+    return speed
 
 
 @compiled
@@ -165,11 +183,11 @@ def detect_contacts(model, state, work, h, count):
         a, b = work.neighbours[s, 0], work.neighbours[s, 1]
         if work.examined[s] or not (work.awake[a] or work.awake[b]):
             continue
-        work.examined[s] = 1
+        work.examined[s], work.least_gap[s] = 1, 0.0
         if not (state.alive[a] and state.alive[b]) or work.waits[a] or work.waits[b]:
             continue
         if square_distance(model, work, a, b) < (model.reach + limit) ** 2:
-            count = detect_pair(model, state, work, a, b, limit, h / model.step, count)
+            count = detect_pair(model, state, work, s, limit, h / model.step, count)
             if count < 0:
                 return NONE
     return count
