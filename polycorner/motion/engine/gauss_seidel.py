@@ -81,9 +81,7 @@ def block_residual(model, work, b, compliance):
         return abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
     out = work.projection[b]
     y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0
-    project(
-        model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load_on(work, b), out
-    )
+    project(model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load_on(work, b), out)
     far = abs(out[0] - work.impulse[b, 0]) / rho
     if work.block_rows[b] == 2:
         far = max(far, abs(out[1] - work.impulse[b, 1]) / rho)

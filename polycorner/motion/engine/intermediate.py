@@ -16,7 +16,7 @@ import hashlib
 import logging
 import lzma
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ SECONDS = 2  # of processor time, about, to make machine code
 Advance = Callable[[NDArray[np.int64], int], list[int]]
 
 
-@lru_cache(maxsize=None)
+@cache
 def compiled_advance(dimension: int = ANY) -> Advance:
     """Return the function that advances by several steps bodies of so many coordinates.
 

@@ -126,7 +126,14 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
     """Return the entries of the contacts between bodies; their parameters are appended."""
     family = bodies.contacts
     if family is None or bodies.count < 2:
-        numbers = ("pair_kernel", "pair_values", "pair_parameters", "pair_gaps", "pair_cause", "pair_restitution")
+        numbers = (
+            "pair_kernel",
+            "pair_values",
+            "pair_parameters",
+            "pair_gaps",
+            "pair_cause",
+            "pair_restitution",
+        )
         empty = {"pair_reads": [], "pair_slips": [], "pair_sets": [0, 0]}
         return {**dict.fromkeys(numbers, 0), "reach": 0.0, **empty}
     first = len(parameters)

@@ -183,8 +183,6 @@ def mark_misses(model, state, work, left, h):
         way = max(way, 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j)))
         if work.least_gap[s] > 2.0 * way:
             continue
-        if not stay_apart(model, state, work, i, j, h) and pair_misses(
-            model, state, work, i, j, h
-        ):
+        if not stay_apart(model, state, work, i, j, h) and pair_misses(model, state, work, i, j, h):
             left[work.parent[i]] |= 1
             left[work.parent[j]] |= 1

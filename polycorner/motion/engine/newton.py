@@ -9,12 +9,11 @@ from polycorner.motion.engine.band import (
     row_product,
     solve_band,
 )
-from polycorner.motion.engine.blocks import apply_impulse, load_on
+from polycorner.motion.engine.blocks import apply_impulse
 from polycorner.motion.engine.gauss_seidel import (
     copy_impulses,
     recompute_velocities,
     residual,
-    yielding_velocity,
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.linearisation import change_impulses, is_loaded, linearise_block
@@ -30,9 +29,7 @@ IDLE_NEWTON_STEPS = 6  # Newton steps without progress after which a round ends
 
 
 @compiled
-def newton_steps(
-    model, work, first, last, n, width, goal, softness, compliance, worst, is_small
-):
+def newton_steps(model, work, first, last, n, width, goal, softness, compliance, worst, is_small):
     """Take semismooth Newton steps on the natural map; return their number and the least residual.
 
     The map is ``p - proj(p - rho u)`` with the velocities ``u = J v + d`` of the rows; its

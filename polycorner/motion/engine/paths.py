@@ -23,8 +23,8 @@ SHORTEST_PART = 1.0 / 4096.0  # of a step, to which parts are halved
 MOST_SEARCH = 80  # evaluations in the search for one contact
 NEVER = np.inf
 
-# Rows of what is evaluated on the way: at the start and at the midpoint with the velocity before; at
-# the midpoint, half a step later and at the next midpoint with that after; in a search.
+# Rows of what is evaluated on the way: at the start and at the midpoint with the velocity before;
+# at the midpoint, half a step later and at the next midpoint with that after; in a search.
 START, MIDDLE, NEXT, HALF, FULL, SEARCH = range(6)
 
 
@@ -145,7 +145,7 @@ def may_meet(work, g, first, last, duration, slack):
 
 @compiled
 def look_ahead(model, state, work, i, j, h):
-    """Evaluate gaps at the start, the midpoint and the end of the step, and at the next midpoint."""
+    """Evaluate gaps at the start, the midpoint and the end of a step, and at the next midpoint."""
     gaps_at(model, work, state.q, state.v, i, j, 0.0, START)
     gaps_at(model, work, state.q, state.v, i, j, 0.5 * h, MIDDLE)
     gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.0, NEXT)

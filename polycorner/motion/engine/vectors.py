@@ -1,8 +1,8 @@
 """Vectors of eight reals, for compiled code: one instruction where the processor has it.
 
-They are read from and written to arrays at any place.  LLVM turns them into what the processor has, of two,
-four or eight reals; products are not contracted with sums, and sums are taken in one fixed order,
-so the results are the same on all of them.
+They are read from and written to arrays at any place.  LLVM turns them into what the processor has,
+of two, four or eight reals; products are not contracted with sums, and sums are taken in one fixed
+order, so the results are the same on all of them.
 """
 
 import operator
@@ -75,7 +75,7 @@ def multiply(_: Any, builder: Any, __: Any, values: Any) -> Any:
 @intrinsic
 def zeros(_: Any) -> Any:
     """Return a vector of zeros."""
-    return VECTOR(), lambda context, builder, kind, values: ir.Constant(REALS, None)
+    return VECTOR(), lambda *_: ir.Constant(REALS, None)
 
 
 @intrinsic

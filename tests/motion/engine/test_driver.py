@@ -10,7 +10,16 @@ import pytest
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.motion.engine import driver
-from polycorner.motion.engine.intermediate import ENTRY, HEAD, engine_sources, shipped_code
+from polycorner.motion.engine.intermediate import (
+    ANY,
+    COMMON,
+    ENTRY,
+    HEAD,
+    compiled_advance,
+    engine_sources,
+    shipped_code,
+)
+from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import start
 
 
@@ -29,15 +38,38 @@ def test_room_for_contacts_grows(monkeypatch):
     assert narrow.capacity > 16
 
 
-def test_the_package_contains_the_engine_as_it_is():
+@pytest.mark.parametrize("dimension", [ANY, *COMMON])
+def test_the_package_contains_the_engine_as_it_is(dimension):
     """After a change of a stage, `make engine` makes it anew."""
-    assert shipped_code().startswith(HEAD + engine_sources() + "\n")
+    assert shipped_code(dimension).startswith(HEAD + engine_sources() + "\n")
 
 
-def test_what_the_package_contains_names_no_file():
-    code = shipped_code()
+@pytest.mark.parametrize("dimension", [ANY, *COMMON])
+def test_what_the_package_contains_names_no_file(dimension):
+    code = shipped_code(dimension)
     assert "/" not in code
     assert f"@{ENTRY}(" in code
+
+
+def advanced(system, state, noise, seconds):
+    """Return the state after a time, bit for bit."""
+    engine = start(system, state, 1e-3, noise=noise)
+    engine.advance(round(seconds / 1e-3))
+    return engine.save()
+
+
+@pytest.mark.parametrize("count", [1, 2, 9])
+def test_a_known_number_of_coordinates_changes_nothing(monkeypatch, count):
+    """Code for dumbbells and code for bodies of any number of coordinates give the same bits."""
+    drum = DumbbellDrum(count=count, floor=True)
+    starts = bunch(drum, np.random.default_rng(3))
+    noise = Noise(chatter=0.2, kicks={"eta": 1.0, "theta": 0.1}, seed=2)
+    known = advanced(drum, drum.state(starts), noise, 0.5)
+    monkeypatch.setattr(driver, "compiled_advance", lambda _: compiled_advance(ANY))
+    unknown = advanced(drum, drum.state(starts), noise, 0.5)
+    assert known["counts"][1] == 500
+    for name, array in known.items():
+        np.testing.assert_array_equal(array, unknown[name], err_msg=name)
 
 
 RUN = """
@@ -46,7 +78,7 @@ from polycorner.models.textbook import bouncing_ball
 from polycorner.motion import simulate
 from polycorner.motion.engine import intermediate
 if len(sys.argv) > 1:
-    intermediate.shipped_code = lambda: sys.argv[1]
+    intermediate.shipped_code = lambda dimension: sys.argv[1]
 ball = bouncing_ball(0.7)
 print(simulate(ball, ball.state([1.0]), 2.0, 1e-2).q.tobytes().hex())
 """
