@@ -311,6 +311,7 @@ class Work(NamedTuple):
     small_offset: Annotated[Any, real("64")]  # of its rows
     small_matrix: Annotated[Any, real("64")]
     small_vector: Annotated[Any, real("8")]
+    small_free: Annotated[Any, real("8")]  # velocities after forces alone
     small_velocity: Annotated[Any, real("8")]
 
 

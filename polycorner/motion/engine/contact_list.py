@@ -191,11 +191,15 @@ def add_contacts(model, state, work, C, size, share):
 
 @compiled
 def listed(model, work, C, key):
-    """Return whether a contact is in this step's list."""
-    found = False
-    for s in range(C):
-        found = found or key_of(model, work, work.origin[work.sort_keys[s], 1]) == key
-    return found
+    """Return whether a contact is in this step's list, which ascends."""
+    low, high = 0, C
+    while low < high:
+        middle = (low + high) // 2
+        if key_of(model, work, work.origin[work.sort_keys[middle], 1]) < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low < C and key_of(model, work, work.origin[work.sort_keys[low], 1]) == key
 
 
 @compiled

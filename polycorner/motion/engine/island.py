@@ -24,6 +24,8 @@ CYCLE_ROUNDS = 3
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 MISSED = 1e-12  # scaled gap up to which an equation holds
 FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
+FEW = 8  # blocks of a small island up to which sweeps, which may be exact, come first
+SPARE = 1e-2  # share of the tolerance to which small islands are solved if possible
 SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
@@ -31,35 +33,39 @@ SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 def iterate(model, state, work, first, last, speed, sweeps):
     """Solve an island by rounds of Gauss-Seidel sweeps and Newton steps; return the residual.
 
-    Where a round does not do, the small errors of closed gaps are left as they are: contacts that
-    stick in closed loops cannot correct all of them, and would jam.  Where the next does not do
-    either, the solution is continued from that of simpler problems.  After that contacts are made
-    softer from round to round, and hard again.  It ends when the residual has reached its goal,
-    when ``sweeps`` are done, or when a cycle of rounds has not halved the residual.
+    Small islands, which cost little, are solved more exactly than asked, and begin with Newton
+    steps if they have more than a few blocks.  Where a round does not do, the
+    small errors of closed gaps are left as they are: contacts that stick in closed loops cannot
+    correct all of them, and would jam.  Where the next does not do either, the solution is
+    continued from that of simpler problems.  After that contacts are made softer from round to
+    round, and hard again.  It ends when the residual has reached its goal, when ``sweeps`` are
+    done, or when a cycle of rounds has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
     n, width, small = number_few(model, work, first, last), ZERO, ONE
     if n == 0:
         n, width = number_bodies(model, state, work, first, last)
         small = ZERO
+    direct, enough = small and last - first > FEW, SPARE * goal if small else goal
+    if not direct:
         worst = residual(model, work, first, last, 0.0)
-        if worst <= goal:
+        if worst <= enough:
             return worst
     hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
     rounds, done, former = 0, 0, np.inf
-    while worst > goal and done < sweeps:
+    while rounds == 0 or (worst > goal and done < sweeps):
         if rounds == 1:
             leave_errors(work, first, last)
-        if not small or rounds > 0:
+        if not direct or rounds > 0:
             for _ in range(FIRST_SWEEPS if rounds == 0 else ROUND_SWEEPS):
                 worst = 0.0
                 for s in range(first, last):
                     worst = max(worst, relax_block(model, work, work.order[s]))
                 done += 1
-                if worst <= goal:
+                if worst <= enough:
                     break
             worst = residual(model, work, first, last, 0.0)
-        if worst > goal and n > 0:
+        if worst > enough and n > 0:
             phase = rounds % CYCLE_ROUNDS
             softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
             steps, worst = newton_steps(
@@ -67,6 +73,7 @@ def iterate(model, state, work, first, last, speed, sweeps):
             )
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
+                n, width = number_bodies(model, state, work, first, last)
                 worst = continue_island(model, state, work, first, last, n, width, goal, hard)
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:

@@ -36,16 +36,16 @@ def number_few(model, work, first, last):
 
 @compiled
 def gather(model, work, first, last, n):
-    """Gather velocities and rows of a small island.
+    """Gather the free velocities and the rows of a small island.
 
     Bodies that sleep keep their velocities, which count as offsets of the rows.
     """
     k, row = model.dimension, ZERO
     jacobian, response = work.small_jacobian, work.small_response
-    store(work.small_velocity, 0, zeros())
+    store(work.small_free, 0, zeros())
     for at in range(n):
         for c in range(k):
-            work.small_velocity[at * k + c] = work.v_new[work.members[at], c]
+            work.small_free[at * k + c] = work.v_free[work.members[at], c]
     for s in range(first, last):
         b = work.order[s]
         work.first_row[b] = row
@@ -80,8 +80,18 @@ def scatter(model, work, n):
 
 @compiled
 def small_residual(model, work, first, last, compliance):
-    """Return the largest residual of a small island that was gathered, like ``residual``."""
-    v, worst = load(work.small_velocity, 0), 0.0
+    """Return the largest residual of a small island that was gathered, like ``residual``.
+
+    Its velocities are computed from its impulses.
+    """
+    v, worst = load(work.small_free, 0), 0.0
+    for s in range(first, last):
+        b = work.order[s]
+        row = work.first_row[b]
+        v = v + work.impulse[b, 0] * load(work.small_response, WIDTH * row)
+        if work.block_rows[b] == 2:
+            v = v + work.impulse[b, 1] * load(work.small_response, WIDTH * (row + 1))
+    store(work.small_velocity, 0, v)
     for s in range(first, last):
         b = work.order[s]
         row = work.first_row[b]
@@ -98,8 +108,7 @@ def small_step(model, work, first, last, n):
     assemble(model, work, first, last, n)
     if not solve(work.small_matrix, work.small_vector, n * model.dimension):
         return False
-    x, v = load(work.small_vector, 0), load(work.small_velocity, 0)
-    change = work.slip
+    x = load(work.small_vector, 0)
     for s in range(first, last):
         b = work.order[s]
         row, pressing = work.first_row[b], work.pressing[b]
@@ -109,11 +118,7 @@ def small_step(model, work, first, last, n):
         along = dot(load(work.small_jacobian, WIDTH * row), x)
         if work.block_rows[b] == 2:
             across = dot(load(work.small_jacobian, WIDTH * (row + 1)), x)
-        change_impulses(work, b, normal, along, across, change)
-        v = v + change[0] * load(work.small_response, WIDTH * row)
-        if work.block_rows[b] == 2:
-            v = v + change[1] * load(work.small_response, WIDTH * (row + 1))
-    store(work.small_velocity, 0, v)
+        change_impulses(work, b, normal, along, across, work.slip)
     return True
 
 
