@@ -154,6 +154,7 @@ class Model(NamedTuple):
     chatter: Annotated[Any, real()]  # relative amplitude of the noise of known loads
     correlation_time: Annotated[Any, real()]  # for which one of its values holds
     kicks: Annotated[Any, real("k")]  # intensities of random impulses
+    kick_time: Annotated[Any, real()]  # for which a random force is held; 0: white noise
     seed: Annotated[Any, whole()]
     tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
     sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island

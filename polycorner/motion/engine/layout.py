@@ -44,6 +44,7 @@ def model_of(
         "chatter": noise.chatter,
         "correlation_time": noise.correlation_time,
         "kicks": [noise.kicks.get(name, 0.0) for name in formulation.coordinates],
+        "kick_time": noise.kick_time,
         "seed": noise.seed,
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,

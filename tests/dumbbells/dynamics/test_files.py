@@ -14,7 +14,7 @@ from polycorner.models.textbook import bouncing_ball
 from polycorner.motion.noise import Noise
 
 DRUM = DumbbellDrum(floor=True, top=60.0, tilt=0.5, spin=0.02)
-NOISE = Noise(chatter=0.3, kicks={"phi": 1e-3}, seed=7)
+NOISE = Noise(chatter=0.3, kicks={"phi": 1e-3}, kick_time=0.02, seed=7)
 RUN = replace(motion(DRUM, 1, 4, "floor1"), noise=NOISE, every=20, t_end=0.8)
 
 
