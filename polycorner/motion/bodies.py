@@ -65,6 +65,11 @@ class Body(Value):
         Length by which gaps are scaled.
     equations : int
         How many of the gaps are equations: they remain zero, by forces of either sign.
+    signals : Family, optional
+        Functions of the time, computed once a step for all bodies.  Their values are the parameters
+        of the formulation that follow the time.
+    signal_parameters : array
+        Values of the parameters of the signals.
     """
 
     formulation: Formulation
@@ -76,6 +81,8 @@ class Body(Value):
     units: Array
     gap_unit: float
     equations: int = 0
+    signals: Family | None = None
+    signal_parameters: Array = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +172,8 @@ class IdenticalBodies(Value):
     def formula_keys(self) -> list[str]:
         """Keys of all compiled formulas: they identify expressions to the last digit."""
         found = [self.body.formulation.key]
+        if self.body.signals is not None:
+            found.append(f"{self.body.signals.key} {self.body.signal_parameters.tolist()}")
         found += [f"{call.family.key} {call.parameters.tolist()}" for call in self.body.gaps]
         if self.contacts is not None:
             slips = [family.key for family, _, _ in self.contacts.slips]

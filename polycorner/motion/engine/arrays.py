@@ -163,6 +163,8 @@ class Model(NamedTuple):
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
+    signal_kernel: Annotated[Any, whole()]  # address: parameters that follow the time, or 0
+    signal_parameters: Annotated[Any, whole()]  # its first parameter
     start: Annotated[Any, real()]  # time of the first state
     step: Annotated[Any, real()]  # length of a whole step
 

@@ -37,16 +37,17 @@ def evaluate_forces(model, work, i, v, h):
 
 @compiled
 def random_impulse(model, i, c, h, time, index):
-    """Return the random impulse of unit intensity in a step or part with the midpoint ``time``.
+    """Return the random impulse on a coordinate in a step or part with the midpoint ``time``.
 
-    It is white, ``sqrt(step)`` times a number for each whole step, or the integral of a force
-    that is held, ``1 / sqrt(kick_time)`` times a number for each interval of that length.
+    It is white, ``sigma sqrt(step)`` times a number for each whole step, or the integral of a force
+    that is held, ``sigma / sqrt(kick_time)`` times a number for each interval of that length.
     """
     if model.kick_time > 0.0:
         begin, end = time - 0.5 * h, time + 0.5 * h
         drawn = held_integral(model.seed, model.kick_time, begin, end, i, KICK + c)
-        return drawn / np.sqrt(model.kick_time)
-    return np.sqrt(model.step) * (gaussian(model.seed, index, i, KICK + c) * (h / model.step))
+        return model.kicks[c] / np.sqrt(model.kick_time) * drawn
+    draw = gaussian(model.seed, index, i, KICK + c) * (h / model.step)
+    return model.kicks[c] * np.sqrt(model.step) * draw
 
 
 @compiled
@@ -59,7 +60,7 @@ def evaluate_body(model, state, work, i, h, time, index):
         work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         work.kick[i, c] = 0.0
         if model.kicks[c] > 0.0:
-            work.kick[i, c] = model.kicks[c] * random_impulse(model, i, c, h, time, index)
+            work.kick[i, c] = random_impulse(model, i, c, h, time, index)
     if model.unilateral < model.restitution.size:
         approach_equations(model, work, i)
     at = evaluate_forces(model, work, i, state.v, h)

@@ -54,6 +54,7 @@ def model_of(
         "step": step,
         "time_parameter": body.formulation.time_parameter,
         **_dependence(body),
+        **_signals(body, parameters),
         **_friction(bodies, sets),
         **_gaps(body.gaps, len(body.contacts), parameters),
         **_pairs(bodies, parameters, sets),
@@ -84,6 +85,15 @@ def _dependence(body: Body) -> dict[str, bool]:
         "constant_mass": all(np.array_equal(slow.mass, other.mass) for other in others),
         "follows_velocity": not same,
     }
+
+
+def _signals(body: Body, parameters: list[float]) -> dict[str, int]:
+    """Return the entries of the functions of the time; their parameters are appended."""
+    if body.signals is None:
+        return {"signal_kernel": 0, "signal_parameters": 0}
+    first = len(parameters)
+    parameters += body.signal_parameters.tolist()
+    return {"signal_kernel": body.signals.kernel.compiled(0).point, "signal_parameters": first}
 
 
 def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:
