@@ -118,6 +118,7 @@ def imperfect_body(
         parameters=np.array([*fixed, 0.0, *now.tolist()]),
         signals=family,
         signal_parameters=numbers,
+        slow_signals=shaking is None,
     )
 
 

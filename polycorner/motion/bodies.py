@@ -70,6 +70,9 @@ class Body(Value):
         of the formulation that follow the time.
     signal_parameters : array
         Values of the parameters of the signals.
+    slow_signals : bool
+        Whether they change as slowly as the substrate carries bodies, so that a body at rest need
+        not be examined in every step.
     """
 
     formulation: Formulation
@@ -83,6 +86,7 @@ class Body(Value):
     equations: int = 0
     signals: Family | None = None
     signal_parameters: Array = field(default_factory=lambda: np.empty(0))
+    slow_signals: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -165,6 +165,7 @@ class Model(NamedTuple):
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
     signal_kernel: Annotated[Any, whole()]  # address: parameters that follow the time, or 0
     signal_parameters: Annotated[Any, whole()]  # its first parameter
+    follows_time: Annotated[Any, whole()]  # whether forces may change much from step to step
     start: Annotated[Any, real()]  # time of the first state
     step: Annotated[Any, real()]  # length of a whole step
 

@@ -53,6 +53,7 @@ def model_of(
         "start": start,
         "step": step,
         "time_parameter": body.formulation.time_parameter,
+        "follows_time": body.formulation.time_parameter >= 0 and not body.slow_signals,
         **_dependence(body),
         **_signals(body, parameters),
         **_friction(bodies, sets),

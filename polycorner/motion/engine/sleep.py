@@ -108,7 +108,7 @@ def next_check(model, state, work, i, h, index):
             return index + 1
         change = abs(x - state.friction[i, f, 0]) + abs(y - state.friction[i, f, 1])
         rate = max(rate, change / load)
-    if model.time_parameter >= 0:
+    if model.follows_time:
         return index + 1
     steps = LONGEST_SLEEP
     if rate * LONGEST_SLEEP > 0.1 * SLEEP_MARGIN:
