@@ -185,6 +185,7 @@ class State(NamedTuple):
     rests: Annotated[Any, whole("N")]  # whether it has exactly the velocity of rest
     asleep: Annotated[Any, whole("N")]  # whether its rest is proved and it is not solved for
     booked_friction: Annotated[Any, real("N F 2")]  # friction impulses when work was booked last
+    booked_applied: Annotated[Any, real("N k")]  # impulses of applied forces then
     check_due: Annotated[Any, whole("N")]  # step in which a sleeper is checked again
     booked_to: Annotated[Any, whole("N")]  # step up to which its work is booked
     neighbour_impulse: Annotated[Any, real("N k")]  # generalised impulses from other bodies
