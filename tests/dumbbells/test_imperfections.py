@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from polycorner.dumbbells import DumbbellDrum, OutOfRound, Shaking, UnevenFriction, Wobble
 from polycorner.dumbbells.imperfections import KINDS
 from polycorner.motion import Checkpoint, Noise, simulate
+from polycorner.motion.engine.driver import Engine
 from polycorner.motion.formulation import moment
 
 SHAKEN = DumbbellDrum(shaking=Shaking((300.0, 200.0, 400.0), (2.0, 15.0), seed=3))
@@ -206,6 +207,21 @@ def test_a_sleeper_wakes_when_the_drum_is_shaken_more_than_friction_holds():
     first = int(np.argmax(np.abs(pull) > held))
     moved = int(np.argmax(path.v[:, 0, 0] != 0.0))
     assert moved == first + 1
+
+
+@pytest.mark.parametrize("drum", [OVAL, WOBBLING, UNEVEN])
+def test_sleepers_under_slow_signals_wake_as_if_examined_in_every_step(drum):
+    bodies = replace(drum, count=2).bodies
+    always = replace(bodies, body=replace(bodies.body, slow_signals=False))
+    q = np.array([[0.05, 0.0, 0.1, 0.0], [0.08, 90.0, -0.2, 0.0]])
+    v, sticks, ends = np.tile([drum.spin, 0, 0, 0], (2, 1)), np.ones((2, 3), dtype=bool), []
+    for given_bodies in (bodies, always):
+        engine = Engine(given_bodies, q, v, sticks, 1e-3, noise=Noise())
+        events = engine.advance(15_000)
+        ends.append((engine.motion.q, [(e.kind, e.bodies, e.time) for e in events]))
+    assert len(ends[0][1]) > 4
+    assert ends[0][1] == ends[1][1]
+    assert ends[0][0] == pytest.approx(ends[1][0], abs=1e-9)
 
 
 @each
