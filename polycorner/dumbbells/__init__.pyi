@@ -1,5 +1,6 @@
 from .drum import DumbbellDrum
 from .formulas import plane_heading_formula
+from .imperfections import OutOfRound, Shaking, UnevenFriction, Wobble
 from .pair import DumbbellPair
 from .statics.critical import critical_length, critical_rod_radius, plane_critical_formula
 from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
@@ -16,9 +17,13 @@ __all__ = [
     "ErrorBar",
     "Keel",
     "MinimaMap",
+    "OutOfRound",
     "PairAtlas",
     "PairMap",
     "RestRegion",
+    "Shaking",
+    "UnevenFriction",
+    "Wobble",
     "critical_length",
     "critical_rod_radius",
     "dyad_minima",

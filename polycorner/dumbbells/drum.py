@@ -18,11 +18,16 @@ from numpy.typing import ArrayLike
 from polycorner.checks import real, refuse, whole
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
+from polycorner.dumbbells.drum_motion import COORDINATES, imperfect_body, perfect_motion, rub
+from polycorner.dumbbells.imperfections import (
+    Imperfections,
+    OutOfRound,
+    Shaking,
+    UnevenFriction,
+    Wobble,
+)
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.formulas.bundles import Call
-from polycorner.formulas.cache import source_key
-from polycorner.formulas.families import Family
-from polycorner.motion import formulation as equations
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.mechanics import MechanicalSystem, State
@@ -33,10 +38,9 @@ if TYPE_CHECKING:
     from polycorner.motion.trajectory import Trajectory
 
 GRAVITY = 9806.65  # mm/s^2
-COORDINATES = ("phi", "eta", "theta", "psi")
-PARAMETERS = ("l", "r", "rho", "m", "surface", "weight", "pull")
 FREE_FALL = 0.1  # part of the rod radius by which a ball may fall within one step
 PILES = Solver(tolerance=1e-4, sweeps=62)  # default for more than two dumbbells
+RESOLVED = 0.1  # part of the shortest period of shaking that a step may last
 OVERLAP = 1e-6  # mm up to which a start counts as touching
 
 Pair = tuple[float, float]
@@ -67,6 +71,9 @@ class DumbbellDrum(MechanicalSystem):
         Whether the drum has a flat bottom at ``eta = 0``.
     top : float
         Where the drum ends, in mm: a dumbbell whose centre passes it has left; ``inf``: never.
+    shaking, out_of_round, wobble, uneven_friction : optional
+        :class:`Shaking`, :class:`OutOfRound`, :class:`Wobble` and :class:`UnevenFriction`, the
+        imperfections of a real drum; none by default.
 
     Notes
     -----
@@ -94,6 +101,10 @@ class DumbbellDrum(MechanicalSystem):
     ball_mass: float = 0.14
     floor: bool = False
     top: float = math.inf
+    shaking: Shaking | None = None
+    out_of_round: OutOfRound | None = None
+    wobble: Wobble | None = None
+    uneven_friction: UnevenFriction | None = None
 
     def __post_init__(self) -> None:
         _ = self.pair  # checks the lengths
@@ -105,7 +116,13 @@ class DumbbellDrum(MechanicalSystem):
         real("restitution", self.restitution, least=0, most=1)
         real("ball_mass", self.ball_mass, above=0, unit="g")
         real("top", self.top, above=0, infinite=True, unit="mm")
+        self.imperfections.check(self.tilt, self.centre_radius)
         super().__post_init__()
+
+    @property
+    def imperfections(self) -> Imperfections:
+        """The imperfections of the drum together."""
+        return Imperfections(self.shaking, self.out_of_round, self.wobble, self.uneven_friction)
 
     @cached_property
     def pair(self) -> DumbbellPair:
@@ -141,7 +158,7 @@ class DumbbellDrum(MechanicalSystem):
         length, r, rho = self.length, self.ball_radius, self.centre_radius
         m, g = self.ball_mass, GRAVITY
         weight, pull = m * g * math.cos(self.tilt), m * g * math.sin(self.tilt)
-        numbers = np.array([length, r, rho, m, self.spin * rho, weight, pull])
+        numbers = [length, r, rho, m, self.spin * rho, weight, pull]
         slide, roll = self.sliding, self.rolling
         friction = (
             *(
@@ -157,9 +174,9 @@ class DumbbellDrum(MechanicalSystem):
         names = ("floor1", "floor2") if self.floor else ()
         gaps = [Call(drum_formulas.floors(), (1, 2), np.array([length, r]), (0, 1), (0, 1))]
         units = np.array([rho, 1.0, length / 2, r])
-        return Body(
-            dumbbell_motion(),
-            numbers,
+        body = Body(
+            perfect_motion(),
+            np.array(numbers),
             friction,
             gaps if self.floor else [],
             names,
@@ -167,6 +184,10 @@ class DumbbellDrum(MechanicalSystem):
             units,
             1.0,
         )
+        if self.imperfections == Imperfections():
+            return body
+        driven = (self.spin, self.ball_mass, GRAVITY, self.tilt)
+        return imperfect_body(body, self.imperfections, rho, driven)
 
     def _pair_contacts(self, reach: float) -> PairContacts:
         names = ("length", "ball_radius", "rod_radius", "centre_radius")
@@ -178,7 +199,7 @@ class DumbbellDrum(MechanicalSystem):
             gaps,
             tuple(values[name] for name in gaps.parameters),
             reads,
-            tuple(_rub(contact, (length, r, t, rho)) for contact in gaps.names),
+            tuple(rub(contact, (length, r, t, rho)) for contact in gaps.names),
             Disc(self.rubbing[0]),
             Disc(self.rubbing[1]),
             float(self.restitution),
@@ -195,9 +216,17 @@ class DumbbellDrum(MechanicalSystem):
         return Solver() if self.count <= 2 else PILES
 
     def largest_step(self, state: State) -> tuple[float, str]:
-        """Return the time in which gravity moves a ball by a tenth of the rod radius."""
+        """Return the time in which gravity moves a ball by a tenth of the rod radius.
+
+        In a drum that is shaken it is the effective gravity, and a step is at most a tenth of the
+        shortest period.
+        """
         del state  # it is the same everywhere in the drum
-        longest = math.sqrt(2 * FREE_FALL * self.rod_radius / GRAVITY)
+        shaking = self.shaking
+        gravity = GRAVITY + (shaking.peak if shaking is not None else 0.0)
+        longest = math.sqrt(2 * FREE_FALL * self.rod_radius / gravity)
+        if shaking is not None and RESOLVED * shaking.shortest_period < longest:
+            return RESOLVED * shaking.shortest_period, "a tenth of the shortest period of shaking"
         return longest, "in which a ball falls by a tenth of the rod's radius"
 
     def described(self) -> dict[str, Any]:
@@ -293,38 +322,6 @@ def drum_of(trajectory: "Trajectory") -> DumbbellDrum:
         msg = f"trajectory: expected one of dumbbells in a drum; got one of a {got}"
         raise TypeError(msg)
     return trajectory.system
-
-
-def dumbbell_motion() -> equations.Formulation:
-    """Return the equations of motion of one dumbbell in the drum."""
-    modules = (equations.__name__, drum_formulas.__name__, dumbbell_formulas.__name__, __name__)
-    return equations.Formulation(COORDINATES, PARAMETERS, _laws, 5, 2, source_key(*modules))
-
-
-def _laws() -> equations.Laws:
-    grip = drum_formulas.grip()
-    slips = ("slip1_r", "slip1_s", "slip2_r", "slip2_s", "spin")
-    return equations.Laws(
-        drum_formulas.kinetic().expression("kinetic"),
-        drum_formulas.weight().expression("potential"),
-        {},
-        tuple(grip.expression(name) for name in slips),
-        tuple(grip.expression(name) for name in ("load1", "load2")),
-    )
-
-
-def _rub(
-    contact: str, lengths: tuple[float, float, float, float]
-) -> tuple[Family, bool, tuple[float, ...]]:
-    """Return the slip at a contact: its family, whether bodies are exchanged, its parameters."""
-    ends = {"1": -1.0, "2": 1.0}
-    balls = [ends[c] for c in contact if c in ends]
-    if len(balls) == 2:
-        return drum_formulas.rubs("ball_ball"), False, (*lengths, *balls)
-    if balls:
-        swapped = contact.startswith("a")  # the ball belongs to the second dumbbell
-        return drum_formulas.rubs("ball_rod"), swapped, (*lengths, balls[0], 0.0)
-    return drum_formulas.rubs("rod_rod"), False, (*lengths, 0.0, 0.0)
 
 
 def _coefficients(name: str, value: Any) -> Pair:

@@ -12,6 +12,7 @@ from .events import Event, EventKind
 from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
 from .mechanics import MechanicalSystem, State
 from .noise import Noise, Solver
+from .random_functions import random_field, random_signal
 from .simulation import simulate, step
 from .system import System
 from .trajectory import Trajectory
@@ -39,6 +40,8 @@ __all__ = [
     "accelerations",
     "pair_coordinates",
     "pair_velocities",
+    "random_field",
+    "random_signal",
     "simulate",
     "step",
     "time_symbol",

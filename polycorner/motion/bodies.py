@@ -65,6 +65,14 @@ class Body(Value):
         Length by which gaps are scaled.
     equations : int
         How many of the gaps are equations: they remain zero, by forces of either sign.
+    signals : Family, optional
+        Functions of the time, computed once a step for all bodies.  Their values are the parameters
+        of the formulation that follow the time.
+    signal_parameters : array
+        Values of the parameters of the signals.
+    slow_signals : bool
+        Whether they change as slowly as the substrate carries bodies, so that a body at rest need
+        not be examined in every step.
     """
 
     formulation: Formulation
@@ -76,6 +84,9 @@ class Body(Value):
     units: Array
     gap_unit: float
     equations: int = 0
+    signals: Family | None = None
+    signal_parameters: Array = field(default_factory=lambda: np.empty(0))
+    slow_signals: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +176,8 @@ class IdenticalBodies(Value):
     def formula_keys(self) -> list[str]:
         """Keys of all compiled formulas: they identify expressions to the last digit."""
         found = [self.body.formulation.key]
+        if self.body.signals is not None:
+            found.append(f"{self.body.signals.key} {self.body.signal_parameters.tolist()}")
         found += [f"{call.family.key} {call.parameters.tolist()}" for call in self.body.gaps]
         if self.contacts is not None:
             slips = [family.key for family, _, _ in self.contacts.slips]

@@ -41,8 +41,12 @@ class Noise(Value):
     On a substrate that is not quite smooth loads fluctuate.  *Chatter*: every known load ``N`` is
     multiplied by ``max(0, 1 + A xi)`` with ``xi`` standard normal, independent for each body and
     load, held for a correlation time and then drawn anew.  Bodies that need almost all of their
-    friction then slip now and then: these are the slippages of [GMBN] sec. 3.  *Kicks*: white
-    noise forces, impulses ``sigma sqrt(h) xi`` in each step of length ``h``.
+    friction then slip now and then: these are the slippages of [GMBN] sec. 3.  *Kicks*: random
+    forces on coordinates.  White ones, impulses ``sigma sqrt(h) xi`` in each step of length ``h``,
+    have different paths for different steps.  With a ``kick_time`` ``tau`` the force is
+    ``sigma / sqrt(tau) xi_n`` on ``[n tau, (n + 1) tau)``, counted from the start of the run, and
+    each step gets its exact integral: the motion converges as ``h -> 0``, and as ``tau -> 0`` the
+    force tends to the white one of the same ``sigma``.
 
     Each number is a function of the seed, the time, the body and its use (SplitMix64, [Steele]), so
     a run that resumes meets the same noise.
@@ -55,7 +59,10 @@ class Noise(Value):
         How long a draw is held, in s; default 0.01.
     kicks : mapping from str to float, optional
         ``sigma`` by coordinate: a coordinate of mass ``m`` diffuses in velocity with
-        ``<dv^2> = (sigma / m)^2 t``.
+        ``<dv^2> = (sigma / m)^2 t``, for times that are long against ``kick_time``.  In units of
+        force times sqrt(s).
+    kick_time : float, optional
+        How long a random force is held, in s, or 0 (default): white noise.
     seed : int, optional
         Any whole number from 0 to 2^63 - 1; default 0.
     """
@@ -63,6 +70,7 @@ class Noise(Value):
     chatter: float = 0.0
     correlation_time: float = 0.01
     kicks: Mapping[str, float] = field(default_factory=dict)
+    kick_time: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -70,4 +78,5 @@ class Noise(Value):
         real("correlation_time", self.correlation_time, least=1e-12, unit="s")
         for size in mapping("kicks", self.kicks).values():
             real("kicks", size, least=0)
+        real("kick_time", self.kick_time, least=0, unit="s")
         whole("seed", self.seed, least=0, most=2**63 - 1)

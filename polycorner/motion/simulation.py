@@ -77,6 +77,7 @@ if TYPE_CHECKING:
 
 FRAMES = 1000  # instants recorded by default
 LONGEST = 1e12  # s
+MOST_KICKS = 10_000  # random forces of one coordinate in a step
 MOST_STEPS = 10**15
 SHORTEST_STEP = 1e-50  # s, by which gaps are divided
 ROUNDING = 1e-12  # relative, within which a duration is a whole number of steps
@@ -244,6 +245,7 @@ def _parameters(
         "noise.chatter": float(noise.chatter),
         "noise.correlation_time": float(noise.correlation_time),
         "noise.kicks": {name: float(size) for name, size in sorted(noise.kicks.items())},
+        **({"noise.kick_time": float(noise.kick_time)} if noise.kick_time else {}),
         "noise.seed": int(noise.seed),
         "solver.tolerance": float(solver.tolerance),
         "solver.sweeps": int(solver.sweeps),
@@ -290,6 +292,8 @@ def start(
         raise ValueError(msg)
     noise = Noise() if noise is None else instance("noise", noise, Noise)
     names("kicks", noise.kicks, bodies.body.formulation.coordinates)
+    if noise.kicks and noise.kick_time:
+        real("kick_time", noise.kick_time, least=dt / MOST_KICKS, unit="s")
     sticking = np.reshape(state.sticking, (bodies.count, -1))
     return Engine(
         bodies,

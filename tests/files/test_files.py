@@ -72,7 +72,7 @@ def trajectory():
 def run():
     drum = DumbbellDrum(floor=True, top=60.0, tilt=0.5, spin=0.02)
     path = motion(drum, 1, 4, "floor1")
-    noise = Noise(chatter=0.3, kicks={"phi": 1e-3}, seed=7)
+    noise = Noise(chatter=0.3, kicks={"phi": 1e-3}, kick_time=0.02, seed=7)
     value = replace(path, noise=noise, every=20, t_end=0.8)
     return Sample(value, run_files.save_run, run_files.load_run, same_motion, run_files)
 

@@ -219,3 +219,22 @@ def test_the_end_is_reached_whatever_the_step(dt, duration, begin):
     assert path.times[-1] == pytest.approx(begin + duration, abs=1e-12)
     assert path.dt <= dt * (1 + 1e-12)
     assert path.q[-1, 0, 0] == pytest.approx(length, rel=1e-12)
+
+
+def test_the_work_of_an_applied_force_on_a_sleeper_is_booked():
+    """A block that a belt carries against a force sleeps, and is examined now and then."""
+    from polycorner.motion import Friction, Interval
+
+    belt = Friction("belt", [VS - 2], Interval(0.5), load=[10.0])
+    system = System(
+        Polyhedron(LINE, {"far": FAR - S}),
+        VS**2 / 2,
+        forces={"x": -3},
+        friction=[belt],
+        substrate={"x": 2.0},
+    )
+    path = simulate(system, system.state([0.0]), 1.0, 1e-3)
+    assert path.rests[-1].all()
+    assert path.work["applied"][-1] == pytest.approx(-3 * 2.0, rel=0.01)
+    assert path.work["substrate"][-1] == pytest.approx(3 * 2.0, rel=0.01)
+    assert path.audit < 1e-9

@@ -24,6 +24,11 @@ from polycorner.cli.output import (
 )
 from polycorner.dumbbells.cli.drum_options import drum_options, without_hidden
 from polycorner.dumbbells.cli.drum_report import drum_answer, drum_sheet
+from polycorner.dumbbells.cli.imperfection_options import (
+    imperfection_options,
+    imperfections,
+    noise_of,
+)
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
@@ -63,6 +68,13 @@ NAMES = {
     "rolling": "mu_roll",
     "rubbing": "mu_contact",
     "chatter": "noise",
+    "shaking": "shake",
+    "out_of_round": "out_of_round",
+    "wobble": "wobble",
+    "uneven_friction": "uneven_friction",
+    "correlation_length": "uneven_friction",
+    "kicks": "kicks",
+    "kick_time": "kick_time",
     "duration": "duration",
     "dt": "dt",
     "seed": "seed",
@@ -77,6 +89,7 @@ NAMES = {
 
 @command(epilog=EPILOG)
 @drum_options
+@imperfection_options
 def drum(resume: bool, movie: str | None, as_json: bool, out: Path | None, **options: Any) -> None:
     """Simulate dumbbells in a slowly rotating, tilted drum."""
     values = without_hidden(options)
@@ -114,7 +127,6 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, State]":
     in_bunch = count > 1 and not (values["pair"] or values["heading"] or values["start"])
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics import starts as drum_starts
-    from polycorner.motion.noise import Noise
 
     model = DumbbellDrum(
         length=values["length"],
@@ -129,8 +141,8 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, State]":
         rubbing=(values["mu_contact"], values["mu_contact"]),
         floor=in_bunch,
         top=math.inf if values["top"] is None else values["top"],
+        **imperfections(values),
     )
-    noise = Noise(chatter=values["noise"], seed=values["seed"])
     headings = [math.radians(h) for h in values["heading"] or ()]
     if values["start"]:
         q = np.array(values["start"]) * [math.radians(1), 1.0, math.radians(1)]
@@ -142,7 +154,7 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, State]":
         q = drum_starts.bunch(model, np.random.default_rng(values["seed"]))
     else:
         q = drum_starts.isolated(model, headings or [math.radians(10)])
-    return model, noise, model.state(q)
+    return model, noise_of(values), model.state(q)
 
 
 def _check_angles(values: dict[str, Any]) -> None:

@@ -80,7 +80,7 @@ def drum_options(function: Command) -> Command:
                 "--duration", type=number, default=60.0, group=RUN, help="Simulated time, s."
             ),
             option("--dt", type=number, default=1e-3, group=RUN, help="Time step, s."),
-            seed_option("the noise and of the bunch", group=RUN),
+            seed_option("the noise, the imperfections and the bunch", group=RUN),
             option(
                 "--resume", is_flag=True, group=RUN,
                 help="Continue a run that was stopped or killed.",

@@ -48,7 +48,7 @@ def drum_answer(path: "Trajectory", values: dict[str, Any]) -> dict[str, Any]:
 
 def _parameters(values: dict[str, Any]) -> dict[str, Any]:
     """Return the options, those in degrees under keys that end in ``_deg``."""
-    told = {f"{k}_deg" if k in ("tilt", "heading") else k: v for k, v in values.items()}
+    told = {f"{k}_deg" if k in ("tilt", "heading", "wobble") else k: v for k, v in values.items()}
     names = ("azimuth_deg", "eta", "heading_deg")
     return told | {"start": [dict(zip(names, s, strict=True)) for s in values["start"] or ()]}
 

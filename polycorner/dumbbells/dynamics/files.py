@@ -1,5 +1,6 @@
 """Runs in the drum as NetCDF files: self-describing, and read back bit for bit."""
 
+import json
 import os
 from dataclasses import fields
 from pathlib import Path
@@ -8,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.container import BINARY, Kind
-from polycorner.dumbbells.drum import COORDINATES, DumbbellDrum, drum_of
+from polycorner.dumbbells.drum import DumbbellDrum, drum_of
+from polycorner.dumbbells.drum_motion import COORDINATES
+from polycorner.dumbbells.imperfections import KINDS
 from polycorner.files.motions import (
     MotionUnits,
     column,
@@ -74,7 +77,8 @@ def _attributes(path: Trajectory, names: list[str]) -> dict[str, Any]:
         whole = isinstance(value, bool | int)
         values[name] = np.int64(value) if whole else np.array(value, dtype=np.float64)
         values[f"{name}_units"] = unit
-    return values
+    told = drum_of(path).imperfections.described()
+    return values | {name: json.dumps(parameters) for name, parameters in told.items()}
 
 
 def save_run(trajectory: Trajectory, path: str | os.PathLike[str]) -> Path:
@@ -105,6 +109,11 @@ def _read(content: "xr.Dataset") -> Trajectory:
     at = content.attrs
     values: dict[str, Any] = {}
     for field in fields(DumbbellDrum):
+        if field.name in KINDS:
+            if field.name in at:
+                told = json.loads(at[field.name])
+                values[field.name] = KINDS[field.name].restored(told)
+            continue
         value = at[field.name]
         if field.name in ("count", "floor"):
             values[field.name] = int(value) if field.name == "count" else bool(value)

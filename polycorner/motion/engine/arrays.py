@@ -158,6 +158,7 @@ class Model(NamedTuple):
     chatter: Annotated[Any, real()]  # relative amplitude of the noise of known loads
     correlation_time: Annotated[Any, real()]  # for which one of its values holds
     kicks: Annotated[Any, real("k")]  # intensities of random impulses
+    kick_time: Annotated[Any, real()]  # for which a random force is held; 0: white noise
     seed: Annotated[Any, whole()]
     tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
     sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island
@@ -167,6 +168,9 @@ class Model(NamedTuple):
     diagonal_mass: Annotated[Any, whole()]  # whether it is diagonal everywhere
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
+    signal_kernel: Annotated[Any, whole()]  # address: parameters that follow the time, or 0
+    signal_parameters: Annotated[Any, whole()]  # its first parameter
+    follows_time: Annotated[Any, whole()]  # whether forces may change much from step to step
     start: Annotated[Any, real()]  # time of the first state
     step: Annotated[Any, real()]  # length of a whole step
 
@@ -186,6 +190,7 @@ class State(NamedTuple):
     rests: Annotated[Any, whole("N")]  # whether it has exactly the velocity of rest
     asleep: Annotated[Any, whole("N")]  # whether its rest is proved and it is not solved for
     booked_friction: Annotated[Any, real("N F 2")]  # friction impulses when work was booked last
+    booked_applied: Annotated[Any, real("N k")]  # impulses of applied forces then
     check_due: Annotated[Any, whole("N")]  # step in which a sleeper is checked again
     booked_to: Annotated[Any, whole("N")]  # step up to which its work is booked
     neighbour_impulse: Annotated[Any, real("N k")]  # generalised impulses from other bodies

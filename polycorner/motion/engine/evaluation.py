@@ -5,13 +5,14 @@ import numpy as np
 from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
-from polycorner.motion.engine.random import gaussian
+from polycorner.motion.engine.random import gaussian, held_integral
 
 # Change of a velocity, relative to the speed, below which forces are those of the step.
 SETTLED = 1e-14
 ON_EQUATIONS = 1e-10  # scaled distance up to which a body is on its equations
 MOST_APPROACHES = 8  # Newton steps onto them
 BENDING = 1e-8  # weight of the change of place, relative to the equations
+KICK = 32  # index of the first random impulse; those below are of chattering loads
 
 
 @compiled
@@ -35,6 +36,21 @@ def evaluate_forces(model, work, i, v, h):
 
 
 @compiled
+def random_impulse(model, i, c, h, time, index):
+    """Return the random impulse on a coordinate in a step or part with the midpoint ``time``.
+
+    It is white, ``sigma sqrt(step)`` times a number for each whole step, or the integral of a force
+    that is held, ``sigma / sqrt(kick_time)`` times a number for each interval of that length.
+    """
+    if model.kick_time > 0.0:
+        begin, end = time - 0.5 * h, time + 0.5 * h
+        drawn = held_integral(model.seed, model.kick_time, begin, end, i, KICK + c)
+        return model.kicks[c] / np.sqrt(model.kick_time) * drawn
+    draw = gaussian(model.seed, index, i, KICK + c) * (h / model.step)
+    return model.kicks[c] * np.sqrt(model.step) * draw
+
+
+@compiled
 def evaluate_body(model, state, work, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
     k, F = model.dimension, model.friction_sets.shape[0]
@@ -44,8 +60,7 @@ def evaluate_body(model, state, work, i, h, time, index):
         work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         work.kick[i, c] = 0.0
         if model.kicks[c] > 0.0:
-            draw = gaussian(model.seed, index, i, 32 + c) * (h / model.step)
-            work.kick[i, c] = model.kicks[c] * np.sqrt(model.step) * draw
+            work.kick[i, c] = random_impulse(model, i, c, h, time, index)
     if model.unilateral < model.restitution.size:
         approach_equations(model, work, i)
     at = evaluate_forces(model, work, i, state.v, h)

@@ -44,6 +44,7 @@ def model_of(
         "chatter": noise.chatter,
         "correlation_time": noise.correlation_time,
         "kicks": [noise.kicks.get(name, 0.0) for name in formulation.coordinates],
+        "kick_time": noise.kick_time,
         "seed": noise.seed,
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,
@@ -52,7 +53,9 @@ def model_of(
         "start": start,
         "step": step,
         "time_parameter": body.formulation.time_parameter,
+        "follows_time": body.formulation.time_parameter >= 0 and not body.slow_signals,
         **_dependence(body),
+        **_signals(body, parameters),
         **_friction(bodies, sets),
         **_gaps(body.gaps, len(body.contacts), parameters),
         **_pairs(bodies, parameters, sets),
@@ -85,6 +88,15 @@ def _dependence(body: Body) -> dict[str, bool]:
         "constant_mass": all(np.array_equal(slow.mass, other.mass) for other in others),
         "follows_velocity": not same,
     }
+
+
+def _signals(body: Body, parameters: list[float]) -> dict[str, int]:
+    """Return the entries of the functions of the time; their parameters are appended."""
+    if body.signals is None:
+        return {"signal_kernel": 0, "signal_parameters": 0}
+    first = len(parameters)
+    parameters += body.signal_parameters.tolist()
+    return {"signal_kernel": body.signals.kernel.compiled(0).point, "signal_parameters": first}
 
 
 def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Random numbers as functions of a seed, a time, a body and an index."""
+"""Random numbers and forces as functions of a seed, a time, a body and an index."""
 
 import numpy as np
 
@@ -23,3 +23,18 @@ def gaussian(seed, when, body, which):
     first = (np.float64(key >> np.uint64(11)) + 0.5) * unit
     second = (np.float64(other >> np.uint64(11)) + 0.5) * unit
     return np.sqrt(-2.0 * np.log(first)) * np.cos(2.0 * np.pi * second)
+
+
+@compiled
+def held_integral(seed, held, begin, end, body, which):
+    """Return the integral over time of ``xi_n``, which is constant on ``[n held, (n + 1) held)``.
+
+    ``xi_n`` is the standard normal number that belongs to the seed, ``n``, the body and the index.
+    Integrals over parts of an interval add up to that over the whole.
+    """
+    total = 0.0
+    for n in range(np.int64(np.floor(begin / held)), np.int64(np.floor(end / held)) + 1):
+        length = min(end, (n + 1) * held) - max(begin, n * held)
+        if length > 0.0:
+            total += length * gaussian(seed, n, body, which)
+    return total

@@ -9,6 +9,7 @@ sinks in, is halved.  The parts of an island do not depend on other bodies.
 
 import numpy as np
 
+from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.engine.arrays import (
     DONE,
     EVENTS_FULL,
@@ -154,9 +155,14 @@ def count_residuals(model, state, work, log, time, count):
 
 @compiled
 def set_time(model, time):
-    """Tell the formulas the time since the start."""
-    if model.time_parameter >= 0:
-        model.parameters[model.time_parameter] = model.start + time
+    """Tell the formulas the time, and what depends on nothing else."""
+    at = model.time_parameter
+    if at >= 0:
+        model.parameters[at] = model.start + time
+        if model.signal_kernel != 0:
+            base = model.parameters.ctypes.data
+            known = base + 8 * model.signal_parameters
+            call_kernel(model.signal_kernel, base + 8 * at, known, base + 8 * (at + 1), base, base)
 
 
 @compiled

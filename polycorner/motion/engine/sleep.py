@@ -2,7 +2,13 @@
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import CONTACTS, PAIR_FRICTION, PAIR_GAP, SUBSTRATE_WORK
+from polycorner.motion.engine.arrays import (
+    APPLIED_WORK,
+    CONTACTS,
+    PAIR_FRICTION,
+    PAIR_GAP,
+    SUBSTRATE_WORK,
+)
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.partition import island_of, root_of
@@ -75,7 +81,7 @@ def wake_piles(model, state, work, h, time, index):
 
 @compiled
 def stays_asleep(model, state, work, i, others, h, time, index):
-    """Evaluate a body; return whether it stays asleep, and book the work of its friction since."""
+    """Evaluate a body; return whether it stays asleep, and book the work on it since."""
     work.evaluated[i] = 1
     evaluate_body(model, state, work, i, h, time, index)
     if not state.asleep[i]:
@@ -91,6 +97,12 @@ def stays_asleep(model, state, work, i, others, h, time, index):
                 state.sums[SUBSTRATE_WORK] -= p * work.slip_offset[i, model.slip_start[f] + r]
                 if asleep:
                     state.booked_friction[i, f, r] = now
+        for c in range(model.dimension):
+            before, now = state.booked_applied[i, c], work.applied[i, c]
+            mean = (steps - share) * before + share * now
+            state.sums[APPLIED_WORK] += mean * state.v[i, c]
+            if asleep:
+                state.booked_applied[i, c] = now
         state.booked_to[i] = index
     return asleep
 
@@ -108,7 +120,7 @@ def next_check(model, state, work, i, h, index):
             return index + 1
         change = abs(x - state.friction[i, f, 0]) + abs(y - state.friction[i, f, 1])
         rate = max(rate, change / load)
-    if model.time_parameter >= 0:
+    if model.follows_time:
         return index + 1
     steps = LONGEST_SLEEP
     if rate * LONGEST_SLEEP > 0.1 * SLEEP_MARGIN:
@@ -195,6 +207,8 @@ def settle(model, state, work, h, index):
                 for r in range(2):
                     state.friction[i, f, r] = work.proof_friction[i, f, r]
                     state.booked_friction[i, f, r] = work.proof_friction[i, f, r]
+            for c in range(k):
+                state.booked_applied[i, c] = work.applied[i, c]
             for g in range(model.restitution.size):
                 before, now = state.normal[i, g], work.proof_normal[i, g]
                 release = release_time(before, now, state.release[i, g], h, index * h)

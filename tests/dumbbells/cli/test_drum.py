@@ -11,6 +11,7 @@ import commands
 import numpy as np
 import pytest
 
+from polycorner.dumbbells import OutOfRound, Shaking, UnevenFriction, Wobble
 from polycorner.dumbbells.cli.drum_report import _parameters
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.files import load_run
@@ -122,6 +123,20 @@ def test_a_movie_with_a_name_needs_no_folder(capsys, tmp_path):
     assert (tmp_path / "mine.gif").stat().st_size > 1000
 
 
+def test_imperfections_are_those_of_the_options(capsys, tmp_path):
+    chosen = ("--shake", "30", "0", "20", "--out-of-round", "2", "0.4", "--wobble", "0.5")
+    more = ("--uneven-friction", "0.2", "6", "--kicks", "30", "0.3", "0", "0", "--seed", "5")
+    found = answer(capsys, "--pair", "R", *SHORT, *chosen, *more, "--out", str(tmp_path))
+    assert found["parameters"]["wobble_deg"] == 0.5
+    path = load_run(tmp_path / "trajectory.nc")
+    assert path.system.shaking == Shaking((30.0, 0.0, 20.0), (1.0, 15.0), seed=5)
+    assert path.system.out_of_round == OutOfRound({2: 0.4})
+    assert path.system.wobble == Wobble(math.radians(0.5))
+    assert path.system.uneven_friction == UnevenFriction(0.2, 6.0, seed=5)
+    assert path.noise.kicks == {"phi": 30.0, "eta": 0.3, "theta": 0.0, "psi": 0.0}
+    assert path.noise.kick_time == 0.01
+
+
 def test_the_table_is_for_people(capsys):
     code, out, err = run(capsys, "--pair", "R", *SHORT)
     assert (code, err) == (0, "")
@@ -200,6 +215,16 @@ WRONG = [
     ("--drum", "inf"),
     ("--top", "-3"),
     ("--noise", "-1"),
+    ("--shake", "1", "-1", "0"),
+    ("--shake", "1", "1", "1", "--shake-band", "3", "2"),
+    ("--out-of-round", "1.5", "0.1"),
+    ("--out-of-round", "40", "9"),
+    ("--wobble", "-1"),
+    ("--wobble", "85"),
+    ("--uneven-friction", "-0.1", "5"),
+    ("--uneven-friction", "0.1", "1e-9"),
+    ("--kicks", "1", "1", "1", "-1"),
+    ("--kick-time", "1e-12", "--kicks", "1", "1", "1", "1"),
     ("--spin", "nan"),
     ("--seed", "-1"),
     ("--duration", "inf"),

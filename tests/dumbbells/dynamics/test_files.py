@@ -7,14 +7,14 @@ import xarray as xr
 from kept_files import motion
 from kept_files import same_motion as same
 
-from polycorner.dumbbells import DumbbellDrum
+from polycorner.dumbbells import DumbbellDrum, OutOfRound, Shaking, UnevenFriction, Wobble
 from polycorner.dumbbells.dynamics.files import KIND, dataset, load_run, save_run
 from polycorner.files.motions import save_dataset
 from polycorner.models.textbook import bouncing_ball
 from polycorner.motion.noise import Noise
 
 DRUM = DumbbellDrum(floor=True, top=60.0, tilt=0.5, spin=0.02)
-NOISE = Noise(chatter=0.3, kicks={"phi": 1e-3}, seed=7)
+NOISE = Noise(chatter=0.3, kicks={"phi": 1e-3}, kick_time=0.02, seed=7)
 RUN = replace(motion(DRUM, 1, 4, "floor1"), noise=NOISE, every=20, t_end=0.8)
 
 
@@ -31,7 +31,30 @@ def test_a_run_names_its_drum_and_its_noise(tmp_path):
     assert [entry.name for entry in path.parent.iterdir()] == ["run.nc"]
 
 
-@pytest.mark.parametrize("attributes", [{"count": -1}, {"seed": "x"}, {"noise_kicks": "{"}])
+def test_a_run_keeps_the_imperfections_of_its_drum(tmp_path):
+    drum = replace(
+        DRUM,
+        shaking=Shaking((1 / 3, 20.0, 5.0), (2.0, 30.1), seed=4),
+        out_of_round=OutOfRound({1: 0.7, 3: -0.1}, {3: 0.1 + 0.2}),
+        wobble=Wobble(0.01, 2.0),
+        uneven_friction=UnevenFriction(0.3, 6.0, seed=1),
+    )
+    run = replace(RUN, system=drum)
+    read = load_run(save_run(run, tmp_path / "run.nc"))
+    same(read, run)
+    assert read.system == drum
+    content = dataset(run)
+    del content.attrs["noise_kick_time"]  # as in a file of an earlier version
+    for name in ("shaking", "out_of_round", "wobble", "uneven_friction"):
+        del content.attrs[name]
+    old = load_run(save_dataset(KIND, tmp_path / "old.nc", content))
+    assert old.system == DRUM
+    assert old.noise == replace(NOISE, kick_time=0.0)
+
+
+@pytest.mark.parametrize(
+    "attributes", [{"count": -1}, {"seed": "x"}, {"noise_kicks": "{"}, {"wobble": "{}"}]
+)
 def test_attributes_that_cannot_be_are_refused(tmp_path, attributes):
     path = save_dataset(KIND, tmp_path / "run.nc", dataset(RUN).assign_attrs(attributes))
     with pytest.raises(ValueError, match=r"^path: expected a run that save_run wrote.*is damaged"):
