@@ -71,21 +71,22 @@ def yielding_velocity(work, b, compliance, u):
 def block_residual(model, work, b, compliance):
     """Return the residual of a block's natural map, as a speed, from ``work.after``.
 
-    For friction, ``work.projection`` gets the projection and its derivative.
+    For friction, ``work.projection`` gets the projection and its derivative.  What is not a number
+    has the residual inf.
     """
     u, rho = work.slip, work.delassus[b, 3]
     yielding_velocity(work, b, compliance, u)
     if work.block_rows[b] == 0:
-        if work.bilateral[b]:
-            return abs(u[0])
-        return abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
-    out = work.projection[b]
-    y = work.impulse[b, 1] - u[1] * rho if work.block_rows[b] == 2 else 0.0
+        far = abs(u[0])
+        if not work.bilateral[b]:
+            far = abs(max(0.0, work.impulse[b, 0] - u[0] * rho) - work.impulse[b, 0]) / rho
+        return far if far < np.inf else np.inf
+    out, two = work.projection[b], work.block_rows[b] == 2
+    y = work.impulse[b, 1] - u[1] * rho if two else 0.0
     project(model, work.block_set[b], work.impulse[b, 0] - u[0] * rho, y, load_on(work, b), out)
     far = abs(out[0] - work.impulse[b, 0]) / rho
-    if work.block_rows[b] == 2:
-        far = max(far, abs(out[1] - work.impulse[b, 1]) / rho)
-    return far
+    across = abs(out[1] - work.impulse[b, 1]) / rho if two else 0.0
+    return max(far, across) if far < np.inf and across < np.inf else np.inf
 
 
 @compiled

@@ -34,12 +34,12 @@ def iterate(model, state, work, first, last, speed, sweeps):
     """Solve an island by rounds of Gauss-Seidel sweeps and Newton steps; return the residual.
 
     Small islands, which cost little, are solved more exactly than asked, and begin with Newton
-    steps if they have more than a few blocks.  Where a round does not do, the
-    small errors of closed gaps are left as they are: contacts that stick in closed loops cannot
-    correct all of them, and would jam.  Where the next does not do either, the solution is
-    continued from that of simpler problems.  After that contacts are made softer from round to
-    round, and hard again.  It ends when the residual has reached its goal, when ``sweeps`` are
-    done, or when a cycle of rounds has not halved the residual.
+    steps if they have more than a few blocks.  Where a round does not do, the small errors of
+    closed gaps are left as they are: contacts that stick in closed loops cannot correct all of
+    them, and would jam.  Where the next does not do either, the solution is continued from that of
+    simpler problems.  After that contacts are made softer from round to round, and hard again.  It
+    ends when the residual has reached its goal, when ``sweeps`` are done, or when a cycle of rounds
+    has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
     n, width, small = number_few(model, work, first, last), ZERO, ONE

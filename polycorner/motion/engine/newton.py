@@ -73,7 +73,7 @@ def newton_steps(model, work, first, last, n, width, goal, softness, compliance,
         steps += ONE
     if is_small:
         scatter(model, work, n)
-    if worst > least:
+    if not worst <= least:
         copy_impulses(work, first, last, work.best, work.impulse)
         recompute_velocities(model, work, first, last)
         least = residual(model, work, first, last, compliance)
