@@ -281,14 +281,14 @@ def behaviour() -> dict[str, Any]:
 
     single = [0.1, 150.0]
     climbs = {
-        "dyad": climb(start(DYAD)),
-        "dyad, NoSlip": climb(start(DYAD), noslip_iterations=5),
-        "dyad, 360 boxes": climb(start(DYAD), segments=360),
-        "dyad, steps of 0.5 ms": climb(start(DYAD), dt=5e-4),
-        "dyad, mu_roll 0.05": climb(start(DYAD), mu_roll=0.05),
-        "dyad, mu_slide 0.5": climb(start(DYAD), mu_slide=0.5),
-        "dyad, rolling in a joint": climb(start(DYAD), rolling="joint"),
-        "dyad, in a joint, mu_roll 0.05": climb(start(DYAD), rolling="joint", mu_roll=0.05),
+        "dyad": climb(placements(DYAD)),
+        "dyad, NoSlip": climb(placements(DYAD), noslip_iterations=5),
+        "dyad, 360 boxes": climb(placements(DYAD), segments=360),
+        "dyad, steps of 0.5 ms": climb(placements(DYAD), dt=5e-4),
+        "dyad, mu_roll 0.05": climb(placements(DYAD), mu_roll=0.05),
+        "dyad, mu_slide 0.5": climb(placements(DYAD), mu_slide=0.5),
+        "dyad, rolling in a joint": climb(placements(DYAD), rolling="joint"),
+        "dyad, in a joint, mu_roll 0.05": climb(placements(DYAD), rolling="joint", mu_roll=0.05),
     }
     for heading in (8, 0, -8):
         rows = [[*single, math.radians(heading)]]

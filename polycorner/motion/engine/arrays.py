@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
-from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.engine.sizes import Sizes
 
 # Indices into `State.counts` and `State.sums`; the dissipation by cause follows DISSIPATED.
 CONTACTS, STEPS, UNSOLVED, SWEEPS, NEWTON_STEPS, ISLANDS, PARTS = range(7)
@@ -21,62 +21,6 @@ OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
 
 # Why compiled code returns.
 DONE, CONTACTS_FULL, EVENTS_FULL, NOT_FINITE = range(4)
-
-MAX_BAND = 192  # columns of the widest band matrix that is solved
-PADDING = 8  # zeros at the end of its rows
-EVENTS = 4096  # events recorded, at least, before the engine returns
-
-
-class Sizes(NamedTuple):
-    """Sizes on which the shapes depend."""
-
-    N: int  # bodies
-    k: int  # coordinates of a body
-    F: int  # friction contacts of a body with its surroundings
-    R: int  # rows of their slip velocities
-    L: int  # known loads of a body, at least 1
-    m: int  # gaps between a body and its surroundings
-    G: int  # gaps between two bodies
-    Y: int  # gaps of a body or of two, whichever are more
-    D: int  # causes of dissipation
-    C: int  # contacts between bodies for which there is room
-    P: int  # pairs of neighbours for which there is room
-    B: int  # blocks
-    E: int  # events
-    S: int  # keys to be sorted
-    W: int  # numbers that go in and come out of a kernel
-    M: int  # entries of the band matrix
-
-    @classmethod
-    def of(cls, bodies: IdenticalBodies, contacts: int) -> "Sizes":
-        """Return the sizes of bodies with room for so many contacts between them."""
-        body, N, k = bodies.body, bodies.count, bodies.dimension
-        F, m, R = len(body.friction), len(body.contacts), sum(c.rows for c in body.friction)
-        families = [body.formulation.forces]
-        if bodies.contacts is not None:
-            families += [bodies.contacts.gaps, *(slip for slip, _, _ in bodies.contacts.slips)]
-        shapes = [(len(f.names), len(f.variables)) for f in families]
-        shapes += [(len(call.family.names), len(call.reads)) for call in body.gaps]
-        kernels = [m * (1 + k) + k for m, k in shapes]
-        pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
-        return cls(
-            N=N,
-            k=k,
-            F=F,
-            R=R,
-            L=max(1, body.formulation.loads),
-            m=m,
-            G=len(bodies.pair_contacts),
-            Y=max(m, len(bodies.pair_contacts)),
-            D=len(bodies.causes),
-            C=contacts,
-            P=pairs,
-            B=N * (F + m) + 2 * contacts,
-            E=EVENTS + 4 * contacts,
-            S=max(contacts, pairs, 1),
-            W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
-            M=N * k * (min(2 * N * k, MAX_BAND) + PADDING),
-        )
 
 
 class Declaration(NamedTuple):

@@ -1,8 +1,8 @@
 """The band matrix of an island, and its solution."""
 
 from polycorner.formulas.compilation import never_inline
-from polycorner.motion.engine.arrays import PADDING
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.sizes import PADDING
 from polycorner.motion.engine.vectors import WIDTH, load, store
 
 

@@ -8,10 +8,10 @@ contacts whose friction has a known load are a convex problem, with one solution
 import numpy as np
 
 from polycorner.motion.engine.arrays import NEWTON_STEPS
-from polycorner.motion.engine.blocks import load_on
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
 from polycorner.motion.engine.jit import ZERO, compiled
 from polycorner.motion.engine.newton import newton_steps
+from polycorner.motion.engine.rows import load_on
 
 FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and at its end
 FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path

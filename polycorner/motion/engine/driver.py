@@ -20,7 +20,6 @@ from polycorner.motion.engine.arrays import (
     SWEEPS,
     UNSOLVED,
     Log,
-    Sizes,
     State,
     Work,
     allocate,
@@ -29,6 +28,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.intermediate import compiled_advance
 from polycorner.motion.engine.layout import model_of
+from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver

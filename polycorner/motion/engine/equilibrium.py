@@ -12,11 +12,11 @@ from polycorner.motion.engine.band import (
     row_product,
     solve_band,
 )
-from polycorner.motion.engine.blocks import load_on, velocity_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import TOUCHING
 from polycorner.motion.engine.rest import REST_FACTOR
+from polycorner.motion.engine.rows import load_on, velocity_of
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
 
 TARGET_PRESSURE = 0.2  # n_0, as a share of the impulse that would stop a body

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from polycorner.motion.engine.blocks import apply_impulse, load_on, velocity_of
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
+from polycorner.motion.engine.rows import apply_impulse, load_on, velocity_of
 from polycorner.motion.engine.sets import contains, project
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from polycorner.formulas.bundles import Call
 from polycorner.motion.bodies import RUBBING, Body, IdenticalBodies
 from polycorner.motion.convex_sets import ConvexSet
-from polycorner.motion.engine.arrays import Model, Sizes, filled
+from polycorner.motion.engine.arrays import Model, filled
+from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 

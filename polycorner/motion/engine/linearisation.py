@@ -1,8 +1,8 @@
 """Linearisation of the natural map of single blocks."""
 
-from polycorner.motion.engine.blocks import load_on
 from polycorner.motion.engine.gauss_seidel import yielding_velocity
 from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.rows import load_on
 
 
 @compiled

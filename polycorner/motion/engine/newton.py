@@ -9,7 +9,6 @@ from polycorner.motion.engine.band import (
     row_product,
     solve_band,
 )
-from polycorner.motion.engine.blocks import apply_impulse
 from polycorner.motion.engine.gauss_seidel import (
     copy_impulses,
     recompute_velocities,
@@ -17,6 +16,7 @@ from polycorner.motion.engine.gauss_seidel import (
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.linearisation import change_impulses, is_loaded, linearise_block
+from polycorner.motion.engine.rows import apply_impulse
 from polycorner.motion.engine.small_islands import (
     gather,
     scatter,

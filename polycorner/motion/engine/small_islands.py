@@ -124,10 +124,7 @@ def small_step(model, work, first, last, n):
 
 @compiled
 def assemble(model, work, first, last, n):
-    """Assemble the matrix ``M + J' G J`` of a small island, and ``J' a``.
-
-    The matrix ends in ones on its diagonal.
-    """
+    """Assemble the matrix ``M + J' G J`` of a small island, and ``J' a``."""
     k, matrix, rows, G = model.dimension, work.small_matrix, work.small_jacobian, work.derivative
     for x in range(WIDTH):
         store(matrix, WIDTH * x, zeros())

@@ -9,7 +9,6 @@ from polycorner.motion.contacts import velocities
 from polycorner.motion.engine.arrays import (
     Log,
     Model,
-    Sizes,
     State,
     Work,
     allocate,
@@ -20,6 +19,7 @@ from polycorner.motion.engine.arrays import (
     whole,
 )
 from polycorner.motion.engine.layout import model_of
+from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.system import System
 
