@@ -176,6 +176,7 @@ class Work(NamedTuple):
     waits: Annotated[Any, whole("N")]  # whether a body is left as it is for the time being
     joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
+    may_divide: Annotated[Any, whole("1")]  # whether shorter steps follow if this is not solved
     awake: Annotated[Any, whole("N")]
     evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
     speed: Annotated[Any, real("N")]

@@ -176,7 +176,7 @@ def step(model, state, work, log, count):
         left = left or state.cluster[i] >= 0
     if not left:
         time = index * h
-        work.located[0] = 0
+        work.located[0], work.may_divide[0] = 0, model.refines
         for i in range(model.bodies):
             work.waits[i] = 0
         set_time(model, time + 0.5 * h)
@@ -192,6 +192,7 @@ def step(model, state, work, log, count):
             state.watched[i] = 0 if work.waits[i] else 1
         count = commit(model, state, work, log, blocks, h, time, index, any_awake, count)
     if left:
+        work.may_divide[0] = 0
         for i in range(model.bodies):
             if state.cluster[i] == i:
                 why, count = refine(model, state, work, log, i, index, count)
