@@ -25,7 +25,6 @@ MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equat
 MISSED = 1e-12  # scaled gap up to which an equation holds
 FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
 FEW = 8  # blocks of a small island up to which sweeps, which may be exact, come first
-MANY = 48  # blocks of a large island, in which continuation costs more than shorter steps
 SPARE = 1e-2  # share of the tolerance to which small islands are solved if possible
 SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
@@ -37,11 +36,11 @@ def iterate(model, state, work, first, last, speed, sweeps):
     Small islands, which cost little, are solved more exactly than asked, and begin with Newton
     steps if they have more than a few blocks.  Where a round does not do, the small errors of
     closed gaps are left as they are: contacts that stick in closed loops cannot correct all of
-    them, and would jam.  Where the next does not do either, large islands whose step may be divided
-    are given up, and the solution of others is continued from that of simpler problems.  After that
-    contacts are made softer from round to round, and hard again.  It ends when the residual has
-    reached its goal, when ``sweeps`` are done, or when a cycle of rounds has not halved the
-    residual.
+    them, and would jam.  Where the next does not do either, the island is given up if its step may
+    be divided, which costs less; if not, the solution is continued from that of simpler problems.
+    After that contacts are made softer from round to round, and hard again.  It ends when the
+    residual has reached its goal, when ``sweeps`` are done, or when a cycle of rounds has not
+    halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
     n, width, small = number_few(model, work, first, last), ZERO, ONE
@@ -75,7 +74,7 @@ def iterate(model, state, work, first, last, speed, sweeps):
             )
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
-                if work.may_divide[0] and last - first > MANY:
+                if work.may_divide[0]:
                     break
                 n, width = number_bodies(model, state, work, first, last)
                 worst = continue_island(model, state, work, first, last, n, width, goal, hard)
