@@ -33,7 +33,7 @@ def driven(
     tilt: float = 7.0,
     spin: float = 0.01,
     duration: float = 400.0,
-    dt: float = 0.002,
+    dt: float = 0.001,
 ) -> dict[str, Any]:
     """Return what one kind of noise makes of single dumbbells and of pairs in a turning drum.
 
