@@ -105,7 +105,7 @@ def test_in_a_level_drum_left_handed_pairs_are_mirror_images(kind):
 
 
 def test_pairs_are_those_that_dyads_follow():
-    found = results("out of round", 0.5, 2.0, duration=6.0, spin=0.05)
+    found = results("out of round", 0.5, 2.0, duration=6.0, spin=0.05, dt=0.002)
     drum = DumbbellDrum(spin=0.05, out_of_round=OutOfRound({2: 0.5}))
     starts = [("R", math.radians(angle)) for angle in PAIRS]
     paths = follow_dyads(drum, starts, 6.0)
