@@ -51,11 +51,15 @@ class DyadPaths(Value):
     Attributes
     ----------
     trajectory : Trajectory
-        Of ``2 n`` dumbbells in a drum: 0 and 1 are the first pair, 2 and 3 the second, ...; pairs
-        are multiples of ``APART`` apart along the axis.
+        Of dumbbells in a drum: 0 and 1 are the first pair, 2 and 3 the second, ...; pairs are
+        multiples of ``APART`` apart along the axis.
+    first, last : int or None, optional
+        Numbers of the first of the ``2 n`` dumbbells and of that after the last; default all.
     """
 
     trajectory: Trajectory
+    first: int | None = None
+    last: int | None = None
 
     @cached_property
     def drum(self) -> DumbbellDrum:
@@ -79,7 +83,7 @@ class DyadPaths(Value):
         ``eta`` is counted from the multiple of ``APART`` at which the pair started.
         """
         path = self.trajectory
-        q = path.q.reshape(len(path), -1, 2, 4).copy()
+        q = path.q[:, self.first : self.last].reshape(len(path), -1, 2, 4).copy()
         q[..., 1] -= APART * np.round(q[0, :, :, 1].mean(axis=1) / APART)[:, None]
         q.setflags(write=False)
         return q
@@ -182,12 +186,16 @@ def follow_dyads(
     if not starts:
         msg = "starts: expected at least one chirality and heading; got none"
         raise ValueError(msg)
-    two = replace(drum, count=2)
-    nests = [two.pair.nested(hand, heading=angle, clearance=CLEARANCE) for hand, angle in starts]
-    places = np.concatenate([nest.reshape(2, 3) for nest in nests])
-    offset = APART * np.repeat(np.arange(len(starts)), 2)
-    places[:, 1] += offset
+    places = nested_places(drum, starts)
     return follow_pairs(drum, places, duration, noise=noise, dt=dt, interval=interval)
+
+
+def nested_places(drum: DumbbellDrum, starts: Sequence[Start]) -> Array:
+    """Return nested pairs on the lowest line, far apart along the axis, ``(2 n, 3)``."""
+    nests = [drum.pair.nested(hand, heading=angle, clearance=CLEARANCE) for hand, angle in starts]
+    places = np.concatenate([nest.reshape(2, 3) for nest in nests])
+    places[:, 1] += APART * np.repeat(np.arange(len(starts)), 2)
+    return places
 
 
 def follow_pairs(
@@ -201,9 +209,8 @@ def follow_pairs(
 ) -> DyadPaths:
     """Follow pairs of dumbbells from rest at ``places``, ``(2 n, 3)``; see :class:`DyadPaths`."""
     many = replace(drum, count=len(np.asarray(places)))
-    stride = max(1, round(interval / dt))
-    start = many.state(places)
-    return DyadPaths(simulate(many, start, duration, dt, every=stride, noise=noise, solver=SOLVER))
+    start, every = many.state(places), max(1, round(interval / dt))
+    return DyadPaths(simulate(many, start, duration, dt, every=every, noise=noise, solver=SOLVER))
 
 
 @dataclass(frozen=True)
@@ -220,7 +227,9 @@ class Steady:
         Amplitude of the noise.
     heading, shift, azimuth, climb_rate : Mean
     early, late : Mean
-        The heading in both halves of the time: where they differ, it has not settled.
+        The heading in both halves of the time.
+    drift : Mean
+        Late less early heading of each pair: where it is not zero, the heading has not settled.
     scatter : float
         Standard deviation of the heading in time.
     held, count : int
@@ -239,6 +248,7 @@ class Steady:
     climb_rate: Mean
     early: Mean
     late: Mean
+    drift: Mean
     scatter: float
     held: int
     count: int
@@ -248,8 +258,7 @@ class Steady:
     @property
     def settled(self) -> bool:
         """Whether both halves give the same heading to within two standard errors."""
-        error = math.hypot(self.early.error, self.late.error)
-        return abs(self.early.value - self.late.value) <= 2 * error
+        return abs(self.drift.value) <= 2 * self.drift.error
 
 
 def steady(paths: DyadPaths, *, after: float) -> Steady:
@@ -275,6 +284,7 @@ def steady(paths: DyadPaths, *, after: float) -> Steady:
         climb_rate=Mean.of((sign * paths.climb_rates(after=after))[held]),
         early=averaged(heading[:half]),
         late=averaged(heading[half:]),
+        drift=Mean.of(heading[half:].mean(axis=0) - heading[:half].mean(axis=0)),
         scatter=float(heading.std(axis=0).mean()) if held.any() else math.nan,
         held=int(held.sum()),
         count=len(held),
@@ -293,17 +303,15 @@ def steady_headings(
     after: float = 150.0,
     hand: Chirality = "R",
 ) -> tuple[Steady, ...]:
-    """Return the behaviour under noise of pairs of each length, from several headings in degrees.
+    """Return the behaviour under noise of pairs of each length, from headings in degrees.
 
     For left-handed pairs the headings are taken negative.
     """
     sign = 1.0 if hand == "R" else -1.0
     starts = [(hand, sign * math.radians(angle)) for angle in headings]
-    found = []
-    for length in lengths:
-        longer = replace(drum, length=float(length))
-        found.append(steady(follow_dyads(longer, starts, duration, noise=noise), after=after))
-    return tuple(found)
+    drums = [replace(drum, length=float(length)) for length in lengths]
+    runs = (follow_dyads(longer, starts, duration, noise=noise) for longer in drums)
+    return tuple(steady(run, after=after) for run in runs)
 
 
 def heading_at_shift(drum: DumbbellDrum, shift: float) -> float:

@@ -91,6 +91,15 @@ class Mean:
         error = float(array.std(ddof=1)) / math.sqrt(n) if n > 1 else math.nan
         return cls(float(array.mean()) if n else math.nan, error, n)
 
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the members."""
+        return self.error * math.sqrt(self.count)
+
+    def __rmul__(self, factor: float) -> "Mean":
+        """Return the mean of the members times a number."""
+        return Mean(factor * self.value, abs(factor) * self.error, self.count)
+
     def __str__(self) -> str:
         """Write ``value +- error``."""
         return f"{self.value:.4g} ± {self.error:.2g} ({self.count})"

@@ -170,9 +170,28 @@ def draw_bunch_sweep(found: "xr.Dataset", across: str, others: str | None) -> Fi
     return figure
 
 
+def draw_driven_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
+    """Draw headings and climb rates of right- and left-handed pairs, with twice the errors."""
+    figure, first, second = _panels("Pairs under noise in a turning drum")
+    for x, colour, label, curve in _side_by_side(found, across, others):
+        for axes, name in ((first, "heading"), (second, "climb_rate")):
+            _with_bars(axes, x, curve, f"{name}_right", color=colour, label=label)
+            _with_bars(axes, x, curve, f"{name}_left", color=colour, fmt="s:", mfc="white")
+    for axes, words in ((first, "heading (degrees)"), (second, "climb rate (mm/s)")):
+        axes.axhline(0, color="0.8", lw=0.8, zorder=0)
+        axes.set(ylabel=words, xlabel=_axis_label(found, across))
+    second.plot([], [], "ko-", ms=4, label="right-handed")
+    second.plot([], [], "ks:", ms=4, mfc="white", label="left-handed")
+    if others:
+        first.legend(fontsize=9, frameon=False)
+    second.legend(fontsize=9, frameon=False)
+    return figure
+
+
 REPEATED: Mapping[str, str] = {"bunch": "start"}  # the axis over which to average
 DRAWN: Mapping[str, Callable[["xr.Dataset", str, str | None], Figure]] = {
     "heading": draw_heading_sweep,
     "climbing": draw_climbing_sweep,
     "bunch": draw_bunch_sweep,
+    "driven": draw_driven_sweep,
 }

@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from polycorner.dumbbells.studies.driven import driven
 from polycorner.dumbbells.studies.functions import bunch, climbing, heading
 from polycorner.sweeps.study_files import NamedStudy
 
 FOLDER = Path(__file__).parent
 LENGTHS = dict.fromkeys(("length", "ball_radius", "rod_radius", "drum_radius"), "mm")
-DRUM = LENGTHS | {"tilt": "deg", "spin": "rad/s", "duration": "s", "noise": "1"}
+DRUM = LENGTHS | {"tilt": "deg", "spin": "rad/s", "duration": "s", "dt": "s", "noise": "1"}
 
 
 def _named(function: Callable[..., Mapping[str, Any]], units: Mapping[str, str]) -> NamedStudy:
@@ -26,5 +27,6 @@ def _named(function: Callable[..., Mapping[str, Any]], units: Mapping[str, str])
 STUDIES: Mapping[str, NamedStudy] = {
     "heading": _named(heading, LENGTHS),
     "climbing": _named(climbing, DRUM),
-    "bunch": _named(bunch, DRUM | {"top": "mm", "dt": "s"}),
+    "bunch": _named(bunch, DRUM | {"top": "mm"}),
+    "driven": _named(driven, DRUM),
 }

@@ -45,6 +45,7 @@ def steady(length, tilt, shift):
         climb_rate=rate,
         early=heading,
         late=heading,
+        drift=Mean(0.0, 0.1, 4),
         scatter=1.0,
         held=4,
         count=4,

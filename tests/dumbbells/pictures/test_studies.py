@@ -57,6 +57,24 @@ def test_climb_rates_have_bars_of_two_standard_errors():
         np.testing.assert_allclose(spans, 4 * found["climb_rate_error"].values[:, k])
 
 
+def test_pairs_of_either_hand_under_noise_are_drawn_with_bars():
+    shape, names = (3, 2), ("strength", "scale")
+    rng = np.random.default_rng(3)
+    columns = [f"{n}_{hand}" for n in ("heading", "climb_rate") for hand in ("right", "left")]
+    columns += [f"{name}_error" for name in columns]
+    data = {name: (names, rng.uniform(size=shape)) for name in columns}
+    data["status"] = (names, np.ones(shape, dtype=np.int8))
+    found = xr.Dataset(data, {"strength": [10.0, 20.0, 30.0], "scale": [0.01, 0.03]})
+    for axes, name in zip(draw_study("driven", found).axes, ("heading", "climb_rate"), strict=True):
+        for k, one in enumerate(axes.containers):
+            points, _, (bars,) = one
+            column = f"{name}_{('right', 'left')[k % 2]}"
+            values = [found[n].values[:, k // 2] for n in (column, f"{column}_error")]
+            np.testing.assert_array_equal(points.get_ydata(), values[0])
+            spans = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
+            np.testing.assert_allclose(spans, 4 * values[1])
+
+
 def test_members_of_an_ensemble_are_averaged():
     names, rng = ("rubbing", "start", "top"), np.random.default_rng(2)
     data = {name: (names, rng.integers(9, size=(2, 5, 3))) for name in ("left", "in_left")}
