@@ -17,6 +17,7 @@ FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and 
 FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path
 EASY_STEPS = 8  # Newton steps up to which the next factor is smaller
 LOAD_ROUNDS = 20  # convex problems that are solved, at most
+MANY, FEW_ROUNDS = 600, 4  # blocks of a large island, and problems in it if steps may be divided
 GRIP = 1e3  # speed of slip that first loads stop, over that of the island
 LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
 
@@ -87,10 +88,12 @@ def iterate_loads(model, state, work, first, last, n, width, goal, softness, gri
 
     The first loads are those at hand, or stop a slip of the speed ``grip`` if it is not zero.  In
     Painleve's paradox only this start leads to the impulse that stops the slip.  Where the loads
-    go to and fro, only a share of their change is taken over.
+    go to and fro, only a share of their change is taken over.  Large islands
+    whose step may be divided are given a few problems only.
     """
     share, former = 1.0, np.inf
-    for _ in range(LOAD_ROUNDS):
+    few = work.may_divide[0] and last - first > MANY
+    for _ in range(FEW_ROUNDS if few else LOAD_ROUNDS):
         detach_loads(work, first, last, 1.0 if former == np.inf else share)
         if former == np.inf and grip > 0.0:
             for s in range(first, last):

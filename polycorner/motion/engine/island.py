@@ -6,7 +6,7 @@ from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
 from polycorner.motion.engine.band import number_bodies
 from polycorner.motion.engine.blocks import STRAIGHT, equation_offset
-from polycorner.motion.engine.continuation import continue_island
+from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
@@ -37,10 +37,10 @@ def iterate(model, state, work, first, last, speed, sweeps):
     steps if they have more than a few blocks.  Where a round does not do, the small errors of
     closed gaps are left as they are: contacts that stick in closed loops cannot correct all of
     them, and would jam.  Where the next does not do either, the island is given up if its step may
-    be divided, which costs less; if not, the solution is continued from that of simpler problems.
-    After that contacts are made softer from round to round, and hard again.  It ends when the
-    residual has reached its goal, when ``sweeps`` are done, or when a cycle of rounds has not
-    halved the residual.
+    be divided, which costs less unless it is large; if not, the solution is continued from that of
+    simpler problems.  After that contacts are made softer from round to round, and hard again.  It
+    ends when the residual has reached its goal, when ``sweeps`` are done, or when a cycle of rounds
+    has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
     n, width, small = number_few(model, work, first, last), ZERO, ONE
@@ -74,7 +74,7 @@ def iterate(model, state, work, first, last, speed, sweeps):
             )
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
-                if work.may_divide[0]:
+                if work.may_divide[0] and last - first <= MANY:
                     break
                 n, width = number_bodies(model, state, work, first, last)
                 worst = continue_island(model, state, work, first, last, n, width, goal, hard)
