@@ -265,7 +265,15 @@ def test_mp4_without_the_extra_names_it(capsys, tmp_path, monkeypatch):
 
 # ------------------------------------------------------------------------------------------- resume
 
-LONG = ("--count", "6", "--noise", "0.3", "--duration", "15", "--json")
+LONG = ("--count", "6", "--noise", "0.3", "--duration", "90", "--json")
+
+SAVING = """
+from polycorner.cli.main import main
+from polycorner.motion.checkpoints import Checkpoint
+
+Checkpoint.__init__.__defaults__ = (0.1, *Checkpoint.__init__.__defaults__[1:])  # seconds
+main()
+"""
 
 
 @pytest.mark.slow
@@ -273,7 +281,7 @@ LONG = ("--count", "6", "--noise", "0.3", "--duration", "15", "--json")
 def test_a_stopped_run_goes_on(capsys, tmp_path, how):
     """Ctrl-C is answered with what was done; a killed process leaves its last saving."""
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "polycorner", "drum", *LONG, "--out", str(out)]
+    command = [sys.executable, "-c", SAVING, "drum", *LONG, "--out", str(out)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while process.poll() is None and not (out / "drum-state" / "state.npz").exists():
         time.sleep(0.001)
