@@ -41,6 +41,7 @@ def whole_module(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str]:
     return module, name
 
 
+# Numba has no types, so its classes are Any to mypy.
 class LinkedCompiler(CompilerBase):  # type: ignore[misc]
     """Numba's compiler, with a library of our own."""
 

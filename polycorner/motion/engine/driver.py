@@ -136,9 +136,8 @@ class Engine:
 
     def advance(self, steps: int) -> list[Event]:
         """Advance by so many steps and return the events in them."""
-        advance = compiled_advance(
-            self.bodies.dimension
-        )  # compiles the engine, unless the cache has it
+        # Compiles the engine, unless the cache has it.
+        advance = compiled_advance(self.bodies.dimension)
         events: list[Event] = []
         while steps > 0:
             why, done, count = advance(self._addresses, steps)

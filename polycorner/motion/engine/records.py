@@ -26,6 +26,7 @@ from polycorner.motion.engine.arrays import Log, Model, State, Work, declaration
 ITEMSIZE = 8  # bytes of every number
 
 
+# Numba has no types, so its classes are Any to mypy.
 class RecordType(types.Type):  # type: ignore[misc]
     """The type of a record to compiled code, for bodies of so many coordinates."""
 

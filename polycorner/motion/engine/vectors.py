@@ -20,6 +20,7 @@ WIDTH, ITEMSIZE = 8, 8  # reals in a vector, bytes of one
 REALS = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
+# Numba has no types, so its classes are Any to mypy.
 class VectorType(types.Type):  # type: ignore[misc]
     """The type of a vector to compiled code."""
 
