@@ -160,6 +160,12 @@ def _described(values: dict[str, Any]) -> "tuple[DumbbellDrum, Noise, State]":
 def _check_angles(values: dict[str, Any]) -> None:
     if not -90 < values["tilt"] < 90:
         fail(f"--tilt: expected an angle between -90 and 90 degrees; got {values['tilt']:g}")
+    wobble = values["wobble"]
+    if wobble is not None and not 0 <= wobble < 90 - abs(values["tilt"]):
+        fail(
+            "--wobble: expected an angle of at least 0 degrees, with which the tilt remains below "
+            f"90; got {wobble:g}"
+        )
     for heading in values["heading"] or ():
         if not math.isfinite(heading):
             fail(f"--heading: expected an angle in degrees; got {heading:g}")

@@ -164,8 +164,6 @@ def draw_bunch_sweep(found: "xr.Dataset", across: str, others: str | None) -> Fi
     for axes, words in ((first, "have left"), (second, "in the drum at the end")):
         axes.set(ylabel=words, xlabel=_axis_label(found, across))
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    if others:
-        first.legend(fontsize=9, frameon=False)
     second.legend(fontsize=9, frameon=False)
     return figure
 
