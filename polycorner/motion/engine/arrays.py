@@ -63,6 +63,7 @@ class Model(NamedTuple):
 
     bodies: Annotated[Any, whole()]  # N
     dimension: Annotated[Any, whole()]  # k
+    lanes: Annotated[Any, whole()]  # K: coordinates of a body, and zeros up to whole vectors
     force_kernel: Annotated[Any, whole()]  # address: upper triangle of M, F, applied forces, loads
     slip_kernel: Annotated[Any, whole()]  # address: slip velocities
     parameters: Annotated[Any, real("*")]  # of all kernels
@@ -109,7 +110,6 @@ class Model(NamedTuple):
     refines: Annotated[Any, whole()]  # whether bodies take shorter steps where they need them
     near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
-    diagonal_mass: Annotated[Any, whole()]  # whether it is diagonal everywhere
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
     signal_kernel: Annotated[Any, whole()]  # address: parameters that follow the time, or 0
@@ -158,7 +158,7 @@ class Work(NamedTuple):
     force: Annotated[Any, real("N k")]  # impulse of all forces in the step
     applied: Annotated[Any, real("N k")]  # that of the applied forces among them
     kick: Annotated[Any, real("N k")]  # random impulse
-    inverse_mass: Annotated[Any, real("N k k")]
+    inverse_mass: Annotated[Any, real("N k K")]
     slip_rows: Annotated[Any, real("N R k")]  # Jacobian of the slip velocities
     slip_offset: Annotated[Any, real("N R")]  # slip velocity at zero velocity
     load: Annotated[Any, real("N F")]  # known normal impulse
@@ -184,9 +184,10 @@ class Work(NamedTuple):
     island_residual: Annotated[Any, real("N")]  # of the island that a body represents
     curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
     parent: Annotated[Any, whole("N")]  # in the union-find forest
-    v_free: Annotated[Any, real("N k")]  # velocities after forces alone
-    v_new: Annotated[Any, real("N k")]  # velocities after the step
-    v_rest: Annotated[Any, real("N k")]  # velocities of bodies at which they would be at rest
+    v_old: Annotated[Any, real("N K")]  # velocities before the step
+    v_free: Annotated[Any, real("N K")]  # velocities after forces alone
+    v_new: Annotated[Any, real("N K")]  # velocities after the step
+    v_rest: Annotated[Any, real("N K")]  # velocities of bodies at which they would be at rest
     v_mean: Annotated[Any, real("N k")]  # mean velocities of the step
     former_force: Annotated[Any, real("N k")]  # `force` with the mean velocities before
     neighbour_impulse: Annotated[Any, real("N k")]
@@ -221,8 +222,8 @@ class Work(NamedTuple):
     before: Annotated[Any, real("B 2")]  # J v before the step
     free: Annotated[Any, real("B 2")]  # J v after forces alone
     after: Annotated[Any, real("B 2")]  # u after the step, as of the last residual
-    jacobian: Annotated[Any, real("B 2 2*k")]  # J
-    response: Annotated[Any, real("B 2 2*k")]  # M^-1 J'
+    jacobian: Annotated[Any, real("B 2 2*K")]  # J: K numbers for each of two bodies
+    response: Annotated[Any, real("B 2 2*K")]  # M^-1 J'
     delassus: Annotated[Any, real("B 4")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm of W
     impulse: Annotated[Any, real("B 2")]
     order: Annotated[Any, whole("B")]  # blocks, island after island
@@ -238,10 +239,8 @@ class Work(NamedTuple):
     derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows
     projection: Annotated[Any, real("B 6")]  # of the natural map, and its derivative by rows
     constant: Annotated[Any, real("B 2")]  # a of the Newton step dp = a - G J dv
-    schur_row: Annotated[Any, real("B 2*k")]  # normal after elimination of friction
+    schur_row: Annotated[Any, real("B 2*K")]  # normal after elimination of friction
     load_slope: Annotated[Any, real("B 2")]  # change of friction with its load
-    stacked: Annotated[Any, real("3 2*k")]  # rows of a block and of the contact that presses
-    weighted: Annotated[Any, real("3 2*k")]  # G times these
     body_matrix: Annotated[Any, real("k k")]
     body_vector: Annotated[Any, real("k")]
     rest_velocity: Annotated[Any, real("k")]
@@ -252,17 +251,12 @@ class Work(NamedTuple):
     number: Annotated[Any, whole("N")]  # number of a body in its island
     first_side: Annotated[Any, whole("N")]  # first contact of a body, as 2 block + side
     next_side: Annotated[Any, whole("B 2")]  # the one after it
-    island_vector: Annotated[Any, real("N*k")]
-    envelope: Annotated[Any, whole("N*k")]  # end of each row of the band matrix
+    island_vector: Annotated[Any, real("N*K")]
+    row_begin: Annotated[Any, whole("N")]  # first body in a body's rows of the band matrix
+    row_end: Annotated[Any, whole("N")]  # the one after the last
+    line: Annotated[Any, whole("N")]  # where column 0 of its first row would stand
+    factors: Annotated[Any, real("16")]  # multiples of four rows that are subtracted from others
     band: Annotated[Any, real("M")]  # the band matrix, row by row
-    first_row: Annotated[Any, whole("B")]  # of a block, in a small island
-    small_jacobian: Annotated[Any, real("512")]  # of a small island: rows of eight
-    small_response: Annotated[Any, real("512")]  # M^-1 J', likewise
-    small_offset: Annotated[Any, real("64")]  # of its rows
-    small_matrix: Annotated[Any, real("64")]
-    small_vector: Annotated[Any, real("8")]
-    small_free: Annotated[Any, real("8")]  # velocities after forces alone
-    small_velocity: Annotated[Any, real("8")]
 
 
 class Log(NamedTuple):

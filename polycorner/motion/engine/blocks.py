@@ -13,6 +13,9 @@ from polycorner.motion.engine.neighbours import (
     heap_sort,
     key_of,
 )
+from polycorner.motion.engine.rows import apply_impulse, row_at, row_times, rows_product
+from polycorner.motion.engine.sizes import WIDTH
+from polycorner.motion.engine.vectors import entry, load, store, zeros
 
 ELASTIC = 1e-6  # scaled travel in a step up to which an impact that bounces is slow
 DEPENDENT = 1e-4  # sine of the angle to other equations below which one follows from them
@@ -22,42 +25,38 @@ STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothi
 @compiled
 def finish_block(model, state, work, b):
     """Compute ``M^-1 J'``, the Delassus matrix and ``J v``, and apply the initial impulse."""
-    k = model.dimension
-    rows = max(1, work.block_rows[b])
-    d00 = d01 = d11 = 0.0
+    rows, J, responses = max(1, work.block_rows[b]), work.jacobian, work.response
+    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
     for r in range(rows):
-        work.before[b, r] = work.free[b, r] = 0.0
-    for side in range(2):
-        i = work.block_bodies[b, side]
-        if i < 0:
-            continue
-        for r in range(rows):
-            row, response, p = work.jacobian[b, r], work.response[b, r], work.impulse[b, r]
-            before, free = 0.0, 0.0
-            for c in range(k):
-                before += row[side * k + c] * state.v[i, c]
-                free += row[side * k + c] * work.v_free[i, c]
-                value = 0.0
-                if work.awake[i]:
-                    if model.diagonal_mass:
-                        value = work.inverse_mass[i, c, c] * row[side * k + c]
-                    else:
-                        for a in range(k):
-                            value += work.inverse_mass[i, c, a] * row[side * k + a]
-                    work.v_new[i, c] += value * p
-                response[side * k + c] = value
-            work.before[b, r] += before
-            work.free[b, r] += free
-        for c in range(side * k, side * k + k):
-            d00 += work.jacobian[b, 0, c] * work.response[b, 0, c]
-            if rows == 2:
-                d01 += work.jacobian[b, 0, c] * work.response[b, 1, c]
-                d11 += work.jacobian[b, 1, c] * work.response[b, 1, c]
-    top = d00
+        at = row_at(model, b, r)
+        work.before[b, r] = row_times(model, J, at, work.v_old, i, j)
+        work.free[b, r] = row_times(model, J, at, work.v_free, i, j)
+        respond(model, work, at, ZERO, i)
+        if j >= 0:
+            respond(model, work, at, model.lanes, j)
+        apply_impulse(model, work, b, r, work.impulse[b, r])
+    one, other = row_at(model, b, ZERO), row_at(model, b, ONE)
+    top = d00 = rows_product(model, J, one, responses, one)
+    d01 = d11 = 0.0
     if rows == 2:
+        d01 = rows_product(model, J, one, responses, other)
+        d11 = rows_product(model, J, other, responses, other)
         top = 0.5 * (d00 + d11) + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
     work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2] = d00, d01, d11
     work.delassus[b, 3] = 1.0 / top if top > 0.0 else 1.0
+
+
+@compiled
+def respond(model, work, at, side, i):
+    """Compute the part of ``M^-1 J'`` of a row that belongs to one of its bodies."""
+    k, K, J = model.dimension, model.lanes, work.jacobian
+    for c in range(0, K, WIDTH):
+        value = zeros()
+        if work.awake[i]:
+            for a in range(k):
+                slope = entry(J, at + side + a)
+                value = value + slope * load(work.inverse_mass, (i * k + a) * K + c)
+        store(work.response, at + side + c, value)
 
 
 @compiled
@@ -145,7 +144,7 @@ def is_independent(model, work, i, g):
 
 
 @compiled
-def new_block(work, b, k, first, second, rows):
+def new_block(model, work, b, first, second, rows):
     """Initialise a block with a Jacobian of zeros."""
     work.block_bodies[b, 0], work.block_bodies[b, 1], work.block_rows[b] = first, second, rows
     work.bilateral[b], work.pressing[b] = ZERO, -1
@@ -153,8 +152,9 @@ def new_block(work, b, k, first, second, rows):
     for r in range(2):
         work.offset[b, r] = 0.0
         work.impulse[b, r] = 0.0
-        for c in range(2 * k):
-            work.jacobian[b, r, c] = 0.0
+    for c in range(row_at(model, b, ZERO), row_at(model, b + 1, ZERO), WIDTH):
+        store(work.jacobian, c, zeros())
+        store(work.response, c, zeros())
 
 
 @compiled
@@ -184,7 +184,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         b = count
         count += 1
         block_of[g] = b
-        new_block(work, b, k, i, NONE, ZERO)
+        new_block(model, work, b, i, NONE, ZERO)
         for c in range(k):
             work.jacobian[b, 0, c] = work.gradient[i, g, c]
         change = 0.0
@@ -215,7 +215,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         b = count
         count += 1
         first = model.slip_start[f]
-        new_block(work, b, k, i, NONE, model.slip_start[f + 1] - first)
+        new_block(model, work, b, i, NONE, model.slip_start[f + 1] - first)
         for r in range(work.block_rows[b]):
             work.offset[b, r] = work.slip_offset[i, first + r]
             work.impulse[b, r] = state.friction[i, f, r] * share
@@ -234,7 +234,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
 @compiled
 def add_pair_blocks(model, state, work, contact, h, count):
     """Append the blocks of a contact between two bodies; return the block count."""
-    k, scratch = model.dimension, work.scratch
+    k, K, scratch = model.dimension, model.lanes, work.scratch
     i, j, g = work.contact[contact, 0], work.contact[contact, 1], work.contact[contact, 2]
     before, free = 0.0, 0.0
     for c in range(k):
@@ -247,9 +247,10 @@ def add_pair_blocks(model, state, work, contact, h, count):
     if work.located[0] and not acts(model, gap, before, model.pair_restitution, closed):
         return count
     n = count
-    new_block(work, n, k, i, j, ZERO)
-    for c in range(2 * k):
+    new_block(model, work, n, i, j, ZERO)
+    for c in range(k):
         work.jacobian[n, 0, c] = work.contact_gradient[contact, c]
+        work.jacobian[n, 0, K + c] = work.contact_gradient[contact, k + c]
     change = 0.0
     if closed or not work.located[0]:
         change = curvature_change(gap, before, work.pair_gap_next[g], h, model.gap_unit)
@@ -276,12 +277,12 @@ def add_pair_blocks(model, state, work, contact, h, count):
     v0 = reads + 2 * k
     call_kernel(address, start, base + 8 * p0, start + 8 * v0, start + 8 * (v0 + 2), start)
     b = count + 1
-    new_block(work, b, k, first, second, TWO)
+    new_block(model, work, b, first, second, TWO)
     for r in range(2):
         value = scratch[v0 + r]
         for c in range(2 * k):
             slope = scratch[v0 + 2 + r * v0 + reads + c]
-            work.jacobian[b, r, c] = slope
+            work.jacobian[b, r, c if c < k else K + c - k] = slope
             value -= slope * scratch[reads + c]
         work.offset[b, r] = value
         work.impulse[b, r] = work.contact_impulse[contact, 1 + r]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
-from polycorner.motion.engine.jit import NONE, compiled
+from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import TOUCHING, key_of
 from polycorner.motion.engine.paths import release_time
 
@@ -164,7 +164,7 @@ def keep_contacts(model, state, work, log, C, h, time, count):
 @compiled
 def add_contacts(model, state, work, C, size, share):
     """Append this step's contacts to the list, with their impulses."""
-    k = model.dimension
+    k, K = model.dimension, model.lanes
     for s in range(C):
         b = work.sort_keys[s]
         state.keys[size] = key_of(model, work, work.origin[b, 1])
@@ -173,17 +173,22 @@ def add_contacts(model, state, work, C, size, share):
         state.pair_impulse[size, 0] = work.impulse[b, 0] * lasting
         state.pair_impulse[size, 1] = state.pair_impulse[size, 2] = 0.0
         state.pair_flags[size, 0] = 0
-        for a in range(2 * k):
-            state.pair_action[size, a] = work.jacobian[b, 0, a] * state.pair_impulse[size, 0]
+        for a in range(k):
+            p = state.pair_impulse[size, 0]
+            state.pair_action[size, a] = work.jacobian[b, 0, a] * p
+            state.pair_action[size, k + a] = work.jacobian[b, 0, K + a] * p
         if model.pair_slips.shape[0] > 0:
             f = b + 1
             state.pair_flags[size, 0] = 1 if sticks(model, work, f) else 0
-            shift = 0 if work.block_bodies[f, 0] == work.block_bodies[b, 0] else k
+            one, two = ZERO, K
+            if work.block_bodies[f, 0] != work.block_bodies[b, 0]:
+                one, two = K, ZERO
             for r in range(2):
                 p = work.impulse[f, r] * lasting
                 state.pair_impulse[size, 1 + r] = p
-                for a in range(2 * k):
-                    state.pair_action[size, (a + shift) % (2 * k)] += work.jacobian[f, r, a] * p
+                for a in range(k):
+                    state.pair_action[size, a] += work.jacobian[f, r, one + a] * p
+                    state.pair_action[size, k + a] += work.jacobian[f, r, two + a] * p
         state.pair_flags[size, 1] = work.origin[b, 3]
         size += 1
     state.counts[CONTACTS] = size

@@ -9,7 +9,7 @@ import numpy as np
 
 from polycorner.motion.engine.arrays import NEWTON_STEPS
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
-from polycorner.motion.engine.jit import ZERO, compiled
+from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.rows import load_on
 
@@ -23,7 +23,7 @@ LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
 
 
 @compiled
-def continue_island(model, state, work, first, last, n, width, goal, softness):
+def continue_island(model, state, work, first, last, n, goal, softness):
     """Solve an island by continuation; return the residual.
 
     First the loads of friction are iterated; else the compliance of the contacts is taken from
@@ -35,14 +35,14 @@ def continue_island(model, state, work, first, last, n, width, goal, softness):
     for attempt in range(4):
         if attempt in (0, 3):
             grip = GRIP * goal / model.tolerance if attempt == 3 else 0.0
-            iterate_loads(model, state, work, first, last, n, width, goal, softness, grip)
+            iterate_loads(model, state, work, first, last, n, goal, softness, grip)
         elif attempt == 1:
-            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE)
+            follow(model, state, work, first, last, n, goal, FIRST_COMPLIANCE)
         else:
             for s in range(first, last):
                 work.impulse[work.order[s], 0] = work.impulse[work.order[s], 1] = 0.0
             recompute_velocities(model, work, first, last)
-            follow(model, state, work, first, last, n, width, goal, 1.0)
+            follow(model, state, work, first, last, n, goal, 1.0)
         worst = residual(model, work, first, last, 0.0)
         if worst <= goal:
             return worst
@@ -52,7 +52,7 @@ def continue_island(model, state, work, first, last, n, width, goal, softness):
 
 
 @compiled
-def follow(model, state, work, first, last, n, width, goal, compliance):
+def follow(model, state, work, first, last, n, goal, compliance):
     """Solve an island for a compliance, and follow the solution to rigid contacts.
 
     Contacts yield by ``c p / rho``.  The compliance ``c`` is divided by more or less, as Newton's
@@ -62,9 +62,7 @@ def follow(model, state, work, first, last, n, width, goal, compliance):
     factor, reached, trial = FIRST_FACTOR, np.inf, compliance
     while factor < LEAST_FACTOR:
         worst = residual(model, work, first, last, trial)
-        steps, worst = newton_steps(
-            model, work, first, last, n, width, goal, trial, trial, worst, ZERO
-        )
+        steps, worst = newton_steps(model, work, first, last, n, goal, trial, trial, worst)
         state.counts[NEWTON_STEPS] += steps
         if worst <= goal:
             reached = trial
@@ -83,7 +81,7 @@ def follow(model, state, work, first, last, n, width, goal, compliance):
 
 
 @compiled
-def iterate_loads(model, state, work, first, last, n, width, goal, softness, grip):
+def iterate_loads(model, state, work, first, last, n, goal, softness, grip):
     """Solve an island with known loads of friction, again and again with the loads that result.
 
     The first loads are those at hand, or stop a slip of the speed ``grip`` if it is not zero.  In
@@ -101,19 +99,15 @@ def iterate_loads(model, state, work, first, last, n, width, goal, softness, gri
                 if work.pressing[b] <= -2:
                     work.block_load[b] = grip * work.delassus[b, 3]
         worst = residual(model, work, first, last, 0.0)
-        steps, worst = newton_steps(
-            model, work, first, last, n, width, goal, softness, 0.0, worst, ZERO
-        )
+        steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
         state.counts[NEWTON_STEPS] += steps
         if worst > goal:
-            follow(model, state, work, first, last, n, width, goal, FIRST_COMPLIANCE)
+            follow(model, state, work, first, last, n, goal, FIRST_COMPLIANCE)
         attach_loads(work, first, last)
         worst = residual(model, work, first, last, 0.0)
         if worst > goal:
             copy_impulses(work, first, last, work.impulse, work.loaded)
-            steps, worst = newton_steps(
-                model, work, first, last, n, width, goal, softness, 0.0, worst, ZERO
-            )
+            steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             state.counts[NEWTON_STEPS] += steps
         if worst <= goal:
             return

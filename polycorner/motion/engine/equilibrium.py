@@ -5,10 +5,11 @@ import numpy as np
 from polycorner.motion.engine.arrays import NEWTON_STEPS
 from polycorner.motion.engine.band import (
     add_block,
+    add_columns,
     add_transposed_row,
     assemble_mass,
     number_bodies,
-    row_length,
+    numbers_of,
     row_product,
     solve_band,
 )
@@ -16,8 +17,16 @@ from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import TOUCHING
 from polycorner.motion.engine.rest import REST_FACTOR
-from polycorner.motion.engine.rows import load_on, velocity_of
+from polycorner.motion.engine.rows import (
+    add_row,
+    copy_velocity,
+    load_on,
+    row_times,
+    velocity_of,
+)
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
+from polycorner.motion.engine.sizes import WIDTH
+from polycorner.motion.engine.vectors import load
 
 TARGET_PRESSURE = 0.2  # n_0, as a share of the impulse that would stop a body
 START_MARGIN = 0.1  # relative distance from the boundary of the sets at the start
@@ -92,14 +101,14 @@ def find_interior_start(model, work, first, last, speed, goal):
 
 
 @compiled
-def assemble_interior(model, work, first, last, n, width, speed):
+def assemble_interior(model, work, first, last, n, speed):
     """Assemble the Newton system of :func:`find_equilibrium`: matrix and right-hand side.
 
     ``work.derivative`` gets, for each block that carries load, the inverse of its Hessian (2 x 2);
     ``work.load_slope`` the change of its impulse with its load; ``work.schur_row``, for each
     unilateral contact, the row that is left of its normal when its friction is eliminated.
     """
-    k, out, x = model.dimension, work.image, work.island_vector
+    K, out, x = model.lanes, work.image, work.island_vector
     derivative, constant = work.derivative, work.constant
     stiffest = 0.0
     for s in range(first, last):
@@ -114,7 +123,7 @@ def assemble_interior(model, work, first, last, n, width, speed):
                 derivative[b, 0] = (TARGET_PRESSURE * work.delassus[b, 3] * speed) ** -2.0
                 slope = p * derivative[b, 0]
             constant[b, 0], constant[b, 1] = slope, slope
-            for c in range(2 * k):
+            for c in range(2 * K):
                 work.schur_row[b, c] = work.jacobian[b, 0, c]
     for s in range(first, last):
         b = work.order[s]
@@ -141,9 +150,9 @@ def assemble_interior(model, work, first, last, n, width, speed):
         derivative[pressing, 0] += out[3] - t0 * out[4] - t1 * out[5]
         constant[pressing, 0] += out[0] - t0 * out[1] - t1 * out[2]
         constant[pressing, 1] += out[0]
-        shift = 0 if work.block_bodies[pressing, 0] == work.block_bodies[b, 0] else k
-        for c in range(2 * k):
-            at = (c + shift) % (2 * k)
+        shift = 0 if work.block_bodies[pressing, 0] == work.block_bodies[b, 0] else K
+        for c in range(2 * K):
+            at = (c + shift) % (2 * K)
             work.schur_row[pressing, at] -= t0 * work.jacobian[b, 0, c]
             if rows == 2:
                 work.schur_row[pressing, at] -= t1 * work.jacobian[b, 1, c]
@@ -151,15 +160,13 @@ def assemble_interior(model, work, first, last, n, width, speed):
         b = work.order[s]
         if work.block_rows[b] == 0 and work.carries[b] > 0.0:
             stiffest = max(stiffest, 1.0 / (derivative[b, 0] * work.delassus[b, 3]))
-    assemble_mass(model, work, n, width)
-    for a in range(n * k * row_length(width)):
-        work.band[a] *= REGULARISATION * stiffest
+    assemble_mass(model, work, n, REGULARISATION * stiffest)
     for s in range(first, last):
         b = work.order[s]
         if work.carries[b] == 0.0:
             continue
         if work.block_rows[b] > 0:
-            add_block(model, work, b, width)
+            add_block(model, work, b)
             g0, g1 = constant[b, 0], constant[b, 1]
             p0 = derivative[b, 4] * g0 + derivative[b, 5] * g1
             p1 = derivative[b, 7] * g0 + derivative[b, 8] * g1
@@ -167,35 +174,23 @@ def assemble_interior(model, work, first, last, n, width, speed):
             if work.block_rows[b] == 2:
                 add_transposed_row(model, work, b, ONE, p1, x)
         else:
-            add_schur_complement(model, work, b, width)
+            add_schur_complement(model, work, b)
 
 
 @compiled
-def add_schur_complement(model, work, b, width):
+def add_schur_complement(model, work, b):
     """Add a contact, its friction eliminated, to the matrix and the right-hand side."""
-    k, x, schur_row = model.dimension, work.island_vector, work.schur_row
-    stride, share = row_length(width), 1.0 / work.derivative[b, 0]
-    for side in range(2):
-        i = work.block_bodies[b, side]
-        if i < 0 or not work.awake[i]:
-            continue
-        for c in range(k):
-            row = work.number[i] * k + c
-            value = share * schur_row[b, side * k + c]
-            x[row] += value * work.constant[b, 0]
-            for other in range(2):
-                j = work.block_bodies[b, other]
-                if j < 0 or not work.awake[j]:
-                    continue
-                at = row * stride + width - row + work.number[j] * k
-                for d in range(k):
-                    work.band[at + d] += value * schur_row[b, other * k + d]
+    K, rows, at = model.lanes, work.schur_row, b * 2 * model.lanes
+    share, (x, y) = 1.0 / work.derivative[b, 0], numbers_of(work, b)
+    add_row(model, rows, at, share * work.constant[b, 0], work.island_vector, x, y)
+    for d in range(0 if x >= 0 else K, 2 * K if y >= 0 else K, WIDTH):
+        add_columns(model, work, x, y, d, rows, at, share * load(rows, at + d))
 
 
 @compiled
 def newton_direction(model, work, first, last):
     """Put the Newton direction of the impulses in ``work.best``; return its squared local norm."""
-    k, x, best = model.dimension, work.island_vector, work.best
+    x, best = work.island_vector, work.best
     derivative, constant = work.derivative, work.constant
     square = 0.0
     for s in range(first, last):
@@ -203,12 +198,9 @@ def newton_direction(model, work, first, last):
         best[b, 0], best[b, 1] = 0.0, 0.0
         if work.block_rows[b] > 0 or work.carries[b] == 0.0:
             continue
-        value = 0.0
-        for side in range(2):
-            i = work.block_bodies[b, side]
-            if i >= 0 and work.awake[i]:
-                for c in range(k):
-                    value += work.schur_row[b, side * k + c] * x[work.number[i] * k + c]
+        first_number, second = numbers_of(work, b)
+        at = b * 2 * model.lanes
+        value = row_times(model, work.schur_row, at, x, first_number, second)
         best[b, 0] = (value - constant[b, 0]) / derivative[b, 0]
         square += best[b, 0] * (row_product(model, work, b, ZERO, x) - constant[b, 1])
     for s in range(first, last):
@@ -254,9 +246,10 @@ def in_interior(model, work, first, last, share):
 
 
 @compiled
-def interior_point_steps(model, state, work, first, last, n, width, speed, goal):
+def interior_point_steps(model, state, work, first, last, n, speed, goal):
     """Take interior-point steps to balance and centrality; return whether forces balance."""
-    k, x, p, best = model.dimension, work.island_vector, work.impulse, work.best
+    k, K = model.dimension, model.lanes
+    x, p, best = work.island_vector, work.impulse, work.best
     balanced_for, stuck = 0, 0
     for _ in range(MAX_INTERIOR_STEPS):
         far = 0.0
@@ -266,7 +259,9 @@ def interior_point_steps(model, state, work, first, last, n, width, speed, goal)
                 value = 0.0
                 for a in range(k):
                     value += work.mass[i, c, a] * (work.v_rest[i, a] - work.v_free[i, a])
-                x[at * k + c] = value
+                x[at * K + c] = value
+            for c in range(k, K):
+                x[at * K + c] = 0.0
         for s in range(first, last):
             b = work.order[s]
             for r in range(max(1, work.block_rows[b])):
@@ -276,14 +271,16 @@ def interior_point_steps(model, state, work, first, last, n, width, speed, goal)
             for c in range(k):
                 value = 0.0
                 for a in range(k):
-                    value += work.inverse_mass[i, c, a] * x[at * k + a]
+                    value += work.inverse_mass[i, c, a] * x[at * K + a]
                 far = max(far, abs(value) * model.units[c])
         if far <= BALANCE_TOLERANCE * goal:
             balanced_for += 1
         if balanced_for > CENTRING_STEPS:
             return True
-        assemble_interior(model, work, first, last, n, width, speed)
-        if not solve_band(work.band, x, n * k, width, work.envelope):
+        assemble_interior(model, work, first, last, n, speed)
+        if not solve_band(
+            work.band, x, n, K, work.row_begin, work.row_end, work.line, work.factors
+        ):
             return balanced_for > 0
         state.counts[NEWTON_STEPS] += 1
         square = newton_direction(model, work, first, last)
@@ -321,20 +318,17 @@ def find_equilibrium(model, state, work, first, last, speed):
     Impulses far from the boundary can still balance when the loads change a little, so that the
     pile can sleep.
     """
-    k = model.dimension
-    n, width = number_bodies(model, state, work, first, last)
+    n = number_bodies(model, state, work, first, last)
     if n == 0:
         return False
     goal = model.tolerance * speed
     copy_impulses(work, first, last, work.impulse, work.initial)
     proved = False
     if find_interior_start(model, work, first, last, speed, goal):
-        proved = interior_point_steps(model, state, work, first, last, n, width, speed, goal)
+        proved = interior_point_steps(model, state, work, first, last, n, speed, goal)
     if not proved:
         copy_impulses(work, first, last, work.initial, work.impulse)
         return False
     for at in range(n):
-        i = work.members[at]
-        for c in range(k):
-            work.v_new[i, c] = work.v_rest[i, c]
+        copy_velocity(model, work.v_rest, work.v_new, work.members[at])
     return True

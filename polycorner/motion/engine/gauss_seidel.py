@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
-from polycorner.motion.engine.rows import apply_impulse, load_on, velocity_of
+from polycorner.motion.engine.rows import apply_impulse, copy_velocity, load_on, velocity_of
 from polycorner.motion.engine.sets import contains, project
 
 
@@ -119,8 +119,7 @@ def recompute_velocities(model, work, first, last):
         for side in range(2):
             i = work.block_bodies[work.order[s], side]
             if i >= 0:
-                for c in range(model.dimension):
-                    work.v_new[i, c] = work.v_free[i, c]
+                copy_velocity(model, work.v_free, work.v_new, i)
     for s in range(first, last):
         b = work.order[s]
         for r in range(max(1, work.block_rows[b])):

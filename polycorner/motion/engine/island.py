@@ -10,13 +10,13 @@ from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
-from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
 from polycorner.motion.engine.rest import find_rest_velocity
-from polycorner.motion.engine.small_islands import number_few
+from polycorner.motion.engine.rows import copy_velocity
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; further rounds multiply this by powers of three
@@ -24,6 +24,7 @@ CYCLE_ROUNDS = 3
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 MISSED = 1e-12  # scaled gap up to which an equation holds
 FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
+SMALL = 8  # lanes of a small island
 FEW = 8  # blocks of a small island up to which sweeps, which may be exact, come first
 SPARE = 1e-2  # share of the tolerance to which small islands are solved if possible
 SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
@@ -43,15 +44,12 @@ def iterate(model, state, work, first, last, speed, sweeps):
     has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
-    n, width, small = number_few(model, work, first, last), ZERO, ONE
-    if n == 0:
-        n, width = number_bodies(model, state, work, first, last)
-        small = ZERO
+    n = number_bodies(model, state, work, first, last)
+    small = 0 < n * model.lanes <= SMALL
     direct, enough = small and last - first > FEW, SPARE * goal if small else goal
-    if not direct:
-        worst = residual(model, work, first, last, 0.0)
-        if worst <= enough:
-            return worst
+    worst = residual(model, work, first, last, 0.0)
+    if worst <= enough:
+        return worst
     hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
     rounds, done, former = 0, 0, np.inf
     while rounds == 0 or (worst > goal and done < sweeps):
@@ -69,15 +67,12 @@ def iterate(model, state, work, first, last, speed, sweeps):
         if worst > enough and n > 0:
             phase = rounds % CYCLE_ROUNDS
             softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
-            steps, worst = newton_steps(
-                model, work, first, last, n, width, goal, softness, 0.0, worst, small
-            )
+            steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
                 if work.may_divide[0] and last - first <= MANY:
                     break
-                n, width = number_bodies(model, state, work, first, last)
-                worst = continue_island(model, state, work, first, last, n, width, goal, hard)
+                worst = continue_island(model, state, work, first, last, n, goal, hard)
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:
                     break
@@ -149,8 +144,7 @@ def solve_island(model, state, work, first, last):
             for side in range(2):
                 i = work.block_bodies[work.order[s], side]
                 if i >= 0:
-                    for c in range(model.dimension):
-                        work.v_new[i, c] = work.v_free[i, c]
+                    copy_velocity(model, work.v_free, work.v_new, i)
         return 0.0
     if at_rest and rests(model, state, work, first, last, speed):
         return residual(model, work, first, last, 0.0) / speed

@@ -17,19 +17,15 @@ from polycorner.motion.engine.gauss_seidel import (
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.linearisation import change_impulses, is_loaded, linearise_block
 from polycorner.motion.engine.rows import apply_impulse
-from polycorner.motion.engine.small_islands import (
-    gather,
-    scatter,
-    small_residual,
-    small_step,
-)
+from polycorner.motion.engine.sizes import WIDTH
+from polycorner.motion.engine.vectors import store, zeros
 
 ROUND_NEWTON_STEPS = 20  # most Newton steps in a round
 IDLE_NEWTON_STEPS = 6  # Newton steps without progress after which a round ends
 
 
 @compiled
-def newton_steps(model, work, first, last, n, width, goal, softness, compliance, worst, is_small):
+def newton_steps(model, work, first, last, n, goal, softness, compliance, worst):
     """Take semismooth Newton steps on the natural map; return their number and the least residual.
 
     The map is ``p - proj(p - rho u)`` with the velocities ``u = J v + d`` of the rows; its
@@ -38,14 +34,10 @@ def newton_steps(model, work, first, last, n, width, goal, softness, compliance,
     that is solved is as large as the velocities, not as the impulses.  All contacts are slightly
     softened, so that redundant ones have a solution; this also damps the steps, as in the method of
     multipliers, of which this is one step ([Rockafellar76]).  The impulses of the least residual
-    are kept.  The residual must have been evaluated before, except that of an island that is to be
-    solved as a small one.  With a ``compliance`` the contacts yield; see
-    :func:`yielding_velocity`.
+    are kept.  The residual must have been evaluated before.  With a ``compliance`` the contacts
+    yield; see :func:`yielding_velocity`.
     """
     least, former, steps, idle = np.inf, np.inf, ZERO, 0
-    if is_small:
-        gather(model, work, first, last, n)
-        worst = small_residual(model, work, first, last, compliance)
     while True:
         idle = 0 if worst < least else idle + 1
         if worst < least:
@@ -62,17 +54,10 @@ def newton_steps(model, work, first, last, n, width, goal, softness, compliance,
         former = worst
         for s in range(first, last):
             linearise_block(work, work.order[s], softness, compliance)
-        if is_small:
-            if not small_step(model, work, first, last, n):
-                break
-            worst = small_residual(model, work, first, last, compliance)
-        else:
-            if not take_step(model, work, first, last, n, width):
-                break
-            worst = residual(model, work, first, last, compliance)
+        if not take_step(model, work, first, last, n):
+            break
+        worst = residual(model, work, first, last, compliance)
         steps += ONE
-    if is_small:
-        scatter(model, work, n)
     if not worst <= least:
         copy_impulses(work, first, last, work.best, work.impulse)
         recompute_velocities(model, work, first, last)
@@ -81,19 +66,19 @@ def newton_steps(model, work, first, last, n, width, goal, softness, compliance,
 
 
 @compiled
-def take_step(model, work, first, last, n, width):
+def take_step(model, work, first, last, n):
     """Take a Newton step on an island that was linearised; return whether there is one."""
-    size, x = n * model.dimension, work.island_vector
-    assemble_mass(model, work, n, width)
-    for c in range(size):
-        x[c] = 0.0
+    K, x = model.lanes, work.island_vector
+    assemble_mass(model, work, n, 1.0)
+    for c in range(0, n * K, WIDTH):
+        store(x, c, zeros())
     for s in range(first, last):
         b = work.order[s]
         if is_loaded(work, b):
-            add_block(model, work, b, width)
+            add_block(model, work, b)
         for r in range(max(1, work.block_rows[b])):
             add_transposed_row(model, work, b, r, work.constant[b, r], x)
-    if not solve_band(work.band, x, size, width, work.envelope):
+    if not solve_band(work.band, x, n, K, work.row_begin, work.row_end, work.line, work.factors):
         return False
     for s in range(first, last):
         b = work.order[s]

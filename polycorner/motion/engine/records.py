@@ -22,8 +22,10 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import intrinsic, register_model
 
 from polycorner.motion.engine.arrays import Log, Model, State, Work, declarations
+from polycorner.motion.engine.sizes import WIDTH
 
 ITEMSIZE = 8  # bytes of every number
+LETTERS = {"dimension": "k", "lanes": "K"}  # numbers of the model that may be known
 
 
 # Numba has no types, so its classes are Any to mypy.
@@ -31,7 +33,9 @@ class RecordType(types.Type):  # type: ignore[misc]
     """The type of a record to compiled code, for bodies of so many coordinates."""
 
     def __init__(self, record: Any, dimension: int) -> None:
-        self.known = {"k": dimension, "2*k": 2 * dimension} if dimension else {}
+        lanes = -(-dimension // WIDTH) * WIDTH
+        known = {"k": dimension, "2*k": 2 * dimension, "K": lanes, "2*K": 2 * lanes}
+        self.known = known if dimension else {}
         self.fields: dict[str, tuple[int, Any]] = {}
         self.shapes: dict[str, list[str]] = {}
         slot = 0
@@ -68,8 +72,8 @@ class RecordAttributes(AttributeTemplate):  # type: ignore[misc]
 def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name: str) -> Any:
     """Load an entry."""
     slot, held = record.fields[name]
-    if name == "dimension" and record.known:
-        return ir.Constant(ir.IntType(64), record.known["k"])
+    if name in LETTERS and record.known:
+        return ir.Constant(ir.IntType(64), record.known[LETTERS[name]])
     invariant = builder.module.add_metadata([])
 
     def load(at: int, kind: Any = None) -> Any:

@@ -1,21 +1,68 @@
-"""Velocities, loads and impulses of single blocks."""
+"""Rows of blocks: their products with velocities, and their impulses.
+
+A row has ``model.lanes`` numbers for each of two bodies: those of its coordinates, and zeros up to
+whole vectors; so have all velocities that it is multiplied by.
+"""
 
 from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.sizes import WIDTH
+from polycorner.motion.engine.vectors import load, store, total, zeros
+
+
+@compiled
+def row_at(model, b, r):
+    """Return where a row of a block stands among the Jacobians or responses."""
+    return (2 * b + r) * 2 * model.lanes
+
+
+@compiled
+def row_times(model, rows, at, v, i, j):
+    """Return the product of a row with the velocities of bodies ``i`` and ``j`` (-1: none)."""
+    K, value = model.lanes, zeros()
+    if i >= 0:
+        for c in range(0, K, WIDTH):
+            value = value + load(rows, at + c) * load(v, i * K + c)
+    if j >= 0:
+        for c in range(0, K, WIDTH):
+            value = value + load(rows, at + K + c) * load(v, j * K + c)
+    return total(value)
+
+
+@compiled
+def rows_product(model, first, at, second, other):
+    """Return the product of two rows over two bodies."""
+    value = zeros()
+    for c in range(0, 2 * model.lanes, WIDTH):
+        value = value + load(first, at + c) * load(second, other + c)
+    return total(value)
+
+
+@compiled
+def add_row(model, rows, at, factor, v, i, j):
+    """Add a multiple of a row to the velocities of bodies ``i`` and ``j`` (-1: none)."""
+    K = model.lanes
+    if i >= 0:
+        for c in range(0, K, WIDTH):
+            store(v, i * K + c, load(v, i * K + c) + factor * load(rows, at + c))
+    if j >= 0:
+        for c in range(0, K, WIDTH):
+            store(v, j * K + c, load(v, j * K + c) + factor * load(rows, at + K + c))
+
+
+@compiled
+def copy_velocity(model, source, target, i):
+    """Copy the velocity of body ``i``."""
+    for c in range(i * model.lanes, (i + 1) * model.lanes, WIDTH):
+        store(target, c, load(source, c))
 
 
 @compiled
 def velocity_of(model, work, b, v, out):
     """Evaluate the velocities ``J v + d`` of a block's rows."""
-    k = model.dimension
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
     for r in range(max(1, work.block_rows[b])):
-        value = work.offset[b, r]
-        for c in range(k):
-            value += work.jacobian[b, r, c] * v[i, c]
-        if j >= 0:
-            for c in range(k):
-                value += work.jacobian[b, r, k + c] * v[j, c]
-        out[r] = value
+        product = row_times(model, work.jacobian, row_at(model, b, r), v, i, j)
+        out[r] = work.offset[b, r] + product
 
 
 @compiled
@@ -31,12 +78,6 @@ def load_on(work, b):
 @compiled
 def apply_impulse(model, work, b, r, change):
     """Add an impulse of one row to the velocities of its bodies."""
-    k = model.dimension
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-    if change == 0.0:
-        return
-    for c in range(k):
-        work.v_new[i, c] += work.response[b, r, c] * change
-    if j >= 0:
-        for c in range(k):
-            work.v_new[j, c] += work.response[b, r, k + c] * change
+    if change != 0.0:
+        add_row(model, work.response, row_at(model, b, r), change, work.v_new, i, j)

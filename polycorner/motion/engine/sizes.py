@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from polycorner.motion.bodies import IdenticalBodies
 
-MAX_BAND = 192  # columns of the widest band matrix that is solved
-PADDING = 8  # zeros at the end of its rows
+WIDTH = 4  # reals in a vector
+MAX_BAND = 48  # bodies of the widest band matrix that is solved, to either side
 EVENTS = 4096  # events recorded, at least, before the engine returns
 
 
@@ -14,6 +14,7 @@ class Sizes(NamedTuple):
 
     N: int  # bodies
     k: int  # coordinates of a body
+    K: int  # the same, rounded up to whole vectors
     F: int  # friction contacts of a body with its surroundings
     R: int  # rows of their slip velocities
     L: int  # known loads of a body, at least 1
@@ -40,10 +41,12 @@ class Sizes(NamedTuple):
         shapes = [(len(f.names), len(f.variables)) for f in families]
         shapes += [(len(call.family.names), len(call.reads)) for call in body.gaps]
         kernels = [m * (1 + k) + k for m, k in shapes]
+        lanes = -(-k // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
         return cls(
             N=N,
             k=k,
+            K=lanes,
             F=F,
             R=R,
             L=max(1, body.formulation.loads),
@@ -57,5 +60,5 @@ class Sizes(NamedTuple):
             E=EVENTS + 4 * contacts,
             S=max(contacts, pairs, 1),
             W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
-            M=N * k * (min(2 * N * k, MAX_BAND) + PADDING),
+            M=N * lanes * (2 * min(N - 1, MAX_BAND) + 1) * lanes,
         )

@@ -167,7 +167,7 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
                 for r in range(max(1, work.block_rows[b])):
                     for c in range(k):
                         work.neighbour_impulse[i, c] += (
-                            work.jacobian[b, r, side * k + c] * work.impulse[b, r]
+                            work.jacobian[b, r, side * model.lanes + c] * work.impulse[b, r]
                         )
     woken = False
     for i in range(N):

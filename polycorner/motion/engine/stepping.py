@@ -68,6 +68,7 @@ def start_bodies(model, state, work):
             if work.awake[i]:
                 for a in range(k):
                     value += work.inverse_mass[i, c, a] * (work.force[i, a] + work.kick[i, a])
+            work.v_old[i, c] = state.v[i, c]
             work.v_free[i, c] = value
             work.v_new[i, c] = value
             finite = finite and np.isfinite(value)

@@ -1,8 +1,8 @@
-"""Vectors of eight reals, for compiled code: one instruction where the processor has it.
+"""Vectors of four reals, for compiled code: one instruction where the processor has it.
 
-They are read from and written to arrays at any place.  LLVM turns them into what the processor has,
-of two, four or eight reals; products are not contracted with sums, and sums are taken in one fixed
-order, so the results are the same on all of them.
+They are read from and written to arrays at any place.  LLVM turns them into what the processor has;
+products are not contracted with sums, and sums are taken in one fixed order, so the results are the
+same on all processors.
 """
 
 import operator
@@ -16,7 +16,9 @@ from numba.core.typing import signature
 from numba.core.typing.templates import ConcreteTemplate, infer_global
 from numba.extending import intrinsic, register_model
 
-WIDTH, ITEMSIZE = 8, 8  # reals in a vector, bytes of one
+from polycorner.motion.engine.sizes import WIDTH
+
+ITEMSIZE = 8  # bytes of a real
 REALS = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
@@ -48,10 +50,10 @@ class Sum(ConcreteTemplate):  # type: ignore[misc]
 
 
 @infer_global(operator.mul)
-class Multiple(ConcreteTemplate):  # type: ignore[misc]
-    """A number times a vector."""
+class Product(ConcreteTemplate):  # type: ignore[misc]
+    """Vectors are multiplied entry by entry, or by a number."""
 
-    cases = (signature(VECTOR, types.float64, VECTOR),)
+    cases = (signature(VECTOR, VECTOR, VECTOR), signature(VECTOR, types.float64, VECTOR))
 
 
 @lower_builtin(operator.add, VectorType, VectorType)
@@ -66,8 +68,14 @@ def subtract(_: Any, builder: Any, __: Any, values: Any) -> Any:
     return builder.fsub(*values)
 
 
-@lower_builtin(operator.mul, types.Float, VectorType)
+@lower_builtin(operator.mul, VectorType, VectorType)
 def multiply(_: Any, builder: Any, __: Any, values: Any) -> Any:
+    """Generate the product of two vectors."""
+    return builder.fmul(*values)
+
+
+@lower_builtin(operator.mul, types.Float, VectorType)
+def scale(_: Any, builder: Any, __: Any, values: Any) -> Any:
     """Generate a number times a vector."""
     number, vector = values
     return builder.fmul(_repeated(builder, number), vector)
@@ -81,7 +89,7 @@ def zeros(_: Any) -> Any:
 
 @intrinsic
 def load(_: Any, array: Any, at: Any) -> Any:
-    """Return the eight numbers of an array that begin with number ``at``."""
+    """Return the numbers of an array, of any shape, that begin with number ``at``."""
 
     def generate(context: Any, builder: Any, kind: Any, values: Any) -> Any:
         place = _place(context, builder, kind.args[0], *values)
@@ -92,7 +100,7 @@ def load(_: Any, array: Any, at: Any) -> Any:
 
 @intrinsic
 def store(_: Any, array: Any, at: Any, vector: Any) -> Any:
-    """Write the eight numbers of an array that begin with number ``at``."""
+    """Write the numbers of an array, of any shape, that begin with number ``at``."""
 
     def generate(context: Any, builder: Any, kind: Any, values: Any) -> Any:
         place = _place(context, builder, kind.args[0], *values[:2])
@@ -103,22 +111,34 @@ def store(_: Any, array: Any, at: Any, vector: Any) -> Any:
 
 
 @intrinsic
-def dot(_: Any, first: Any, second: Any) -> Any:
-    """Return the scalar product of two vectors, summed by halves."""
+def entry(_: Any, array: Any, at: Any) -> Any:
+    """Return number ``at`` of an array of any shape."""
 
     def generate(context: Any, builder: Any, kind: Any, values: Any) -> Any:
-        total, length = builder.fmul(*values), WIDTH
+        array, at = values
+        data = context.make_array(kind.args[0])(context, builder, array).data
+        return builder.load(builder.gep(data, [at]))
+
+    return types.float64(array, at), generate
+
+
+@intrinsic
+def total(_: Any, vector: Any) -> Any:
+    """Return the sum of the entries of a vector, by halves."""
+
+    def generate(context: Any, builder: Any, kind: Any, values: Any) -> Any:
+        left, length = values[0], WIDTH
         while length > 1:
             length //= 2
-            nothing = ir.Constant(total.type, ir.Undefined)
+            nothing = ir.Constant(left.type, ir.Undefined)
             low, high = (
-                builder.shuffle_vector(total, nothing, _numbers(range(start, start + length)))
+                builder.shuffle_vector(left, nothing, _numbers(range(start, start + length)))
                 for start in (0, length)
             )
-            total = builder.fadd(low, high)
-        return builder.extract_element(total, ir.Constant(ir.IntType(32), 0))
+            left = builder.fadd(low, high)
+        return builder.extract_element(left, ir.Constant(ir.IntType(32), 0))
 
-    return types.float64(first, second), generate
+    return types.float64(vector), generate
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, at: Any) -> Any:

@@ -20,16 +20,17 @@ def spare(engine, before):
     work, model = engine.work, engine.model
     k, count = model.dimension, int(work.island_start[-1])
     p, share = cp.Variable((count, 2)), cp.Variable()
-    sums = {i: work.mass[i] @ (work.v_free[i] - before[i]) for i in np.flatnonzero(work.awake)}
+    sums = {i: work.mass[i] @ (work.v_free[i, :k] - before[i]) for i in np.flatnonzero(work.awake)}
     rules = [share <= 1]
     for b in range(count):
         rows, owner = max(1, work.block_rows[b]), work.pressing[b]
-        J, bodies = work.jacobian[b, :rows], [i for i in work.block_bodies[b] if i >= 0]
+        J = work.jacobian[b, :rows].reshape(rows, 2, -1)
+        bodies = [i for i in work.block_bodies[b] if i >= 0]
         for side, i in enumerate(bodies):
             if i in sums:
-                sums[i] = sums[i] + J[:, k * side : k * side + k].T @ p[b, :rows]
+                sums[i] = sums[i] + J[:, side, :k].T @ p[b, :rows]
         if work.block_rows[b] == 0:
-            ends = [J[0, k * side : k * side + k] @ before[i] for side, i in enumerate(bodies)]
+            ends = [J[0, side, :k] @ before[i] for side, i in enumerate(bodies)]
             opens = sum(ends) + work.offset[b, 0] > 1e-2
             rules.append(p[b, 0] == 0 if opens else p[b, 0] >= 0)
             continue
