@@ -66,8 +66,12 @@ class Model(NamedTuple):
     lanes: Annotated[Any, whole()]  # K: coordinates of a body, and zeros up to whole vectors
     force_kernel: Annotated[Any, whole()]  # address: upper triangle of M, F, applied forces, loads
     slip_kernel: Annotated[Any, whole()]  # address: slip velocities
+    contact_room: Annotated[Any, whole()]  # C: contacts between bodies for which there is room
+    neighbour_room: Annotated[Any, whole()]  # P: pairs of neighbours
+    event_room: Annotated[Any, whole()]  # E: events
     parameters: Annotated[Any, real("*")]  # of all kernels
     loads: Annotated[Any, whole()]  # number of known loads
+    frictions: Annotated[Any, whole()]  # F: friction contacts of a body with its surroundings
     slip_start: Annotated[Any, whole("F+1")]  # first slip row of each friction contact
     friction_sets: Annotated[Any, whole("F 2")]  # static and dynamic set
     pressing_gap: Annotated[Any, whole("F")]  # gap whose contact presses, or -1
@@ -77,6 +81,7 @@ class Model(NamedTuple):
     set_sizes: Annotated[Any, real("* 4")]
     first_vertex: Annotated[Any, whole("*")]  # of each set, and one more
     vertices: Annotated[Any, real("* 2")]  # of polygons
+    gap_kernels: Annotated[Any, whole()]  # kernels of a body's gaps
     gap_calls: Annotated[
         Any, whole("* 6")
     ]  # address, variables, outputs; first read, row, parameter
@@ -87,8 +92,10 @@ class Model(NamedTuple):
     pair_kernel: Annotated[Any, whole()]  # address: gaps of a pair, or 0
     pair_values: Annotated[Any, whole()]  # address: gaps without gradients
     pair_parameters: Annotated[Any, whole()]  # their first parameter
+    pair_inputs: Annotated[Any, whole()]  # coordinates that they read
     pair_reads: Annotated[Any, whole("* 2")]  # body 0 or 1, coordinate
     pair_gaps: Annotated[Any, whole()]  # number of gaps of a pair
+    pair_rubs: Annotated[Any, whole()]  # whether there is friction between bodies
     pair_slips: Annotated[Any, whole("* 3")]  # address, whether bodies are exchanged, parameters
     pair_sets: Annotated[Any, whole("2")]  # static and dynamic set
     pair_cause: Annotated[Any, whole()]  # cause under which dissipation between bodies is booked

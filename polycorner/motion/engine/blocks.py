@@ -206,7 +206,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
         work.impulse[b, 0] = state.normal[i, g] * share
         finish_block(model, state, work, b)
-    for f in range(model.friction_sets.shape[0]):
+    for f in range(model.frictions):
         pressing = model.pressing_gap[f]
         if (pressing < 0 and work.load[i, f] <= 0.0) or (pressing >= 0 and block_of[pressing] < 0):
             state.friction[i, f, 0], state.friction[i, f, 1] = 0.0, 0.0
@@ -263,11 +263,11 @@ def add_pair_blocks(model, state, work, contact, h, count):
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]
     finish_block(model, state, work, n)
-    if model.pair_slips.shape[0] == 0:
+    if not model.pair_rubs:
         return count + 1
     address, p0 = model.pair_slips[g, 0], model.pair_slips[g, 2]
     first, second = (j, i) if model.pair_slips[g, 1] else (i, j)
-    reads = model.pair_reads.shape[0]
+    reads = model.pair_inputs
     for a in range(reads):
         body = first if model.pair_reads[a, 0] == 0 else second
         scratch[a] = work.q_mid[body, model.pair_reads[a, 1]]
@@ -316,6 +316,6 @@ def assemble_blocks(model, state, work, h, contacts):
             first, second = work.contact[contact, 0], work.contact[contact, 1]
             evaluate_pair_gaps(model, work, first, second, work.q_next)
             for g in range(model.pair_gaps):
-                work.pair_gap_next[g] = work.scratch[model.pair_reads.shape[0] + g]
+                work.pair_gap_next[g] = work.scratch[model.pair_inputs + g]
         blocks = add_pair_blocks(model, state, work, contact, h, blocks)
     return blocks

@@ -134,7 +134,7 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
     if model.pair_kernel != 0:
         size, count = keep_contacts(model, state, work, log, C, h, time, count)
         add_contacts(model, state, work, C, size, share)
-        sort_contacts(state, state.counts[CONTACTS])
+        sort_contacts(model, state, state.counts[CONTACTS])
     return count
 
 
@@ -177,7 +177,7 @@ def add_contacts(model, state, work, C, size, share):
             p = state.pair_impulse[size, 0]
             state.pair_action[size, a] = work.jacobian[b, 0, a] * p
             state.pair_action[size, k + a] = work.jacobian[b, 0, K + a] * p
-        if model.pair_slips.shape[0] > 0:
+        if model.pair_rubs:
             f = b + 1
             state.pair_flags[size, 0] = 1 if sticks(model, work, f) else 0
             one, two = ZERO, K
@@ -208,7 +208,7 @@ def listed(model, work, C, key):
 
 
 @compiled
-def sort_contacts(state, size):
+def sort_contacts(model, state, size):
     """Sort contacts by key, by insertion: they are nearly sorted already."""
     for s in range(1, size):
         t = s
@@ -221,7 +221,7 @@ def sort_contacts(state, size):
                 x = state.pair_impulse[t, a]
                 state.pair_impulse[t, a] = state.pair_impulse[t - 1, a]
                 state.pair_impulse[t - 1, a] = x
-            for a in range(state.pair_action.shape[1]):
+            for a in range(2 * model.dimension):
                 x = state.pair_action[t, a]
                 state.pair_action[t, a] = state.pair_action[t - 1, a]
                 state.pair_action[t - 1, a] = x

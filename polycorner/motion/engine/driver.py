@@ -105,7 +105,11 @@ class Engine:
 
     def _allocate(self) -> None:
         """Allocate the workspace, and tell compiled code where everything is."""
-        self.work, self.log = allocate(Work, self._sizes), allocate(Log, self._sizes)
+        sizes = self._sizes
+        self.work, self.log = allocate(Work, sizes), allocate(Log, sizes)
+        self.model = self.model._replace(
+            contact_room=sizes.C, neighbour_room=sizes.P, event_room=sizes.E
+        )
         records = self.model, self.motion, self.work, self.log
         self._tables = [table_of(record) for record in records]
         self._addresses = np.array([table.ctypes.data for table in self._tables])

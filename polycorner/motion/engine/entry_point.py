@@ -19,9 +19,9 @@ NEW = r" (captures|range)\([^)]*\)"  # properties of arguments that older versio
 def advance(model, state, work, log, steps):
     """Advance by several steps; return why it stopped, and how many steps and events."""
     count = ZERO
-    most = 2 * work.contact.shape[0] + model.bodies * (3 + model.restitution.size)
+    most = 2 * model.contact_room + model.bodies * (3 + model.restitution.size)
     for done in range(steps):
-        if count + most > log.entries.shape[0]:
+        if count + most > model.event_room:
             return EVENTS_FULL, done, count
         why, count = step(model, state, work, log, count)
         if why != DONE:

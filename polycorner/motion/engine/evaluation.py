@@ -27,7 +27,7 @@ def evaluate_forces(model, work, i, v, h):
     call_kernel(model.force_kernel, start, base, start + 8 * f0, start, start)
     upper = k * (k + 1) // 2
     if not (model.constant_mass and work.mass[i, 0, 0] > 0.0):
-        invert(scratch[f0 : f0 + upper], k, work.mass[i], work.inverse_mass[i])
+        invert(scratch, f0, k, work.mass[i], work.inverse_mass[i])
     at = f0 + upper
     for c in range(k):
         work.force[i, c] = h * scratch[at + c]
@@ -53,7 +53,7 @@ def random_impulse(model, i, c, h, time, index):
 @compiled
 def evaluate_body(model, state, work, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, F = model.dimension, model.friction_sets.shape[0]
+    k, F = model.dimension, model.frictions
     scratch, f0 = work.scratch, 2 * k
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
     for c in range(k):
@@ -157,7 +157,7 @@ def evaluate_gaps(model, work, i, q, gap, gradient):
     """Evaluate the gaps between a body and its surroundings, and their gradients."""
     scratch = work.scratch
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
-    for call in range(model.gap_calls.shape[0]):
+    for call in range(model.gap_kernels):
         address, n, m = model.gap_calls[call, 0], model.gap_calls[call, 1], model.gap_calls[call, 2]
         r0, w0, p0 = model.gap_calls[call, 3], model.gap_calls[call, 4], model.gap_calls[call, 5]
         for a in range(n):
@@ -192,7 +192,7 @@ def evaluate_pair_gaps(model, work, a, b, q):
 @compiled
 def call_pair_kernel(model, work, kernel, a, b, q):
     """Call a kernel for two bodies."""
-    scratch, n, m = work.scratch, model.pair_reads.shape[0], model.pair_gaps
+    scratch, n, m = work.scratch, model.pair_inputs, model.pair_gaps
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
     for r in range(n):
         body = a if model.pair_reads[r, 0] == 0 else b

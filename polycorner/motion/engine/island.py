@@ -237,7 +237,7 @@ def correct_curvature(model, state, work, blocks, h):
                 evaluate_pair_gaps(model, work, i, j, work.q_next)
             first, second = i, j
             gap = work.contact_gap[work.origin[b, 1]]
-            following = work.scratch[model.pair_reads.shape[0] + g]
+            following = work.scratch[model.pair_inputs + g]
         if work.bilateral[b]:
             found = bend_equation(model, work, b, gap, following, h) or found
             continue

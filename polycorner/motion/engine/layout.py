@@ -33,6 +33,7 @@ def model_of(
         "bodies": bodies.count,
         "dimension": bodies.dimension,
         "lanes": sizes.K,
+        **dict.fromkeys(("contact_room", "neighbour_room", "event_room"), 0),  # not yet known
         "force_kernel": formulation.forces.kernel.compiled(0).point,
         "loads": formulation.loads,
         "units": body.units,
@@ -107,6 +108,7 @@ def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:
         source[list(contact.loads)] = 1
     return {
         "slip_kernel": formulation.slip.kernel.compiled(1).point if contacts else 0,
+        "frictions": len(contacts),
         "slip_start": np.cumsum([0, *(contact.rows for contact in contacts)]),
         "friction_sets": [[sets.add(c.static), sets.add(c.dynamic)] for c in contacts],
         "pressing_gap": [contact.gap for contact in contacts],
@@ -131,7 +133,12 @@ def _gaps(calls: Sequence[Call], rows: int, parameters: list[float]) -> dict[str
         reads += call.reads
         places += [row_of.get(column, -1) for column in range(kernel.outputs)]
         parameters += call.parameters.tolist()
-    return {"gap_calls": table, "gap_reads": [*reads, 0], "gap_rows": [*places, 0]}
+    return {
+        "gap_kernels": len(table),
+        "gap_calls": table,
+        "gap_reads": [*reads, 0],
+        "gap_rows": [*places, 0],
+    }
 
 
 def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> dict[str, Any]:
@@ -142,7 +149,9 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
             "pair_kernel",
             "pair_values",
             "pair_parameters",
+            "pair_inputs",
             "pair_gaps",
+            "pair_rubs",
             "pair_cause",
             "pair_restitution",
         )
@@ -158,8 +167,10 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
         "pair_kernel": family.gaps.kernel.compiled(1).point,
         "pair_values": family.gaps.kernel.compiled(0).point,
         "pair_parameters": first,
+        "pair_inputs": len(family.reads),
         "pair_reads": family.reads,
         "pair_gaps": len(family.gaps.names),
+        "pair_rubs": bool(slips),
         "pair_slips": slips,
         "pair_sets": [sets.add(family.static), sets.add(family.dynamic)],
         "pair_cause": bodies.causes.index(RUBBING) if family.slips else 0,

@@ -7,14 +7,13 @@ from polycorner.motion.engine.jit import compiled
 
 
 @compiled
-def invert(upper, k, mass, out):
-    """Invert a symmetric positive definite matrix, given by its upper triangle row by row.
+def invert(upper, at, k, mass, out):
+    """Invert a symmetric positive definite matrix; its upper triangle begins at ``upper[at]``.
 
     The result is not a number where the matrix is not definite.
     """
     never_inline()
     diagonal = True
-    at = 0
     for i in range(k):
         for j in range(i, k):
             out[i, j] = out[j, i] = upper[at]

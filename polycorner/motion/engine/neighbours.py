@@ -92,7 +92,7 @@ def list_neighbours(model, state, work, h, time):
                 break
             across = position[j, 0] - position[i, 0]
             if state.alive[j] and across * across + along * along < far * far:
-                if count == work.neighbours.shape[0]:
+                if count == model.neighbour_room:
                     return False
                 found[count] = min(i, j) * N + max(i, j)
                 count += 1
@@ -111,13 +111,13 @@ def detect_pair(model, state, work, slot, limit, share, count):
     """
     a, b, least = work.neighbours[slot, 0], work.neighbours[slot, 1], np.inf
     k, scratch = model.dimension, work.scratch
-    n, m = model.pair_reads.shape[0], model.pair_gaps
+    n, m = model.pair_inputs, model.pair_gaps
     evaluate_pair(model, work, a, b, work.q_mid)
     for g in range(m):
         least = min(least, scratch[n + g])
         if scratch[n + g] < limit:
             # contacts between sleepers, which are kept, need room as well
-            if count + state.counts[CONTACTS] >= work.contact.shape[0]:
+            if count + state.counts[CONTACTS] >= model.contact_room:
                 return -1
             work.contact[count, 0], work.contact[count, 1], work.contact[count, 2] = a, b, g
             work.contact_gap[count] = scratch[n + g]

@@ -47,7 +47,7 @@ def gaps_at(model, work, base, velocity, i, j, t, row):
     for c in range(k):
         work.q_path[j, c] = base[j, c] + t * velocity[j, c]
     evaluate_pair(model, work, i, j, work.q_path)
-    n, m = model.pair_reads.shape[0], model.pair_gaps
+    n, m = model.pair_inputs, model.pair_gaps
     for g in range(m):
         gap[g], rate[g] = work.scratch[n + g], 0.0
         for r in range(n):

@@ -6,6 +6,9 @@ Reading ``record.name`` loads what it needs from there; the loads are marked inv
 do not change while compiled code runs.  To call a function so costs one argument for each record,
 not one for each length of some 140 arrays.
 
+The first length of an array is not told: Numba adds it to indices below zero, of which there are
+none; added as zero, it vanishes from the machine code.
+
 The number of a body's coordinates may be known when code is compiled: then it is a constant, and so
 are the lengths that follow from it, and loops over coordinates are unrolled.
 """
@@ -86,7 +89,7 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
 
     if not isinstance(held, types.Array):
         return load(slot, context.get_value_type(held))
-    word = ir.IntType(64)
+    word, unused = ir.IntType(64), ir.Constant(ir.IntType(64), 1 << 40)
     known = [record.known.get(length, length) for length in record.shapes[name]]
     shape = [
         ir.Constant(word, int(length)) if str(length).isdigit() else load(slot + 1 + axis)
@@ -100,7 +103,7 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
         "nitems": stride,
         "itemsize": strides[-1],
         "data": load(slot, context.get_data_type(held.dtype).as_pointer()),
-        "shape": cgutils.pack_array(builder, shape, word),
+        "shape": cgutils.pack_array(builder, [unused, *shape[1:]], word),
         "strides": cgutils.pack_array(builder, strides, word),
     }
     model = context.data_model_manager[held]

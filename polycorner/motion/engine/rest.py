@@ -45,7 +45,7 @@ def compliance(model, work, lam, i, g):
 @compiled
 def find_rest_velocity(model, work, lam, i, out):
     """Find the velocity at which no loaded contact slips or opens; return whether there is one."""
-    k, F = model.dimension, model.friction_sets.shape[0]
+    k, F = model.dimension, model.frictions
     A = work.body_matrix
     for c in range(k):
         out[c] = 0.0
@@ -83,7 +83,7 @@ def keeps_contacts(model, work, lam, i, v):
                 size += abs(work.gradient[i, g, c] * v[c])
             if abs(value) > 1e-11 * size:
                 return False
-    for f in range(model.friction_sets.shape[0]):
+    for f in range(model.frictions):
         if load_of(model, work, lam, i, f) > 0.0:
             for r in range(model.slip_start[f], model.slip_start[f + 1]):
                 value = work.slip_offset[i, r]
@@ -118,7 +118,7 @@ def balances(model, state, work, i, others, again, slack):
     sets, up to a relative slack, it proves that the body remains at rest.  It is left in
     ``work.proof_friction`` and ``work.proof_normal``.
     """
-    k, F, m = model.dimension, model.friction_sets.shape[0], model.restitution.size
+    k, F, m = model.dimension, model.frictions, model.restitution.size
     A, r = work.body_matrix, work.body_vector
     lam, friction = work.proof_normal, work.proof_friction
     for c in range(k):
@@ -176,7 +176,7 @@ def comes_to_rest(model, state, work, i, rest):
     that it remains at rest.
     """
     k = model.dimension
-    for f in range(model.friction_sets.shape[0]):
+    for f in range(model.frictions):
         if load_of(model, work, state.normal, i, f) > 0.0 and not state.sticks[i, f]:
             return False
     if not find_rest_velocity(model, work, state.normal, i, rest):

@@ -90,7 +90,7 @@ def stays_asleep(model, state, work, i, others, h, time, index):
     steps = index - state.booked_to[i]
     if steps > 0:  # by the trapezoidal rule, if there is a new value
         share = 0.5 * steps if asleep else 0.0
-        for f in range(model.friction_sets.shape[0]):
+        for f in range(model.frictions):
             for r in range(model.slip_start[f + 1] - model.slip_start[f]):
                 before, now = state.booked_friction[i, f, r], work.proof_friction[i, f, r]
                 p = (steps - share) * before + share * now
@@ -111,7 +111,7 @@ def stays_asleep(model, state, work, i, others, h, time, index):
 def next_check(model, state, work, i, h, index):
     """Return the step in which a sleeper is checked again."""
     rate = 0.0
-    for f in range(model.friction_sets.shape[0]):
+    for f in range(model.frictions):
         load = load_of(model, work, work.proof_normal, i, f)
         if load <= 0.0:
             continue
@@ -203,7 +203,7 @@ def settle(model, state, work, h, index):
             if not work.awake[i]:
                 state.booked_to[i] = index + 1
                 state.check_due[i] = next_check(model, state, work, i, h, index)
-            for f in range(model.friction_sets.shape[0]):
+            for f in range(model.frictions):
                 for r in range(2):
                     state.friction[i, f, r] = work.proof_friction[i, f, r]
                     state.booked_friction[i, f, r] = work.proof_friction[i, f, r]

@@ -114,7 +114,7 @@ def book_work(model, state, work, blocks, h):
             state.sums[APPLIED_WORK] += mean * work.applied[i, c]
             state.sums[NOISE_WORK] += mean * work.kick[i, c]
         if not work.awake[i] and work.evaluated[i]:
-            for f in range(model.friction_sets.shape[0]):
+            for f in range(model.frictions):
                 for r in range(model.slip_start[f + 1] - model.slip_start[f]):
                     drift = work.slip_offset[i, model.slip_start[f] + r]
                     state.sums[SUBSTRATE_WORK] -= work.proof_friction[i, f, r] * drift
