@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
@@ -45,6 +45,7 @@ def chord(centre, radius, start, velocity):
     st.floats(1e-3, 3.0),
     st.sampled_from([0.0, 0.4, 1.0]),
 )
+@example(1.0, 0.0, 1.0, 0.5, 0.0)  # touches in the middle of a step, and again a step later
 def test_a_particle_meets_a_pin_or_flies_past(radius, height, speed, dt, e):
     """It is deflected if and only if it touches: where, when and into which direction."""
     start, velocity = np.array([-2.0, height]), np.array([speed, 0.0])

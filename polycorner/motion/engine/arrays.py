@@ -166,18 +166,18 @@ class Work(NamedTuple):
     applied: Annotated[Any, real("N k")]  # that of the applied forces among them
     kick: Annotated[Any, real("N k")]  # random impulse
     inverse_mass: Annotated[Any, real("N k K")]
-    slip_rows: Annotated[Any, real("N R k")]  # Jacobian of the slip velocities
+    slip_rows: Annotated[Any, real("N R K")]  # Jacobian of the slip velocities
     slip_offset: Annotated[Any, real("N R")]  # slip velocity at zero velocity
     load: Annotated[Any, real("N F")]  # known normal impulse
     gap: Annotated[Any, real("N m", initial=np.inf)]
-    gradient: Annotated[Any, real("N m k")]  # of the gaps
+    gradient: Annotated[Any, real("N m K")]  # of the gaps
     q_next: Annotated[Any, real("N k")]  # prediction for the next midpoint
     gap_next: Annotated[Any, real("N m")]  # gaps there
-    gradient_next: Annotated[Any, real("N m k")]
+    gradient_next: Annotated[Any, real("N m K")]
     pair_gap_next: Annotated[Any, real("G")]
     q_path: Annotated[Any, real("N k")]  # coordinates on the way
     gap_path: Annotated[Any, real("N m")]  # gaps there
-    gradient_path: Annotated[Any, real("N m k")]
+    gradient_path: Annotated[Any, real("N m K")]
     way_gap: Annotated[Any, real("6 Y")]  # gaps of a body or of two, at places on the way
     way_rate: Annotated[Any, real("6 Y")]  # their rates
     waits: Annotated[Any, whole("N")]  # whether a body is left as it is for the time being
@@ -216,7 +216,7 @@ class Work(NamedTuple):
     contact_gap: Annotated[Any, real("C")]
     contact_before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
     contact_impulse: Annotated[Any, real("C 3")]  # initial impulses
-    contact_gradient: Annotated[Any, real("C 2*k")]
+    contact_gradient: Annotated[Any, real("C 2*K")]
     block_bodies: Annotated[Any, whole("B 2")]  # the second is -1 for the surroundings
     block_rows: Annotated[Any, whole("B")]  # rows of friction; 0 for a unilateral contact
     bilateral: Annotated[Any, whole("B")]  # whether a block is an equation
@@ -234,7 +234,7 @@ class Work(NamedTuple):
     delassus: Annotated[Any, real("B 4")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm of W
     impulse: Annotated[Any, real("B 2")]
     order: Annotated[Any, whole("B")]  # blocks, island after island
-    mass: Annotated[Any, real("N k k")]
+    mass: Annotated[Any, real("N k K")]
     reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
     bounces: Annotated[Any, whole("B")]  # whether a contact bounces
     release: Annotated[Any, real("B")]  # when its normal impulse would vanish

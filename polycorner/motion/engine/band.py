@@ -20,21 +20,22 @@ def number_bodies(model, state, work, first, last):
     """
     n, done = ZERO, ZERO
     members, local, ring, chain = work.members, work.number, work.first_side, work.next_side
-    lowest = NONE
+    lowest, known = NONE, NONE
     for s in range(first, last):
         for side in range(2):
             i = work.block_bodies[work.order[s], side]
-            if i >= 0:
-                local[i], ring[i] = NONE, NONE
-                along = state.q[i, model.position[1]]
-                if work.awake[i] and (lowest < 0 or along < state.q[lowest, model.position[1]]):
-                    lowest = i
+            if i < 0 or i == known:
+                continue
+            known, local[i], ring[i] = i, NONE, NONE
+            along = state.q[i, model.position[1]]
+            if work.awake[i] and (lowest < 0 or along < state.q[lowest, model.position[1]]):
+                lowest = i
     for s in range(last - 1, first - 1, -1):
         b = work.order[s]
-        for side in range(2):
-            i = work.block_bodies[b, side]
-            if i >= 0 and work.block_rows[b] == 0:
-                chain[b, side], ring[i] = ring[i], 2 * b + side
+        i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+        if j >= 0 and work.block_rows[b] == 0:
+            chain[b, 1], ring[j] = ring[j], 2 * b + 1
+            chain[b, 0], ring[i] = ring[i], 2 * b
     members[0], local[lowest], n = lowest, ZERO, ONE
     while done < n:
         at = ring[members[done]]
@@ -185,8 +186,8 @@ def assemble_mass(model, work, n, weight):
             if x >= k:
                 A[line + at * K + x] = 1.0
                 continue
-            for y in range(k):
-                A[line + at * K + y] = weight * work.mass[i, x, y]
+            for c in range(0, K, WIDTH):
+                store(A, line + at * K + c, weight * load(work.mass, (i * k + x) * K + c))
 
 
 @compiled

@@ -13,7 +13,13 @@ from polycorner.motion.engine.neighbours import (
     heap_sort,
     key_of,
 )
-from polycorner.motion.engine.rows import apply_impulse, row_at, row_times, rows_product
+from polycorner.motion.engine.rows import (
+    apply_impulse,
+    copy_lanes,
+    row_at,
+    row_times,
+    rows_product,
+)
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import entry, load, store, zeros
 
@@ -23,7 +29,7 @@ STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothi
 
 
 @compiled
-def finish_block(model, state, work, b):
+def finish_block(model, work, b):
     """Compute ``M^-1 J'``, the Delassus matrix and ``J v``, and apply the initial impulse."""
     rows, J, responses = max(1, work.block_rows[b]), work.jacobian, work.response
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
@@ -36,11 +42,12 @@ def finish_block(model, state, work, b):
             respond(model, work, at, model.lanes, j)
         apply_impulse(model, work, b, r, work.impulse[b, r])
     one, other = row_at(model, b, ZERO), row_at(model, b, ONE)
-    top = d00 = rows_product(model, J, one, responses, one)
+    sides = ONE if j < 0 else TWO
+    top = d00 = rows_product(model, J, one, responses, one, sides)
     d01 = d11 = 0.0
     if rows == 2:
-        d01 = rows_product(model, J, one, responses, other)
-        d11 = rows_product(model, J, other, responses, other)
+        d01 = rows_product(model, J, one, responses, other, sides)
+        d11 = rows_product(model, J, other, responses, other, sides)
         top = 0.5 * (d00 + d11) + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
     work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2] = d00, d01, d11
     work.delassus[b, 3] = 1.0 / top if top > 0.0 else 1.0
@@ -144,31 +151,26 @@ def is_independent(model, work, i, g):
 
 
 @compiled
-def new_block(model, work, b, first, second, rows):
-    """Initialise a block with a Jacobian of zeros."""
+def new_block(work, b, first, second, rows):
+    """Initialise a block without its Jacobian."""
     work.block_bodies[b, 0], work.block_bodies[b, 1], work.block_rows[b] = first, second, rows
     work.bilateral[b], work.pressing[b] = ZERO, -1
     work.block_load[b] = 0.0
     for r in range(2):
         work.offset[b, r] = 0.0
         work.impulse[b, r] = 0.0
-    for c in range(row_at(model, b, ZERO), row_at(model, b + 1, ZERO), WIDTH):
-        store(work.jacobian, c, zeros())
-        store(work.response, c, zeros())
 
 
 @compiled
 def add_body_blocks(model, state, work, i, h, limit, count):
     """Append the blocks of a body's contacts with its surroundings; return the block count."""
-    k, m, share = model.dimension, model.restitution.size, h / model.step
+    m, share = model.restitution.size, h / model.step
     block_of, predicted = work.own_block, False
     for g in range(m):
         block_of[g] = -1
-        before, free = 0.0, 0.0
-        for c in range(k):
-            before += work.gradient[i, g, c] * state.v[i, c]
-            free += work.gradient[i, g, c] * work.v_free[i, c]
-        gap = work.gap[i, g]
+        at, gap = (i * m + g) * model.lanes, work.gap[i, g]
+        before = row_times(model, work.gradient, at, work.v_old, i, NONE)
+        free = row_times(model, work.gradient, at, work.v_free, i, NONE)
         closed = state.touches[i, g] != 0
         close = gap + h * min(before, free, 0.0) < limit
         if work.located[0]:
@@ -184,9 +186,8 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         b = count
         count += 1
         block_of[g] = b
-        new_block(model, work, b, i, NONE, ZERO)
-        for c in range(k):
-            work.jacobian[b, 0, c] = work.gradient[i, g, c]
+        new_block(work, b, i, NONE, ZERO)
+        copy_lanes(model, work.gradient, at, work.jacobian, row_at(model, b, ZERO))
         change = 0.0
         if g >= model.unilateral:
             if h > STRAIGHT * model.step:
@@ -205,7 +206,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         work.block_load[b] = -change
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
         work.impulse[b, 0] = state.normal[i, g] * share
-        finish_block(model, state, work, b)
+        finish_block(model, work, b)
     for f in range(model.frictions):
         pressing = model.pressing_gap[f]
         if (pressing < 0 and work.load[i, f] <= 0.0) or (pressing >= 0 and block_of[pressing] < 0):
@@ -215,19 +216,19 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         b = count
         count += 1
         first = model.slip_start[f]
-        new_block(model, work, b, i, NONE, model.slip_start[f + 1] - first)
+        new_block(work, b, i, NONE, model.slip_start[f + 1] - first)
         for r in range(work.block_rows[b]):
             work.offset[b, r] = work.slip_offset[i, first + r]
             work.impulse[b, r] = state.friction[i, f, r] * share
-            for c in range(k):
-                work.jacobian[b, r, c] = work.slip_rows[i, first + r, c]
+            at = (i * model.slip_start[model.frictions] + first + r) * model.lanes
+            copy_lanes(model, work.slip_rows, at, work.jacobian, row_at(model, b, r))
         work.block_set[b] = model.friction_sets[f, 0 if state.sticks[i, f] else 1]
         if pressing >= 0:
             work.pressing[b] = block_of[pressing]
         else:
             work.block_load[b] = work.load[i, f]
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_FRICTION, i, f
-        finish_block(model, state, work, b)
+        finish_block(model, work, b)
     return count
 
 
@@ -236,21 +237,17 @@ def add_pair_blocks(model, state, work, contact, h, count):
     """Append the blocks of a contact between two bodies; return the block count."""
     k, K, scratch = model.dimension, model.lanes, work.scratch
     i, j, g = work.contact[contact, 0], work.contact[contact, 1], work.contact[contact, 2]
-    before, free = 0.0, 0.0
-    for c in range(k):
-        before += work.contact_gradient[contact, c] * state.v[i, c]
-        before += work.contact_gradient[contact, k + c] * state.v[j, c]
-        free += work.contact_gradient[contact, c] * work.v_free[i, c]
-        free += work.contact_gradient[contact, k + c] * work.v_free[j, c]
+    rows, at = work.contact_gradient, contact * 2 * K
+    before = row_times(model, rows, at, work.v_old, i, j)
+    free = row_times(model, rows, at, work.v_free, i, j)
     index, gap = work.contact_before[contact], work.contact_gap[contact]
     closed = index >= 0 and state.pair_flags[index, 1] != 0
     if work.located[0] and not acts(model, gap, before, model.pair_restitution, closed):
         return count
     n = count
-    new_block(model, work, n, i, j, ZERO)
-    for c in range(k):
-        work.jacobian[n, 0, c] = work.contact_gradient[contact, c]
-        work.jacobian[n, 0, K + c] = work.contact_gradient[contact, k + c]
+    new_block(work, n, i, j, ZERO)
+    copy_lanes(model, rows, at, work.jacobian, row_at(model, n, ZERO))
+    copy_lanes(model, rows, at + K, work.jacobian, row_at(model, n, ZERO) + K)
     change = 0.0
     if closed or not work.located[0]:
         change = curvature_change(gap, before, work.pair_gap_next[g], h, model.gap_unit)
@@ -262,7 +259,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     work.is_error[n] = closed and abs(gap + change) < TOUCHING * model.gap_unit
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]
-    finish_block(model, state, work, n)
+    finish_block(model, work, n)
     if not model.pair_rubs:
         return count + 1
     address, p0 = model.pair_slips[g, 0], model.pair_slips[g, 2]
@@ -277,7 +274,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     v0 = reads + 2 * k
     call_kernel(address, start, base + 8 * p0, start + 8 * v0, start + 8 * (v0 + 2), start)
     b = count + 1
-    new_block(model, work, b, first, second, TWO)
+    new_block(work, b, first, second, TWO)
     for r in range(2):
         value = scratch[v0 + r]
         for c in range(2 * k):
@@ -290,7 +287,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     work.block_set[b] = model.pair_sets[0 if stuck else 1]
     work.pressing[b] = n
     work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = PAIR_FRICTION, contact, g
-    finish_block(model, state, work, b)
+    finish_block(model, work, b)
     return count + 2
 
 

@@ -112,6 +112,14 @@ def rate_of(model, gradient, v, i, g):
 
 
 @compiled
+def open_gap(model, gap):
+    """Return a gap; one that just vanishes has to close by as much as curvature may close it."""
+    if gap > ZERO_GAP * model.gap_unit:
+        return gap
+    return gap + 2.0 * CURVATURE_DEPTH * model.gap_unit
+
+
+@compiled
 def body_misses(model, state, work, i, h):
     """Return whether a body crosses the boundary of an open gap, or sinks into a closed one.
 
@@ -132,7 +140,7 @@ def body_misses(model, state, work, i, h):
             continue
         rate = rate_of(model, work.gradient, work.v_new, i, g)
         after = rate_of(model, work.gradient_next, work.v_new, i, g)
-        if f > ZERO_GAP * unit and may_vanish(f, rate, following, after, h, deep):
+        if f > -ZERO_GAP * unit and may_vanish(open_gap(model, f), rate, following, after, h, deep):
             return True
         if not state.watched[i] and work.gap_path[i, g] > 0.0:
             before = rate_of(model, work.gradient_path, state.v, i, g)
@@ -154,7 +162,7 @@ def pair_misses(model, state, work, i, j, h):
         gaps_at(model, work, state.q, state.v, i, j, 0.5 * h, MIDDLE)
     for g in range(model.pair_gaps):
         f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
-        misses = f0 > zero and may_vanish(f0, rate0, f1, rate1, h, deep)
+        misses = f0 > -zero and may_vanish(open_gap(model, f0), rate0, f1, rate1, h, deep)
         if not watched and not misses:
             f0, rate0, f1, rate1 = gap[START, g], rate[START, g], gap[MIDDLE, g], rate[MIDDLE, g]
             misses = f0 > 0.0 and may_vanish(f0, rate0, f1, rate1, 0.5 * h, zero)

@@ -110,7 +110,7 @@ def detect_pair(model, state, work, slot, limit, share, count):
     The least of all its gaps is kept.
     """
     a, b, least = work.neighbours[slot, 0], work.neighbours[slot, 1], np.inf
-    k, scratch = model.dimension, work.scratch
+    K, scratch = model.lanes, work.scratch
     n, m = model.pair_inputs, model.pair_gaps
     evaluate_pair(model, work, a, b, work.q_mid)
     for g in range(m):
@@ -126,10 +126,10 @@ def detect_pair(model, state, work, slot, limit, share, count):
             for c in range(3):
                 before = state.pair_impulse[index, c] if index >= 0 else 0.0
                 work.contact_impulse[count, c] = before * share
-            for c in range(2 * k):
+            for c in range(2 * K):
                 work.contact_gradient[count, c] = 0.0
             for r in range(n):
-                c = model.pair_reads[r, 0] * k + model.pair_reads[r, 1]
+                c = model.pair_reads[r, 0] * K + model.pair_reads[r, 1]
                 work.contact_gradient[count, c] = scratch[n + m + g * n + r]
             count += 1
     work.least_gap[slot] = least

@@ -89,7 +89,7 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
 
     if not isinstance(held, types.Array):
         return load(slot, context.get_value_type(held))
-    word, unused = ir.IntType(64), ir.Constant(ir.IntType(64), 1 << 40)
+    word, unused = ir.IntType(64), ir.Constant(ir.IntType(64), 0)
     known = [record.known.get(length, length) for length in record.shapes[name]]
     shape = [
         ir.Constant(word, int(length)) if str(length).isdigit() else load(slot + 1 + axis)

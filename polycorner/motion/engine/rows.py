@@ -29,10 +29,10 @@ def row_times(model, rows, at, v, i, j):
 
 
 @compiled
-def rows_product(model, first, at, second, other):
-    """Return the product of two rows over two bodies."""
+def rows_product(model, first, at, second, other, sides):
+    """Return the product of two rows over so many bodies."""
     value = zeros()
-    for c in range(0, 2 * model.lanes, WIDTH):
+    for c in range(0, sides * model.lanes, WIDTH):
         value = value + load(first, at + c) * load(second, other + c)
     return total(value)
 
@@ -50,10 +50,16 @@ def add_row(model, rows, at, factor, v, i, j):
 
 
 @compiled
+def copy_lanes(model, source, at, target, to):
+    """Copy the numbers of one body from one array to another, from and to these places."""
+    for c in range(0, model.lanes, WIDTH):
+        store(target, to + c, load(source, at + c))
+
+
+@compiled
 def copy_velocity(model, source, target, i):
     """Copy the velocity of body ``i``."""
-    for c in range(i * model.lanes, (i + 1) * model.lanes, WIDTH):
-        store(target, c, load(source, c))
+    copy_lanes(model, source, i * model.lanes, target, i * model.lanes)
 
 
 @compiled
