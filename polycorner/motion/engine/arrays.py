@@ -231,7 +231,7 @@ class Work(NamedTuple):
     after: Annotated[Any, real("B 2")]  # u after the step, as of the last residual
     jacobian: Annotated[Any, real("B 2 2*K")]  # J: K numbers for each of two bodies
     response: Annotated[Any, real("B 2 2*K")]  # M^-1 J'
-    delassus: Annotated[Any, real("B 4")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm of W
+    delassus: Annotated[Any, real("B 5")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm; norm
     impulse: Annotated[Any, real("B 2")]
     order: Annotated[Any, whole("B")]  # blocks, island after island
     mass: Annotated[Any, real("N k K")]
@@ -246,6 +246,7 @@ class Work(NamedTuple):
     derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows
     projection: Annotated[Any, real("B 6")]  # of the natural map, and its derivative by rows
     constant: Annotated[Any, real("B 2")]  # a of the Newton step dp = a - G J dv
+    along: Annotated[Any, real("B")]  # J dv of a block's first row
     schur_row: Annotated[Any, real("B 2*K")]  # normal after elimination of friction
     load_slope: Annotated[Any, real("B 2")]  # change of friction with its load
     body_matrix: Annotated[Any, real("k k")]

@@ -7,7 +7,7 @@ in ``work.band``.  Four rows are eliminated at a time, in vectors.
 
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
-from polycorner.motion.engine.rows import add_row, row_at, row_times
+from polycorner.motion.engine.rows import add_rows, row_at, row_times
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import entry, load, store, total, zeros
 
@@ -237,10 +237,10 @@ def add_columns(model, work, x, y, d, rows, at, weighted):
 
 
 @compiled
-def add_transposed_row(model, work, b, r, value, target):
-    """Add ``value J'`` of one row to a vector over the bodies of an island."""
+def add_transposed(model, work, b, f, g, target):
+    """Add ``J' (f, g)`` of a block to a vector over the bodies of its island."""
     x, y = numbers_of(work, b)
-    add_row(model, work.jacobian, row_at(model, b, r), value, target, x, y)
+    add_rows(model, work, work.jacobian, b, f, g, target, x, y)
 
 
 @compiled

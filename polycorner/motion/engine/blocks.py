@@ -14,7 +14,7 @@ from polycorner.motion.engine.neighbours import (
     key_of,
 )
 from polycorner.motion.engine.rows import (
-    apply_impulse,
+    apply_impulses,
     copy_lanes,
     row_at,
     row_times,
@@ -40,7 +40,7 @@ def finish_block(model, work, b):
         respond(model, work, at, ZERO, i)
         if j >= 0:
             respond(model, work, at, model.lanes, j)
-        apply_impulse(model, work, b, r, work.impulse[b, r])
+    apply_impulses(model, work, b, work.impulse[b, 0], work.impulse[b, 1])
     one, other = row_at(model, b, ZERO), row_at(model, b, ONE)
     sides = ONE if j < 0 else TWO
     top = d00 = rows_product(model, J, one, responses, one, sides)
@@ -50,7 +50,8 @@ def finish_block(model, work, b):
         d11 = rows_product(model, J, other, responses, other, sides)
         top = 0.5 * (d00 + d11) + np.sqrt((0.5 * (d00 - d11)) ** 2 + d01 * d01)
     work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2] = d00, d01, d11
-    work.delassus[b, 3] = 1.0 / top if top > 0.0 else 1.0
+    top = top if top > 0.0 else 1.0
+    work.delassus[b, 3], work.delassus[b, 4] = 1.0 / top, top
 
 
 @compiled

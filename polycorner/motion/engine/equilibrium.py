@@ -6,7 +6,7 @@ from polycorner.motion.engine.arrays import NEWTON_STEPS
 from polycorner.motion.engine.band import (
     add_block,
     add_columns,
-    add_transposed_row,
+    add_transposed,
     assemble_mass,
     number_bodies,
     numbers_of,
@@ -142,7 +142,7 @@ def assemble_interior(model, work, first, last, n, speed):
             x00, x01, x11 = out[8] / determinant, -out[7] / determinant, out[6] / determinant
         derivative[b, 4], derivative[b, 5], derivative[b, 7], derivative[b, 8] = x00, x01, x01, x11
         constant[b, 0], constant[b, 1] = out[1], out[2]
-        stiffest = max(stiffest, max(x00, x11) / work.delassus[b, 3])
+        stiffest = max(stiffest, max(x00, x11) * work.delassus[b, 4])
         if pressing < 0:
             continue
         t0, t1 = x00 * out[4] + x01 * out[5], x01 * out[4] + x11 * out[5]
@@ -170,9 +170,7 @@ def assemble_interior(model, work, first, last, n, speed):
             g0, g1 = constant[b, 0], constant[b, 1]
             p0 = derivative[b, 4] * g0 + derivative[b, 5] * g1
             p1 = derivative[b, 7] * g0 + derivative[b, 8] * g1
-            add_transposed_row(model, work, b, ZERO, p0, x)
-            if work.block_rows[b] == 2:
-                add_transposed_row(model, work, b, ONE, p1, x)
+            add_transposed(model, work, b, p0, p1, x)
         else:
             add_schur_complement(model, work, b)
 
@@ -264,8 +262,7 @@ def interior_point_steps(model, state, work, first, last, n, speed, goal):
                 x[at * K + c] = 0.0
         for s in range(first, last):
             b = work.order[s]
-            for r in range(max(1, work.block_rows[b])):
-                add_transposed_row(model, work, b, r, -p[b, r], x)
+            add_transposed(model, work, b, -p[b, 0], -p[b, 1], x)
         for at in range(n):
             i = work.members[at]
             for c in range(k):

@@ -21,7 +21,8 @@ def linearise_block(work, b, softness, compliance):
     if p - rho * u[0] <= 0.0 and not work.bilateral[b]:
         derivative[b, 4], constant[b, 0] = 0.0, -p
     else:
-        derivative[b, 4], constant[b, 0] = rho / softness, -rho * u[0] / softness
+        stiffness = rho / softness
+        derivative[b, 4], constant[b, 0] = stiffness, -stiffness * u[0]
 
 
 @compiled
@@ -40,6 +41,7 @@ def change_impulses(work, b, normal, along, across, change):
     ``change`` gets what is added.
     """
     derivative, pressing, rows = work.derivative, work.pressing[b], max(1, work.block_rows[b])
+    change[1] = 0.0
     for r in range(rows):
         change[r] = work.constant[b, r] - derivative[b, 4 + 3 * r] * along
         if pressing >= 0:
@@ -62,21 +64,21 @@ def linearise_friction(work, b, softness, u):
     if d == 1:
         d01 = d10 = d11 = 0.0
     if pressing >= 0 and load > 0.0:  # the load changes as well
-        per_load = load if work.impulse[pressing, 0] > 0.0 else -load
-        change = work.constant[pressing, 0] / per_load
+        per_load = (1.0 if work.impulse[pressing, 0] > 0.0 else -1.0) / load
+        change = work.constant[pressing, 0] * per_load
         ex = out[0] - d00 * zx - d01 * zy
         ey = out[1] - d10 * zx - d11 * zy if d == 2 else 0.0
         fx -= ex * change
         fy -= ey * change
-        stiff = derivative[pressing, 4] / per_load
+        stiff = derivative[pressing, 4] * per_load
         ex *= stiff
         ey *= stiff
     else:
         ex = ey = 0.0
     # the inverse of 1 - D + softness
     s00, s11 = 1.0 + softness - d00, 1.0 + softness - d11
-    determinant = s00 * s11 - d01 * d10
-    i00, i01, i10, i11 = s11 / determinant, d01 / determinant, d10 / determinant, s00 / determinant
+    inverse = 1.0 / (s00 * s11 - d01 * d10)
+    i00, i01, i10, i11 = s11 * inverse, d01 * inverse, d10 * inverse, s00 * inverse
     derivative[b, 3], derivative[b, 6] = i00 * ex + i01 * ey, i10 * ex + i11 * ey
     derivative[b, 4] = rho * (i00 * d00 + i01 * d10)
     derivative[b, 5] = rho * (i00 * d01 + i01 * d11)

@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.motion.engine.band import (
     add_block,
-    add_transposed_row,
+    add_transposed,
     assemble_mass,
     row_product,
     solve_band,
@@ -16,7 +16,7 @@ from polycorner.motion.engine.gauss_seidel import (
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.linearisation import change_impulses, is_loaded, linearise_block
-from polycorner.motion.engine.rows import apply_impulse
+from polycorner.motion.engine.rows import apply_impulses
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import store, zeros
 
@@ -76,17 +76,16 @@ def take_step(model, work, first, last, n):
         b = work.order[s]
         if is_loaded(work, b):
             add_block(model, work, b)
-        for r in range(max(1, work.block_rows[b])):
-            add_transposed_row(model, work, b, r, work.constant[b, r], x)
+        add_transposed(model, work, b, work.constant[b, 0], work.constant[b, 1], x)
     if not solve_band(work.band, x, n, K, work.row_begin, work.row_end, work.line, work.factors):
         return False
     for s in range(first, last):
         b = work.order[s]
         pressing, change = work.pressing[b], work.slip
-        normal = row_product(model, work, pressing, ZERO, x) if pressing >= 0 else 0.0
         along = row_product(model, work, b, ZERO, x)
         across = row_product(model, work, b, ONE, x) if work.block_rows[b] == 2 else 0.0
+        work.along[b] = along
+        normal = work.along[pressing] if pressing >= 0 else 0.0
         change_impulses(work, b, normal, along, across, change)
-        for r in range(max(1, work.block_rows[b])):
-            apply_impulse(model, work, b, r, change[r])
+        apply_impulses(model, work, b, change[0], change[1])
     return True

@@ -50,6 +50,23 @@ def add_row(model, rows, at, factor, v, i, j):
 
 
 @compiled
+def add_rows(model, work, rows, b, f, g, v, i, j):
+    """Add ``f`` times the first row of a block and ``g`` times the second, if there is one."""
+    K, at, two = model.lanes, row_at(model, b, 0), work.block_rows[b] == 2
+    if not two:
+        add_row(model, rows, at, f, v, i, j)
+        return
+    for side in range(2):
+        body = j if side else i
+        if body < 0:
+            continue
+        for c in range(0, K, WIDTH):
+            first, second = at + side * K + c, at + (2 + side) * K + c
+            more = f * load(rows, first) + g * load(rows, second)
+            store(v, body * K + c, load(v, body * K + c) + more)
+
+
+@compiled
 def copy_lanes(model, source, at, target, to):
     """Copy the numbers of one body from one array to another, from and to these places."""
     for c in range(0, model.lanes, WIDTH):
@@ -82,8 +99,8 @@ def load_on(work, b):
 
 
 @compiled
-def apply_impulse(model, work, b, r, change):
-    """Add an impulse of one row to the velocities of its bodies."""
+def apply_impulses(model, work, b, along, across):
+    """Add impulses of the rows of a block to the velocities of its bodies."""
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-    if change != 0.0:
-        add_row(model, work.response, row_at(model, b, r), change, work.v_new, i, j)
+    if along != 0.0 or across != 0.0:
+        add_rows(model, work, work.response, b, along, across, work.v_new, i, j)

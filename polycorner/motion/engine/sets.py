@@ -70,8 +70,8 @@ def project(model, shape, x, y, load, out):
 @compiled
 def project_disc(x, y, radius, out):
     """Project a point outside a disc onto it."""
-    far = np.sqrt(x * x + y * y)
-    ux, uy, f = x / far, y / far, radius / far
+    inverse = 1.0 / np.sqrt(x * x + y * y)
+    ux, uy, f = x * inverse, y * inverse, radius * inverse
     out[0], out[1] = radius * ux, radius * uy
     out[2], out[3] = f * uy * uy, -f * ux * uy
     out[4], out[5] = out[3], f * ux * ux
