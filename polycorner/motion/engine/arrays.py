@@ -116,6 +116,7 @@ class Model(NamedTuple):
     sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island
     refines: Annotated[Any, whole()]  # whether bodies take shorter steps where they need them
     near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
+    near_many: Annotated[Any, real()]  # the same for bodies in a crowd
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
     time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
@@ -182,6 +183,7 @@ class Work(NamedTuple):
     way_rate: Annotated[Any, real("6 Y")]  # their rates
     waits: Annotated[Any, whole("N")]  # whether a body is left as it is for the time being
     joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
+    near: Annotated[Any, real("1")]  # which of the two distances holds for the bodies at hand
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
     may_divide: Annotated[Any, whole("1")]  # whether shorter steps follow if this is not solved
     awake: Annotated[Any, whole("N")]

@@ -77,18 +77,18 @@ def curvature_change(gap, before, following, h, scale):
 
 
 @compiled
-def is_slow(model, before, bounce):
+def is_slow(model, work, before, bounce):
     """Return whether a gap closes at a velocity at which impacts need not be located."""
-    return -before * model.step <= (model.near if bounce == 0.0 else ELASTIC) * model.gap_unit
+    return -before * model.step <= (work.near[0] if bounce == 0.0 else ELASTIC) * model.gap_unit
 
 
 @compiled
-def acts(model, gap, before, bounce, closed):
+def acts(model, work, gap, before, bounce, closed):
     """Return whether a contact acts in a located step: it is closed, or about to close slowly."""
     if closed or gap <= ZERO_GAP * model.gap_unit:
         return True
-    near = model.near if bounce == 0.0 else ELASTIC
-    return gap <= near * model.gap_unit and is_slow(model, before, bounce)
+    near = work.near[0] if bounce == 0.0 else ELASTIC
+    return gap <= near * model.gap_unit and is_slow(model, work, before, bounce)
 
 
 @compiled
@@ -175,7 +175,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         closed = state.touches[i, g] != 0
         close = gap + h * min(before, free, 0.0) < limit
         if work.located[0]:
-            close = acts(model, gap, before, model.restitution[g], closed)
+            close = acts(model, work, gap, before, model.restitution[g], closed)
         if g >= model.unilateral:
             close = closed = is_independent(model, work, i, g)
         if not close and not closed:
@@ -243,7 +243,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     free = row_times(model, rows, at, work.v_free, i, j)
     index, gap = work.contact_before[contact], work.contact_gap[contact]
     closed = index >= 0 and state.pair_flags[index, 1] != 0
-    if work.located[0] and not acts(model, gap, before, model.pair_restitution, closed):
+    if work.located[0] and not acts(model, work, gap, before, model.pair_restitution, closed):
         return count
     n = count
     new_block(work, n, i, j, ZERO)

@@ -13,8 +13,8 @@ from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 
-NEAR, KICKED = 1e-6, 1e-3  # scaled travel in a step of a slow impact, without and with kicks
-SHARE = 0.01  # that between bodies, over their reach
+NEAR, KICKED = 1e-6, 1e-4  # scaled travel in a step of a slow impact, without and with kicks
+SHARE = 0.01  # that in a crowd, over the reach of bodies
 
 
 def model_of(
@@ -52,7 +52,7 @@ def model_of(
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,
         "refines": solver.refine,
-        "near": _near(bodies, noise),
+        **_near(bodies, noise),
         "start": start,
         "step": step,
         "time_parameter": body.formulation.time_parameter,
@@ -67,12 +67,12 @@ def model_of(
     return filled(Model, sizes, {**values, "parameters": [*parameters, 0.0]})
 
 
-def _near(bodies: IdenticalBodies, noise: Noise) -> float:
-    """Return the scaled travel in a step up to which a plastic impact is slow."""
-    near = KICKED if any(noise.kicks.values()) else NEAR
-    if bodies.contacts is None or bodies.count < 2:
-        return near
-    return max(near, SHARE * bodies.contacts.reach / bodies.body.gap_unit)
+def _near(bodies: IdenticalBodies, noise: Noise) -> dict[str, float]:
+    """Return the scaled travel in a step up to which a plastic impact is slow, and in a crowd."""
+    near = many = KICKED if any(noise.kicks.values()) else NEAR
+    if bodies.contacts is not None and bodies.count > 1:
+        many = max(near, SHARE * bodies.contacts.reach / bodies.body.gap_unit)
+    return {"near": near, "near_many": many}
 
 
 def _dependence(body: Body) -> dict[str, bool]:

@@ -30,6 +30,13 @@ from polycorner.motion.engine.paths import (
 )
 
 LARGE = 48  # blocks of an island beyond which impacts need not be located
+CROWD = 2  # bodies beyond which those that are not fast need not be, either
+
+
+@compiled
+def slow_travel(model, members):
+    """Return the scaled travel of a slow impact among so many bodies."""
+    return model.near_many if members > CROWD else model.near
 
 
 @compiled
@@ -41,9 +48,15 @@ def leave_out(model, state, work, blocks, h):
         left[i] = 0
         if work.island_start[i + 1] > work.island_start[i]:
             left[i] = 2 if work.island_residual[i] > model.tolerance else 0
+        work.members[i] = 0
+    for i in range(N):
+        if work.awake[i]:
+            work.members[work.parent[i]] += 1
     for b in range(blocks):
+        island = island_of(work, b)
+        work.near[0] = slow_travel(model, work.members[island])
         if work.block_rows[b] == 0 and strikes_early(model, state, work, b):
-            left[island_of(work, b)] |= 1
+            left[island] |= 1
     mark_misses(model, state, work, left, h)
     for i in range(N):
         if work.island_start[i + 1] - work.island_start[i] > LARGE and left[i] == 1:
@@ -99,7 +112,7 @@ def strikes_early(model, state, work, b):
         closed = index >= 0 and state.pair_flags[index, 1] != 0
     if closed or abs(gap) <= ZERO_GAP * model.gap_unit:
         return False
-    return not is_slow(model, -work.impulse[b, 0] * work.delassus[b, 0], bounce)
+    return not is_slow(model, work, -work.impulse[b, 0] * work.delassus[b, 0], bounce)
 
 
 @compiled
@@ -178,7 +191,7 @@ def mark_misses(model, state, work, left, h):
         for i in range(model.bodies):
             if state.alive[i] and work.awake[i] and body_misses(model, state, work, i, h):
                 left[work.parent[i]] |= 1
-    slow = model.near * model.gap_unit
+    slow = model.near_many * model.gap_unit
     if model.pair_kernel == 0 or 2.0 * travel(model, work, h) <= slow:
         return
     for s in range(work.list_status[0]):

@@ -190,7 +190,7 @@ def acceptable_to(model, state, work, i, j, h, out):
             closed, bounce = state.touches[i, g] != 0, model.restitution[g]
         else:
             closed, bounce = touching(model, state, i, j, g), model.pair_restitution
-        acting = acts(model, work.way_gap[NEXT, g], work.way_rate[MIDDLE, g], bounce, closed)
+        acting = acts(model, work, work.way_gap[NEXT, g], work.way_rate[MIDDLE, g], bounce, closed)
         if not closed:
             length = min(length, first_in_gap(model, state, work, i, j, g, acting, h, out))
         if acting:

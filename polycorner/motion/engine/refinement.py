@@ -24,7 +24,7 @@ from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.left_out import leave_out
+from polycorner.motion.engine.left_out import leave_out, slow_travel
 from polycorner.motion.engine.paths import acceptable_length
 from polycorner.motion.engine.sleep import stays_asleep, wake
 from polycorner.motion.engine.stepping import attempt, commit
@@ -65,8 +65,10 @@ def record_failure(model, work, log, island, time, count):
 @compiled
 def gather(model, state, work, root, time, index):
     """Wake the bodies of a cluster, and let all others wait."""
+    members = 0
     for i in range(model.bodies):
         inside = state.alive[i] and state.cluster[i] == root
+        members += 1 if inside else 0
         if inside:
             state.watched[i] = 0
         work.waits[i], work.evaluated[i], work.disturbed[i] = 0 if inside else 1, 0, 0
@@ -78,6 +80,7 @@ def gather(model, state, work, root, time, index):
         if not inside:
             for c in range(model.dimension):
                 work.q_mid[i, c] = state.q[i, c]
+    work.near[0] = slow_travel(model, members)
 
 
 @compiled
