@@ -184,7 +184,8 @@ def draw_driven_sweep(found: "xr.Dataset", across: str, others: str | None) -> F
     second.plot([], [], "ks:", ms=4, mfc="white", label="left-handed")
     if across == "length":
         _bounds(first, found[across].values)
-    if others or across == "length":
+        first.legend(fontsize=8, frameon=False, ncols=2, loc="center")
+    elif others:
         first.legend(fontsize=9, frameon=False)
     second.legend(fontsize=9, frameon=False)
     return figure
