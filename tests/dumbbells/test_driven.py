@@ -43,10 +43,13 @@ def test_every_kind_has_the_same_results_with_units(kind):
         for name in ("heading", "early", "late", "drift", "spread"):
             means[f"{name}_{hand}"] = "deg"
         means |= {f"shift_{hand}": "mm", f"climb_rate_{hand}": "mm/s"}
-        assert found[f"held_{hand}"] == len(PAIRS)
+        means[f"relaxation_{hand}"] = "s"
+        assert found[f"samples_{hand}"] >= PAIRS
+        assert found[f"held_{hand}"] == PAIRS
         assert 0 <= found[f"corner_{hand}"] <= 1
         assert found[f"settled_{hand}"] in {True, False}
-    errors = {f"{n}_error": unit for n, unit in means.items() if not n.startswith("spread")}
+    whole = ("spread", "relaxation")
+    errors = {f"{n}_error": unit for n, unit in means.items() if not n.startswith(whole)}
     assert units == means | errors
     assert found["missed"] < 0.1
 
@@ -106,8 +109,8 @@ def test_in_a_level_drum_left_handed_pairs_are_mirror_images(kind):
 
 def test_pairs_are_those_that_dyads_follow():
     found = results("out of round", 0.5, 2.0, duration=6.0, spin=0.05, dt=0.002)
-    drum = DumbbellDrum(spin=0.05, out_of_round=OutOfRound({2: 0.5}))
-    starts = [("R", math.radians(angle)) for angle in PAIRS]
+    drum = DumbbellDrum(spin=0.05, restitution=1e-6, out_of_round=OutOfRound({2: 0.5}))
+    starts = [("R", math.radians(angle)) for angle in np.linspace(-8.0, 14.0, PAIRS)]
     paths = follow_dyads(drum, starts, 6.0)
     late = np.degrees(paths.heading[paths.times >= 3.0])
     assert found["heading_right"] == pytest.approx(late.mean(), abs=1e-4)
@@ -115,6 +118,7 @@ def test_pairs_are_those_that_dyads_follow():
     assert found["spread_right"] == pytest.approx(last.std(ddof=1), abs=1e-6)
     assert found["climb_rate_right"] == pytest.approx(paths.climb_rates(after=3.0).mean(), abs=1e-4)
     assert found["single_kept"] == pytest.approx(1.0, abs=1e-6)
+    assert found["relaxation_right"] == math.inf
 
 
 @pytest.mark.parametrize(

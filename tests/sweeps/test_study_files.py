@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from polycorner.dumbbells.studies import STUDIES, bunch, climbing, driven, heading
+from polycorner.dumbbells.studies import STUDIES, bunch, climbing, driven, heading, turning
 from polycorner.sweeps import read_study, sweep
 
 
@@ -16,7 +16,8 @@ def written(tmp_path, text):
 def test_files_of_the_package_are_studies():
     studies = {name: read_study(study.file, STUDIES) for name, study in STUDIES.items()}
     assert {name: plan.function for name, plan in studies.items()} == {
-        "heading": heading, "climbing": climbing, "bunch": bunch, "driven": driven
+        "heading": heading, "climbing": climbing, "bunch": bunch, "driven": driven,
+        "turning": turning,
     }  # fmt: skip
     assert studies["heading"].grid.axes["length"].unit == "mm"
     assert (studies["climbing"].seed, studies["climbing"].random) == (1, True)
@@ -41,7 +42,9 @@ def test_axes_are_lists_or_ranges(tmp_path):
 MISTAKES = {
     'studdy = "heading"': r"expected study, seed, axes, fixed; got studdy \(did you mean study\?\)",
     'study = "haeding"': r"study: expected heading, climbing, .*; got haeding \(did",
-    "study = 3": "study: expected heading, climbing, bunch, driven or module:function; got 3",
+    "study = 3": (
+        "study: expected heading, climbing, bunch, driven, turning or module:function; got 3"
+    ),
     'study = "no_such_module:f"': "study: expected module:function that can be imported",
     'study = "math:no_such"': "study: expected module:function that can be imported",
     'study = "heading"': "axes: expected a table",

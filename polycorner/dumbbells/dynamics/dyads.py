@@ -28,6 +28,7 @@ Start = tuple[Chirality, float]
 SOLVER = Solver(tolerance=1e-6, sweeps=300)
 TOUCH = 0.01  # mm, below which a gap counts as a contact
 CLEARANCE = 0.05  # mm, between the dumbbells of a pair at the start
+WINDOW = 5  # correlation times over which correlations are summed
 
 
 def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
@@ -126,17 +127,33 @@ class DyadPaths(Value):
         """Mask of the nine gaps that are closed to within 0.01 mm, ``(T, n, 9)``."""
         return gaps(self.drum, self.q) < TOUCH
 
-    def strata(self, *, after: float = 0.0) -> dict[str, float]:
+    def strata(self, *, after: float = 0.0, touch: float = TOUCH) -> dict[str, float]:
         """Return shares of time by the contacts that touch, commonest first.
 
         Ball-ball contacts count as ``ball``, ball-rod ones as ``rod`` and rod-rod as ``cross``, so
-        the nested corner is ``ball rod rod``, whatever the numbering.
+        the nested corner is ``ball rod rod``, whatever the numbering.  A gap below ``touch``, in
+        mm, counts as a contact.
         """
         kinds = np.array([_kind(name) for name in CONTACTS])
-        closed = self.contacts[self.times >= after].reshape(-1, len(CONTACTS))
+        closed = gaps(self.drum, self.q[self.times >= after]) < touch
+        closed = closed.reshape(-1, len(CONTACTS))
         names = [" ".join(sorted(kinds[row])) or "none" for row in closed]
         found = {name: names.count(name) / len(names) for name in set(names)}
         return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+
+    @property
+    def relaxation_time(self) -> float:
+        """Time after which headings have come together to 1/e of their first spread, in s.
+
+        The spread is the standard deviation over the pairs of one run that held to the end; inf if
+        it remains larger, nan for fewer than two pairs.
+        """
+        heading = (self.signs * self.heading)[:, np.isinf(self.lifetimes)]
+        if heading.shape[1] < 2:
+            return math.nan
+        spread = heading.std(axis=1)
+        near = spread <= spread[0] / math.e
+        return float(self.times[np.argmax(near)]) if near.any() else math.inf
 
     @property
     def lifetimes(self) -> Array:
@@ -232,6 +249,9 @@ class Steady:
         Late less early heading of each pair: where it is not zero, the heading has not settled.
     scatter : float
         Standard deviation of the heading in time.
+    samples : float
+        Effective number of independent headings, all pairs together: time over twice the
+        integrated autocorrelation time (:func:`correlation_time`).
     held, count : int
         Pairs that held to the end, and all.
     minimiser : float
@@ -250,6 +270,7 @@ class Steady:
     late: Mean
     drift: Mean
     scatter: float
+    samples: float
     held: int
     count: int
     minimiser: float
@@ -286,11 +307,30 @@ def steady(paths: DyadPaths, *, after: float) -> Steady:
         late=averaged(heading[half:]),
         drift=Mean.of(heading[half:].mean(axis=0) - heading[:half].mean(axis=0)),
         scatter=float(heading.std(axis=0).mean()) if held.any() else math.nan,
+        samples=sum(len(one) / (2 * correlation_time(one)) for one in heading.T),
         held=int(held.sum()),
         count=len(held),
         minimiser=minimiser_heading(paths.drum),
         strata=paths.strata(after=after),
     )
+
+
+def correlation_time(values: ArrayLike) -> float:
+    """Return the integrated autocorrelation time of a series, in units of its interval.
+
+    ``1/2 + sum_k c_k / c_0``, summed up to the first ``k`` that is five times the sum ([Sokal]); a
+    mean over ``n`` values has the variance ``2 tau c_0 / n``.  A trend makes it long; it is at
+    least 1/2, that of independent values.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    x = x - x.mean()
+    padded = np.fft.rfft(x, 2 * len(x))
+    correlations = np.fft.irfft(np.abs(padded) ** 2)[: len(x)]
+    if not correlations[0] > 0.0:
+        return 0.5 * len(x)
+    sums = np.cumsum(correlations / correlations[0]) - 0.5
+    enough = np.arange(len(x)) >= WINDOW * sums
+    return max(0.5, float(sums[np.argmax(enough)])) if enough.any() else 0.5 * len(x)
 
 
 def steady_headings(

@@ -1,7 +1,8 @@
-"""Figures of experiments in the drum: steady headings of dyads, climb rates, and exits."""
+"""Figures of experiments in the drum: headings of dyads, what turns them, climb rates, exits."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +12,11 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import KINDS, BunchRun
 from polycorner.dumbbells.dynamics.dyads import Steady, heading_at_shift
 from polycorner.dumbbells.dynamics.singles import Zigzag
+from polycorner.pictures.style import SHADES
 from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COLOURS = {"right": "#0072B2", "left": "#009E73", "single": "#8A6D3B"}
 MINIMISER, PAPER, OTHER_END = "#333333", "#C1272D", "#7B3294"
@@ -79,6 +84,35 @@ def _points(axes: Axes, found: Sequence[Steady], what: str) -> None:
             capsize=3,
             label=f"simulated, tilt {np.degrees(some[0].drum.tilt):.3g}°",
         )
+
+
+def draw_balance(found: "xr.Dataset") -> Figure:
+    """Draw how fast pairs turn against their heading, a panel for each hand, with the prediction.
+
+    Of the study ``turning`` over ``heading``, ``part``, ``hand`` and ``strength``: rates under all
+    kicks with twice their standard errors; dotted, those under rolling kicks alone; solid, these
+    plus the rate due to the weight, from single dumbbells under all kicks.
+    """
+    figure = Figure(figsize=(12.5, 5.2), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, found.sizes["hand"], sharey=True))
+    for axes, hand in zip(panels, found["hand"].values.tolist(), strict=True):
+        for colour, strength in zip(SHADES, found["strength"].values.tolist(), strict=False):
+            one = found.sel(hand=hand, strength=strength)
+            both, rolling = one.sel(part="all"), one.sel(part="rolling")
+            x, bars = both["at"].values, 2 * both["rate_error"].values
+            axes.errorbar(x, both["rate"].values, bars, fmt="o", ms=5, color=colour, capsize=3)
+            alone = np.interp(x, rolling["at"].values, rolling["rate"].values)
+            axes.plot(rolling["at"].values, rolling["rate"].values, ":", color=colour, lw=1.2)
+            predicted = alone + both["weight"].values
+            axes.plot(x, predicted, "-", color=colour, label=f"strength {strength:g}")
+        axes.axhline(0, color="0.8", lw=0.8, zorder=0)
+        axes.set(title=f"{hand}-handed pairs", xlabel="heading, away from zero (degrees)")
+    panels[0].set_ylabel("rate of the heading (degrees/s)")
+    panels[0].plot([], [], "k:", lw=1.2, label="rolling kicks alone")
+    panels[0].plot([], [], "k-", label="and the weight: predicted")
+    panels[0].plot([], [], "ko", ms=5, label="all kicks")
+    panels[0].legend(fontsize=9, frameon=False)
+    return figure
 
 
 def draw_climbing(

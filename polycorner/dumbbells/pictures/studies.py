@@ -1,5 +1,6 @@
 """Figures of parameter studies: results over one parameter, a curve for each value of another."""
 
+import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from itertools import cycle
@@ -15,6 +16,7 @@ from polycorner.spaces.manifold import Array
 if TYPE_CHECKING:
     import xarray as xr
 
+PAPER = (16.0, 15.0, 2.0)  # measured: length in mm, heading and its fluctuation in degrees
 MOST_CURVES = 12  # drawn for a second parameter of many values
 
 
@@ -180,9 +182,62 @@ def draw_driven_sweep(found: "xr.Dataset", across: str, others: str | None) -> F
         axes.set(ylabel=words, xlabel=_axis_label(found, across))
     second.plot([], [], "ko-", ms=4, label="right-handed")
     second.plot([], [], "ks:", ms=4, mfc="white", label="left-handed")
-    if others:
+    if across == "length":
+        _bounds(first, found[across].values)
+        first.legend(fontsize=8, frameon=False, ncols=2, loc="center")
+    elif others:
         first.legend(fontsize=9, frameon=False)
     second.legend(fontsize=9, frameon=False)
+    return figure
+
+
+def _bounds(axes: Axes, lengths: Array) -> None:
+    """Draw headings of either hand between which noise leaves pairs, and the paper's."""
+    from polycorner.dumbbells.drum import DumbbellDrum
+    from polycorner.dumbbells.dynamics.balance import parting_heading
+
+    drums = [DumbbellDrum(float(x)) for x in np.linspace(lengths.min(), lengths.max(), 100)]
+    x = np.array([drum.length for drum in drums])
+    curves = {
+        "parting, arctan(p/s)": ([parting_heading(drum) for drum in drums], "-"),
+        "paper, arctan(r/l)": (np.degrees(np.arctan2([d.ball_radius for d in drums], x)), "--"),
+        "least energy": ([math.degrees(drum.pair.plane_corner()[0]) for drum in drums], ":"),
+    }
+    for label, (heading, line) in curves.items():
+        for sign in (1, -1):
+            y = sign * np.asarray(heading)
+            axes.plot(x, y, f"k{line}", lw=1, label=label if sign > 0 else None)
+    if lengths.min() <= PAPER[0] <= lengths.max():
+        both = np.array([1, -1])
+        axes.errorbar(
+            [PAPER[0]] * 2, PAPER[1] * both, yerr=PAPER[2], fmt="kD", capsize=3, label="measured"
+        )
+
+
+def draw_turning_sweep(found: "xr.Dataset", across: str, others: str | None) -> Figure:
+    """Draw how fast pairs turn, and how fast their impacts would turn them, by their heading.
+
+    With a second axis ``part`` that has "all" and "rolling", a line is the rate by rolling kicks
+    alone plus that of the weight, from single dumbbells under all of them.
+    """
+    figure, first, second = _panels("How fast pairs turn")
+    name = "at" if across == "heading" else across  # the heading changes in the meantime
+    for colour, label, curve in _curves(found, others):
+        x = curve[name].values
+        bars = 2 * curve["rate_error"].values
+        first.errorbar(x, curve["rate"].values, bars, fmt="o", ms=4, color=colour, label=label)
+        second.plot(x, curve["impacts"].values, "o--", ms=4, color=colour, label=label)
+    if others == "part" and {"all", "rolling"} <= set(found["part"].values.tolist()):
+        rolling, both = found.sel(part="rolling"), found.sel(part="all")
+        x = rolling[name].values
+        weight = np.interp(x, both[name].values, both["weight"].values)
+        first.plot(x, rolling["rate"].values + weight, "k-", lw=1, label="rolling + weight")
+    words = ("rate of the heading (degrees/s)", "that of impacts alone (degrees/s)")
+    for axes, title in ((first, words[0]), (second, words[1])):
+        axes.axhline(0, color="0.8", lw=0.8, zorder=0)
+        axes.set(xlabel=_axis_label(found, across), ylabel=title)
+    if others:
+        first.legend(fontsize=9, frameon=False)
     return figure
 
 
@@ -192,4 +247,5 @@ DRAWN: Mapping[str, Callable[["xr.Dataset", str, str | None], Figure]] = {
     "climbing": draw_climbing_sweep,
     "bunch": draw_bunch_sweep,
     "driven": draw_driven_sweep,
+    "turning": draw_turning_sweep,
 }

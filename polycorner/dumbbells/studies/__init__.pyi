@@ -1,6 +1,7 @@
 from .catalogue import STUDIES
 from .driven import driven
 from .functions import bunch, climbing, heading
+from .turning import turning
 
 __all__ = [
     "STUDIES",
@@ -8,4 +9,5 @@ __all__ = [
     "climbing",
     "driven",
     "heading",
+    "turning",
 ]

@@ -6,6 +6,7 @@ from typing import Any
 
 from polycorner.dumbbells.studies.driven import driven
 from polycorner.dumbbells.studies.functions import bunch, climbing, heading
+from polycorner.dumbbells.studies.turning import turning
 from polycorner.sweeps.study_files import NamedStudy
 
 FOLDER = Path(__file__).parent
@@ -29,4 +30,5 @@ STUDIES: Mapping[str, NamedStudy] = {
     "climbing": _named(climbing, DRUM),
     "bunch": _named(bunch, DRUM | {"top": "mm"}),
     "driven": _named(driven, DRUM),
+    "turning": _named(turning, DRUM | {"heading": "deg"}),
 }

@@ -11,16 +11,17 @@ from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import Steady
+    from polycorner.dumbbells.dynamics.dyads import DyadPaths, Steady
     from polycorner.motion.noise import Noise
     from polycorner.motion.trajectory import Trajectory
 
 SINGLES = (12.0, 12.0, 6.0, -6.0)  # degrees: headings at the start
-PAIRS = (-8.0, 2.0, 6.0, 10.0, 14.0)  # of right-handed pairs; of left-handed ones, mirrored
+PAIRS = 5  # of each hand
 SHAKEN = ("shaking across", "shaking along", "shaking up")
 KINDS = ("kicks", "chatter", *SHAKEN, "out of round", "wobble", "uneven friction")
 LOWEST = 0.1  # least frequency of shaking over the greatest
 CORNER = "ball rod rod"  # contacts of a nested pair
+CLOSE = 0.1  # mm, up to which a contact of a pair that rattles counts as closed
 
 
 def driven(
@@ -32,14 +33,17 @@ def driven(
     length: float = 16.0,
     tilt: float = 7.0,
     spin: float = 0.01,
+    lowest: float = -8.0,
+    highest: float = 14.0,
+    restitution: float = 1e-6,
     duration: float = 400.0,
     dt: float = 0.001,
 ) -> dict[str, Any]:
     """Return what one kind of noise makes of single dumbbells and of pairs in a turning drum.
 
     One run of 24 dumbbells far apart: four single ones with headings 12, 12, 6 and -6 degrees, five
-    right-handed nested pairs from -8, 2, 6, 10 and 14 degrees, and five left-handed ones from the
-    negatives.  Other parameters are the defaults of
+    right-handed nested pairs from headings that are evenly spaced, and five left-handed ones from
+    their negatives.  Other parameters are the defaults of
     :class:`~polycorner.dumbbells.drum.DumbbellDrum`.
 
     ===============  ==================================  =========================================
@@ -68,6 +72,12 @@ def driven(
         In mm.
     tilt, spin : float
         Of the drum, in degrees and rad/s.
+    lowest, highest : float
+        First headings of right-handed pairs, in degrees.
+    restitution : float
+        Of dumbbells that collide.  One that is tiny makes the engine act impacts of any speed where
+        bodies meet: with 0, those that are slow act within a step, where friction on the drum, an
+        impulse of ``mu N dt``, holds against them.
     duration, dt : float
         In s.
 
@@ -81,8 +91,10 @@ def driven(
         the last half and over the pairs that held together, ``heading`` in degrees, ``shift`` in
         mm, ``climb_rate`` in mm/s; ``early`` and ``late``, the headings of the third and the last
         quarter, their difference ``drift``, and ``settled``, whether it is zero within two standard
-        errors; ``spread``, the standard deviation of ``late`` over the pairs; ``corner``, the share
-        of time with the three contacts of the nested pair (of all five pairs); ``held``, the number
+        errors; ``spread``, the standard deviation of ``late`` over the pairs; ``samples``, the
+        number of headings that are independent in time; ``relaxation``, the time in s in which
+        headings come together to 1/e of their first spread; ``corner``, the share of time with the
+        three contacts of the nested pair closed to 0.1 mm (of all five pairs); ``held``, the number
         of pairs.  Means have a standard ``_error`` over the pairs or dumbbells; shaking, unlike
         other kinds, is the same for all of them.  ``missed``, the share of groups in contact that
         were not solved to the tolerance.
@@ -97,15 +109,17 @@ def driven(
 
     real("tilt", tilt, unit="deg")
     real("duration", duration, above=0, unit="s")
-    drum = DumbbellDrum(length, tilt=math.radians(tilt), spin=spin)
+    drum = DumbbellDrum(length, tilt=math.radians(tilt), spin=spin, restitution=restitution)
     drum, noise = disturbed(drum, kind, strength, scale, int(rng.integers(2**63)))
-    path = follow_pairs(drum, _places(drum), duration, noise=noise, dt=dt).trajectory
-    first, middle = len(SINGLES), len(SINGLES) + 2 * len(PAIRS)
+    places = _places(drum, np.radians(np.linspace(lowest, highest, PAIRS)).tolist())
+    path = follow_pairs(drum, places, duration, noise=noise, dt=dt).trajectory
+    first, middle = len(SINGLES), len(SINGLES) + 2 * PAIRS
     right, left = DyadPaths(path, first, middle), DyadPaths(path, middle)
+    half = duration / 2
     return {
         **_singles(path),
-        **_pairs("right", steady(right, after=duration / 2)),
-        **_pairs("left", steady(left, after=duration / 2)),
+        **_pairs("right", right, steady(right, after=half)),
+        **_pairs("left", left, steady(left, after=half)),
         "missed": path.missed,
     }
 
@@ -165,12 +179,11 @@ def _harmonic(scale: float) -> int:
     return int(scale)
 
 
-def _places(drum: "DumbbellDrum") -> Array:
+def _places(drum: "DumbbellDrum", angles: list[float]) -> Array:
     """Return single dumbbells, right-handed and left-handed pairs, far apart, ``(24, 3)``."""
     from polycorner.dumbbells.dynamics.dyads import Start, nested_places
     from polycorner.dumbbells.dynamics.singles import APART
 
-    angles = np.radians(PAIRS).tolist()
     starts: list[Start] = [*(("R", a) for a in angles), *(("L", -a) for a in angles)]
     count = len(SINGLES)
     singles = [np.zeros(count), APART * np.arange(count), np.radians(SINGLES)]
@@ -191,7 +204,7 @@ def _singles(path: "Trajectory") -> dict[str, Any]:
     return _with_errors({f"single_{n}": (Mean.of(x), unit) for n, (x, unit) in means.items()})
 
 
-def _pairs(hand: str, found: "Steady") -> dict[str, Any]:
+def _pairs(hand: str, paths: "DyadPaths", found: "Steady") -> dict[str, Any]:
     sign = 1 if hand == "right" else -1
     means = {
         "heading": (sign * found.heading, "deg"),
@@ -205,7 +218,9 @@ def _pairs(hand: str, found: "Steady") -> dict[str, Any]:
     others = {
         "spread": (found.late.deviation, "deg"),
         "settled": found.settled,
-        "corner": found.strata.get(CORNER, 0.0),
+        "samples": found.samples,
+        "relaxation": (paths.relaxation_time, "s"),
+        "corner": paths.strata(after=paths.times[-1] / 2, touch=CLOSE).get(CORNER, 0.0),
         "held": found.held,
     }
     return _with_errors(means) | {f"{name}_{hand}": value for name, value in others.items()}

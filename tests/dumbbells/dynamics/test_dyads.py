@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.dyads import (
+    correlation_time,
     follow_dyads,
     handedness,
     heading_at_shift,
@@ -144,3 +145,18 @@ def test_arguments_are_checked():
         follow_dyads(DRUM, [], 1.0)
     with pytest.raises(ValueError, match="drum: expected one without bottom"):
         follow_dyads(replace(DRUM, floor=True), [("R", 0.1)], 1.0)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.95])
+def test_the_correlation_time_of_a_first_order_process_is_the_closed_form(memory):
+    rng, values = np.random.default_rng(5), np.zeros(200_000)
+    noise = rng.normal(size=len(values))
+    for k in range(1, len(values)):
+        values[k] = memory * values[k - 1] + noise[k]
+    expected = 0.5 * (1 + memory) / (1 - memory)
+    assert correlation_time(values) == pytest.approx(expected, rel=0.1)
+
+
+def test_a_trend_and_a_constant_are_one_sample():
+    assert correlation_time(np.full(50, 3.0)) == 25.0
+    assert correlation_time(np.arange(1000.0)) > 100.0

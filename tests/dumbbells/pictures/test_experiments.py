@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from drum_motions import recorded
 from matplotlib.colors import same_color
 
@@ -20,6 +21,7 @@ from polycorner.dumbbells.pictures.experiments import (
     OTHER_END,
     PAPER,
     TILTED,
+    draw_balance,
     draw_climbing,
     draw_exits,
     draw_steady_headings,
@@ -47,6 +49,7 @@ def steady(length, tilt, shift):
         late=heading,
         drift=Mean(0.0, 0.1, 4),
         scatter=1.0,
+        samples=20.0,
         held=4,
         count=4,
         minimiser=8.0,
@@ -242,3 +245,20 @@ def test_bunches_stand_side_by_side(bunch, tmp_path):
     assert [axes.get_title() for axes in figure.axes[:2]] == ["one", "two"]
     assert stairs(figure.axes[1], "single")[-1].tolist() == [40, 0]
     assert save(figure, tmp_path / "exits.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_rates_of_turning_are_drawn_beside_the_sum_of_their_parts():
+    names, rng = ("heading", "part", "hand", "strength"), np.random.default_rng(8)
+    places = {"heading": [2.0, 8.0, 14.0], "part": ["all", "rolling"], "hand": ["right", "left"]}
+    shape = (3, 2, 2, 1)
+    data = {n: (names, rng.uniform(size=shape)) for n in ("rate", "rate_error", "weight")}
+    at = np.broadcast_to(np.array([2.0, 8.0, 14.0])[:, None, None, None], shape)
+    found = xr.Dataset(data | {"at": (names, at)}, places | {"strength": [30.0]})
+    for axes, hand in zip(draw_balance(found).axes, ("right", "left"), strict=True):
+        one = found.sel(hand=hand, strength=30.0)
+        ((shown, halves, _),) = bars(axes)
+        np.testing.assert_allclose(shown[:, 1], one["rate"].sel(part="all"))
+        np.testing.assert_allclose(halves, 2 * one["rate_error"].sel(part="all"))
+        (line,) = [x for x in axes.lines if x.get_label() == "strength 30"]
+        expected = one["rate"].sel(part="rolling").values + one["weight"].sel(part="all").values
+        np.testing.assert_allclose(line.get_ydata(), expected)

@@ -75,6 +75,34 @@ def test_pairs_of_either_hand_under_noise_are_drawn_with_bars():
             np.testing.assert_allclose(spans, 4 * values[1])
 
 
+def test_lengths_of_driven_pairs_come_with_the_bounds_of_their_headings():
+    columns = [f"{n}_{hand}" for n in ("heading", "climb_rate") for hand in ("right", "left")]
+    columns += [f"{name}_error" for name in columns]
+    data = {name: (("length",), np.ones(2)) for name in columns}
+    data["status"] = (("length",), np.ones(2, dtype=np.int8))
+    axes = draw_study("driven", xr.Dataset(data, {"length": [12.0, 24.0]})).axes[0]
+    lines = {line.get_label(): line.get_ydata() for line in axes.lines}
+    ends = {
+        "parting, arctan(p/s)": (29.27, 12.66),
+        "paper, arctan(r/l)": (14.04, 7.13),
+        "least energy": (10.50, 5.33),
+    }
+    for label, values in ends.items():
+        assert lines[label][[0, -1]] == pytest.approx(values, abs=0.01)
+
+
+def test_the_rate_of_turning_is_drawn_with_its_two_parts():
+    names, rng = ("heading", "part"), np.random.default_rng(6)
+    columns = ("rate", "rate_error", "weight", "impacts")
+    data = {name: (names, rng.uniform(size=(3, 2))) for name in columns}
+    data["at"] = (names, np.array([[2.0, 2.0], [8.0, 8.0], [14.0, 14.0]]))
+    data["status"] = (names, np.ones((3, 2), dtype=np.int8))
+    found = xr.Dataset(data, {"heading": [2.0, 8.0, 14.0], "part": ["all", "rolling"]})
+    lines = {line.get_label(): line for line in draw_study("turning", found).axes[0].lines}
+    expected = found["rate"].values[:, 1] + found["weight"].values[:, 0]
+    np.testing.assert_allclose(lines["rolling + weight"].get_ydata(), expected)
+
+
 def test_members_of_an_ensemble_are_averaged():
     names, rng = ("rubbing", "start", "top"), np.random.default_rng(2)
     data = {name: (names, rng.integers(9, size=(2, 5, 3))) for name in ("left", "in_left")}
