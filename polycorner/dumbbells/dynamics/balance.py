@@ -18,7 +18,6 @@ from polycorner.motion.simulation import simulate
 
 FLAT = 1e7  # mm: radius of a drum that is as good as a plane
 CONTACT = 1e-5  # mm between dumbbells before an impact
-LOCATED = 1e-6  # coefficient of restitution so small that an impact is as good as plastic
 STEPS = 60  # in the time for which the dumbbells slide
 
 
@@ -92,7 +91,7 @@ def turn_by_impact(drum: DumbbellDrum, speed: float) -> ImpactTurn:
     square of the speed over ``mu g``, ``mu`` being the dynamic coefficient of sliding.
     """
     plane = replace(
-        drum, drum_radius=FLAT, count=2, tilt=0.0, spin=0.0, restitution=LOCATED, floor=False
+        drum, drum_radius=FLAT, count=2, tilt=0.0, spin=0.0, restitution=0.0, floor=False
     )
     places = plane.pair.nested("R", heading=0.0, clearance=CONTACT).reshape(2, 3)
     towards = math.copysign(1.0, places[1, 0] - places[0, 0])

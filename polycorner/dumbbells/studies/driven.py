@@ -35,7 +35,7 @@ def driven(
     spin: float = 0.01,
     lowest: float = -8.0,
     highest: float = 14.0,
-    restitution: float = 1e-6,
+    restitution: float = 0.0,
     duration: float = 400.0,
     dt: float = 0.001,
 ) -> dict[str, Any]:
@@ -75,9 +75,7 @@ def driven(
     lowest, highest : float
         First headings of right-handed pairs, in degrees.
     restitution : float
-        Of dumbbells that collide.  One that is tiny makes the engine act impacts of any speed where
-        bodies meet: with 0, those that are slow act within a step, where friction on the drum, an
-        impulse of ``mu N dt``, holds against them.
+        Of dumbbells that collide.
     duration, dt : float
         In s.
 

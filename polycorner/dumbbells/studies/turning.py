@@ -25,7 +25,7 @@ def turning(
     length: float = 16.0,
     tilt: float = 7.0,
     spin: float = 0.01,
-    restitution: float = 1e-6,
+    restitution: float = 0.0,
     duration: float = 30.0,
     after: float = 10.0,
     dt: float = 0.0005,
