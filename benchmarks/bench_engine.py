@@ -25,6 +25,9 @@ CASES: dict[str, tuple[int, float, float, int, int]] = {
     "sixty, kicks": (60, 0.0, KICK, 1_000, 4),
     "240": (240, 0.0, 0.0, 8_000, 3),
     "960": (960, 0.0, 0.0, 4_000, 1),
+    "60, all move": (60, 0.0, KICK, 300, 4),
+    "240, all move": (240, 0.0, KICK, 300, 1),
+    "960, all move": (960, 0.0, KICK, 300, 1),
 }
 
 # What a process does: it imports bench_motion, and the package, of its own folder.

@@ -46,6 +46,8 @@ def chord(centre, radius, start, velocity):
     st.sampled_from([0.0, 0.4, 1.0]),
 )
 @example(1.0, 0.0, 1.0, 0.5, 0.0)  # touches in the middle of a step, and again a step later
+@example(1.0, 0.0, 1.0, 0.5, 0.4)
+@example(1.0, 0.0, 1.0, 0.5, 1.0)
 def test_a_particle_meets_a_pin_or_flies_past(radius, height, speed, dt, e):
     """It is deflected if and only if it touches: where, when and into which direction."""
     start, velocity = np.array([-2.0, height]), np.array([speed, 0.0])

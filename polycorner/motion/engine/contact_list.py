@@ -116,8 +116,8 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
             when = out[2]
             if out[1] == LOST:
                 when = min(release, when)
-            elif before < 0.0 and gap > 0.0:
-                when = min(time + 0.5 * h + gap / -before, time + 1.5 * h)
+            elif before < 0.0:
+                when = min(time + 0.5 * h + max(gap, 0.0) / -before, time + 1.5 * h)
             elif work.located[0]:
                 when = time + 0.5 * h
             if out[1] == MADE and work.impulse[b, 0] <= 0.0:
