@@ -27,6 +27,6 @@ def _named(function: Callable[..., Mapping[str, Any]], units: Mapping[str, str])
 STUDIES: Mapping[str, NamedStudy] = {
     "heading": _named(heading, LENGTHS),
     "climbing": _named(climbing, DRUM),
-    "bunch": _named(bunch, DRUM | {"top": "mm"}),
+    "bunch": _named(bunch, DRUM | {"top": "mm", "kick_time": "s"}),
     "driven": _named(driven, DRUM),
 }

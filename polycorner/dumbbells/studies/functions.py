@@ -1,13 +1,17 @@
 """Functions for parameter studies: headings of dyads, climbing pairs, bunches in a drum."""
 
 import math
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner.checks import whole
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
+
+if TYPE_CHECKING:
+    from polycorner.dumbbells.dynamics.bunch import BunchRun
 
 FIRST, LAST = 2.0, 14.0  # degrees: headings of the first and the last pair at the start
 
@@ -132,7 +136,11 @@ def climbing(
 def bunch(
     start: int,
     *,
-    noise: float = 0.0,
+    kind: str = "chatter",
+    strength: float = 0.0,
+    scale: float = 0.01,
+    kicks: float = 0.0,
+    kick_time: float = 0.003,
     top: float = 300.0,
     sliding: float = 0.3,
     rolling: float = 0.1,
@@ -155,8 +163,11 @@ def bunch(
     ----------
     start : int
         Seed of the start and of the noise: one member of an ensemble.
-    noise : float
-        Amplitude of the chatter, see :class:`~polycorner.motion.noise.Noise`.
+    kind : str
+    strength, scale : float
+        Kind of noise, as of :func:`~polycorner.dumbbells.studies.driven.driven`; by default none.
+    kicks, kick_time : float
+        Strength and time in s of kicks in addition to another kind.
     top : float
         Height at which the drum ends, in mm.
     sliding, rolling, rubbing : float
@@ -176,11 +187,16 @@ def bunch(
         Numbers of dumbbells that ``left`` the drum, among them ``left_right`` and ``left_left`` in
         right- and left-handed dyads and ``left_single``; numbers of those in the drum at the end:
         ``in_right``, ``in_left``, in dyads of ``both`` hands, ``single``, and ``rollers``.
-        ``reach``, the mean height of those in the drum, and ``max_penetration`` in mm; ``missed``,
-        the share of groups in contact that were not solved to the tolerance.
+        ``reach``, the mean height of those in the drum, and ``highest``, the greatest height of any
+        at any time, in mm: where nobody left, the motion in a longer drum is the same, and so it is
+        in a shorter one that ends above it.  For dyads of either hand ``free_right``, the share of
+        intervals of 10 s in which no third dumbbell touched them, and the mean rates of climbing,
+        ``rate_right_free`` and ``rate_right_touched``, in mm/s.  ``max_penetration`` in mm;
+        ``missed``, the share of groups in contact that were not solved to the tolerance.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch
+    from polycorner.dumbbells.studies.driven import disturbed, kicks_of
 
     whole("start", start, least=0)
     drum = DumbbellDrum(
@@ -194,7 +210,10 @@ def bunch(
         rubbing=in_proportion(rubbing, DumbbellDrum.rubbing),
     )
     drum = drum_for_bunch(drum, count=count, top=top)
-    run = follow_bunch(drum, duration, seed=start, chatter=noise, dt=dt)
+    drum, noise = disturbed(drum, kind, strength, scale, start)
+    if kicks:
+        noise = replace(noise, kicks=kicks_of(drum, kicks), kick_time=kick_time)
+    run = follow_bunch(drum, duration, seed=start, noise=noise, dt=dt)
     census, there = run.census(-1), run.present[-1]
     return {
         "left": len(run.exits),
@@ -205,9 +224,25 @@ def bunch(
         "single": census["single"],
         "rollers": int(run.rollers(-1).sum()),
         "reach": (float(run.q[-1, there, 1].mean()) if there.any() else math.nan, "mm"),
+        "highest": (float(run.q[..., 1].max()), "mm"),
+        **_climbing(run),
         "max_penetration": (run.trajectory.max_penetration, "mm"),
         "missed": run.trajectory.missed,
     }
+
+
+def _climbing(run: "BunchRun") -> dict[str, Any]:
+    """Return the share of free dyads and the mean rates of climbing, by chirality."""
+    found: dict[str, Any] = {}
+    rates = run.dyad_rates()
+    for hand in ("right", "left"):
+        free, touched = (rates[f"{hand} {state}"] for state in ("free", "touched"))
+        many = len(free) + len(touched)
+        found[f"free_{hand}"] = len(free) / many if many else math.nan
+        for name, values in (("free", free), ("touched", touched)):
+            mean = float(values.mean()) if len(values) else math.nan
+            found[f"rate_{hand}_{name}"] = (mean, "mm/s")
+    return found
 
 
 def in_proportion(static: float, usual: tuple[float, float]) -> tuple[float, float]:
