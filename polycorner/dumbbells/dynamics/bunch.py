@@ -132,7 +132,7 @@ class BunchRun(Value):
         return np.asarray(self.present[index] & (spun > ROLLING))
 
     def dyad_rates(self, window: float = WINDOW) -> dict[str, Array]:
-        """Return how fast dyads rise, in mm/s: ``right free``, ``right touched``, ``left free``, ...
+        """Return how fast dyads rise, in mm/s: ``right free``, ``right touched`` and for ``left``.
 
         The time is divided into intervals of ``window`` s.  A rate is the mean rise of the members
         of a dyad over an interval, at both ends of which they are in the drum as this dyad, and it

@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from polycorner.dumbbells.studies.bunches import bunch
 from polycorner.dumbbells.studies.driven import driven
-from polycorner.dumbbells.studies.functions import bunch, climbing, heading
+from polycorner.dumbbells.studies.functions import climbing, heading
 from polycorner.sweeps.study_files import NamedStudy
 
 FOLDER = Path(__file__).parent
