@@ -51,7 +51,7 @@ def bunch(
     length, r, t = sizes
     drum = replace(DRUM, length=length, ball_radius=r, rod_radius=t)
     drum = drum_for_bunch(drum, count=LEAVING[0], top=top)
-    return follow_bunch(drum, duration, seed=seed, dt=dt)
+    return follow_bunch(drum, duration, start=seed, dt=dt)
 
 
 def partitions(

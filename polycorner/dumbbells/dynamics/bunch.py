@@ -170,21 +170,21 @@ def follow_bunch(
     drum: DumbbellDrum,
     duration: float,
     *,
-    seed: int = 0,
+    start: int | Array = 0,
     noise: Noise | None = None,
     dt: float = 1e-3,
     interval: float = 0.5,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> BunchRun:
-    """Follow a scattered bunch for ``duration`` s.
+    """Follow a bunch for ``duration`` s.
 
     Parameters
     ----------
     drum : DumbbellDrum
         With a bottom, as of :func:`drum_for_bunch`.
-    seed : int, optional
-        Of the start.
+    start : int or (count, 3) array, optional
+        The seed of a :func:`scattered` start, or placements.
     noise : Noise, optional
         None by default.
     dt, interval : float, optional
@@ -195,7 +195,7 @@ def follow_bunch(
     if not drum.floor:
         msg = "drum: expected one with a bottom, on which the bunch lies; got floor=False"
         raise ValueError(msg)
-    q = scattered(drum, np.random.default_rng(seed))
+    q = start if isinstance(start, np.ndarray) else scattered(drum, np.random.default_rng(start))
     stride = max(1, round(interval / dt))
     return BunchRun(
         simulate(

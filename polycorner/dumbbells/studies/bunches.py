@@ -4,11 +4,19 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from polycorner.checks import whole
+import numpy as np
+
+from polycorner.checks import choice, whole
+from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed, kicks_of
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
+    from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.bunch import BunchRun
+
+HEADING = 8.0  # degrees
+BETWEEN = 36.0  # mm, from pair to pair
 
 
 def bunch(
@@ -29,6 +37,7 @@ def bunch(
     ball_radius: float = 3.0,
     rod_radius: float = 1.5,
     count: int = 60,
+    pairs: str = "",
     duration: float = 1200.0,
     dt: float = 0.004,
 ) -> dict[str, Any]:
@@ -56,6 +65,9 @@ def bunch(
         In mm.
     count : int
         How many dumbbells.
+    pairs : str
+        Chiralities, as in ``"RLRL"``, of nested pairs that start one above the other on the lowest
+        line with headings of 8 and -8 degrees, in place of ``count`` scattered dumbbells.
     duration, dt : float
         In s.
 
@@ -73,7 +85,7 @@ def bunch(
         ``missed``, the share of groups in contact that were not solved to the tolerance.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch
+    from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch, scattered
 
     whole("start", start, least=0)
     drum = DumbbellDrum(
@@ -86,11 +98,16 @@ def bunch(
         rolling=in_proportion(rolling, DumbbellDrum.rolling),
         rubbing=in_proportion(rubbing, DumbbellDrum.rubbing),
     )
-    drum = drum_for_bunch(drum, count=count, top=top)
+    drum = drum_for_bunch(drum, count=2 * len(pairs) or count, top=top)
     drum, noise = disturbed(drum, kind, strength, scale, start)
     if kicks:
         noise = replace(noise, kicks=kicks_of(drum, kicks), kick_time=kick_time)
-    run = follow_bunch(drum, duration, seed=start, noise=noise, dt=dt)
+    q = (
+        _one_above_the_other(drum, pairs)
+        if pairs
+        else scattered(drum, np.random.default_rng(start))
+    )
+    run = follow_bunch(drum, duration, start=q, noise=noise, dt=dt)
     census, there = run.census(-1), run.present[-1]
     return {
         "left": len(run.exits),
@@ -106,6 +123,19 @@ def bunch(
         "max_penetration": (run.trajectory.max_penetration, "mm"),
         "missed": run.trajectory.missed,
     }
+
+
+def _one_above_the_other(drum: "DumbbellDrum", pairs: str) -> Array:
+    """Return nested pairs on the lowest line, ``(2 n, 3)``, the first at the bottom."""
+    from polycorner.dumbbells.dynamics.dyads import CLEARANCE
+
+    places = []
+    for k, letter in enumerate(pairs):
+        hand: Chirality = "R" if choice("pairs", letter, ("R", "L")) == "R" else "L"
+        angle = math.radians(HEADING if hand == "R" else -HEADING)
+        pair = drum.pair.nested(hand, heading=angle, clearance=CLEARANCE).reshape(2, 3)
+        places.append(pair + np.array([0.0, (k + 2 / 3) * BETWEEN, 0.0]))
+    return np.concatenate(places)
 
 
 def _climbing(run: "BunchRun") -> dict[str, Any]:
