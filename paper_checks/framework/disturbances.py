@@ -14,6 +14,8 @@ class Disturbance(NamedTuple):
 
     def __str__(self) -> str:
         """Return the kind with its strength and time or frequencies, in words."""
+        if not self.strength:
+            return "no noise"
         if self.kind == "kicks":
             held = f"held for {1000 * self.scale:g} ms"
             return f"kicks of {self.strength:g} mm/s per $\\sqrt{{\\mathrm{{s}}}}$ {held}"

@@ -103,7 +103,7 @@ def bunch(
     if kicks:
         noise = replace(noise, kicks=kicks_of(drum, kicks), kick_time=kick_time)
     q = (
-        _one_above_the_other(drum, pairs)
+        one_above_the_other(drum, pairs)
         if pairs
         else scattered(drum, np.random.default_rng(start))
     )
@@ -125,7 +125,7 @@ def bunch(
     }
 
 
-def _one_above_the_other(drum: "DumbbellDrum", pairs: str) -> Array:
+def one_above_the_other(drum: "DumbbellDrum", pairs: str) -> Array:
     """Return nested pairs on the lowest line, ``(2 n, 3)``, the first at the bottom."""
     from polycorner.dumbbells.dynamics.dyads import CLEARANCE
 
