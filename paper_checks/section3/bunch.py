@@ -50,11 +50,13 @@ def bunch(
     seed: int = 0,
     top: float = TOP,
     dt: float = 2e-3,
+    noise: Disturbance = QUIET,
 ) -> BunchRun:
-    """Simulate a bunch without noise; ``sizes`` are ``l, r, t``."""
+    """Simulate a bunch; ``sizes`` are ``l, r, t``."""
     length, r, t = sizes
     drum = replace(DRUM, length=length, ball_radius=r, rod_radius=t)
     drum = drum_for_bunch(drum, count=LEAVING[0], top=top)
+    drum, kicks = disturbed(drum, *noise, seed)
     return follow_bunch(drum, duration, start=seed, noise=kicks, dt=dt)
 
 
@@ -200,7 +202,9 @@ def of_sixty_leave(
     leaving: int = LEAVING[1], starts: Mapping[Disturbance, int] = STARTS, top: float = TOP
 ) -> Finding:
     """Simulate bunches for the twenty minutes of the observation, under each kind of noise."""
-    listed, numbers, good = [], {}, False
+    listed: list[str] = []
+    numbers: dict[str, float] = {}
+    good = False
     for k, (noise, count) in enumerate(starts.items()):
         runs = [
             bunch(LARGER, OBSERVED_TIME, seed, top, STEPS[noise], noise) for seed in range(count)

@@ -102,11 +102,7 @@ def bunch(
     drum, noise = disturbed(drum, kind, strength, scale, start)
     if kicks:
         noise = replace(noise, kicks=kicks_of(drum, kicks), kick_time=kick_time)
-    q = (
-        one_above_the_other(drum, pairs)
-        if pairs
-        else scattered(drum, np.random.default_rng(start))
-    )
+    q = one_above_the_other(drum, pairs) if pairs else scattered(drum, np.random.default_rng(start))
     run = follow_bunch(drum, duration, start=q, noise=noise, dt=dt)
     census, there = run.census(-1), run.present[-1]
     return {
