@@ -27,6 +27,7 @@ from polycorner.dumbbells.dynamics.bunch import (
 from polycorner.dumbbells.dynamics.dyads import handedness
 from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.pair import Chirality
+from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import simulate
