@@ -1,5 +1,6 @@
 """Kinds of noise by which observations are judged, each with its strength and time."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 ALONG = "shaking along"
@@ -22,4 +23,12 @@ class Disturbance(NamedTuple):
         if self.kind == "chatter":
             return f"chatter of {self.strength:g}"
         band = f"{0.05 / self.scale:.2g} to {0.5 / self.scale:.2g} Hz"
-        return f"{self.kind} with {self.strength:g} mm/s² at {band}"
+        way = self.kind.replace(ALONG, "shaking along the axis")
+        return f"{way} with {self.strength:g} mm/s² at {band}"
+
+
+def which(some: Sequence[Disturbance], kinds: Sequence[Disturbance]) -> str:
+    """Name the kinds of noise under which a statement holds, among those tried."""
+    if len(some) == len(kinds):
+        return "of any of these kinds" if len(kinds) > 1 else str(kinds[0])
+    return "; ".join(map(str, some))

@@ -12,7 +12,7 @@ import numpy as np
 
 from paper_checks.appendixA.forces import judged
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.disturbances import Disturbance
+from paper_checks.framework.disturbances import Disturbance, which
 from paper_checks.section7.driven import (
     HARD,
     KINDS,
@@ -150,6 +150,7 @@ def heading_is_common(spread: float = 2.0, kinds: Sequence[Kept] = KINDS) -> Fin
     """Check that right-handed dyads from -8 to 14 degrees reach the same heading."""
     found = {noise: settled(*noise) for noise in kinds}
     reached = [noise for noise, one in found.items() if one.spread <= 2 * spread]
+    climb = [str(noise[0]) for noise in reached if found[noise].climb > 0]
     listed = "; ".join(
         f"{noise[0]}, after {0.75 * noise[1]:g} to {noise[1]:g} s {one.right.min():.1f}° to "
         f"{one.right.max():.1f}°, moving at {one.climb:.2f} mm/s"
@@ -159,8 +160,9 @@ def heading_is_common(spread: float = 2.0, kinds: Sequence[Kept] = KINDS) -> Fin
         Verdict.HOLDS_UNDER if reached else Verdict.REFUTED,
         f"right-handed dyads of 16 mm from -8°, 2°, 6°, 10° and 14°, tilted by 7°: {listed}",
         {f"spread_{k}": one.spread for k, one in enumerate(found.values())},
-        f"{'; '.join(str(noise[0]) for noise in reached)}; of these they climb under the kinds "
-        "whose rate above is positive; less noise leaves dyads their headings"
+        f"noise that makes dyads slip, {which([n[0] for n in reached], [n[0] for n in kinds])}; at "
+        f"the same time they climb under {' and '.join(climb) or 'none of these'}; less noise "
+        "leaves dyads their headings"
         if reached
         else "",
     )

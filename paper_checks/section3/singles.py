@@ -17,7 +17,7 @@ from paper_checks.appendixA.forces import STATIC, judged
 from paper_checks.appendixA.torque import DRUM
 from paper_checks.appendixA.turning import turns
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.disturbances import ALONG, Disturbance
+from paper_checks.framework.disturbances import ALONG, Disturbance, which
 from polycorner.dumbbells.dynamics.singles import follow, zigzags
 from polycorner.dumbbells.statics.keel import Keel
 from polycorner.dumbbells.studies.driven import disturbed
@@ -44,13 +44,6 @@ def shaken(
     drum, kicks = disturbed(DRUM, *noise, 1)
     dt = 1e-3 if noise.kind == "kicks" else 2e-3
     return follow(drum, np.radians(headings), duration, noise=kicks, dt=dt)
-
-
-def _which(some: Sequence[Disturbance], kinds: Sequence[Disturbance]) -> str:
-    """Name the kinds of noise under which a statement holds, among those tried."""
-    if len(some) == len(kinds):
-        return "of any of these kinds" if len(kinds) > 1 else str(kinds[0])
-    return "; ".join(map(str, some))
 
 
 def risen(path: Trajectory) -> Array:
@@ -168,7 +161,7 @@ def heading_decays(kinds: Sequence[Disturbance] = KINDS) -> Finding:
         f"headings of 15° (two) and -15° (two) after 200 s: {listed}; without noise they change by "
         f"{math.degrees(quiet):.1e}° in 30 s",
         {"largest": max(float(np.abs(end).max()) for end in ends.values())},
-        f"noise that makes dumbbells slip, {_which(decay, kinds)}; friction balances the torque at "
+        f"noise that makes dumbbells slip, {which(decay, kinds)}; friction balances the torque at "
         "rest and in rolling, and only slippage lets the heading decay",
     )
 
@@ -202,7 +195,7 @@ def level_heading_slips_down(kinds: Sequence[Disturbance] = KINDS) -> Finding:
         f"two dumbbells of heading 0 move in 200 s under {listed}, and stay within {widest:.1f}° "
         "of it",
         {"rise": max(float(rise.max()) for rise in rises.values()), "widest": widest},
-        f"noise that makes dumbbells slip, {_which(sink, kinds)}; without it a dumbbell of "
+        f"noise that makes dumbbells slip, {which(sink, kinds)}; without it a dumbbell of "
         "heading 0 stays where it is along the drum",
     )
 
@@ -224,7 +217,7 @@ def all_descend_in_the_end(kinds: Sequence[Disturbance] = KINDS) -> Finding:
         f"±15° and 0 move along the drum under {listed}",
         {"highest": highest, "slowest": max(slowest.values())},
         "with noise strong enough that slippage outweighs the climb once the heading is small, "
-        + _which(sink, kinds),
+        + which(sink, kinds),
     )
 
 
