@@ -74,7 +74,7 @@ def test_bunches_are_judged_by_how_many_have_left(monkeypatch):
     }
     assert found[40].numbers["left_0"] == found[40].numbers["left_1"] == 0
     assert "no noise, 2 start(s)" in found[40].evidence
-    assert "shaking along with 600 mm/s² at 5 to 50 Hz, 1 start(s)" in found[40].evidence
+    assert "shaking along the axis with 600 mm/s² at 5 to 50 Hz, 1 start(s)" in found[40].evidence
     assert "0.02 s" in found[40].evidence
 
 
