@@ -7,12 +7,20 @@ import asyncio
 import sys
 import tempfile
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from polycorner import minimise, skeleton
 from polycorner.dumbbells import DumbbellPair, dyad_minima, pair_atlas, pair_map
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch, follow_bunch
+from polycorner.dumbbells.dynamics.pairs import Sizes
 from polycorner.dumbbells.pictures import (
     draw_atlas,
     draw_heading,
@@ -21,6 +29,10 @@ from polycorner.dumbbells.pictures import (
     pair_film,
     write_solid,
 )
+from polycorner.dumbbells.pictures.bodies import rod_outlines
+from polycorner.dumbbells.pictures.drum import HANDS
+from polycorner.dumbbells.studies.bunches import one_above_the_other
+from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.dumbbells.viewer import descent, film_page, live_application, serve, write_page
 from polycorner.dumbbells.viewer.server import bound
 from polycorner.models import Tutorial
@@ -112,11 +124,59 @@ def viewer_film() -> None:
         tab.picture(_png("viewer_film"))
 
 
+def drum_bunch() -> None:
+    """Draw sixty dumbbells, and eight pairs one above the other, in a shaken drum."""
+    drum = drum_for_bunch(DumbbellDrum(16.0), top=300.0)
+    shaken, again = (disturbed(drum, "shaking along", 600.0, 0.01, seed)[0] for seed in (0, 1))
+    heap = follow_bunch(shaken, 1200.0, dt=1e-3)
+    file = follow_bunch(
+        replace(again, count=16), 1200.0, start=one_above_the_other(drum, "RLRLRLRL"), dt=2e-3
+    )
+    stills = {heap: (0.0, 100.0, 1200.0), file: (0.0, 100.0, 400.0, 1200.0)}
+    save(draw_bunches(stills), _png("drum_bunch"))
+
+
+def draw_bunches(runs: dict[BunchRun, tuple[float, ...]]) -> Figure:
+    """Draw instants of bunches side by side, the drum unrolled, dyads coloured by chirality."""
+    stills = [(run, time) for run, times in runs.items() for time in times]
+    widths = [125 if run.drum.count > 16 else 62 for run, _ in stills]
+    figure = Figure(figsize=(12, 5.4), layout="constrained")
+    panels = figure.subplots(1, len(stills), sharey=True, width_ratios=widths)
+    for axes, width, (run, time) in zip(panels, widths, stills, strict=True):
+        index = int(np.searchsorted(run.times, time - 0.01))
+        _draw_instant(axes, run, index)
+        left = 48 if width > 100 else 12
+        axes.set(xlim=(-left, width - left), ylim=(0, 300), aspect="equal", title=f"{time:g} s")
+        axes.axvline(0, color="0.6", lw=0.8, ls=":", zorder=0)
+    panels[0].set_ylabel("along the axis, η (mm)")
+    words = "across, ρφ (mm); the lowest line is dotted, and the wall moves to the right"
+    figure.supxlabel(words, fontsize=10)
+    return figure
+
+
+def _draw_instant(axes: Axes, run: BunchRun, index: int) -> None:
+    sizes, q, here = Sizes.of_drum(run.drum), run.q[index], np.flatnonzero(run.present[index])
+    sums = dict.fromkeys(here.tolist(), 0)
+    for i, j, hand in run.dyads(index):
+        sums[i] += hand
+        sums[j] += hand
+    colours = [HANDS["R"] if n > 0 else HANDS["L"] if n < 0 else "0.7" for n in sums.values()]
+    balls = sizes.balls(q[here])
+    outlines = list(rod_outlines(balls, sizes.rod_radius))
+    axes.add_collection(PolyCollection(outlines, facecolor=colours, edgecolor="none"))
+    for pair, colour in zip(balls, colours, strict=True):
+        for centre in pair:
+            axes.add_patch(Circle(tuple(centre), sizes.ball_radius, color=colour, lw=0))
+
+
 def _png(name: str) -> Path:
     return IMAGES / f"{name}.png"
 
 
-DRAWN = {f.__name__: f for f in (heading, delta, atlas, proportions, tutorial, viewer, viewer_film)}
+DRAWN = {
+    f.__name__: f
+    for f in (heading, delta, atlas, proportions, tutorial, viewer, viewer_film, drum_bunch)
+}
 
 if __name__ == "__main__":
     for chosen in sys.argv[1:] or DRAWN:

@@ -3,13 +3,15 @@
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from paper_checks.appendixA.torque import DRUM
+from paper_checks.framework.disturbances import ALONG, Disturbance
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, follow_pairs
 from polycorner.dumbbells.pair import Chirality
+from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
@@ -17,9 +19,72 @@ from polycorner.motion.trajectory import Trajectory
 Kind = Literal["end_to_end", "side_by_side"]
 Starts = tuple[tuple[Chirality, float], ...]  # chirality and heading, in degrees
 TWO = replace(DRUM, count=2)
-LASTING, LATE = 300.0, 150.0  # s, duration of runs for steady headings, and start of the averages
 CLEARANCE = 0.05  # mm, between the dumbbells at the start
 APART = 1e4  # mm along the drum, between pairs that are to stay apart
+
+
+CHATTER = Disturbance("chatter", 0.4, 0.01)  # turns pairs within minutes
+SHAKEN = Disturbance(ALONG, 600.0, 0.01)  # under which right-handed pairs climb
+HARD = Disturbance(ALONG, 1500.0, 0.01)  # under which pairs of a level drum slip, too
+KICKED = Disturbance("kicks", 30.0, 0.003)
+ACROSS = Disturbance("shaking across", 3000.0, 0.03)
+UP = Disturbance("shaking up", 4000.0, 0.03)
+KINDS: tuple[tuple[Disturbance, float], ...] = (
+    (SHAKEN, 1600.0),
+    (HARD, 200.0),
+    (ACROSS, 200.0),
+    (UP, 200.0),
+    (KICKED, 400.0),
+    (CHATTER, 300.0),
+)  # those by which pairs are judged, and for how long they are kept up, in s
+STEPS = {"kicks": 5e-4}  # s, of kinds for which that of :func:`follow_dyads` is too long
+ANGLES = (-8.0, 2.0, 6.0, 10.0, 14.0)  # degrees, of right-handed pairs; mirrored for left-handed
+ALL: Starts = (*(("R", a) for a in ANGLES), *(("L", -a) for a in ANGLES))
+
+
+@cache
+def disturbed_dyads(
+    noise: Disturbance, duration: float, tilt: float = 7.0, length: float = 16.0
+) -> DyadPaths:
+    """Simulate five right-handed and five left-handed nested pairs; angles in degrees."""
+    drum = replace(DRUM, tilt=math.radians(tilt), length=length)
+    drum, kicks = disturbed(drum, *noise, 1)
+    starts = [(hand, math.radians(degrees)) for hand, degrees in ALL]
+    dt = STEPS.get(noise.kind, 2e-3)
+    return follow_dyads(drum, starts, duration, noise=kicks, dt=dt)
+
+
+class Settled(NamedTuple):
+    """Last quarter of a run of ten pairs: headings in degrees, in the order of the starts."""
+
+    right: np.ndarray
+    left: np.ndarray
+    climb: float  # mm/s, of right-handed pairs, over the last half
+    held: tuple[int, int]  # right- and left-handed pairs that held together
+    opened: float  # mm, by which the shift of a right-handed pair differs from that at the start
+
+    @property
+    def spread(self) -> float:
+        """The largest less the smallest heading of right-handed pairs."""
+        return float(np.ptp(self.right))
+
+
+def settled(
+    noise: Disturbance, duration: float, tilt: float = 7.0, length: float = 16.0
+) -> Settled:
+    """Return what noise makes of the ten pairs; those that came apart are left out of means."""
+    paths, half = disturbed_dyads(noise, duration, tilt, length), len(ANGLES)
+    whole = np.isinf(paths.lifetimes)
+    late = np.degrees(paths.heading[paths.times >= 0.75 * duration]).mean(axis=0)
+    late[~whole] = np.nan
+    changed = np.abs(paths.shift[-1] - paths.shift[0])[:half]
+    return Settled(
+        right=late[:half][whole[:half]],
+        left=late[half:][whole[half:]],
+        climb=float(paths.climb_rates(after=duration / 2)[:half][whole[:half]].mean()),
+        held=(int(whole[:half].sum()), int(whole[half:].sum())),
+        opened=float(changed.max()),
+    )
 
 
 def dyads(

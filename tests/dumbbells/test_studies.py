@@ -91,7 +91,7 @@ def test_members_of_a_bunch_are_counted():
         "top": 60.0,
         "tilt": -20.0,
         "sliding": 0.15,
-        "noise": 0.1,
+        "strength": 0.1,
     }
     found = sweep(bunch, {"start": [0, 3], "rubbing": [0.1, 0.3]}, fixed=fixed)
     drum = DumbbellDrum(
@@ -102,7 +102,7 @@ def test_members_of_a_bunch_are_counted():
         sliding=(0.15, 0.1),
         rubbing=(0.1, 0.1),
     )
-    run = follow_bunch(drum, 0.2, seed=3, chatter=0.1, dt=0.004)
+    run = follow_bunch(drum, 0.2, start=3, noise=Noise(chatter=0.1, seed=3), dt=0.004)
     at = {name: values.item() for name, values in found.sel(start=3, rubbing=0.1).items()}
     assert at["left"] == len(run.exits)
     assert 0 < at["left"] < 12
@@ -121,7 +121,10 @@ def test_members_of_a_bunch_are_counted():
     [
         ({"start": 1.5}, "start: expected"),
         ({"start": -1}, "start: expected"),
-        ({"noise": -1.0}, "chatter: expected"),
+        ({"kind": "noise"}, "kind: expected"),
+        ({"strength": -1.0}, "strength: expected"),
+        ({"kicks": -1.0}, "kicks: expected"),
+        ({"pairs": "RX"}, "pairs: expected"),
         ({"count": 0}, "count: expected"),
         ({"rubbing": -0.1}, "rubbing: expected"),
         ({"top": 0.0}, "top: expected"),
@@ -132,3 +135,13 @@ def test_members_of_a_bunch_are_counted():
 def test_bunches_name_what_is_wrong(wrong, words):
     with pytest.raises((TypeError, ValueError), match=words):
         bunch(**({"start": 1, "count": 3, "duration": 0.01} | wrong))
+
+
+def test_pairs_start_one_above_the_other_and_kinds_of_noise_are_those_of_the_study_of_pairs():
+    given = {"duration": 0.2, "top": 100.0, "dt": 0.002, "pairs": "RL"}
+    found = bunch(1, kind="shaking along", strength=600.0, kicks=30.0, **given)
+    assert found["in_right"] == found["in_left"] == 2
+    assert found["highest"][0] == pytest.approx(67, abs=1.5)
+    assert found["highest"][0] > bunch(1, **given)["reach"][0] > 40
+    other = bunch(1, kind="kicks", strength=30.0, scale=0.003, **given)
+    assert len({one["reach"][0] for one in (found, other, bunch(1, **given))}) == 3

@@ -32,6 +32,8 @@ TRIES = 1000  # rejected draws in a row after which the strip grows
 WINDOW = 10.0  # s, longer than a zigzag
 ROLLING = math.radians(30.0)  # own spin within the window beyond which it counts as a roller
 KINDS = tuple(LEFT_AS.values())
+HANDS = {1: "right", -1: "left"}
+STATES = ("free", "touched")  # of a dyad, by other dumbbells
 
 
 def drum_for_bunch(drum: DumbbellDrum, *, count: int = COUNT, top: float = TOP) -> DumbbellDrum:
@@ -129,6 +131,30 @@ class BunchRun(Value):
         spun = np.abs(np.diff(self.q[first : index + 1, :, 3], axis=0)).sum(axis=0)
         return np.asarray(self.present[index] & (spun > ROLLING))
 
+    def dyad_rates(self, window: float = WINDOW) -> dict[str, Array]:
+        """Return how fast dyads rise, in mm/s: ``right free``, ``right touched`` and for ``left``.
+
+        The time is divided into intervals of ``window`` s.  A rate is the mean rise of the members
+        of a dyad over an interval, at both ends of which they are in the drum as this dyad, and it
+        is free if none of its records shows a third dumbbell that touches one of them.
+        """
+        step = max(1, int(np.searchsorted(self.times, self.times[0] + window)))
+        found: dict[str, list[float]] = {f"{h} {s}": [] for h in HANDS.values() for s in STATES}
+        for first in range(0, len(self.times) - step, step):
+            last = first + step
+            touching = self._touching(first, last)
+            for i, j, hand in set(self.dyads(first)) & set(self.dyads(last)):
+                free = all(len({i, j} & pair) != 1 for pair in touching)
+                rise = self.q[last, [i, j], 1].mean() - self.q[first, [i, j], 1].mean()
+                rate = rise / (self.times[last] - self.times[first])
+                found[f"{HANDS[hand]} {STATES[not free]}"].append(float(rate))
+        return {name: np.array(sorted(rates)) for name, rates in found.items()}
+
+    def _touching(self, first: int, last: int) -> set[frozenset[int]]:
+        """Return the pairs of dumbbells that touch in one of the records."""
+        records = self.trajectory.touching[first : last + 1]
+        return {frozenset(b) for record in records for b, *_ in record if len(b) == 2}
+
     def azimuths(self, index: int) -> tuple[float, float]:
         """Return the mean azimuths of rollers and of sliders, in rad; nan for none."""
         rolls = self.rollers(index)
@@ -144,23 +170,23 @@ def follow_bunch(
     drum: DumbbellDrum,
     duration: float,
     *,
-    seed: int = 0,
-    chatter: float = 0.0,
+    start: int | Array = 0,
+    noise: Noise | None = None,
     dt: float = 1e-3,
     interval: float = 0.5,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> BunchRun:
-    """Follow a scattered bunch for ``duration`` s.
+    """Follow a bunch for ``duration`` s.
 
     Parameters
     ----------
     drum : DumbbellDrum
         With a bottom, as of :func:`drum_for_bunch`.
-    seed : int, optional
-        Of the start and of the noise.
-    chatter : float, optional
-        Amplitude of the noise of the loads.
+    start : int or (count, 3) array, optional
+        The seed of a :func:`scattered` start, or placements.
+    noise : Noise, optional
+        None by default.
     dt, interval : float, optional
         Step, and time between records, in s.
     progress, checkpoint : optional
@@ -169,8 +195,7 @@ def follow_bunch(
     if not drum.floor:
         msg = "drum: expected one with a bottom, on which the bunch lies; got floor=False"
         raise ValueError(msg)
-    q = scattered(drum, np.random.default_rng(seed))
-    noise = Noise(chatter=chatter, seed=seed)
+    q = start if isinstance(start, np.ndarray) else scattered(drum, np.random.default_rng(start))
     stride = max(1, round(interval / dt))
     return BunchRun(
         simulate(

@@ -1,6 +1,7 @@
+from .bunches import bunch
 from .catalogue import STUDIES
 from .driven import driven
-from .functions import bunch, climbing, heading
+from .functions import climbing, heading
 from .turning import turning
 
 __all__ = [

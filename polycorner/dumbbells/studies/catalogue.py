@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from polycorner.dumbbells.studies.bunches import bunch
 from polycorner.dumbbells.studies.driven import driven
-from polycorner.dumbbells.studies.functions import bunch, climbing, heading
+from polycorner.dumbbells.studies.functions import climbing, heading
 from polycorner.dumbbells.studies.turning import turning
 from polycorner.sweeps.study_files import NamedStudy
 
@@ -28,7 +29,7 @@ def _named(function: Callable[..., Mapping[str, Any]], units: Mapping[str, str])
 STUDIES: Mapping[str, NamedStudy] = {
     "heading": _named(heading, LENGTHS),
     "climbing": _named(climbing, DRUM),
-    "bunch": _named(bunch, DRUM | {"top": "mm"}),
+    "bunch": _named(bunch, DRUM | {"top": "mm", "kick_time": "s"}),
     "driven": _named(driven, DRUM),
     "turning": _named(turning, DRUM | {"heading": "deg"}),
 }

@@ -15,6 +15,7 @@ from polycorner.motion.noise import Noise, Solver
 
 NEAR, KICKED = 1e-6, 1e-4  # scaled travel in a step of a slow impact, without and with kicks
 SHARE = 0.01  # that in a crowd, over the reach of bodies
+MANY = 300  # bodies beyond which all are a crowd: the parts of an island cost a look at each body
 
 
 def model_of(
@@ -72,6 +73,7 @@ def _near(bodies: IdenticalBodies, noise: Noise) -> dict[str, float]:
     near = many = KICKED if any(noise.kicks.values()) else NEAR
     if bodies.contacts is not None and bodies.count > 1:
         many = max(near, SHARE * bodies.contacts.reach / bodies.body.gap_unit)
+        near = near if bodies.count <= MANY else many
     return {"near": near, "near_many": many}
 
 

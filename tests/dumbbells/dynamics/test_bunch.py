@@ -112,7 +112,7 @@ def test_what_spins_rolls_and_what_does_not_slides():
 
 
 def test_a_bunch_stays_in_the_drum_and_sorts_itself():
-    run = follow_bunch(SMALL, 1.0, seed=2, dt=2e-3)
+    run = follow_bunch(SMALL, 1.0, start=2, dt=2e-3)
     assert run.present.all()
     assert run.exits == ()
     assert run.trajectory.max_penetration < 0.01
@@ -123,7 +123,7 @@ def test_a_bunch_stays_in_the_drum_and_sorts_itself():
 
 def test_dumbbells_leave_at_the_top():
     drum = replace(SMALL, top=40.0, tilt=math.radians(-40))  # steep: all slide out
-    run = follow_bunch(drum, 0.5, seed=2, interval=0.01)
+    run = follow_bunch(drum, 0.5, start=2, interval=0.01)
     assert len(run.exits) == 8
     assert run.exits[0][0] > 0.02
     assert not run.present[-1].any()
@@ -131,9 +131,25 @@ def test_dumbbells_leave_at_the_top():
 
 def test_a_bunch_that_begins_above_the_top_is_refused():
     with pytest.raises(ValueError, match=r"top: .* got 10 mm, and number \d is at 17\.2"):
-        follow_bunch(replace(SMALL, top=10.0), 1.0, seed=2)
+        follow_bunch(replace(SMALL, top=10.0), 1.0, start=2)
 
 
 def test_a_drum_without_a_bottom_is_refused():
     with pytest.raises(ValueError, match="drum: expected one with a bottom"):
         follow_bunch(DumbbellDrum(), 1.0)
+
+
+def test_dyads_climb_free_or_touched_by_a_third():
+    """A right-handed pair rises by 1 mm in 10 s; in the second interval a third one touches it."""
+    pair = SMALL.pair.nested("R").reshape(2, 3)
+    drum = replace(SMALL, count=3)
+    q = np.concatenate([pair + np.array([0, 50, 0]), [[1.0, 30.0, 0.0]]])
+    path = still(drum, q, np.arange(0, 21.0)).trajectory
+    rising = path.q.copy()
+    rising[:, :2, 1] += 0.1 * path.times[:, None]
+    touching = tuple((((1, 2), "A2B1", 0.0),) if time > 10 else () for time in path.times)
+    run = BunchRun(replace(path, q=rising, touching=touching))
+    found = run.dyad_rates()
+    assert found["right free"] == pytest.approx([0.1])
+    assert found["right touched"] == pytest.approx([0.1])
+    assert len(found["left free"]) == len(found["left touched"]) == 0

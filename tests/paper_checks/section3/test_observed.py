@@ -67,13 +67,14 @@ def test_encounters_start_apart_and_a_climbing_one_below():
 
 def test_bunches_are_judged_by_how_many_have_left(monkeypatch):
     monkeypatch.setattr(bunch, "OBSERVED_TIME", 0.02)
-    found = {leaving: bunch.of_sixty_leave(leaving, starts=2) for leaving in (0, 40)}
+    found = {leaving: bunch.of_sixty_leave(leaving) for leaving in (0, 40)}
     assert {leaving: one.verdict for leaving, one in found.items()} == {
         0: Verdict.HOLDS_UNDER,
         40: Verdict.REFUTED,
     }
-    assert found[40].numbers["left"] == 0
-    assert "2 starts" in found[40].evidence
+    assert found[40].numbers["left_0"] == found[40].numbers["left_1"] == 0
+    assert "no noise, 2 start(s)" in found[40].evidence
+    assert "shaking along the axis with 600 mm/s² at 5 to 50 Hz, 1 start(s)" in found[40].evidence
     assert "0.02 s" in found[40].evidence
 
 
