@@ -26,6 +26,7 @@ from polycorner import Manifold, Polyhedron, minimise
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
+from polycorner.dumbbells.studies.driven import kicks_of
 from polycorner.errors import SolverError
 from polycorner.models import supports
 from polycorner.models import textbook as scenes
@@ -33,11 +34,11 @@ from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
 from polycorner.motion.mechanics import State
-from polycorner.motion.noise import Solver
+from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulation import start
 from polycorner.motion.system import System
 
-ACCURATE = Solver(1e-10, refine=False)
+ACCURATE, LOCATING = Solver(1e-10, refine=False), Solver(1e-10)
 SAME = 1e-8  # of the speeds in a step
 
 # -------------------------------------------------------------------------------- random systems
@@ -256,10 +257,11 @@ def values(family, drum, at, order, **more):
     return [part.copy() for part in family.kernel.at(place, parameters.ctypes.data, order)]
 
 
-def drum_problem(drum, q, v, dt, sticks, rubbing):
+def drum_problem(drum, q, v, dt, sticks, rubbing, kick=0.0):
     """One step of two dumbbells as an inclusion, from motion's equations and the formulas.
 
-    ``sticks`` ``(2, 3)`` and ``rubbing``, by contact, say which friction contacts stuck.
+    ``sticks`` ``(2, 3)`` and ``rubbing``, by contact, say which friction contacts stuck; ``kick``
+    is a random impulse.
     """
     middle = q + dt / 2 * v
     one = [
@@ -301,7 +303,7 @@ def drum_problem(drum, q, v, dt, sticks, rubbing):
         matrix = rub_matrix(drum, contact, middle, v)
         mu = drum.rubbing[0 if rubbing.get(contact) else 1]
         blocks.append(FrictionBlock(matrix, np.zeros(2), Disc(mu), 0.0, row))
-    v_free = v.ravel() + dt * force / mass
+    v_free = v.ravel() + (dt * force + kick) / mass
     bends = drum_gaps(drum, middle + dt * v) - gaps - dt * normals @ v.ravel()
     slides = (abs(bends) > 1e-9) & (abs(dt * normals @ v.ravel()) <= 4 * abs(bends))
     bends = np.where(slides, bends, 0.0)
@@ -372,7 +374,8 @@ def drum_solution(drum, engine, before):
     motion, known = engine.motion, int(before["counts"][0])
     flags = zip(before["keys"][:known], before["pair_flags"][:known, 0], strict=True)
     stuck = {CONTACTS[key % len(CONTACTS)]: bool(flag) for key, flag in flags}
-    problem = drum_problem(drum, before["q"], before["v"], engine.dt, before["sticks"], stuck)
+    states = before["q"], before["v"], engine.dt, before["sticks"], stuck
+    problem = drum_problem(drum, *states, engine.work.kick.ravel())
     normal, rubs = np.zeros(len(CONTACTS)), np.zeros((len(CONTACTS), 2))
     count = int(motion.counts[0])
     for key, press in zip(motion.keys[:count], motion.pair_impulse[:count], strict=True):
@@ -383,7 +386,7 @@ def drum_solution(drum, engine, before):
     static = [*one, *one, *[Disc(drum.rubbing[0])] * len(CONTACTS)]
     problem = with_turned(problem, static, velocity)
     if natural_residual(problem, velocity, normal, impulses) >= SAME:  # solved twice, then
-        problem = drum_problem(drum, before["q"], before["v"], engine.dt, before["sticks"], stuck)
+        problem = drum_problem(drum, *states, engine.work.kick.ravel())
         first, turned = None, problem
         while first is None or turned is not problem:
             problem = turned
@@ -434,6 +437,29 @@ def test_steps_of_two_dumbbells_solve_the_inclusion(seed):
             pressed.append(int((normal > 0).sum()))
     assert engine.effort.unconverged == 0
     assert np.count_nonzero(pressed) > 10
+
+
+@pytest.mark.parametrize("hand", ["R", "L"])
+def test_steps_of_a_nested_pair_under_kicks_solve_the_inclusion(hand):
+    """Those not taken in parts, under kicks of the strength at which pairs find their heading."""
+    drum = DumbbellDrum(count=2)
+    noise = Noise(kicks=kicks_of(drum, 30.0), kick_time=0.003, seed=4)
+    q = drum.pair.nested(hand, heading=math.radians(14.0), clearance=0.01).reshape(2, 3)
+    q[:, 1] += 50.0
+    engine = start(drum, drum.state(q), 5e-4, noise=noise, solver=LOCATING)
+    checked, pressed = 0, 0
+    while checked < 300 and engine.time < 20.0:
+        before = {name: array.copy() for name, array in engine.save().items()}
+        parts = engine.effort.parts
+        engine.advance(1)
+        if engine.effort.parts == parts and not engine.motion.rests.any():
+            problem, velocity, normal, friction = drum_solution(drum, engine, before)
+            assert natural_residual(problem, velocity, normal, friction) < SAME
+            checked, pressed = checked + 1, pressed + int((normal > 0).any())
+    assert engine.effort.unconverged == 0
+    assert engine.effort.parts > 0
+    assert checked == 300
+    assert pressed > 30
 
 
 def test_a_dyad_rests_where_the_inclusion_says_so():
