@@ -28,6 +28,7 @@ from polycorner.motion.engine.arrays import Log, Model, State, Work, declaration
 from polycorner.motion.engine.sizes import WIDTH
 
 ITEMSIZE = 8  # bytes of every number
+UNTOLD = 0  # said in place of the first length of an array
 LETTERS = {"dimension": "k", "lanes": "K"}  # numbers of the model that may be known
 
 
@@ -89,7 +90,7 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
 
     if not isinstance(held, types.Array):
         return load(slot, context.get_value_type(held))
-    word, unused = ir.IntType(64), ir.Constant(ir.IntType(64), 0)
+    word, untold = ir.IntType(64), ir.Constant(ir.IntType(64), UNTOLD)
     known = [record.known.get(length, length) for length in record.shapes[name]]
     shape = [
         ir.Constant(word, int(length)) if str(length).isdigit() else load(slot + 1 + axis)
@@ -103,7 +104,7 @@ def read_entry(context: Any, builder: Any, record: RecordType, table: Any, name:
         "nitems": stride,
         "itemsize": strides[-1],
         "data": load(slot, context.get_data_type(held.dtype).as_pointer()),
-        "shape": cgutils.pack_array(builder, [unused, *shape[1:]], word),
+        "shape": cgutils.pack_array(builder, [untold, *shape[1:]], word),
         "strides": cgutils.pack_array(builder, strides, word),
     }
     model = context.data_model_manager[held]
