@@ -15,7 +15,7 @@ from polycorner.motion.noise import Noise, Solver
 
 NEAR, KICKED = 1e-6, 1e-4  # scaled travel in a step of a slow impact, without and with kicks
 SHARE = 0.01  # that in a crowd, over the reach of bodies
-MANY = 300  # bodies beyond which all are a crowd: the parts of an island cost a look at each body
+MANY = 32  # bodies beyond which all are a crowd: parts of a step cost a look at each body
 
 
 def model_of(
