@@ -11,6 +11,9 @@ from polycorner.motion.engine.sets import DISC
 from polycorner.motion.simulation import start
 
 
+ACCURACY = 2e-3  # share of friction by which a pile may slide too late or too early
+
+
 def spare(engine, before):
     """Return the largest share of the drum's friction without which a pile would remain at rest.
 
@@ -63,6 +66,6 @@ def test_a_pile_remains_at_rest_as_long_as_it_can():
             found = left if engine.motion.rests.all() else slides
             found.append(spare(engine, before))
     assert max(left) > 0.1
-    assert min(left) > -1e-3
+    assert min(left) > -ACCURACY  # as in the step before a slide
     assert len(slides) > 1
-    assert max(map(abs, slides)) < 2e-3
+    assert max(map(abs, slides)) < ACCURACY
