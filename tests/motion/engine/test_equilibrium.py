@@ -10,7 +10,6 @@ from polycorner.motion.engine.arrays import OWN_FRICTION
 from polycorner.motion.engine.sets import DISC
 from polycorner.motion.simulation import start
 
-
 ACCURACY = 2e-3  # share of friction by which a pile may slide too late or too early
 
 
