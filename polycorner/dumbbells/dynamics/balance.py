@@ -1,4 +1,4 @@
-"""What turns a dyad in the drum: its weight, and impacts between its dumbbells.
+"""Turning of a dyad in the drum: by its weight, and by impacts between its dumbbells.
 
 A nested pair of heading ``theta`` is two parallel dumbbells, ``p = r + t`` across and
 ``s = l - sqrt(4 r^2 - p^2)`` along their axes apart.  Its weight turns it towards the heading of

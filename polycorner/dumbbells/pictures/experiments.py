@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import KINDS, BunchRun
-from polycorner.dumbbells.dynamics.dyads import Steady, heading_at_shift
+from polycorner.dumbbells.dynamics.dyads import heading_at_shift
 from polycorner.dumbbells.dynamics.singles import Zigzag
+from polycorner.dumbbells.dynamics.steady import Steady
 from polycorner.pictures.style import SHADES
 from polycorner.spaces.manifold import Array
 

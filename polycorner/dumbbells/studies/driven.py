@@ -11,7 +11,8 @@ from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import DyadPaths, Steady
+    from polycorner.dumbbells.dynamics.dyads import DyadPaths
+    from polycorner.dumbbells.dynamics.steady import Steady
     from polycorner.motion.noise import Noise
     from polycorner.motion.trajectory import Trajectory
 
@@ -103,7 +104,8 @@ def driven(
         Naming the argument, what was expected and what came.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_pairs, steady
+    from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_pairs
+    from polycorner.dumbbells.dynamics.steady import steady
 
     real("tilt", tilt, unit="deg")
     real("duration", duration, above=0, unit="s")
