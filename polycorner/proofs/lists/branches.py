@@ -1,0 +1,71 @@
+"""Branches of an and/or tree in a box: which inequalities have to hold together there."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner import checks
+from polycorner.polyhedra.polyhedron import Polyhedron
+
+Mask = NDArray[np.bool_]
+MOST_BRANCHES = 4096
+
+
+def conjunctions(polyhedron: Polyhedron) -> Mask:
+    """Return the set as a union of intersections, ``(branches, m)``.
+
+    Raises
+    ------
+    ValueError
+        If there are too many.
+    """
+    m = len(polyhedron.functions)
+    pieces = polyhedron.signs_to_pieces([0] * m)
+    if len(pieces) > MOST_BRANCHES:
+        checks.refuse("polyhedron", f"a tree of at most {MOST_BRANCHES} branches", len(pieces))
+    masks = np.zeros((len(pieces), m), dtype=np.bool_)
+    for mask, piece in zip(masks, pieces, strict=True):
+        mask[list(piece)] = True
+    return masks
+
+
+def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]:
+    """Return the branches that points of the set in each box may lie in.
+
+    A function is ``below`` where it is negative on the whole box, ``above`` where it is positive.
+    A branch whose open functions include those of another one is contained in it, in this box.
+
+    Parameters
+    ----------
+    conj : (c, m) array
+        The union of intersections.
+    below, above : (B, m) arrays
+        Signs of the functions on boxes.
+
+    Returns
+    -------
+    boxes : (I,) array
+        A box for each item; boxes without any are outside the set.
+    masks : (I, m) array
+        The functions that are open there and have to hold in the branch.
+    """
+    if len(conj) == 1:
+        alive = np.flatnonzero(~(below & conj[0]).any(axis=1))
+        return alive, ~above[alive] & conj[0]
+    possible = ~(below[:, None, :] & conj).any(axis=2)  # (B, c)
+    boxes, branches = np.nonzero(possible)
+    masks = conj[branches] & ~above[boxes]
+    keep = np.ones(len(boxes), dtype=np.bool_)
+    starts = np.flatnonzero(np.r_[True, boxes[1:] != boxes[:-1]]) if len(boxes) else []
+    for a, b in zip(starts, [*starts[1:], len(boxes)], strict=True):
+        if b - a > 1:
+            keep[a:b] = _kept(masks[a:b])
+    return boxes[keep], masks[keep]
+
+
+def _kept(masks: Mask) -> Mask:
+    """Return which of some sets are minimal, the first of equal ones."""
+    contains = ~(masks[None, :, :] & ~masks[:, None, :]).any(axis=2)  # [i, j]: j is within i
+    equal = contains & contains.T
+    earlier = np.tril(equal, -1)
+    dropped: Mask = (contains & ~equal).any(axis=1) | earlier.any(axis=1)
+    return ~dropped
