@@ -159,7 +159,7 @@ class Faces:
             return np.array([float(x) for x in reach])
         sharp = self._sharpened(forms, box, image)
         index = self._index(start, len(rows) - 1)
-        ends = np.array([_outward(x) for x in sharp])
+        ends = np.array([outward(x) for x in sharp])
         return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
 
     def _at_centre(
@@ -286,7 +286,7 @@ def enclosed_multipliers(slopes: "list[list[Ball]]") -> "list[Ball] | None":
         return None
 
 
-def _outward(x: "Ball") -> tuple[float, float]:
+def outward(x: "Ball") -> tuple[float, float]:
     """Return doubles below and above a ball."""
     return _double(exact(x.lower()), -np.inf), _double(exact(x.upper()), np.inf)
 

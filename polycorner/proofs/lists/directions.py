@@ -229,7 +229,7 @@ def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v,
     count = 0
     for k in range(m + 1):
         row = m + equations if k == m else k
-        if k < m and not mask[k]:
+        if (k < m and not mask[k]) or (k == m and energy_sign == 0.0):
             continue
         sign = energy_sign if k == m else 1.0
         size, radius = 0.0, 0.0
@@ -250,6 +250,8 @@ def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v,
             a[count, j] /= rho[count]
         rows[count] = row
         count += 1
+    if count == 0:
+        return True
     found = nearest(a, count, v, w, 1.0)
     for k in range(count):
         w[k] /= rho[k]
@@ -290,7 +292,7 @@ def _entry_points(sources: str) -> Any:
         scales : (n,) array
             Units of the coordinates; 0 for coordinates that are fixed.
         energy_sign : float
-            -1 for directions of descent.
+            -1 for directions of descent, 0 for directions into the set alone.
 
         Returns
         -------

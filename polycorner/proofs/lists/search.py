@@ -22,6 +22,8 @@ from polycorner.proofs.lists.branches import Mask, conjunctions, items
 from polycorner.proofs.lists.candidates import active_set, newton
 from polycorner.proofs.lists.directions import directions
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.images import Motion, dropped, weights
+from polycorner.proofs.lists.loci import Locus, locus, read_coordinates
 from polycorner.proofs.lists.tree import Tree
 from polycorner.spaces.manifold import Array
 
@@ -67,13 +69,16 @@ class Tally:
     outside: int = 0
     descending: int = 0
     covered: int = 0
+    images: int = 0
     split: int = 0
     undecided: int = 0
 
     @property
     def boxes(self) -> int:
         """All boxes that were treated."""
-        return self.outside + self.descending + self.covered + self.split + self.undecided
+        return (
+            self.outside + self.descending + self.covered + self.images + self.split + self.undecided
+        )
 
 
 @dataclass
@@ -86,7 +91,9 @@ class Search:
     functions: BoxFunctions = field(init=False)
     faces: Faces = field(init=False)
     conj: Mask = field(init=False)
+    motions: tuple[Motion, ...] = ()
     regions: list[Region] = field(default_factory=list)
+    loci: list[Locus] = field(default_factory=list)
     tally: Tally = field(default_factory=Tally)
     tree: Tree = field(default_factory=Tree)
     undecided: list[Boxes] = field(default_factory=list)
@@ -98,6 +105,9 @@ class Search:
         free = self.domain.free
         self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales)
         self.conj = conjunctions(self.problem.polyhedron)
+        self.reads = read_coordinates(formulas, free)
+        self.weights = weights(self.domain)
+        self._equations = len(self.problem.polyhedron.equations)
         lower, upper = self.domain.lower[None].copy(), self.domain.upper[None].copy()
         start = np.zeros(1, dtype=np.int64)
         self.waiting = Boxes(lower, upper, start, start)
@@ -113,8 +123,19 @@ class Search:
             self.waiting = self.waiting.with_others(self.step(last))
             report(self)
 
+    def _without_images(self, boxes: Boxes) -> Boxes:
+        """Return the boxes that no symmetry carries to others."""
+        if not self.motions:
+            return boxes
+        gone = dropped(boxes.lower, boxes.upper, self.motions, self.weights, self.domain)
+        self.tally.images += int(gone.sum())
+        nothing = np.zeros((0, boxes.lower.shape[1]))
+        self.tree.close(boxes.nodes[gone], boxes.nodes[:0], nothing)
+        return boxes.part(~gone)
+
     def step(self, boxes: Boxes) -> Boxes:
         """Treat some boxes; return the halves of those that are left."""
+        boxes = self._without_images(boxes)
         m, rows = self.problem.inequalities, self.problem.rows
         v_lo, v_hi, g_lo, g_hi = self.functions.gradients(boxes.lower, boxes.upper)
         meets = ((v_lo[:, m : rows - 1] <= 0) & (v_hi[:, m : rows - 1] >= 0)).all(axis=1)
@@ -124,13 +145,16 @@ class Search:
             g_lo, g_hi, where, masks, rows - 1 - m, self.domain.units, -1.0
         )
         continuous = self.functions.continuous(boxes.lower, boxes.upper)[where]
-        found &= (continuous[:, :m] | ~masks).all(axis=1) & continuous[:, m:].all(axis=1)
+        smooth = (continuous[:, :m] | ~masks).all(axis=1) & continuous[:, m:].all(axis=1)
+        found &= smooth
         done = found | self._covered(boxes, where, masks)
+        self._on_loci(boxes, where, masks, (g_lo, g_hi), (done, found, smooth, v))
         since = boxes.since.copy()
         if not done.all():
             rest = np.flatnonzero(~done)
             self._attempt(boxes, where[rest], weights[rest], g_lo, g_hi, since)
             done |= self._covered(boxes, where, masks)
+            self._on_loci(boxes, where, masks, (g_lo, g_hi), (done, found, smooth, v))
         count = len(boxes)
         seen, left, known = (np.zeros(count, dtype=np.bool_) for _ in range(3))
         seen[where], left[where[~done]], known[where[done & ~found]] = True, True, True
@@ -153,6 +177,31 @@ class Search:
                 outside[list(region.active)] = False
                 found |= inside[where] & ~(masks & outside).any(axis=1)
         return found
+
+    def _on_loci(
+        self,
+        boxes: Boxes,
+        where: NDArray[np.intp],
+        masks: Mask,
+        gradients: tuple[Array, Array],
+        state: tuple[Mask, Mask, Mask, Array],
+    ) -> None:
+        """Close items near loci that have a direction into the set along the other coordinates."""
+        done, found, smooth, v = state
+        z = list(self.reads)
+        units = self.domain.units.copy()
+        units[z] = 0.0
+        for place in self.loci:
+            near = (boxes.lower[:, z] >= place.lower).all(axis=1)
+            near &= (boxes.upper[:, z] <= place.upper).all(axis=1)
+            rest = np.flatnonzero(near[where] & ~done & smooth)
+            if rest.size:
+                into, u, _ = directions(
+                    *gradients, where[rest], masks[rest], self._equations, units, 0.0
+                )
+                done[rest[into]] = True
+                some = rest[into & masks[rest].any(axis=1)]
+                found[some], v[some] = True, u[into & masks[rest].any(axis=1)]
 
     def _attempt(
         self,
@@ -183,10 +232,15 @@ class Search:
             self._try(0.5 * (boxes.lower[box] + boxes.upper[box]), active)
 
     def _try(self, q: Array, active: list[int]) -> None:
+        if not active and self.reads != self.domain.free:
+            place = locus(self.problem, self.faces.formulas, self.reads, q)
+            if place is not None and not self._known_locus(place):
+                self.loci.append(place)
         found = newton(self.problem, q, active, self.domain.free)
         if found is None:
             return
         point, multipliers = found
+        point = self.domain.manifold.wrap(point)
         k = len(active)
         if (multipliers[:k] <= 0).any() or self._known(point, active):
             return
@@ -196,6 +250,12 @@ class Search:
         region = self.faces.region(point, multipliers, active)
         if region is not None:
             self.regions.append(region)
+
+    def _known_locus(self, place: Locus) -> bool:
+        return any(
+            (place.sharp_lower >= other.lower).all() and (place.sharp_upper <= other.upper).all()
+            for other in self.loci
+        )
 
     def _known(self, q: Array, active: list[int]) -> bool:
         return any(
