@@ -240,7 +240,6 @@ class Search:
         if found is None:
             return
         point, multipliers = found
-        point = self.domain.manifold.wrap(point)
         k = len(active)
         if (multipliers[:k] <= 0).any() or self._known(point, active):
             return
