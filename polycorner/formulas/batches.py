@@ -241,10 +241,12 @@ def _store_sparse(
 
 
 def at_offset(b: ir.IRBuilder, pointer: ir.Value, position: int) -> ir.Value:
+    """Return the address of a number after the one at an address."""
     return b.gep(pointer, [ir.Constant(emit.I64, position)])
 
 
 def gather(b: ir.IRBuilder, pointer: ir.Value, position: int, stride: int, lanes: int) -> ir.Value:
+    """Load a number at ``position`` for every lane; they lie ``stride`` numbers apart."""
     if lanes == 1:
         return b.load(at_offset(b, pointer, position))
     result = ir.Constant(emit.lane_type(lanes), ir.Undefined)

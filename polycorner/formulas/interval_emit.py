@@ -90,9 +90,10 @@ class IntervalEmitter:
         if op in {"sin", "cos"}:
             return self._sine(children[0])[op == "cos"]
         values = [self._done[a] for a in children]
-        if op in {"mul", "div", "pow"}:
-            return getattr(self, f"_{op}")(children, *values)  # type: ignore[no-any-return]
         x, y = values[0], values[-1]
+        rules = {"mul": self._mul, "div": self._div, "pow": self._pow}
+        if op in rules:
+            return rules[op](children, x, y)
         if op == "add":
             return self.r.add(x[0], y[0], up=False), self.r.add(x[1], y[1], up=True)
         if op == "sub":
@@ -124,20 +125,22 @@ class IntervalEmitter:
         if children[0] == children[1]:
             return self._square(first, x)
         if first.nonpositive:
-            return self._neg(self._product(first.negated(), self._neg(x), second, y))
+            return self._neg(self.product(first.negated(), self._neg(x), second, y))
         if second.nonpositive:
-            return self._neg(self._product(first, x, second.negated(), self._neg(y)))
-        return self._product(first, x, second, y)
+            return self._neg(self.product(first, x, second.negated(), self._neg(y)))
+        return self.product(first, x, second, y)
 
     def _square(self, known: Fact, x: Sides) -> Sides:
         if known.nonpositive:
             x = self._neg(x)
         elif not known.nonnegative:
             x = functions.magnitude(self.r, x)
-        low, high = (self.r.mul([(end, end)], up=up) for end, up in zip(x, (False, True)))
+        low, high = (
+            self.r.mul([(end, end)], up=up) for end, up in zip(x, (False, True), strict=True)
+        )
         return greatest(self.b, self.r.splat(0.0), low), high
 
-    def _product(self, first: Fact, x: Sides, second: Fact, y: Sides) -> Sides:
+    def product(self, first: Fact, x: Sides, second: Fact, y: Sides) -> Sides:
         """Return the range of a product: the least and the greatest of products of ends."""
         if second.nonnegative and not first.nonnegative:
             first, x, second, y = second, y, first, x

@@ -3,7 +3,7 @@
 import ctypes
 import hashlib
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -16,6 +16,7 @@ from polycorner.formulas import (
     batches,
     emit,
     interval_emit,
+    interval_forms,
     interval_library,
     programs,
     ranges,
@@ -25,10 +26,11 @@ from polycorner.formulas import (
 from polycorner.formulas.batches import POINTER, VOID, at_offset, gather, loop, transpose
 from polycorner.formulas.cache import read_code, source_key, write_code
 from polycorner.formulas.interval_emit import IntervalEmitter
+from polycorner.formulas.interval_forms import Sharper
 from polycorner.formulas.interval_library import Sides
 from polycorner.formulas.machine_code import load_code, machine_code, machine_key
 from polycorner.formulas.programs import Graph
-from polycorner.formulas.rounding import ROUNDINGS
+from polycorner.formulas.rounding import ROUNDINGS, Stepped
 from polycorner.spaces.manifold import Array
 
 LOG = logging.getLogger("polycorner.compilation")
@@ -49,6 +51,9 @@ class IntervalKernel:
         ``n``.
     levels : sequence of sequence of node or None
         The results, array by array; None where a result is zero.
+    form : str, optional
+        One of ``FORMS``: how values, the first array, are enclosed; others than the natural one
+        need their first derivatives, the second array.
     continuity : bool, optional
         Whether the results are not bounds but flags: is each node continuous on the box?
     kind : str, optional
@@ -62,6 +67,7 @@ class IntervalKernel:
         levels: Sequence[Level],
         *,
         continuity: bool = False,
+        form: str = "natural",
         kind: str = "",
     ) -> None:
         self.inputs, self.sizes, self.continuity = (
@@ -70,8 +76,9 @@ class IntervalKernel:
             continuity,
         )
         self.kind = kind or best_rounding()
+        self.form = form
         used, kept = compact(graph, levels)
-        name = _symbol((used.nodes, inputs, kept, continuity, self.kind))
+        name = _symbol((used.nodes, inputs, kept, continuity, form, self.kind))
         code = read_code(name)
         self.origin = "compiled" if code is None else "loaded"
         if code is None:
@@ -118,18 +125,29 @@ class IntervalKernel:
         }
         emitter = IntervalEmitter(r, graph, boxes)
         places = iter(pointers[2:])
-        for level in levels:
+        for depth, level in enumerate(levels):
             targets = [next(places) for _ in range(1 if self.continuity else 2)]
-            for start, nodes in _windows(level):
-                if self.continuity:
-                    columns = [[_flag(emitter, node) for node in nodes]]
-                else:
-                    columns = [list(side) for side in zip(*(_bounds(emitter, a) for a in nodes))]
-                for values, target in zip(columns, targets, strict=True):
-                    _store(b, values, target, start, len(level))
+            result = self._results(emitter, levels, depth)
+            for start, size in _windows(level):
+                found = [result(j) for j in range(start, start + size)]
+                for column, target in zip(zip(*found, strict=True), targets, strict=True):
+                    _store(b, list(column), target, start, len(level))
+
+    def _results(
+        self, emitter: IntervalEmitter, levels: Sequence[Level], depth: int
+    ) -> Callable[[int], tuple[ir.Value, ...]]:
+        """Return what emits result number ``j`` of an array: a flag, or both bounds."""
+        level = levels[depth]
+        if self.continuity:
+            return lambda j: (_flag(emitter, level[j]),)
+        if depth or self.form == "natural":
+            return lambda j: _bounds(emitter, level[j])
+        sharper = Sharper(emitter, [a for a in level if a is not None], levels[1])
+        sharpened = sharper.mean_value if self.form == "mean value" else sharper.monotone
+        return lambda j: _infinite(emitter.r, sharpened(j))
 
     def fill(self, lo: Array, hi: Array, results: Sequence[Array]) -> None:
-        """Evaluate on boxes ``(B, n)``; results are C-contiguous and zero where nothing is stored."""
+        """Evaluate on boxes ``(B, n)``; results are C-contiguous, and zero before."""
         whole = len(lo) - len(lo) % LANES
         if whole:
             self._run(whole, lo, hi, results)
@@ -139,7 +157,7 @@ class IntervalKernel:
             for side, given in zip(last, (lo, hi), strict=True):
                 side[:rest] = given[whole:]
             spare = [np.zeros((LANES, *result.shape[1:])) for result in results]
-            self._run(LANES, *last, spare)
+            self._run(LANES, last[0], last[1], spare)
             for result, part in zip(results, spare, strict=True):
                 result[whole:] = part[:rest]
 
@@ -148,14 +166,16 @@ class IntervalKernel:
 
 
 def _bounds(emitter: IntervalEmitter, node: int | None) -> Sides:
-    """Return the bounds of a node, infinite where it was given up."""
-    r = emitter.r
-    if node is None:
-        return r.splat(0.0), r.splat(0.0)
-    low, high = emitter.value(node)
+    """Return the bounds of a node; zero for none."""
+    zero = emitter.r.splat(0.0)
+    return (zero, zero) if node is None else _infinite(emitter.r, emitter.value(node))
+
+
+def _infinite(r: Stepped, x: Sides) -> Sides:
+    """Replace the bounds of intervals that were given up by infinities."""
     return (
-        rounding.greatest(r.b, low, r.splat(-np.inf)),
-        rounding.least(r.b, high, r.splat(np.inf)),
+        rounding.greatest(r.b, x[0], r.splat(-np.inf)),
+        rounding.least(r.b, x[1], r.splat(np.inf)),
     )
 
 
@@ -171,14 +191,14 @@ def _flag(emitter: IntervalEmitter, node: int | None) -> ir.Value:
     return r.b.select(fine, r.splat(1.0), r.splat(0.0))
 
 
-def _windows(level: Level) -> list[tuple[int, list[int | None]]]:
-    """Cut results into runs of at most ``LANES``, of which the first one is not zero."""
+def _windows(level: Level) -> list[tuple[int, int]]:
+    """Cut results into runs of at most ``LANES``, whose first ones are not zero: start and size."""
     windows, start = [], 0
     while start < len(level):
         if level[start] is None:
             start += 1
             continue
-        windows.append((start, list(level[start : start + LANES])))
+        windows.append((start, min(LANES, len(level) - start)))
         start += LANES
     return windows
 
@@ -208,7 +228,8 @@ def compact(graph: Graph, levels: Sequence[Level]) -> tuple[Graph, list[list[int
         if a not in needed:
             needed.add(a)
             waiting += ranges.arguments(graph, a)
-    result, placed = Graph(), {}
+    result = Graph()
+    placed: dict[int, int] = {}
     for a in sorted(needed):
         op, args = graph.nodes[a]
         leaf = op in {"const", "var", "par"}
@@ -225,7 +246,7 @@ def best_rounding() -> str:
 @lru_cache(maxsize=1)
 def _generator_key() -> str:
     rooms = (programs, translate, adjoints, emit, batches)
-    ours = (ranges, rounding, interval_library, interval_emit)
+    ours = (ranges, rounding, interval_library, interval_emit, interval_forms)
     return repr((source_key(*(m.__name__ for m in (*rooms, *ours)), __name__), machine_key()))
 
 

@@ -59,9 +59,8 @@ def circular(r: Stepped, x: Sides) -> tuple[Sides, Sides]:
         r.widen(b.fmul(end, r.splat(QUARTERS)), 8, up=up)
         for end, up in zip(x, (False, True), strict=True)
     ]
-    return tuple(  # type: ignore[return-value]
-        _circular(r, [b.extract_value(end, k) for end in ends], turns, far, 1 - k) for k in (0, 1)
-    )
+    sine, cosine = ([b.extract_value(end, k) for end in ends] for k in (0, 1))
+    return _circular(r, sine, turns, far, 1), _circular(r, cosine, turns, far, 0)
 
 
 def _circular(
@@ -84,7 +83,7 @@ def _passes(r: Stepped, turns: list[ir.Value], place: int) -> ir.Value:
 
     For certain: an end ``t`` near such a number has ``|t| >= 1`` unless the number is zero, so the
     shift by ``place <= 3`` errs by at most ``2**-53 (|t| + 3) <= 2**-51 |t|``; with the errors of
-    ``QUARTERS`` and of its product that is less than ``8 * 2**-52 |t|``, by which ends were widened.
+    ``QUARTERS`` and of its product that is less than ``8 * 2**-52 |t|``, the widening of ends.
     """
     b = r.b
     first, last = (b.fmul(b.fsub(turn, r.splat(float(place))), r.splat(0.25)) for turn in turns)
@@ -143,7 +142,7 @@ def _acos(r: Stepped, x: Sides) -> Sides:
 
 
 def _tan(r: Stepped, x: Sides) -> Sides:
-    """A tangent has poles at odd quarter turns; it is given up at 2**40 as well."""
+    """Return the range of a tangent; its poles, at odd quarter turns, must lie outside."""
     b = r.b
     turns = [
         r.widen(b.fmul(end, r.splat(QUARTERS)), 8, up=up)
@@ -181,9 +180,8 @@ def _corners(r: Stepped, name: str, x: Sides, y: Sides) -> Sides:
     function = emit.library(r.b.module, name)
     second = y if y[0] is not y[1] else y[:1]
     values = [emit.by_lane(r.b, function, [p, q], r.lanes) for p in x for q in second]
-    return tuple(  # type: ignore[return-value]
-        r.widen(r.fold(values, up=up), LIBRARY, up=up) for up in (False, True)
-    )
+    low, high = (r.widen(r.fold(values, up=up), LIBRARY, up=up) for up in (False, True))
+    return low, high
 
 
 def cut_free(r: Stepped, y: Sides, x: Sides) -> ir.Value:

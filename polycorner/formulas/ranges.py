@@ -96,10 +96,10 @@ def fact(op: str, given: list[Fact], *, same: bool) -> Fact:
         like = (x.nonnegative and y.nonnegative) or (x.nonpositive and y.nonpositive)
         unlike = (x.nonnegative and y.nonpositive) or (x.nonpositive and y.nonnegative)
         return Fact(like or (same and op == "mul"), unlike, size)
-    return _elementary(op, x, y)
+    return _elementary(op, x)
 
 
-def _elementary(op: str, x: Fact, y: Fact) -> Fact:
+def _elementary(op: str, x: Fact) -> Fact:
     if op in UNIT:
         odd = op in {"tanh", "erf"}
         return Fact(odd and x.nonnegative, odd and x.nonpositive, 0.0)

@@ -61,19 +61,38 @@ class BoxFunctions:
         self.names, self.dimension = tuple(f.name for f in self.functions), manifold.dimension
         self.rounding = rounding
         self.graph = Graph()
-        self._kernels: dict[int, IntervalKernel] = {}
+        self._kernels: dict[tuple[int, str], IntervalKernel] = {}
 
     def values(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
         """Return lower and upper bounds ``(B, m)`` of values on boxes ``lo <= hi`` ``(B, n)``."""
         low, high = self._evaluate(lo, hi, 0)
         return low, high
 
-    def gradients(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, ...]:
+    def gradients(
+        self,
+        lo: ArrayLike,
+        hi: ArrayLike,
+        *,
+        mean_value: bool = False,
+        monotone: bool = False,
+    ) -> tuple[Array, ...]:
         """Return bounds of values ``(B, m)`` and of first derivatives ``(B, m, n)``.
 
         In the order lower values, upper values, lower derivatives, upper derivatives.
+
+        Parameters
+        ----------
+        lo, hi : (B, n) array
+            The boxes.
+        mean_value, monotone : bool, optional
+            Intersect the bounds of values with those of the mean value form, or with those on the
+            faces where a monotone function is least and greatest
+            (:mod:`~polycorner.formulas.interval_forms`).  At most one of them.
         """
-        return self._evaluate(lo, hi, 1)
+        if mean_value and monotone:
+            checks.refuse("mean_value, monotone", "at most one form", (True, True))
+        form = "mean value" if mean_value else "monotone" if monotone else "natural"
+        return self._evaluate(lo, hi, 1, form)
 
     def hessians(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, ...]:
         """Return what :meth:`gradients` does, and bounds of second derivatives ``(B, m, n, n)``."""
@@ -89,12 +108,14 @@ class BoxFunctions:
         self._continuity.fill(low, high, [found])
         return found > 0
 
-    def _evaluate(self, lo: ArrayLike, hi: ArrayLike, order: int) -> tuple[Array, ...]:
+    def _evaluate(
+        self, lo: ArrayLike, hi: ArrayLike, order: int, form: str = "natural"
+    ) -> tuple[Array, ...]:
         low, high = self._boxes(lo, hi)
         m, n = len(self.functions), self.dimension
         shapes = ((m,), (m, n), (m, n, n))[: order + 1]
         results = tuple([np.zeros((len(low), *shape)) for shape in shapes for _ in range(2)])
-        self._kernel(order).fill(low, high, results)
+        self._kernel(order, form).fill(low, high, results)
         return results
 
     def _boxes(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
@@ -105,19 +126,16 @@ class BoxFunctions:
             checks.refuse("lo, hi", expected, (low.shape, high.shape))
         return low, high
 
-    def _kernel(self, order: int) -> IntervalKernel:
-        if order not in self._kernels:
-            self._kernels[order] = self._compiled(self._levels(order), continuity=False)
-        return self._kernels[order]
+    def _kernel(self, order: int, form: str = "natural") -> IntervalKernel:
+        if (order, form) not in self._kernels:
+            known = self.graph, self.dimension, self._levels(order)
+            self._kernels[order, form] = IntervalKernel(*known, form=form, kind=self.rounding)
+        return self._kernels[order, form]
 
     @cached_property
     def _continuity(self) -> IntervalKernel:
-        return self._compiled(self._levels(0), continuity=True)
-
-    def _compiled(self, levels: list[list[int | None]], *, continuity: bool) -> IntervalKernel:
-        return IntervalKernel(
-            self.graph, self.dimension, levels, continuity=continuity, kind=self.rounding
-        )
+        known = self.graph, self.dimension, self._levels(0)
+        return IntervalKernel(*known, continuity=True, kind=self.rounding)
 
     def _levels(self, order: int) -> list[list[int | None]]:
         """Return the nodes of values, first and second derivatives, None for structural zeros."""
