@@ -170,6 +170,44 @@ def test_what_could_overflow_is_guarded():
     assert np.isinf(bound[1][2]).all()
 
 
+@pytest.mark.parametrize("op", ["atan", "asin", "sinh", "tanh", "erf", "exp", "cosh", "acos"])
+def test_signs_that_are_known_are_kept(op):
+    graph = Graph()
+    x = graph.node("var", 0)
+    square = graph.mul(x, x)
+    values = [graph.node(op, square), graph.node(op, graph.neg(square))]
+    kernel = IntervalKernel(graph, 1, [[graph.node("sqrt", values[0]), *values]])
+    low, high = np.zeros((2, 3)), np.zeros((2, 3))
+    kernel.fill(np.array([[0.0], [-0.5]]), np.array([[0.0], [0.5]]), [low, high])
+    assert np.all(low[:, 0] >= 0)
+    assert np.all(low[:, 1] >= 0)
+    assert np.all(high[:, 2] <= 0) or op in {"exp", "cosh", "acos"}
+    assert np.all(np.isfinite(low) & np.isfinite(high))
+
+
+def test_sizes_below_the_smallest_number_are_not_claimed():
+    """``(2**-990 x)**4`` underflows to a subnormal bound, which four factors ``2**990`` enlarge."""
+    graph = Graph()
+    x, small, large = graph.node("var", 0), *(graph.const(Fraction(2) ** k) for k in (-990, 990))
+    value = graph.power(graph.mul(x, small), Fraction(4))
+    for _ in range(4):
+        value = graph.mul(large, value)
+    kernel = IntervalKernel(graph, 1, [[value]])
+    low, high = np.zeros((1, 1)), np.zeros((1, 1))
+    kernel.fill(np.ones((1, 1)), np.ones((1, 1)), [low, high])
+    assert low.item() <= 1 <= high.item()
+
+
+def test_constants_beyond_doubles_have_no_bounds():
+    graph = Graph()
+    huge = graph.const(Fraction(10) ** 400)
+    kernel = IntervalKernel(graph, 1, [[huge, graph.inv(huge)]])
+    low, high = np.zeros((1, 2)), np.zeros((1, 2))
+    kernel.fill(np.ones((1, 1)), np.ones((1, 1)), [low, high])
+    assert (low[0, 0], high[0, 0]) == (-np.inf, np.inf)
+    assert (low[0, 1], high[0, 1]) == (0, 2.0**-1074)
+
+
 def test_structural_zeros_and_constants_are_results():
     graph = Graph()
     third = graph.const(Fraction(1, 3))
