@@ -163,12 +163,16 @@ def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:
         sides = zip(search.domain.lower.tolist(), search.domain.upper.tolist(), strict=True)
         hull = [between(a, b) for a, b in sides]
         rows = [list(f.at(hull)) for f in fields]  # type: ignore[arg-type]
-        moved = [[float(row[i].mid()) if row[i].rad() == 0 else np.nan for i in fixed] for row in rows]
+        moved = [
+            [float(row[i].mid()) if row[i].rad() == 0 else np.nan for i in fixed] for row in rows
+        ]
     for choice in _square(moved, len(fixed)):
         if abs(np.linalg.det(choice)) > 1e-9:
             return
     names = ", ".join(manifold.names[i] for i in fixed)
-    checks.refuse("box", f"an interval for {names}, or a continuous symmetry that moves it", "one value")
+    checks.refuse(
+        "box", f"an interval for {names}, or a continuous symmetry that moves it", "one value"
+    )
 
 
 def _square(rows: list[list[float]], count: int) -> list[Array]:
@@ -326,4 +330,3 @@ def _outside(found: Domain, lower: Array, upper: Array) -> bool:
     whole = found.upper - found.lower >= periods
     away = (upper < found.lower) | (lower > found.upper)
     return bool((away & ~whole).any())
-

@@ -78,7 +78,12 @@ class Tally:
     def boxes(self) -> int:
         """All boxes that were treated."""
         return (
-            self.outside + self.descending + self.covered + self.images + self.split + self.undecided
+            self.outside
+            + self.descending
+            + self.covered
+            + self.images
+            + self.split
+            + self.undecided
         )
 
 

@@ -159,7 +159,9 @@ class StationaryList(Printed, Value):
         where = f"in the box ({n} coordinates)"
         loci = f" and {len(self.loci)} loci" if self.loci else ""
         if self.complete:
-            return f"Proved: the energy has exactly {count} isolated stationary points{loci} {where}."
+            return (
+                f"Proved: the energy has exactly {count} isolated stationary points{loci} {where}."
+            )
         rest = f"{len(self.undecided)} boxes and {len(self.open_points)} points are undecided"
         return f"Not complete: {count} stationary points{loci} are shown {where}; {rest}."
 

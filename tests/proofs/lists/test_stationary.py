@@ -43,7 +43,9 @@ def test_himmelblau_has_nine_stationary_points_in_the_disc(himmelblau):
 def test_polynomial_systems_have_the_solutions_that_algebra_finds(himmelblau):
     energy = (X**2 + Y - 11) ** 2 + (X + Y**2 - 7) ** 2
     eliminated = sympy.resultant(energy.diff(X), energy.diff(Y), Y)
-    real = sorted(float(root) for root in sympy.Poly(eliminated, X).nroots(30) if abs(sympy.im(root)) < 1e-20)
+    real = sorted(
+        float(root) for root in sympy.Poly(eliminated, X).nroots(30) if abs(sympy.im(root)) < 1e-20
+    )
     assert np.allclose(sorted(p.point[0] for p in himmelblau), real, atol=1e-9)
 
 
@@ -69,9 +71,7 @@ def discs(draw):
     cells = draw(st.permutations([(i, j) for i in (-2, 0, 2) for j in (-2, 0, 2)]))
     numbers = st.integers(-30, 30).map(lambda k: sympy.Rational(k, 100))
     radii = st.integers(20, 60).map(lambda k: sympy.Rational(k, 100))
-    holes = [
-        (i + draw(numbers), j + draw(numbers), draw(radii)) for i, j in cells[:count]
-    ]
+    holes = [(i + draw(numbers), j + draw(numbers), draw(radii)) for i, j in cells[:count]]
     i, j = cells[count]
     return holes, (i + draw(numbers), j + draw(numbers))
 
@@ -105,7 +105,9 @@ def test_projection_onto_a_polygon_is_unique(degrees, way):
     a, b = (sympy.Rational(round(1000 * t), 1000) for t in target)
     d = Polyhedron(PLANE, [*walls, *frame])
     found = stationary_points(d, (X - a) ** 2 + (Y - b) ** 2, box=SIDES)
-    nearest = projected(np.array([[float(u), float(v)] for u, v in normals]), np.array([a, b], float))
+    nearest = projected(
+        np.array([[float(u), float(v)] for u, v in normals]), np.array([a, b], float)
+    )
     assert len(found) <= 1
     if len(found):
         assert np.allclose(found.points[0].point, nearest, atol=1e-8)
