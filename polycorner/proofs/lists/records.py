@@ -30,7 +30,7 @@ import numpy as np
 
 from polycorner.atomic import write_atomically
 from polycorner.formulas.programs import Graph
-from polycorner.intervals.tapes import arguments, needed
+from polycorner.formulas.ranges import arguments, pattern
 from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
@@ -104,19 +104,42 @@ def described(search: "Search", points: Iterable[int]) -> dict[str, Any]:
 
 
 def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list[int]]:
-    """Return the operations that outputs need, renumbered, and the outputs."""
-    kept = needed(graph, outputs)
-    places = {a: k for k, a in enumerate(kept)}
+    """Return the operations that outputs need, renumbered, and the outputs.
+
+    Selections that are a minimum, a maximum or an absolute value are written as such.
+    """
+    places: dict[int, int] = {}
     nodes: list[list[Any]] = []
-    for a in kept:
+    for a in _needed(graph, outputs):
         op, args = graph.nodes[a]
-        if op == "const":
-            nodes.append([op, str(args[0])])
-        elif op == "var":
-            nodes.append([op, int(args[0])])
+        found = pattern(graph, a)
+        if found:
+            op = found.kind.removeprefix("-")
+        if op in {"const", "var"}:
+            nodes.append([op, str(args[0]) if op == "const" else int(args[0])])
         else:
-            nodes.append([op, *(places[b] for b in arguments(graph, a))])
+            nodes.append([op, *(places[b] for b in _reads(graph, a))])
+        if found and found.kind == "-abs":
+            nodes.append(["neg", len(nodes) - 1])
+        places[a] = len(nodes) - 1
     return nodes, [places[a] for a in outputs]
+
+
+def _reads(graph: Graph, a: int) -> tuple[int, ...]:
+    found = pattern(graph, a)
+    return found.nodes if found else tuple(arguments(graph, a))
+
+
+def _needed(graph: Graph, outputs: Sequence[int]) -> list[int]:
+    """Return the nodes that outputs depend on, arguments before results."""
+    seen: set[int] = set()
+    waiting = list(outputs)
+    while waiting:
+        a = waiting.pop()
+        if a not in seen:
+            seen.add(a)
+            waiting += _reads(graph, a)
+    return sorted(seen)
 
 
 def period(value: float) -> str | None:
