@@ -51,21 +51,14 @@ def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]
     if len(conj) == 1:
         alive = np.flatnonzero(~(below & conj[0]).any(axis=1))
         return alive, ~above[alive] & conj[0]
-    possible = ~(below[:, None, :] & conj).any(axis=2)  # (B, c)
-    boxes, branches = np.nonzero(possible)
-    masks = conj[branches] & ~above[boxes]
-    keep = np.ones(len(boxes), dtype=np.bool_)
-    starts = np.flatnonzero(np.r_[True, boxes[1:] != boxes[:-1]]) if len(boxes) else []
-    for a, b in zip(starts, [*starts[1:], len(boxes)], strict=True):
-        if b - a > 1:
-            keep[a:b] = _kept(masks[a:b])
-    return boxes[keep], masks[keep]
-
-
-def _kept(masks: Mask) -> Mask:
-    """Return which of some sets are minimal, the first of equal ones."""
-    contains = ~(masks[None, :, :] & ~masks[:, None, :]).any(axis=2)  # [i, j]: j is within i
-    equal = contains & contains.T
-    earlier = np.tril(equal, -1)
-    dropped: Mask = (contains & ~equal).any(axis=1) | earlier.any(axis=1)
-    return ~dropped
+    alive = ~(below[:, None, :] & conj).any(axis=2)  # (B, c)
+    open_ = conj & ~above[:, None, :]  # (B, c, m)
+    kept = alive.copy()
+    for i in range(len(conj)):
+        for j in range(len(conj)):
+            if i != j:  # branch i is dropped if j is within it, the later one if they are equal
+                within = ~(open_[:, j] & ~open_[:, i]).any(axis=1)
+                equal = within & ~(open_[:, i] & ~open_[:, j]).any(axis=1)
+                kept[:, i] &= ~(alive[:, j] & within & ((j < i) | ~equal))
+    boxes, branches = np.nonzero(kept)
+    return boxes, open_[boxes, branches]

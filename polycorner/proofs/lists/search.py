@@ -215,6 +215,7 @@ class Search:
         """Try to find stationary points near boxes where none was tried for some bisections."""
         n = len(self.domain.free)
         ripe = np.flatnonzero(since[where] >= EVERY * n)
+        ripe = ripe[np.argsort(-since[where[ripe]], kind="stable")]
         tried = 0
         for item in ripe:
             if tried >= ATTEMPTS:
