@@ -113,7 +113,9 @@ SLOPES: dict[str, Callable[..., Any]] = {  # f', f'' or f_x, f_y, f_xx, f_xy, f_
     "add": lambda x, y: (1, 1, 0, 0, 0), "sub": lambda x, y: (1, -1, 0, 0, 0),
     "mul": lambda x, y: (y, x, 0, 1, 0),
     "div": lambda x, y: (1 / y, -x / y**2, 0, -1 / y**2, 2 * x / y**3),
-    "pow": lambda x, y: (y * power(x, y - 1), NAN, y * (y - 1) * power(x, y - 2), NAN, NAN),
+    "pow": lambda x, y: (
+        y * power(x, y - 1), x**y * x.log(), y * (y - 1) * power(x, y - 2),
+        x ** (y - 1) * (1 + y * x.log()), x**y * x.log() ** 2),
     "atan2": lambda y, x: angle(y, x, off_cut(y, x, square(x) + square(y), NAN)),
 }
 # fmt: on
@@ -299,12 +301,27 @@ class Problem:
         found = [self.forms(v, row, memo, order) for row in rows]
         return None if None in found else found
 
-    def open_sets(self, v: list[Any], zeros: frozenset[int] = frozenset()) -> list[Any]:
+    def signs(self, v: list[Any]) -> list[int]:
+        """Return the signs of inequalities and equations, 0 where they are not decided."""
+        rows = (v[output] for output in self.outputs[:-1])
+        return [1 if x > 0 else -1 if x < 0 else 0 for x in rows]
+
+    def sign(self, v: list[Any], row: int, memo: Any, lo: list[float], hi: list[float]) -> int:
+        """Return the sign of a function that is monotone in all coordinates, from two corners."""
+        found = self.forms(v, row, memo)
+        slopes = [found[0].get(i, ZERO) if found else NAN for i in range(self.n)]
+        if all(x >= 0 or x <= 0 for x in slopes):
+            for s, (a, b) in ((1, (lo, hi)), (-1, (hi, lo))):
+                corner = [arb(y if x >= 0 else z) for x, y, z in zip(slopes, a, b, strict=True)]
+                if s * self.values(corner)[self.outputs[row]] > 0:
+                    return s
+        return 0
+
+    def open_sets(self, signs: list[int], zeros: frozenset[int] = frozenset()) -> list[Any]:
         """Return the functions that have to hold in each branch and may vanish; least sets only."""
-        rows = [v[output] for output in self.outputs]
-        if any(h > 0 or h < 0 for h in rows[self.m : -1]):
+        if any(signs[self.m :]):
             return []
-        below, above = ({i for i in range(self.m) if s * rows[i] > 0} - zeros for s in (-1, 1))
+        below, above = ({i for i in range(self.m) if signs[i] == s} - zeros for s in (-1, 1))
         sets = {branch - above for branch in self.branches if not branch & below}
         return [u for u in sets if not any(smaller < u for smaller in sets)]
 
@@ -327,11 +344,12 @@ class Problem:
         return False
 
     def shown(self, lo: list[float], hi: list[float], ways: list[list[arb]]) -> bool:
+        """Whether a box is closed rightly."""
         if any(g.carries(lo, hi) for g in self.symmetries):
             return True
         v, memo = self.values(hull(lo, hi)), {}
+        signs, turned = self.signs(v), []
         regions, loci = ([f for f in all_ if f.holds(lo, hi)] for all_ in (self.regions, self.loci))
-        turned: list[Any] = []
 
         def grows(row: int, w: list[arb]) -> arb:
             found = self.forms(v, row, memo)
@@ -340,16 +358,19 @@ class Problem:
         def leads(u: frozenset[int], w: list[arb]) -> bool:
             return all(grows(i, w) > 0 for i in u)
 
-        for u in self.open_sets(v):
+        def left(u: frozenset[int]) -> bool:
             if any(u <= region.active for region in regions):
-                continue
-            turned = turned or self.tangents(v, memo, ways)
+                return True
+            turned[:] = turned or self.tangents(v, memo, ways)
             if any(grows(-1, w) < 0 and leads(u, w) for w in turned):
-                continue
-            along = [w for w in ways if loci and all(w[i] == 0 for i in loci[0].places)]
-            if not loci or not (not u or any(leads(u, w) for w in along)):
-                return False
-        return True
+                return True
+            along = (w for w in ways if loci and all(w[i] == 0 for i in loci[0].places))
+            return bool(loci) and (not u or any(leads(u, w) for w in along))
+
+        if all(map(left, self.open_sets(signs))):
+            return True
+        closer = [s or self.sign(v, row, memo, lo, hi) for row, s in enumerate(signs)]
+        return closer != signs and all(map(left, self.open_sets(closer)))
 
     def tangents(self, v: list[Any], memo: dict[int, Any], ways: list[list[arb]]) -> list[Any]:
         """Return ``w + C y`` with ``dh (w + C y) = 0``, for all elements of the enclosed ``dh``."""
@@ -397,10 +418,12 @@ class Face:
         self.index = self.negative()
         need(self.index == record["index"], f"{self.name}: the index is {self.index}")
         self.point = self.at(self.unknowns)
-        self.outside = any(self.point[i] < p.lower[i] or self.point[i] > p.upper[i] for i in places)
-        branches = p.open_sets(p.values(self.point), self.active)
+        whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
+        some = [(x, p.lower[i], p.upper[i]) for i, x in enumerate(self.point) if not whole[i]]
+        self.outside = any(x < a or x > b for x, a, b in some)
+        branches = p.open_sets(p.signs(p.values(self.point)), self.active)
         self.stationary = branches == [self.active]
-        self.settled = self.stationary or not branches or any(u < self.active for u in branches)
+        self.absent = not branches or any(u < self.active for u in branches)
         if active is None:
             self.descends()
 
@@ -460,8 +483,13 @@ class Face:
     def negative(self) -> int | None:
         """Return the negative eigenvalues on the tangent space: each row adds one of each sign."""
         n, (_, jacobian) = len(self.places), self.equations(self.unknowns)
-        rows = [[x if i < n else -x for x in row] for i, row in enumerate(jacobian)]
-        found = [x.real for x in acb_mat(arb_mat(rows)).eig(multiple=True)] if rows else []
+        units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(jacobian))]  # no two eigenvalues
+        rows = [
+            [u * x if i < n else -u * x for u, x in zip(units, row, strict=True)]
+            for i, row in enumerate(jacobian)
+        ]  # remain equal
+        scaled = [[u * x for x in row] for u, row in zip(units, rows, strict=True)]
+        found = [x.real for x in acb_mat(arb_mat(scaled)).eig()] if rows else []
         decided = all(x < 0 or x > 0 for x in found)
         return sum(x < 0 for x in found) - len(self.rows) + 1 if decided else None
 
@@ -533,13 +561,13 @@ class Symmetry:
             found = [[v[row] for row in p.outputs] for v in map(p.values, (q, self.image(q)))]
             if all(x.is_finite() for row in found for x in row):
                 pairs.append(found)
-        need(len(pairs) >= POINTS, f"{self.name}: the functions are defined almost nowhere")
+            if len(pairs) == POINTS:
+                break
+        need(len(pairs) == POINTS, f"{self.name}: the functions are defined almost nowhere")
 
         def first(side: int, i: int, rows: Sequence[int], sign: int = 1) -> int:
             fits = (
-                j
-                for j in rows
-                if all(pair[side][i].overlaps(sign * pair[0][j]) for pair in pairs[:POINTS])
+                j for j in rows if all(pair[side][i].overlaps(sign * pair[0][j]) for pair in pairs)
             )
             return next(fits, -1)
 
@@ -588,17 +616,16 @@ def leaves(p: Problem, codes: Any, positions: Any, counts: Any, directions: Any)
     need(closed == len(counts) and rows * p.n == len(directions), "the number of directions")
 
 
-def check_list(p: Problem, points: list[dict[str, int]]) -> None:
-    """Check that the list has all regions with stationary points, each point once."""
-    claimed = [p.regions[point["region"]] for point in points]
+def check_list(p: Problem, data: dict[str, Any]) -> None:
+    """Check that all regions with stationary points are listed, each point once."""
+    claimed = [p.regions[point["region"]] for point in data["points"]]
     for k, face in enumerate(claimed):
         need(face.stationary and not face.outside, f"{face.name}: is no stationary point")
-        need(face.index == points[k]["index"], f"{face.name}: the index is {face.index}")
+        need(face.index == data["points"][k]["index"], f"{face.name}: the index is {face.index}")
         need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
-    for face in p.regions:
-        need(face.outside or face.settled, f"{face.name}: may be a stationary point")
-        known = face.outside or not face.stationary or any(face.same(f) for f in claimed)
-        need(known, f"{face.name}: is not listed")
+    for k, face in enumerate(p.regions):
+        known = face.outside or face.absent or k in data["open_points"]
+        need(known or any(face.same(f) for f in claimed), f"{face.name}: is not listed")
 
 
 WORKER: list[Problem] = []
@@ -617,7 +644,7 @@ def check(path: str, sample: int | None, jobs: int) -> str:
     (data, parts), started, done = contents(path), time.monotonic(), 0
     begin(path)
     p, (total, opened) = WORKER[0], (parts[0].count(code) for code in (-1, -2))
-    check_list(p, data["points"])
+    check_list(p, data)
     need(opened == data["open"], f"{opened} boxes are open, not {data['open']}")
     count = total if sample is None else min(sample, total)
     wanted = range(total) if count == total else set(random.Random(0).sample(range(total), count))
@@ -632,6 +659,7 @@ def check(path: str, sample: int | None, jobs: int) -> str:
             line = f"{done} of {count} leaves, {time.monotonic() - started:.0f} s"
             print(line, file=sys.stderr)
     said = [f"{len(data['points'])} stationary points"]
+    said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
     said += [f"{sum(not f.outside for f in p.loci)} loci"] if p.loci else []
     said += [f"{total} leaves" if count == total else f"ONLY A SAMPLE of {count} of {total} leaves"]
     said += [f"complete outside {opened} open boxes" if opened else "no open box"]

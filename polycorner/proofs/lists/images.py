@@ -130,7 +130,9 @@ def invariant(problem: Problem, g: Motion) -> bool:
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
         return False
     for h in d.equations:
-        if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in product(d.equations, (1, -1))):
+        if not any(
+            sympy.expand(after[h] - s * before[k]) == 0 for k, s in product(d.equations, (1, -1))
+        ):
             return False
     for i, f in enumerate(d.functions):
         images = [j for j, k in enumerate(d.functions) if before[k] == after[f]]
@@ -147,7 +149,11 @@ def _exact_half(period: float) -> object:
     if not np.isfinite(period):
         return sympy.Integer(0)
     turns = period / np.pi
-    return sympy.pi * sympy.Rational(turns) / 2 if turns == round(turns) else sympy.Rational(period) / 2
+    return (
+        sympy.pi * sympy.Rational(turns) / 2
+        if turns == round(turns)
+        else sympy.Rational(period) / 2
+    )
 
 
 def _bound(f: object) -> object:

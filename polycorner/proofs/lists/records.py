@@ -43,7 +43,12 @@ FORMAT = ("polycorner-stationary-list", 1)
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
-def save(path: str | os.PathLike[str], search: "Search", points: Iterable[int]) -> Path:
+def save(
+    path: str | os.PathLike[str],
+    search: "Search",
+    points: Iterable[int],
+    open_points: Iterable[int] = (),
+) -> Path:
     """Save a search and its proof; return the path.
 
     Parameters
@@ -53,6 +58,8 @@ def save(path: str | os.PathLike[str], search: "Search", points: Iterable[int]) 
     search : Search
     points : iterable of int
         Which regions are listed: those whose point is stationary and in the domain.
+    open_points : iterable of int
+        Those of which this is not known.
 
     Raises
     ------
@@ -63,7 +70,7 @@ def save(path: str | os.PathLike[str], search: "Search", points: Iterable[int]) 
     """
     codes, positions, counts, directions = search.tree.preorder()
     parts = {
-        "problem.json": json.dumps(described(search, points), indent=1).encode(),
+        "problem.json": json.dumps(described(search, points, open_points), indent=1).encode(),
         "tree.bin": codes.astype("<i1").tobytes(),
         "positions.bin": positions.astype("<f8").tobytes(),
         "counts.bin": counts.astype("<u1").tobytes(),
@@ -76,7 +83,9 @@ def save(path: str | os.PathLike[str], search: "Search", points: Iterable[int]) 
     return write_atomically(path, memory.getvalue(), suffix=".zip")
 
 
-def described(search: "Search", points: Iterable[int]) -> dict[str, Any]:
+def described(
+    search: "Search", points: Iterable[int], open_points: Iterable[int]
+) -> dict[str, Any]:
     """Return a problem, its regions, loci and symmetries, and the list, as plain data."""
     problem, domain = search.problem, search.domain
     manifold, formulas = problem.polyhedron.manifold, search.faces.formulas
@@ -99,6 +108,7 @@ def described(search: "Search", points: Iterable[int]) -> dict[str, Any]:
         "regions": regions,
         "loci": [_locus(place) for place in search.loci],
         "points": [{"region": k, "index": search.regions[k].index} for k in points],
+        "open_points": list(open_points),
         "open": _open(search),
     }
 

@@ -77,7 +77,12 @@ class Tally:
     def boxes(self) -> int:
         """All boxes that were treated."""
         return (
-            self.outside + self.descending + self.covered + self.images + self.split + self.undecided
+            self.outside
+            + self.descending
+            + self.covered
+            + self.images
+            + self.split
+            + self.undecided
         )
 
 
@@ -169,9 +174,9 @@ class Search:
         """Whether items lie in regions whose only stationary point is known."""
         found = np.zeros(len(where), dtype=np.bool_)
         for region in self.regions:
-            inside = (boxes.lower >= region.lower).all(axis=1) & (
-                boxes.upper <= region.upper
-            ).all(axis=1)
+            inside = (boxes.lower >= region.lower).all(axis=1) & (boxes.upper <= region.upper).all(
+                axis=1
+            )
             if inside.any():
                 outside = np.ones(masks.shape[1], dtype=np.bool_)
                 outside[list(region.active)] = False
