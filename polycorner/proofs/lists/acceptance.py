@@ -41,13 +41,13 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball, Matrix
 
 BITS = 128
-HALVINGS = 30
+QUARTERINGS = 10
 SHARPENINGS = 6
-WIDENINGS = 5  # of a box towards the shape of its image
+WIDENINGS = 3  # of a box towards the shape of its image
 MOST_WIDENING = 64.0
 GROWTH = 1.25
 SLACK = 16  # last binary digits of a multiplier that its enclosure covers at least
-START = 1.0  # radius of the first box that is tried, in scale units
+WIDEST = 2.0  # reach of the widest box that is tried, in scale units
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,20 +99,17 @@ class Faces:
         """Return the rows of a face: active inequalities, equations, energy."""
         return (*active, *range(self.inequalities, len(self.formulas.names)))
 
-    def region(
-        self, q: Array, multipliers: Array, active: Sequence[int], start: float = START
-    ) -> Region | None:
-        """Return the widest box tried about ``q`` in which one solution is shown, or None."""
+    def region(self, q: Array, active: Sequence[int], widest: float = 1.0) -> Region | None:
+        """Return the widest box tried about ``q`` in which one solution is shown, or None.
+
+        Boxes reach ``widest`` scale units from ``q``, a quarter of it, and so on.
+        """
         rows = self.rows(active)
         with precision(BITS):
-            if self._within(q, rows, len(active), start / 2**HALVINGS) is None:
-                return None
-            reach = start
-            for _ in range(HALVINGS):
-                found = self._within(q, rows, len(active), reach)
+            for power in range(QUARTERINGS):
+                found = self._within(q, rows, len(active), min(widest, WIDEST) / 4**power)
                 if found is not None:
                     return found
-                reach /= 2
         return None
 
     def _within(self, q: Array, rows: tuple[int, ...], count: int, reach: float) -> Region | None:

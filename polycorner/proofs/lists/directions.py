@@ -324,7 +324,34 @@ def _entry_points(sources: str) -> Any:
             weights[item, m] = w[count]
         return found, v, weights
 
-    return directions
+    @njit(cache=True)
+    def covered(lower, upper, boxes, masks, left, right, active):  # type: ignore[no-untyped-def]
+        """Whether each item lies in one of some regions and asks for none but its functions.
+
+        Regions have the sides ``left``, ``right`` ``(R, n)``, and the functions ``active``
+        ``(R, m)``; the others are as in ``directions``.
+        """
+        _ = sources
+        found = np.zeros(len(boxes), np.bool_)
+        for item in range(len(boxes)):
+            lo, hi = lower[boxes[item]], upper[boxes[item]]
+            for r in range(len(left)):
+                inside = True
+                for j in range(lo.size):
+                    if lo[j] < left[r, j] or hi[j] > right[r, j]:
+                        inside = False
+                        break
+                if inside:
+                    for k in range(masks.shape[1]):
+                        if masks[item, k] and not active[r, k]:
+                            inside = False
+                            break
+                if inside:
+                    found[item] = True
+                    break
+        return found
+
+    return directions, covered
 
 
-directions = _entry_points(sources_digest(__package__))
+directions, covered = _entry_points(sources_digest(__package__))

@@ -1,8 +1,9 @@
 """Domains of a search: a side for each coordinate, an interval, a whole circle or one value."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,17 +28,17 @@ class Domain(Value):
     lower: Array
     upper: Array
 
-    @property
+    @cached_property
     def free(self) -> tuple[int, ...]:
         """Positions of the coordinates that are not fixed."""
         return tuple(np.flatnonzero(self.lower < self.upper).tolist())
 
-    @property
+    @cached_property
     def fixed(self) -> tuple[int, ...]:
         """Positions of the coordinates that are fixed."""
         return tuple(np.flatnonzero(self.lower == self.upper).tolist())
 
-    @property
+    @cached_property
     def units(self) -> Array:
         """The scales of the coordinates, 0 for those that are fixed, ``(n,)``."""
         return np.where(self.lower < self.upper, self.manifold.scale_array, 0.0)
@@ -48,8 +49,15 @@ class Domain(Value):
         return dict(zip(self.manifold.names, pairs, strict=True))
 
 
-def domain(manifold: Manifold, within: Mapping[str, Any]) -> Domain:
+def domain(manifold: Manifold, box: Any) -> Domain:
     """Return the domain with given sides; whole circles where none is given.
+
+    Parameters
+    ----------
+    manifold : Manifold
+    box : sequence or mapping
+        A side for each coordinate, in their order or by name: two numbers, one number for a
+        coordinate that is fixed, or None (or no entry) for a whole circle.
 
     Raises
     ------
@@ -57,21 +65,32 @@ def domain(manifold: Manifold, within: Mapping[str, Any]) -> Domain:
         For names that are no coordinates, sides that are no increasing pairs of numbers, and lines
         without a side.
     """
-    given = checks.mapping("within", within)
-    checks.names("within", given, manifold.names)
     lower, upper = [], []
+    sides = _sides(manifold, box)
     for name, period in zip(manifold.names, manifold.periods, strict=True):
-        if name in given:
-            low, high = _side(name, given[name])
+        side = sides.get(name)
+        if side is not None:
+            low, high = _side(name, side)
             if high - low > period:
-                checks.refuse(f"within[{name!r}]", f"at most the period {period:g}", (low, high))
+                checks.refuse(f"box[{name!r}]", f"at most the period {period:g}", (low, high))
         elif math.isfinite(period):
             low, high = _circle(period)
         else:
-            checks.refuse("within", f"an interval for {name}, which is a line", sorted(given))
+            checks.refuse("box", f"two finite numbers for {name}, which is a line", side)
         lower.append(low)
         upper.append(high)
     return Domain(manifold, np.array(lower), np.array(upper))
+
+
+def _sides(manifold: Manifold, box: Any) -> dict[str, Any]:
+    if isinstance(box, Mapping):
+        checks.names("box", box, manifold.names)
+        return dict(box)
+    if isinstance(box, str) or not isinstance(box, Sequence | np.ndarray):
+        checks.refuse("box", "sides in the order of the coordinates, or by name", box, TypeError)
+    if len(box) != manifold.dimension:
+        checks.refuse("box", f"{manifold.dimension} sides, one for each coordinate", len(box))
+    return dict(zip(manifold.names, box, strict=True))
 
 
 def _circle(period: float) -> tuple[float, float]:
@@ -81,7 +100,7 @@ def _circle(period: float) -> tuple[float, float]:
 
 
 def _side(name: str, side: Any) -> tuple[float, float]:
-    argument = f"within[{name!r}]"
+    argument = f"box[{name!r}]"
     values = reals(side, argument)
     if values.ndim == 0:
         values = np.array([values, values])

@@ -110,11 +110,12 @@ def closed(motions: Sequence[Motion], n: int) -> list[Motion]:
     return sorted(found - {identity}, key=lambda g: (g.order, g.signs, g.halves))
 
 
-def invariant(problem: Problem, g: Motion) -> bool:
-    """Whether formulas show that a motion permutes the functions and preserves the energy.
+def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
+    """Return where a motion takes each inequality, if formulas show that it is a symmetry.
 
-    Inequalities go to inequalities of the same set, that is, their tree to itself; an equation
-    may change its sign.
+    The energy stays the same, inequalities go to inequalities and their tree to itself; an
+    equation may change its sign.  ``f_i(g q) = f_{p(i)}(q)``.  None where expanding the formulas
+    does not show this.
     """
     import sympy
 
@@ -128,19 +129,27 @@ def invariant(problem: Problem, g: Motion) -> bool:
     before = {f: _normal(_bound(f)) for f in problem.functions}
     after = {f: _normal(_bound(f).subs(moved, simultaneous=True)) for f in problem.functions}
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
-        return False
+        return None
     for h in d.equations:
+<<<<<<< HEAD
         if not any(
             sympy.expand(after[h] - s * before[k]) == 0 for k, s in product(d.equations, (1, -1))
         ):
             return False
+=======
+        pairs = product(d.equations, (1, -1))
+        if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in pairs):
+            return None
+>>>>>>> lists
     for i, f in enumerate(d.functions):
         images = [j for j, k in enumerate(d.functions) if before[k] == after[f]]
         if not images:
-            return False
+            return None
         names[i] = images[0]
     pieces = set(d.signs_to_pieces([0] * len(d.functions)))
-    return {frozenset(names[i] for i in piece) for piece in pieces} == pieces
+    if {frozenset(names[i] for i in piece) for piece in pieces} != pieces:
+        return None
+    return tuple(names[i] for i in range(len(d.functions)))
 
 
 def _exact_half(period: float) -> object:
@@ -149,11 +158,16 @@ def _exact_half(period: float) -> object:
     if not np.isfinite(period):
         return sympy.Integer(0)
     turns = period / np.pi
+<<<<<<< HEAD
     return (
         sympy.pi * sympy.Rational(turns) / 2
         if turns == round(turns)
         else sympy.Rational(period) / 2
     )
+=======
+    whole = sympy.pi * round(turns) if turns == round(turns) else sympy.Rational(period)
+    return whole / 2
+>>>>>>> lists
 
 
 def _bound(f: object) -> object:

@@ -27,7 +27,7 @@ from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box, needed
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.definite import pivots
-from polycorner.proofs.lists.acceptance import BITS, HALVINGS, START, inertia, krawczyk, outward
+from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inertia, krawczyk, outward
 from polycorner.proofs.lists.candidates import newton
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
@@ -70,8 +70,8 @@ def locus(problem: Problem, formulas: Formulas, z: tuple[int, ...], q: Array) ->
     if found is None:
         return None
     with precision(BITS):
-        for power in range(HALVINGS):
-            radii = problem.scales[list(z)] * START / 2**power
+        for power in range(QUARTERINGS):
+            radii = problem.scales[list(z)] * WIDEST / 4**power
             shown = _shown(formulas, z, found[0], radii)
             if shown is not None:
                 return shown

@@ -20,7 +20,7 @@ from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.acceptance import Faces, Region
 from polycorner.proofs.lists.branches import Mask, conjunctions, items
 from polycorner.proofs.lists.candidates import active_set, newton
-from polycorner.proofs.lists.directions import directions
+from polycorner.proofs.lists.directions import covered, directions
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion, dropped, weights
 from polycorner.proofs.lists.loci import Locus, locus, read_coordinates
@@ -29,7 +29,8 @@ from polycorner.spaces.manifold import Array
 
 LOG = logging.getLogger("polycorner.lists")
 CHUNK = 4096  # boxes that are treated together
-ATTEMPTS = 8  # candidates that are tried in one chunk
+ATTEMPTS = 64  # candidates that are tried in one chunk
+WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 EVERY = 2  # bisections of every coordinate between two attempts at a box
 
 
@@ -77,12 +78,7 @@ class Tally:
     def boxes(self) -> int:
         """All boxes that were treated."""
         return (
-            self.outside
-            + self.descending
-            + self.covered
-            + self.images
-            + self.split
-            + self.undecided
+            self.outside + self.descending + self.covered + self.images + self.split + self.undecided
         )
 
 
@@ -97,6 +93,7 @@ class Search:
     faces: Faces = field(init=False)
     conj: Mask = field(init=False)
     motions: tuple[Motion, ...] = ()
+    maps: tuple[tuple[int, ...], ...] = ()
     regions: list[Region] = field(default_factory=list)
     loci: list[Locus] = field(default_factory=list)
     tally: Tally = field(default_factory=Tally)
@@ -115,6 +112,7 @@ class Search:
         self._equations = len(self.problem.polyhedron.equations)
         lower, upper = self.domain.lower[None].copy(), self.domain.upper[None].copy()
         start = np.zeros(1, dtype=np.int64)
+        self._treated: Boxes | None = None
         self.waiting = Boxes(lower, upper, start, start)
 
     def run(self, most: int, seconds: float, report: Callable[["Search"], None]) -> None:
@@ -123,10 +121,16 @@ class Search:
         while len(self.waiting) and self.tally.boxes < most and time.monotonic() < end:
             last = self.waiting.part(slice(-CHUNK, None))
             self.waiting = self.waiting.part(slice(None, -CHUNK))
-            if len(self.waiting) == 0 and len(last) == 0:
-                break
+            self._treated = last
             self.waiting = self.waiting.with_others(self.step(last))
+            self._treated = None
             report(self)
+
+    def recover(self) -> None:
+        """Put boxes back whose treatment was interrupted."""
+        if self._treated is not None:
+            self.waiting = self.waiting.with_others(self._treated)
+            self._treated = None
 
     def _without_images(self, boxes: Boxes) -> Boxes:
         """Return the boxes that no symmetry carries to others."""
@@ -172,15 +176,13 @@ class Search:
 
     def _covered(self, boxes: Boxes, where: NDArray[np.intp], masks: Mask) -> Mask:
         """Whether items lie in regions whose only stationary point is known."""
-        found = np.zeros(len(where), dtype=np.bool_)
-        for region in self.regions:
-            inside = (boxes.lower >= region.lower).all(axis=1) & (boxes.upper <= region.upper).all(
-                axis=1
-            )
-            if inside.any():
-                outside = np.ones(masks.shape[1], dtype=np.bool_)
-                outside[list(region.active)] = False
-                found |= inside[where] & ~(masks & outside).any(axis=1)
+        if not self.regions:
+            return np.zeros(len(where), dtype=np.bool_)
+        sides = [np.array([getattr(r, end) for r in self.regions]) for end in ("lower", "upper")]
+        active = np.zeros((len(self.regions), masks.shape[1]), dtype=np.bool_)
+        for k, region in enumerate(self.regions):
+            active[k, list(region.active)] = True
+        found: Mask = covered(boxes.lower, boxes.upper, where, masks, *sides, active)
         return found
 
     def _on_loci(
@@ -235,9 +237,11 @@ class Search:
                 pulls = np.linalg.norm(steep, axis=1)
             m = self.problem.inequalities
             active = active_set(weights[item], np.r_[pulls[:m], pulls[-1]])
-            self._try(0.5 * (boxes.lower[box] + boxes.upper[box]), active)
+            widths = boxes.upper[box] - boxes.lower[box]
+            size = max((widths / self.problem.scales)[list(self.domain.free)])
+            self._try(0.5 * (boxes.lower[box] + boxes.upper[box]), active, WIDER * size)
 
-    def _try(self, q: Array, active: list[int]) -> None:
+    def _try(self, q: Array, active: list[int], widest: float) -> None:
         if not active and self.reads != self.domain.free:
             place = locus(self.problem, self.faces.formulas, self.reads, q)
             if place is not None and not self._known_locus(place):
@@ -252,7 +256,7 @@ class Search:
         slack = self.domain.units
         if ((point < self.domain.lower - slack) | (point > self.domain.upper + slack)).any():
             return
-        region = self.faces.region(point, multipliers, active)
+        region = self.faces.region(point, active, widest)
         if region is not None:
             self.regions.append(region)
 

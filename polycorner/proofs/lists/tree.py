@@ -66,7 +66,7 @@ class Tree:
         n = vectors[0].shape[1] if vectors else 0
         joined = np.concatenate(vectors) if vectors else np.zeros((0, n), np.float32)
         rank = np.empty(self.count, dtype=np.int64)
-        rank[order] = np.arange(self.count)
+        rank[order] = np.arange(len(order))
         counts = np.bincount(owners, minlength=self.count)[order]
         ordered = codes[order]
         by_rank = np.argsort(rank[owners], kind="stable")
@@ -89,4 +89,4 @@ def _preorder(codes: NDArray[np.int8], first: NDArray[np.int64]) -> NDArray[np.i
         place += 1
         if split[node]:
             waiting += [children[node] + 1, children[node]]
-    return order
+    return order[:place]
