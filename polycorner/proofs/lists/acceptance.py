@@ -190,7 +190,9 @@ class Faces:
         ]
         return [*slope, *values[: len(rows)]], jacobian
 
-    def _sharpened(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball]":
+    def _sharpened(
+        self, forms: SmoothForms, box: Box, unknowns: "list[Ball]"
+    ) -> "list[Ball]":
         """Apply the operator to its image again; return the intersections."""
         n = len(self.free)
         for _ in range(SHARPENINGS):

@@ -131,16 +131,9 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
         return None
     for h in d.equations:
-<<<<<<< HEAD
-        if not any(
-            sympy.expand(after[h] - s * before[k]) == 0 for k, s in product(d.equations, (1, -1))
-        ):
-            return False
-=======
         pairs = product(d.equations, (1, -1))
         if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in pairs):
             return None
->>>>>>> lists
     for i, f in enumerate(d.functions):
         images = [j for j, k in enumerate(d.functions) if before[k] == after[f]]
         if not images:
@@ -158,16 +151,8 @@ def _exact_half(period: float) -> object:
     if not np.isfinite(period):
         return sympy.Integer(0)
     turns = period / np.pi
-<<<<<<< HEAD
-    return (
-        sympy.pi * sympy.Rational(turns) / 2
-        if turns == round(turns)
-        else sympy.Rational(period) / 2
-    )
-=======
     whole = sympy.pi * round(turns) if turns == round(turns) else sympy.Rational(period)
     return whole / 2
->>>>>>> lists
 
 
 def _bound(f: object) -> object:

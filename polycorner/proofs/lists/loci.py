@@ -110,3 +110,4 @@ def _shown(formulas: Formulas, z: tuple[int, ...], q: Array, radii: Array) -> Lo
         return None
     ends = np.array([outward(x) for x in image])
     return Locus(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])
+

@@ -27,7 +27,9 @@ class Tree:
     _closed: list[NDArray[np.int64]] = field(default_factory=list)
     _directions: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = field(default_factory=list)
 
-    def close(self, nodes: NDArray[np.int64], owners: NDArray[np.int64], directions: Array) -> None:
+    def close(
+        self, nodes: NDArray[np.int64], owners: NDArray[np.int64], directions: Array
+    ) -> None:
         """Record boxes as closed, and directions ``(I, n)`` for some nodes, ``owners``."""
         self._closed.append(nodes)
         self._directions.append((owners, directions.astype(np.float32)))
