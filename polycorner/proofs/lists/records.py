@@ -21,7 +21,7 @@ import json
 import math
 import os
 import zipfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,34 +32,28 @@ from polycorner.atomic import write_atomically
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import arguments, pattern
 from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.enumeration import IN, OUT, Known, membership
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
-from polycorner.spaces.manifold import Array, Manifold
+from polycorner.proofs.lists.search import Search
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
-    from polycorner.proofs.lists.search import Search
+    from polycorner.proofs.lists.stationary import StationaryList
 
 FORMAT = ("polycorner-stationary-list", 1)
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
-def save(
-    path: str | os.PathLike[str],
-    search: "Search",
-    points: Iterable[int],
-    open_points: Iterable[int] = (),
-) -> Path:
-    """Save a search and its proof; return the path.
+def save(path: str | os.PathLike[str], found: "StationaryList") -> Path:
+    """Save a list and its proof; return the path.
 
     Parameters
     ----------
     path : path
         Ends in ``.zip``.
-    search : Search
-    points : iterable of int
-        Which regions are listed: those whose point is stationary and in the domain.
-    open_points : iterable of int
-        Those of which this is not known.
+    found : StationaryList
+        Of symmetric points, those that the search met are listed.
 
     Raises
     ------
@@ -68,9 +62,9 @@ def save(
     OSError
         If the file could not be written.
     """
-    codes, positions, counts, directions = search.tree.preorder()
+    codes, positions, counts, directions = found.search.tree.preorder()
     parts = {
-        "problem.json": json.dumps(described(search, points, open_points), indent=1).encode(),
+        "problem.json": json.dumps(described(found.search), indent=1).encode(),
         "tree.bin": codes.astype("<i1").tobytes(),
         "positions.bin": positions.astype("<f8").tobytes(),
         "counts.bin": counts.astype("<u1").tobytes(),
@@ -83,10 +77,9 @@ def save(
     return write_atomically(path, memory.getvalue(), suffix=".zip")
 
 
-def described(
-    search: "Search", points: Iterable[int], open_points: Iterable[int]
-) -> dict[str, Any]:
+def described(search: Search) -> dict[str, Any]:
     """Return a problem, its regions, loci and symmetries, and the list, as plain data."""
+    listed, open_points = members(search)
     problem, domain = search.problem, search.domain
     manifold, formulas = problem.polyhedron.manifold, search.faces.formulas
     nodes, outputs = program(formulas.graph, formulas.outputs)
@@ -107,10 +100,21 @@ def described(
         "weights": _hex(search.weights),
         "regions": regions,
         "loci": [_locus(place) for place in search.loci],
-        "points": [{"region": k, "index": search.regions[k].index} for k in points],
-        "open_points": list(open_points),
+        "points": [{"region": k, "index": search.regions[k].index} for k in listed],
+        "open_points": open_points,
         "open": _open(search),
     }
+
+
+def members(search: Search) -> tuple[list[int], list[int]]:
+    """Return the regions whose point is in the list, each once, and those that may be."""
+    known, listed, undecided = Known(search), list[int](), list[int]()
+    for k, region in enumerate(search.regions):
+        place = OUT if known.has(region) else membership(search, region)
+        if place != OUT:
+            known.add(region)
+            (listed if place == IN else undecided).append(k)
+    return listed, undecided
 
 
 def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list[int]]:
@@ -166,7 +170,7 @@ def period(value: float) -> str | None:
     return str(Fraction(value))
 
 
-def _open(search: "Search") -> int:
+def _open(search: Search) -> int:
     """Return how many boxes are open: undecided ones and those that still wait."""
     return len(search.waiting) + sum(map(len, search.undecided))
 
