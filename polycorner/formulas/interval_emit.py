@@ -104,7 +104,9 @@ class IntervalEmitter:
             return self._sqrt(self.facts[children[0]], x)
         if op == "atan2":
             return functions.arctangent(self.r, x, y)
-        return functions.unary(self.r, op, x)
+        known = self.facts[node]
+        signs = 0.0 if known.nonnegative else None, 0.0 if known.nonpositive else None
+        return functions.within(self.r, functions.unary(self.r, op, x), *signs)
 
     def _neg(self, x: Sides) -> Sides:
         return self.b.fneg(x[1]), self.b.fneg(x[0])

@@ -1,16 +1,23 @@
 """Elementary functions of intervals in lanes.
 
 Sine and cosine are this library's own (:func:`polycorner.formulas.emit.sine_cosine`).  For
-``|x| <= REDUCTION_LIMIT`` their error is below ``CIRCULAR = 2**-50``: the reduced argument errs by
-at most ``2**-53`` (two roundings of numbers below 0.79, the products with the first two parts of
-pi/2 being exact or below ``4e-5``), a Taylor sum by less than ``5e-17`` for its truncation and by
-less than ``3 * 2**-53`` for its roundings, and the slopes are at most 1.  Between the extrema both
-are monotone; an extremum counts as inside unless it is outside for certain.
+``|x| <= REDUCTION_LIMIT`` their error is below ``CIRCULAR = 2**-50 = 8 u``, ``u = 2**-53``:
+
+- The reduced argument errs by at most ``u``: the number of quarter turns times the first part of
+  pi/2 is exact, so is its difference from ``x`` (a multiple of ``2**-53`` below 1), the digits that
+  the second part loses are carried over, and one rounding of a number below 0.79 remains.  The
+  slopes of both functions are at most 1.
+- The Taylor sums are truncated below ``5e-17 < u / 2`` and err by less than ``3 u``: their last
+  addition rounds by at most ``u / 2``, and what is added to ``r`` or to ``1 - r**2 / 2`` is below
+  0.1 with a relative error of at most ``10 u``; ``r**2 / 2`` itself errs by less than ``u / 2``.
+- Subtracting or adding ``CIRCULAR`` rounds by at most ``u``.
+
+Between the extrema both are monotone; an extremum counts as inside unless it surely is outside.
 
 All others are those of the C library, at the ends of the intervals on which they are monotone.
-*Trusted*: they err by at most ``LIBRARY`` units in the last place.  The largest errors that the
-library of GNU documents for these functions are 1 or 2 units; the bound is compared with [Arb] in
-the tests.
+*Trusted*: they err by fewer than ``LIBRARY - 1`` units in the last place.  The largest errors that
+the library of GNU documents for these functions are 1 or 2 units; the tests compare the bounds
+with Arb ([Johansson]).
 """
 
 from collections.abc import Callable

@@ -6,6 +6,7 @@ double precision (``size > LARGEST``) the number is *guarded*: intervals beyond 
 given up at evaluation, so that what follows is bounded again.
 """
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -13,7 +14,9 @@ from typing import Any
 from polycorner.formulas.programs import Graph
 
 INPUT, GUARD, LARGEST = 40.0, 480.0, 1000.0
+BOUNDLESS = 2000.0  # the size of what has no bound of its own
 SMALLEST_DIVISOR = 200.0  # denominators that may be smaller than 2**-200 are given up
+SMALLEST = -1000.0  # no smaller size is claimed, since bounds are moved by subnormal numbers
 LARGEST_EXPONENT = 600.0  # arguments beyond this of exp, sinh and cosh are given up
 
 PI, E = (3.141592653589793, 3.1415926535897936), (2.718281828459045, 2.7182818284590455)
@@ -53,15 +56,19 @@ class Fact:
 
 
 def outward(value: object) -> tuple[float, float]:
-    """Return the tightest doubles about a constant: a fraction, ``"pi"`` or ``"e"``."""
-    import math
+    """Return the tightest doubles about a constant: a fraction, ``"pi"`` or ``"e"``.
 
+    Both are infinite for a fraction beyond the range of doubles.
+    """
     if value == "pi":
         return PI
     if value == "e":
         return E
     assert isinstance(value, Fraction)
-    near = value.numerator / value.denominator
+    try:
+        near = value.numerator / value.denominator
+    except OverflowError:
+        return -math.inf, math.inf
     if Fraction(near) == value:
         return near, near
     if Fraction(near) < value:
@@ -70,11 +77,11 @@ def outward(value: object) -> tuple[float, float]:
 
 
 def constant_fact(value: object) -> Fact:
-    """Return sign and size of a constant."""
-    import math
-
+    """Return sign and size of a constant; one that no double bounds is guarded."""
     low, high = outward(value)
-    return Fact(low >= 0, high <= 0, float(math.frexp(max(abs(low), abs(high)))[1]))
+    largest = max(abs(low), abs(high))
+    size = float(math.frexp(largest)[1]) if math.isfinite(largest) else BOUNDLESS
+    return Fact(low >= 0, high <= 0, max(size, SMALLEST))
 
 
 def fact(op: str, given: list[Fact], *, same: bool) -> Fact:
@@ -92,7 +99,7 @@ def fact(op: str, given: list[Fact], *, same: bool) -> Fact:
         below, above = x.nonnegative and other.nonnegative, x.nonpositive and other.nonpositive
         return Fact(below, above, sizes + 1)
     if op in {"mul", "div"}:
-        size = x.size + (y.size if op == "mul" else SMALLEST_DIVISOR) + 1
+        size = max(x.size + (y.size if op == "mul" else SMALLEST_DIVISOR) + 1, SMALLEST)
         like = (x.nonnegative and y.nonnegative) or (x.nonpositive and y.nonpositive)
         unlike = (x.nonnegative and y.nonpositive) or (x.nonpositive and y.nonnegative)
         return Fact(like or (same and op == "mul"), unlike, size)
@@ -115,8 +122,8 @@ def _elementary(op: str, x: Fact) -> Fact:
     if op == "log":
         return Fact(False, False, 11.0)
     if op == "pow":
-        return Fact(True, False, 2000.0)
-    return Fact(False, False, 2000.0)  # tan
+        return Fact(True, False, BOUNDLESS)
+    return Fact(False, False, BOUNDLESS)  # tan
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ class Stepped:
         return move(r, self.b.fmul(self.call("fabs", r), self.splat(ulps * ULP)))
 
     def widen(self, r: ir.Value, ulps: int, *, up: bool) -> ir.Value:
-        """Return a bound of a number that a library gives within ``ulps / 2`` units."""
+        """Return a bound of a number that is known within ``ulps - 1`` units in the last place."""
         return self._beyond(self.step(r, up=up, ulps=ulps), up=up, steps=ulps)
 
     def call(self, name: str, x: ir.Value) -> ir.Value:
