@@ -89,17 +89,17 @@ def angle(y: arb, x: arb, r: arb) -> tuple[arb, ...]:
     return x / r, -y / r, -bend, twist, bend
 
 
-UNARY = "neg sin cos tan asin acos atan sinh cosh tanh exp log sqrt erf".split()
+ALIKE = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "erf")  # fmt: skip  # noqa: E501
 # fmt: off
 VALUES: dict[str, Callable[..., Any]] = {
-    **{name: getattr(arb, name) for name in UNARY}, "square": square, "abs": abs,
+    **{name: getattr(arb, name) for name in ALIKE}, "square": square, "abs": abs,
     "add": arb.__add__, "sub": arb.__sub__, "mul": arb.__mul__, "div": arb.__truediv__,
     "pow": arb.__pow__, "atan2": lambda y, x: off_cut(y, x, arb.atan2(y, x), arb(0, 3.2)),
     "min": arb.min, "max": arb.max, "lt": ordered, "le": ordered, "not": opposite, "and": both,
     "or": lambda x, y: opposite(both(opposite(x), opposite(y))), "select": chosen,
 }
 SLOPES: dict[str, Callable[..., Any]] = {  # f', f'' or f_x, f_y, f_xx, f_xy, f_yy of the arguments
-    "neg": lambda x: (-1, 0), "square": lambda x: (2 * x, 2), "log": lambda x: (1 / x, -1 / x**2),
+    "neg": lambda _: (-1, 0), "square": lambda x: (2 * x, 2), "log": lambda x: (1 / x, -1 / x**2),
     "abs": lambda x: (-1, 0) if x < 0 else (1, 0) if x > 0 else (arb(0, 1), NAN),
     "sqrt": lambda x: (0.5 / x.sqrt(), -0.25 / x.sqrt() ** 3), "exp": lambda x: (x.exp(), x.exp()),
     "sin": lambda x: (x.cos(), -x.sin()), "cos": lambda x: (-x.sin(), -x.cos()),
@@ -110,7 +110,7 @@ SLOPES: dict[str, Callable[..., Any]] = {  # f', f'' or f_x, f_y, f_xx, f_xy, f_
     "sinh": lambda x: (x.cosh(), x.sinh()), "cosh": lambda x: (x.sinh(), x.cosh()),
     "tanh": lambda x: (1 - square(x.tanh()), -2 * x.tanh() * (1 - square(x.tanh()))),
     "erf": lambda x: (bell(x), -2 * x * bell(x)),
-    "add": lambda x, y: (1, 1, 0, 0, 0), "sub": lambda x, y: (1, -1, 0, 0, 0),
+    "add": lambda *_: (1, 1, 0, 0, 0), "sub": lambda *_: (1, -1, 0, 0, 0),
     "mul": lambda x, y: (y, x, 0, 1, 0),
     "div": lambda x, y: (1 / y, -x / y**2, 0, -1 / y**2, 2 * x / y**3),
     "pow": lambda x, y: (
@@ -121,9 +121,13 @@ SLOPES: dict[str, Callable[..., Any]] = {  # f', f'' or f_x, f_y, f_xx, f_xy, f_
 # fmt: on
 
 
+def unite(x: dict[int, arb], y: dict[int, arb]) -> dict[int, arb]:
+    return {i: x.get(i, ZERO).union(y.get(i, ZERO)) for i in x | y}
+
+
 def chain(slopes: tuple[Any, ...], parts: list[Any], order: int) -> tuple[Any, Any]:
     """Return gradient and Hessian of an operation from those of its arguments, as dictionaries."""
-    g, h = {}, {}
+    g, h = dict[int, Any](), dict[tuple[int, int], Any]()
     for p, (gradient, hessian) in zip(slopes, parts, strict=False):
         for i, x in gradient.items():
             g[i] = g.get(i, ZERO) + p * x
@@ -215,6 +219,7 @@ class Problem:
         ctx.prec = BITS
         need(data["format"] == FORMAT, f"the format is {data['format']}, not {FORMAT}")
         self.n, self.m, self.k = (len(data["coordinates"]), data["inequalities"], data["equations"])
+        need(self.m >= 0 and self.k >= 0, "numbers of functions")
         self.nodes: list[tuple[str, list[Any]]] = []
         self.known: dict[int, arb] = {}
         self.positive: set[int] = set()
@@ -226,8 +231,10 @@ class Problem:
         self.branches = {frozenset(branch) for branch in data["branches"]}
         need(all(0 <= i < self.m for branch in self.branches for i in branch), "branches")
         self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
+        self.anywhere = hull(self.lower, self.upper)
         self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]
         self.free = [i for i in range(self.n) if self.widths[i] > 0]
+        need(data["fixed"] == [i for i in range(self.n) if i not in self.free], "fixed coordinates")
         self.periods = [number(p) if p else None for p in data["periods"]]
         self.regions = [Face(self, r, self.free, r["active"]) for r in data["regions"]]
         self.loci = [Face(self, r, r["z"], None) for r in data["loci"]]
@@ -284,22 +291,13 @@ class Problem:
                 first = v[args[0]] if op == "select" else ordered(*[v[b] for b in args])
                 (x, y), hulls = parts[-2:], op != "select" and order == 1 and None not in parts
                 if first is None:
-                    memo[a] = self.hull(x[0], y[0]) if hulls else None
+                    memo[a] = (unite(x[0], y[0]), {}) if hulls else None
                 else:
                     memo[a] = x if first == (op != "max") else y
             else:
                 slopes = SLOPES[op](*[v[b] for b in args])
                 memo[a] = None if None in parts else chain(slopes, parts, order)
         return memo.get(self.outputs[row], ({}, {}))
-
-    @staticmethod
-    def hull(x: dict[int, arb], y: dict[int, arb]) -> Any:
-        return {i: x.get(i, ZERO).union(y.get(i, ZERO)) for i in x | y}, {}
-
-    def rows(self, v: list[Any], rows: Sequence[int], order: int) -> Any:
-        memo: dict[int, Any] = {}
-        found = [self.forms(v, row, memo, order) for row in rows]
-        return None if None in found else found
 
     def signs(self, v: list[Any]) -> list[int]:
         """Return the signs of inequalities and equations, 0 where they are not decided."""
@@ -347,8 +345,8 @@ class Problem:
         """Whether a box is closed rightly."""
         if any(g.carries(lo, hi) for g in self.symmetries):
             return True
-        v, memo = self.values(hull(lo, hi)), {}
-        signs, turned = self.signs(v), []
+        v, memo = self.values(hull(lo, hi)), dict[int, Any]()
+        signs, turned = self.signs(v), list[Any]()
         regions, loci = ([f for f in all_ if f.holds(lo, hi)] for all_ in (self.regions, self.loci))
 
         def grows(row: int, w: list[arb]) -> arb:
@@ -400,23 +398,23 @@ class Face:
         self.name = f"{'locus' if active is None else 'region'} {record}"
         need(self.active <= set(range(p.m)) and set(places) <= set(p.free), self.name)
         self.rows = [*sorted(self.active), *range(p.m, p.m + p.k + 1)]
-        count = len(record["lower"])
-        four = sides(record, ("lower", "upper"), count) + sides(
-            record, ("sharp_lower", "sharp_upper"), len(places) + len(self.rows) - 1
-        )
-        self.lower, self.upper = (
-            [side[i] for i in places] if active is not None else side for side in four[:2]
-        )
+        count = p.n if active is not None else len(places)
+        self.lower, self.upper = sides(record, ("lower", "upper"), count)
+        if active is not None:
+            self.lower, self.upper = (
+                [side[i] for i in places] for side in (self.lower, self.upper)
+            )
+        sharp = sides(record, ("sharp_lower", "sharp_upper"), len(places) + len(self.rows) - 1)
         starts = filter(None, map(self.start, (1, 4, 16)))
-        self.unknowns = next(filter(None, (zero(self.equations, start) for start in starts)), None)
-        need(self.unknowns, f"{self.name}: no single solution with positive multipliers is shown")
-        near = [x + arb(0, 2.0**-70) * (1 + abs(x)) for x in hull(*four[2:])]
-        need(
-            all(x.contains(y) for x, y in zip(near, self.unknowns)),
-            f"{self.name}: the solution is elsewhere",
-        )
+        solved = next(filter(None, (zero(self.equations, start) for start in starts)), None)
+        need(solved, f"{self.name}: no single solution with positive multipliers is shown")
+        self.unknowns: list[arb] = solved or []
+        slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in self.unknowns]
+        near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
+        inside = all(x.contains(y) for x, y in zip(near, self.unknowns, strict=True))
+        need(inside, f"{self.name}: the solution is elsewhere")
         self.index = self.negative()
-        need(self.index == record["index"], f"{self.name}: the index is {self.index}")
+        need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
         self.point = self.at(self.unknowns)
         whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
         some = [(x, p.lower[i], p.upper[i]) for i, x in enumerate(self.point) if not whole[i]]
@@ -428,9 +426,9 @@ class Face:
             self.descends()
 
     def at(self, unknowns: list[arb]) -> list[arb]:
-        """Return the coordinates; those that are fixed have one value, others are not read."""
+        """Return all coordinates; those that are no unknowns may be anywhere in the domain."""
         known = dict(zip(self.places, unknowns, strict=False))
-        return [known.get(i, arb(x)) for i, x in enumerate(self.p.lower)]
+        return [known.get(i, x) for i, x in enumerate(self.p.anywhere)]
 
     def holds(self, lower: list[float], upper: list[float]) -> bool:
         ends = zip(self.lower, self.upper, self.places, strict=True)
@@ -438,9 +436,9 @@ class Face:
 
     def rows_at(self, unknowns: list[arb]) -> Any:
         """Return values of the functions, and gradients and Hessians in the free coordinates."""
-        v = self.p.values(self.at(unknowns))
-        found = self.p.rows(v, self.rows, 2)
-        if found is None:
+        v, memo = self.p.values(self.at(unknowns)), dict[int, Any]()
+        found = [self.p.forms(v, row, memo, 2) for row in self.rows]
+        if None in found:
             return None
         slopes = [[g.get(i, ZERO) for i in self.places] for g, _ in found]
         pairs = [[(i, j) for j in self.places] for i in self.places]
@@ -457,11 +455,11 @@ class Face:
         middle = arb_mat(rows).mid()
         try:
             left = (middle * middle.transpose()).inv().mid() * middle
-            square = left * arb_mat(rows).transpose()
-            multipliers = square.solve(left * arb_mat([[x] for x in energy])).entries()
+            form = left * arb_mat(rows).transpose()
+            multipliers = form.solve(left * arb_mat([[x] for x in energy])).entries()
         except ZeroDivisionError:
             return None
-        more = [x + arb(0, 1) * (growth * x.rad() + abs(x) / 2**90) for x in multipliers]
+        more = [x + arb(0, 1) * (growth * x.rad() + (abs(x) + 1) / 2**100) for x in multipliers]
         return [*box, *more] if all(x > 0 for x in multipliers[: len(self.active)]) else None
 
     def equations(self, unknowns: list[arb]) -> Any:
@@ -483,13 +481,17 @@ class Face:
     def negative(self) -> int | None:
         """Return the negative eigenvalues on the tangent space: each row adds one of each sign."""
         n, (_, jacobian) = len(self.places), self.equations(self.unknowns)
-        units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(jacobian))]  # no two eigenvalues
-        rows = [
-            [u * x if i < n else -u * x for u, x in zip(units, row, strict=True)]
-            for i, row in enumerate(jacobian)
-        ]  # remain equal
-        scaled = [[u * x for x in row] for u, row in zip(units, rows, strict=True)]
-        found = [x.real for x in acb_mat(arb_mat(scaled)).eig()] if rows else []
+        units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(jacobian))]
+        # a symmetric matrix of the same inertia, whose eigenvalues are not multiple by structure
+        signed = [
+            (u if i < n else -u, row)
+            for i, (u, row) in enumerate(zip(units, jacobian, strict=True))
+        ]
+        form = [[u * w * x for w, x in zip(units, row, strict=True)] for u, row in signed]
+        try:
+            found = [x.real for x in acb_mat(arb_mat(form)).eig()] if form else []
+        except ValueError:
+            return None
         decided = all(x < 0 or x > 0 for x in found)
         return sum(x < 0 for x in found) - len(self.rows) + 1 if decided else None
 
@@ -506,10 +508,9 @@ class Face:
         if self.active != other.active:
             return False
         ends = zip(self.places, other.lower, other.upper, strict=True)
-        known = [
-            (self.point[i] + turn(self.point[i], a, b, self.p.periods[i]), a, b) for i, a, b in ends
-        ]
-        inside = all(a <= x and x <= b for x, a, b in known)
+        places = ((self.point[i], a, b, self.p.periods[i]) for i, a, b in ends)
+        known = [(x + turn(x, a, b, period), a, b) for x, a, b, period in places]
+        inside = all(a <= x <= b for x, a, b in known)
         return True if inside else False if any(x < a or x > b for x, a, b in known) else None
 
 
@@ -517,18 +518,16 @@ class Symmetry:
     """A map ``q -> signs * q[order] + shifts * periods``."""
 
     def __init__(self, p: Problem, record: dict[str, Any], weights: list[str]) -> None:
-        self.p, self.order, self.signs, self.name = (
+        self.p, self.name, self.order, self.signs = (
             p,
-            record["order"],
-            record["signs"],
             f"symmetry {record}",
+            *(record[key] for key in ("order", "signs")),
         )
         need(sorted(self.order) == [*range(p.n)] and set(self.signs) <= {1, -1}, self.name)
-        turned = zip(p.periods, (p.periods[i] for i in self.order), strict=True)
-        need(all(a is b or (a and b and a.overlaps(b)) for a, b in turned), self.name)
-        self.shifts = [
-            number(s) * (period or 0) for s, period in zip(record["shifts"], p.periods, strict=True)
-        ]
+        pairs = [(p.periods[i], period) for i, period in zip(self.order, p.periods, strict=True)]
+        need(all(a is b or (a and b and a.overlaps(b)) for a, b in pairs), self.name)
+        shifts = zip(record["shifts"], p.periods, strict=True)
+        self.shifts = [number(shift) * (period or 0) for shift, period in shifts]
         self.weights = [arb(float.fromhex(w)) for w in weights]
         self.growth = [-w for w in self.weights]
         for w, s, i in zip(self.weights, self.signs, self.order, strict=True):
@@ -542,13 +541,11 @@ class Symmetry:
         """Whether a box is carried into the domain and ``w . q`` increases everywhere on it."""
         p, box = self.p, hull(lower, upper)
         ends = list(zip(p.lower, p.upper, strict=True))
-        turns = [
-            turn(x, *ab, period)
-            for x, ab, period in zip(self.image(box), ends, p.periods, strict=True)
-        ]
+        image = zip(self.image(box), ends, p.periods, strict=True)
+        turns = [turn(x, *end, period) for x, end, period in image]
         for side in (lower, upper):
-            image = [x + t for x, t in zip(self.image([arb(x) for x in side]), turns, strict=True)]
-            if not all(a <= x and x <= b for x, (a, b) in zip(image, ends, strict=True)):
+            corner = zip(self.image([arb(x) for x in side]), turns, ends, strict=True)
+            if not all(a <= x + t <= b for x, t, (a, b) in corner):
                 return False
         added = [a + b for a, b in zip(self.shifts, turns, strict=True)]
         return dot(self.growth, box) + dot(self.weights, added) > 0
@@ -566,20 +563,14 @@ class Symmetry:
         need(len(pairs) == POINTS, f"{self.name}: the functions are defined almost nowhere")
 
         def first(side: int, i: int, rows: Sequence[int], sign: int = 1) -> int:
-            fits = (
-                j for j in rows if all(pair[side][i].overlaps(sign * pair[0][j]) for pair in pairs)
-            )
-            return next(fits, -1)
+            same = (all(x[side][i].overlaps(sign * x[0][j]) for x in pairs) for j in rows)
+            return next((j for j, fits in zip(rows, same, strict=True) if fits), -1)
 
-        m, h = range(p.m), range(p.m, p.m + p.k)
-        kept = all(max(first(1, i, h), first(1, i, h, -1)) >= 0 for i in h)
-        here, there = (
-            {frozenset(first(side, i, m) for i in b) for b in p.branches} for side in (0, 1)
-        )
-        need(
-            first(1, p.m + p.k, [p.m + p.k]) >= 0 and kept and here == there,
-            f"{self.name}: changes the problem",
-        )
+        m, h, energy = range(p.m), range(p.m, p.m + p.k), p.m + p.k
+        kept = first(1, energy, [energy]) >= 0
+        kept &= all(max(first(1, i, h), first(1, i, h, -1)) >= 0 for i in h)
+        sets = [{frozenset(first(side, i, m) for i in b) for b in p.branches} for side in (0, 1)]
+        need(kept and sets[0] == sets[1], f"{self.name}: changes the problem")
 
 
 # ------------------------------------------------------------------------------------------ the file
@@ -654,7 +645,7 @@ def check(path: str, sample: int | None, jobs: int) -> str:
         while wave := list(islice(chunks, 4 * jobs)):
             found = (map if jobs == 1 else pool.map)(failing, wave)
             bad = next(filter(None, found), None)
-            need(not bad, bad and f"leaf {bad[0]}: {[*zip(*bad[1:3], strict=True)]}")
+            need(not bad, f"leaf {bad and (bad[0], [*zip(*bad[1:3], strict=True)])}")
             done += sum(map(len, wave))
             line = f"{done} of {count} leaves, {time.monotonic() - started:.0f} s"
             print(line, file=sys.stderr)

@@ -491,21 +491,58 @@ def test_derivatives_are_those_of_sympy(formula, monkeypatch):
             assert holds(hessian.get((i, j), zero), sp.diff(formula, a, b))
 
 
-def stated(nodes, outputs):
-    """Return a problem without inequalities."""
+def stated(nodes, outputs, **more):
+    """Return a problem without inequalities in the unit square."""
     sides = {"lower": [(0.0).hex()] * 2, "upper": [(1.0).hex()] * 2}
-    nothing = dict.fromkeys(("regions", "loci", "symmetries", "weights", "fixed"), [])
-    return script.Problem(
-        {
-            "format": script.FORMAT,
-            "coordinates": ["x", "y"],
-            "inequalities": 0,
-            "equations": 0,
-            "nodes": nodes,
-            "outputs": outputs,
-            "branches": [[]],
-            "domain": sides,
-            "periods": [None, None],
-            **nothing,
-        }  # fmt: skip
-    )
+    empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed")}
+    data = {"format": script.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
+    data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
+    return script.Problem({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
+
+
+@pytest.mark.parametrize("level", ["-1", "1/2"])
+def test_a_locus_of_an_energy_that_selects_by_another_coordinate_is_refused(level, monkeypatch):
+    """The energy is (x - 1/4)^2 or (x - 3/4)^2, whichever ``y < level`` asks for."""
+    monkeypatch.setattr(flint.ctx, "prec", 128)
+    nodes = [["var", 0], ["var", 1], ["const", "1/4"], ["const", "3/4"], ["const", level]]
+    nodes += [["sub", 0, 2], ["sub", 0, 3], ["mul", 5, 5], ["mul", 6, 6], ["lt", 1, 4]]
+    nodes += [["select", 9, 7, 8]]
+    point = [(0.75).hex()]
+    locus = {"z": [0], "index": 0, "lower": [(0.5).hex()], "upper": [(1.0).hex()]}
+    locus |= {"sharp_lower": point, "sharp_upper": point}
+    if level == "-1":  # which no point of the domain is below
+        assert stated(nodes, [10], loci=[locus]).loci[0].index == 0
+    else:
+        with pytest.raises(script.RefusedError, match="locus"):
+            stated(nodes, [10], loci=[locus])
+
+
+@pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
+@pytest.mark.parametrize("formula", FORMULAS, ids=str)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_boxes_enclose_what_their_points_give(formula, seed):
+    """Values and gradients at points of a box lie in those of the box, where these are finite."""
+    rng, before = np.random.default_rng(seed), flint.ctx.prec
+    formulas = Formulas([SmoothFunction("f", formula, PLANE)], PLANE)
+    nodes, outputs = records.program(formulas.graph, formulas.outputs)
+    problem = stated(nodes, outputs)
+    lower = rng.uniform(-1, 2, 2)
+    upper = lower + rng.exponential(0.5, 2)
+    points = [rng.uniform(lower, upper) for _ in range(8)]
+    found = [forms(problem, script.hull(lower, upper))]
+    found += [forms(problem, script.hull(q, q)) for q in points]
+    flint.ctx.prec = before
+    (value, slopes), *inside = found
+    for v, g in inside:
+        if v.is_finite() and value.is_finite():
+            assert value.contains(v)
+        if slopes is not None and g is not None:
+            for i in (0, 1):
+                a, b = slopes.get(i, flint.arb(0)), g.get(i, flint.arb(0))
+                assert a.contains(b) or not a.is_finite()
+
+
+def forms(problem, box):
+    v = problem.values(box)
+    found = problem.forms(v, 0, {})
+    return v[problem.outputs[0]], found and found[0]
