@@ -573,7 +573,7 @@ class Symmetry:
         need(kept and sets[0] == sets[1], f"{self.name}: changes the problem")
 
 
-# ------------------------------------------------------------------------------------------ the file
+# ----------------------------------------------------------------------------------------- the file
 
 
 def contents(path: str) -> tuple[dict[str, Any], list[Any]]:

@@ -24,7 +24,7 @@ import zipfile
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -32,28 +32,25 @@ from polycorner.atomic import write_atomically
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import arguments, pattern
 from polycorner.proofs.lists.acceptance import Region
-from polycorner.proofs.lists.enumeration import IN, OUT, Known, membership
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.members import IN, OUT, Known, membership
 from polycorner.proofs.lists.search import Search
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.proofs.lists.stationary import StationaryList
 
 FORMAT = ("polycorner-stationary-list", 1)
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
-def save(path: str | os.PathLike[str], found: "StationaryList") -> Path:
-    """Save a list and its proof; return the path.
+def save(path: str | os.PathLike[str], search: Search) -> Path:
+    """Save the list that a search found, and its proof; return the path.
 
     Parameters
     ----------
     path : path
         Ends in ``.zip``.
-    found : StationaryList
-        Of symmetric points, those that the search met are listed.
+    search : Search
+        Of points that are images of each other, those that it met are listed.
 
     Raises
     ------
@@ -62,9 +59,9 @@ def save(path: str | os.PathLike[str], found: "StationaryList") -> Path:
     OSError
         If the file could not be written.
     """
-    codes, positions, counts, directions = found.search.tree.preorder()
+    codes, positions, counts, directions = search.tree.preorder()
     parts = {
-        "problem.json": json.dumps(described(found.search), indent=1).encode(),
+        "problem.json": json.dumps(described(search), indent=1).encode(),
         "tree.bin": codes.astype("<i1").tobytes(),
         "positions.bin": positions.astype("<f8").tobytes(),
         "counts.bin": counts.astype("<u1").tobytes(),
