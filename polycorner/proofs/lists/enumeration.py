@@ -130,19 +130,20 @@ def _motions(
     """Return the group of declared elements, and where they take inequalities."""
     elements: Sequence[Any] = symmetry.elements if symmetry else ()
     manifold = found.manifold
-    generating = [motion(manifold, e.apply, "symmetry") for e in elements]
-    for g in generating:
-        if permutation(problem, g) is None:
+    generating: dict[Motion, tuple[int, ...]] = {}
+    for element in elements:
+        g = motion(manifold, element.apply, "symmetry")
+        p = permutation(problem, g)
+        if p is None:
             checks.refuse("symmetry", "elements that expanded formulas show to be symmetries", g)
         image = g.signs * np.array([found.lower, found.upper])[:, list(g.order)]
         ends = np.sort(image, axis=0) + g.shifts(manifold)
         whole = found.upper - found.lower >= manifold.periods
-        if not (whole | (abs(ends - [found.lower, found.upper]) == 0).all(axis=0)).all():
+        if not (whole | (ends == [found.lower, found.upper]).all(axis=0)).all():
             checks.refuse("box", "one that the symmetry carries to itself", found.sides())
-    group = closed(generating, manifold.dimension)
-    maps = [permutation(problem, g) for g in group]
-    kept = [(g, p) for g, p in zip(group, maps, strict=True) if p is not None]
-    return tuple(g for g, _ in kept), tuple(p for _, p in kept)
+        generating[g] = p
+    group = closed(generating, manifold.dimension, problem.inequalities)
+    return tuple(group), tuple(group.values())
 
 
 def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:

@@ -6,7 +6,7 @@ it into the domain and makes ``w . q`` larger at each of its points, circles bei
 period.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -94,20 +94,26 @@ def motion(manifold: Manifold, apply: Callable[[Array], Array], argument: str) -
     return found
 
 
-def closed(motions: Sequence[Motion], n: int) -> list[Motion]:
-    """Return the group that motions generate, without the identity."""
+def closed(
+    generating: Mapping[Motion, tuple[int, ...]], n: int, functions: int
+) -> dict[Motion, tuple[int, ...]]:
+    """Return the group that motions generate, without the identity, and its permutations.
+
+    ``f_i(g q) = f_{p(i)}(q)`` for the permutation ``p`` of ``g``; those of products are products.
+    """
     identity = Motion(tuple(range(n)), (1,) * n, (0,) * n)
-    found, waiting = {identity}, [identity]
+    found, waiting = {identity: tuple(range(functions))}, [identity]
     while waiting:
         element = waiting.pop()
-        for g in motions:
+        for g, p in generating.items():
             new = element.then(g)
             if new not in found:
-                found.add(new)
+                found[new] = tuple(found[element][i] for i in p)
                 waiting.append(new)
         if len(found) > MOST_ELEMENTS:
             checks.refuse("symmetry", f"a group of at most {MOST_ELEMENTS} elements", "more")
-    return sorted(found - {identity}, key=lambda g: (g.order, g.signs, g.halves))
+    ordered = sorted(found, key=lambda g: (g.order, g.signs, g.halves))
+    return {g: found[g] for g in ordered if g != identity}
 
 
 def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
