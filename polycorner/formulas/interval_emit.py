@@ -196,10 +196,8 @@ class IntervalEmitter:
     def _logic(self, op: str, args: tuple[Any, ...]) -> Sides:
         b, values = self.b, [self._done[int(a)] for a in args]
         x, y = values[0], values[-1]
-        if op == "lt":
-            return b.fcmp_ordered("<", x[1], y[0]), b.fcmp_ordered(">=", x[0], y[1])
-        if op == "le":
-            return b.fcmp_ordered("<=", x[1], y[0]), b.fcmp_ordered(">", x[0], y[1])
+        if op in {"lt", "le"}:  # strictly: what is decided is decided around the closed box, too
+            return b.fcmp_ordered("<", x[1], y[0]), b.fcmp_ordered(">", x[0], y[1])
         if op == "not":
             return x[1], x[0]
         if op == "and":

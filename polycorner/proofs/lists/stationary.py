@@ -197,7 +197,7 @@ class StationaryList(Printed, Value):
         """Write the proof to a file that an independent checker verifies; see ``docs``."""
         from polycorner.proofs.lists.records import save
 
-        save(path, self)
+        save(path, self.search)
 
 
 def locus_of(search: Search, place: Locus, rng: np.random.Generator) -> StationaryLocus:
