@@ -1,7 +1,7 @@
 """Relative placements of two dumbbells in the plane, for complete lists of places of rest.
 
-Rigid motions of the plane preserve the polyhedron ``D`` of a pair, and translations along the axis
-the energy.  Along a translation across it, the energy of stationary points has no derivative
+Rigid motions of the plane preserve the polyhedron ``D`` of a pair, translations along the axis the
+energy as well.  Along a translation across it, the energy of stationary points has no derivative
 either, as it leads from ``D`` into ``D`` both ways: the lateral positions of the two dumbbells
 add up to zero.  All stationary points of the pair are therefore, up to translations along the axis,
 those of the energy on the placements
@@ -9,8 +9,8 @@ those of the energy on the placements
     A: (-x, -y/2, alpha),   B: (x, y/2, beta)
 
 in four coordinates, and local minima are the same.  Dumbbells whose centres are more than
-``l + 2 r`` apart do not touch; there the energy is stationary only at ``x = 0`` and headings that are
-multiples of a right angle, for all ``y``.  What remains is compact.
+``l + 2 r`` apart do not touch; there the energy is stationary only at ``x = 0`` and headings that
+are multiples of a right angle, for all ``y``.  What remains is compact.
 
 The rods overlap where their axes cross: where no ball of one dumbbell overlaps the rod of the
 other, each end is at least ``r + t > 2 t`` from the other axis, which is thus nearer than ``2 t``
@@ -98,8 +98,8 @@ class RelativePlacements(Value):
         import sympy
 
         x, _, alpha, beta = self.manifold.symbols
-        l = sympy.Rational(self.length)
-        lateral = (l / 2) ** 2 * (sympy.sin(alpha) ** 2 + sympy.sin(beta) ** 2)
+        half = sympy.Rational(self.length) / 2
+        lateral = half**2 * (sympy.sin(alpha) ** 2 + sympy.sin(beta) ** 2)
         return SmoothFunction("trough", 2 * x**2 + lateral, self.manifold, unit="mm^2")
 
     @property
@@ -125,12 +125,13 @@ class RelativePlacements(Value):
 
         x, y, alpha, beta = self.manifold.symbols
         sizes = (self.length, self.ball_radius, self.rod_radius)
-        l, r, t = (sympy.Rational(size) for size in sizes)
+        length, r, t = (sympy.Rational(size) for size in sizes)
+        half = length / 2
         heading = {"A": alpha, "B": beta}
         centre = {"A": (-x, -y / 2, sympy.S.Zero), "B": (x, y / 2, sympy.S.Zero)}
         axis = {k: (sympy.sin(h), sympy.cos(h), sympy.S.Zero) for k, h in heading.items()}
         ends = {
-            f"{k}{i}": tuple(c + side * l / 2 * u for c, u in zip(centre[k], axis[k], strict=True))
+            f"{k}{i}": tuple(c + side * half * u for c, u in zip(centre[k], axis[k], strict=True))
             for k in "AB"
             for i, side in ((1, -1), (2, 1))
         }
@@ -138,12 +139,12 @@ class RelativePlacements(Value):
         for a in ("A1", "A2"):
             for b in ("B1", "B2"):
                 gaps[a + b] = distances.norm(distances.minus(ends[a], ends[b])) - 2 * r
-        ways: dict[str, Any] = {"apart": 4 * x**2 + y**2 - l**2}
+        ways: dict[str, Any] = {"apart": 4 * x**2 + y**2 - length**2}
         for end, point in ends.items():
             rod = "B" if end[0] == "A" else "A"
             w, u = distances.minus(point, centre[rod]), axis[rod]
             along = distances.dot(w, u)
-            foot = (sympy.Abs(along + l / 2) - sympy.Abs(along - l / 2)) / 2  # clamped to the rod
+            foot = (sympy.Abs(along + half) - sympy.Abs(along - half)) / 2  # clamped to the rod
             rest = tuple(wi - foot * ui for wi, ui in zip(w, u, strict=True))
             gaps[f"{end}b" if rod == "B" else f"a{end}"] = distances.norm(rest) - r - t
             side = w[0] * u[1] - w[1] * u[0]
@@ -152,20 +153,25 @@ class RelativePlacements(Value):
 
 
 def _turn_a(q: Array) -> Array:
-    return q + np.array([0.0, 0.0, math.pi, 0.0])
+    moved: Array = q + np.array([0.0, 0.0, math.pi, 0.0])
+    return moved
 
 
 def _turn_b(q: Array) -> Array:
-    return q + np.array([0.0, 0.0, 0.0, math.pi])
+    moved: Array = q + np.array([0.0, 0.0, 0.0, math.pi])
+    return moved
 
 
 def _exchange(q: Array) -> Array:
-    return q[..., [0, 1, 3, 2]] * np.array([-1.0, -1.0, 1.0, 1.0])
+    moved: Array = q[..., [0, 1, 3, 2]] * np.array([-1.0, -1.0, 1.0, 1.0])
+    return moved
 
 
 def _mirror_across(q: Array) -> Array:
-    return q * np.array([-1.0, 1.0, -1.0, -1.0])
+    moved: Array = q * np.array([-1.0, 1.0, -1.0, -1.0])
+    return moved
 
 
 def _mirror_along(q: Array) -> Array:
-    return q * np.array([1.0, -1.0, -1.0, -1.0]) + np.array([0.0, 0.0, math.pi, math.pi])
+    moved: Array = q * np.array([1.0, -1.0, -1.0, -1.0]) + np.array([0.0, 0.0, math.pi, math.pi])
+    return moved

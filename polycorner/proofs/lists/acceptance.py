@@ -263,7 +263,7 @@ def inertia(rows: "list[list[Ball]]") -> tuple[int, int] | None:
 
 
 def enclosed_multipliers(slopes: "list[list[Ball]]") -> "list[Ball] | None":
-    """Enclose the solutions ``lam`` of ``sum lam_i g_i = dE``; None if the ``g_i`` may be dependent.
+    """Enclose the solutions of ``sum lam_i g_i = dE``; None if the ``g_i`` may be dependent.
 
     ``slopes`` are the gradients ``g_i``, the energy's last.
     """

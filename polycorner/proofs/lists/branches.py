@@ -49,16 +49,16 @@ def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]
         The functions that are open there and have to hold in the branch.
     """
     if len(conj) == 1:
-        alive = np.flatnonzero(~(below & conj[0]).any(axis=1))
-        return alive, ~above[alive] & conj[0]
-    alive = ~(below[:, None, :] & conj).any(axis=2)  # (B, c)
-    open_ = conj & ~above[:, None, :]  # (B, c, m)
-    kept = alive.copy()
+        inside: NDArray[np.intp] = np.flatnonzero(~(below & conj[0]).any(axis=1))
+        return inside, ~above[inside] & conj[0]
+    alive: Mask = ~np.any(below[:, None, :] & conj, axis=2)  # (B, c)
+    open_: Mask = conj & ~above[:, None, :]  # (B, c, m)
+    kept: Mask = alive.copy()
     for i in range(len(conj)):
         for j in range(len(conj)):
             if i != j:  # branch i is dropped if j is within it, the later one if they are equal
-                within = ~(open_[:, j] & ~open_[:, i]).any(axis=1)
-                equal = within & ~(open_[:, i] & ~open_[:, j]).any(axis=1)
+                within: Mask = ~np.any(open_[:, j] & ~open_[:, i], axis=1)
+                equal: Mask = within & ~np.any(open_[:, i] & ~open_[:, j], axis=1)
                 kept[:, i] &= ~(alive[:, j] & within & ((j < i) | ~equal))
     boxes, branches = np.nonzero(kept)
     return boxes, open_[boxes, branches]

@@ -23,14 +23,15 @@ def newton(
     """
     rows = [*active, *range(problem.inequalities, problem.rows - 1)]
     n, k, scales = len(free), len(rows), problem.scales
-    q, lam = q.copy(), np.zeros(k)
+    q = q.copy()
+    lam = np.zeros(k)
     for step in range(MOST_STEPS):
         values, gradients, hessians = problem.evaluate(q, 2)
         if not (np.isfinite(values).all() and np.isfinite(hessians[[*rows, -1]]).all()):
             return None
         slopes, pull = gradients[rows][:, free], gradients[-1, free]
         if step == 0 and k:
-            lam = np.linalg.lstsq(slopes.T, pull, rcond=None)[0]
+            lam[:] = np.linalg.lstsq(slopes.T, pull, rcond=None)[0]
         bent = hessians[-1] - np.tensordot(lam, hessians[rows], 1)
         matrix = np.zeros((n + k, n + k))
         matrix[:n, :n] = bent[np.ix_(free, free)]
@@ -45,7 +46,7 @@ def newton(
         length = float(abs(change[:n]).max(initial=0.0))
         change *= min(1.0, STRIDE / length) if length else 1.0
         q[list(free)] += change[:n] * scales[list(free)]
-        lam = lam + change[n:]
+        lam += change[n:]
         if length < SETTLED:
             return q, lam
     return None

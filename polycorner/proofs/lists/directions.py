@@ -15,12 +15,8 @@ of all rounding errors: a sum of ``n`` products is off by at most ``(n + 2) 2^-5
 their magnitudes, underflow excluded, which a summand of ``2^-1000`` covers ([Higham] sec. 3.1).
 """
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-from polycorner.formulas.cache import sources_digest
 from polycorner.formulas.linking import linked
 
 compiled = linked()
@@ -32,7 +28,7 @@ LEAST_RADIUS = 1e-9  # relative to the gradient: nearer than this 0 counts as in
 
 
 @compiled
-def lower_product(v, spread, low, high):  # type: ignore[no-untyped-def]
+def lower_product(v, spread, low, high):
     """Return a lower bound of ``u . g`` for ``|u - v| <= spread`` and ``low <= g <= high``."""
     total, size = 0.0, 0.0
     for j in range(v.size):
@@ -44,7 +40,7 @@ def lower_product(v, spread, low, high):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def nearest(a, count, v, w, target):  # type: ignore[no-untyped-def]
+def nearest(a, count, v, w, target):
     """Move ``v = sum w_i a_i`` towards the point of the convex hull that is nearest to 0.
 
     End when ``min a_i . v > target |v|`` (True), or when ``|v| <= target`` (False).
@@ -88,7 +84,7 @@ def nearest(a, count, v, w, target):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def orthonormal(low, high, first, scales, basis):  # type: ignore[no-untyped-def]
+def orthonormal(low, high, first, scales, basis):
     """Orthonormalise the middles of the scaled gradients of the equations; False if dependent."""
     n = scales.size
     for k in range(basis.shape[0]):
@@ -114,7 +110,7 @@ def orthonormal(low, high, first, scales, basis):  # type: ignore[no-untyped-def
 
 
 @compiled
-def tangent_spread(low, high, first, scales, basis, v, spread):  # type: ignore[no-untyped-def]
+def tangent_spread(low, high, first, scales, basis, v, spread):
     """Bound the change of ``v`` that makes it tangent to the equations everywhere in the box.
 
     With ``C`` the scaled ``basis`` as columns and ``R`` an approximate inverse of ``dh C``, the
@@ -124,26 +120,26 @@ def tangent_spread(low, high, first, scales, basis, v, spread):  # type: ignore[
     k, n = basis.shape
     middle = np.zeros((k, k))
     for i in range(k):
-        for l in range(k):
+        for c in range(k):
             for j in range(n):
                 entry = 0.5 * (low[first + i, j] + high[first + i, j])
-                middle[i, l] += entry * basis[l, j] * scales[j]
+                middle[i, c] += entry * basis[c, j] * scales[j]
     inverse = np.zeros((k, k))
     if not inverted(middle, inverse):
         return False
     defect, residual = 0.0, 0.0
     for i in range(k):
         row = 0.0
-        for l in range(k):
+        for c in range(k):
             bound = 0.0
             for s in range(k):
                 bound += abs(inverse[i, s]) * product_defect(
-                    low[first + s], high[first + s], scales, basis[l], middle[s, l]
+                    low[first + s], high[first + s], scales, basis[c], middle[s, c]
                 )
-            exact, size = (1.0 if i == l else 0.0), 1.0
+            exact, size = (1.0 if i == c else 0.0), 1.0
             for s in range(k):
-                exact -= inverse[i, s] * middle[s, l]
-                size += abs(inverse[i, s] * middle[s, l])
+                exact -= inverse[i, s] * middle[s, c]
+                size += abs(inverse[i, s] * middle[s, c])
             row += bound + abs(exact) + (k + 3) * UNIT * size
         defect = max(defect, row)
         along = 0.0
@@ -156,14 +152,14 @@ def tangent_spread(low, high, first, scales, basis, v, spread):  # type: ignore[
     reach = residual / (1 - defect) * (1 + 64 * n * UNIT) + TINY
     for j in range(n):
         total = 0.0
-        for l in range(k):
-            total += abs(basis[l, j]) * scales[j]
+        for c in range(k):
+            total += abs(basis[c, j]) * scales[j]
         spread[j] = total * reach * (1 + 16 * n * UNIT)
     return True
 
 
 @compiled
-def product_defect(low, high, scales, column, middle):  # type: ignore[no-untyped-def]
+def product_defect(low, high, scales, column, middle):
     """Bound ``|g . c - middle|`` for ``low <= g <= high`` and the scaled column ``c``."""
     radius, centre, size = 0.0, 0.0, 0.0
     for j in range(column.size):
@@ -178,7 +174,7 @@ def product_defect(low, high, scales, column, middle):  # type: ignore[no-untype
 
 
 @compiled
-def magnitude(low, high, v):  # type: ignore[no-untyped-def]
+def magnitude(low, high, v):
     """Bound ``|g . v|`` for ``low <= g <= high``."""
     below, above, size = 0.0, 0.0, 0.0
     for j in range(v.size):
@@ -191,7 +187,7 @@ def magnitude(low, high, v):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def inverted(a, inverse):  # type: ignore[no-untyped-def]
+def inverted(a, inverse):
     """Invert a small matrix by elimination with pivots; False where it is singular."""
     k = a.shape[0]
     left = a.copy()
@@ -221,7 +217,7 @@ def inverted(a, inverse):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v, spread, w):  # type: ignore[no-untyped-def]
+def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v, spread, w):
     """Find and verify a direction for one box and branch; see :func:`directions`."""
     m, n = mask.size, scales.size
     if equations and not orthonormal(low, high, m, scales, basis):
@@ -273,85 +269,3 @@ def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v,
         if not bound > 0.0:
             return False
     return True
-
-
-def _entry_points(sources: str) -> Any:
-    @njit(cache=True)
-    def directions(low, high, boxes, masks, equations, scales, energy_sign):  # type: ignore[no-untyped-def]
-        """Find a direction for each item: a box, and the inequalities of a branch.
-
-        Parameters
-        ----------
-        low, high : (B, m + k + 1, n) arrays
-            Enclosures of the gradients: inequalities, equations, energy.
-        boxes : (I,) array of int
-        masks : (I, m) array of bool
-            Inequalities that may vanish in the box and have to hold in the branch.
-        equations : int
-            ``k``.
-        scales : (n,) array
-            Units of the coordinates; 0 for coordinates that are fixed.
-        energy_sign : float
-            -1 for directions of descent, 0 for directions into the set alone.
-
-        Returns
-        -------
-        found : (I,) array of bool
-        v : (I, n) array
-            The directions.
-        weights : (I, m + 1) array
-            Weights of the gradients with which they nearly cancel, by row, the energy last.
-        """
-        _ = sources
-        items, m = masks.shape
-        n = scales.size
-        found, v = np.zeros(items, np.bool_), np.zeros((items, n))
-        weights = np.zeros((items, m + 1))
-        a, rho, rows = np.zeros((m + 1, n)), np.zeros(m + 1), np.zeros(m + 1, np.int64)
-        basis, spread, w = np.zeros((equations, n)), np.zeros(n), np.zeros(m + 1)
-        for item in range(items):
-            lo, hi = low[boxes[item]], high[boxes[item]]
-            w[:] = 0.0
-            found[item] = one(
-                lo, hi, masks[item], equations, scales, energy_sign,
-                a, rho, rows, basis, v[item], spread, w,
-            )  # fmt: skip
-            count = 0
-            for k in range(m):
-                if masks[item, k]:
-                    weights[item, k] = w[count]
-                    count += 1
-            weights[item, m] = w[count]
-        return found, v, weights
-
-    @njit(cache=True)
-    def covered(lower, upper, boxes, masks, left, right, active):  # type: ignore[no-untyped-def]
-        """Whether each item lies in one of some regions and asks for none but its functions.
-
-        Regions have the sides ``left``, ``right`` ``(R, n)``, and the functions ``active``
-        ``(R, m)``; the others are as in ``directions``.
-        """
-        _ = sources
-        found = np.zeros(len(boxes), np.bool_)
-        for item in range(len(boxes)):
-            lo, hi = lower[boxes[item]], upper[boxes[item]]
-            for r in range(len(left)):
-                inside = True
-                for j in range(lo.size):
-                    if lo[j] < left[r, j] or hi[j] > right[r, j]:
-                        inside = False
-                        break
-                if inside:
-                    for k in range(masks.shape[1]):
-                        if masks[item, k] and not active[r, k]:
-                            inside = False
-                            break
-                if inside:
-                    found[item] = True
-                    break
-        return found
-
-    return directions, covered
-
-
-directions, covered = _entry_points(sources_digest(__package__))

@@ -17,10 +17,11 @@ from polycorner.proofs.invariance import annihilated, generators, translations
 from polycorner.proofs.lists.acceptance import BITS, Region
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
-from polycorner.proofs.lists.members import OPEN, OUT, Known, full, membership
+from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.members import OPEN, OUT, ROUNDING, Known, full, membership
 from polycorner.proofs.lists.search import Boxes, Search
 from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -199,7 +200,7 @@ def listed(search: Search) -> StationaryList:
                 points.append(_point(search, image, orbits))
         orbits += 1
     rng = np.random.default_rng(0)
-    loci = tuple(locus_of(search, place, rng) for place in search.loci)
+    loci = tuple(locus_of(search, place, rng) for place in _loci(search))
     return StationaryList(
         search.problem,
         search.domain,
@@ -233,8 +234,43 @@ def _images(search: Search, region: Region) -> list[Region]:
             np.concatenate([(side + turn)[free], rest[n:]])
             for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
         ]
-        found.append(Region(wide[0] + turn, wide[1] + turn, active, *sharp, region.index))
+        sides = wide[0] + turn, wide[1] + turn
+        found.append(Region(*sides, active, sharp[0], sharp[1], region.index))
     return found
+
+
+def _loci(search: Search) -> list[Locus]:
+    """Return the loci that were found and their images, each once."""
+    manifold, z = search.domain.manifold, list(search.reads)
+    found: list[Locus] = []
+    for place in search.loci:
+        for g in (None, *search.motions):
+            image = place if g is None else _locus_image(search, place, g)
+            if not any(_same_locus(manifold, z, image, other) for other in found):
+                found.append(image)
+    return found
+
+
+def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
+    z, ends = list(place.z), []
+    for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
+        sides = search.domain.lower.copy(), search.domain.upper.copy()
+        sides[0][z], sides[1][z] = lower, upper
+        ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
+    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
+
+
+def _same_locus(manifold: Manifold, z: list[int], one: Locus, other: Locus) -> bool:
+    """Whether a locus lies in the box of another one, where there is only one."""
+    periods = np.array(manifold.periods)[z]
+    apart = 0.5 * (other.lower + other.upper - one.sharp_lower - one.sharp_upper)
+    circles = np.where(np.isfinite(periods), periods, 1.0)
+    turn = np.where(np.isfinite(periods), np.round(apart / circles) * circles, 0.0)
+    slack = ROUNDING * manifold.scale_array[z]
+    inside = (one.sharp_lower + turn - slack >= other.lower) & (
+        one.sharp_upper + turn + slack <= other.upper
+    )
+    return bool(inside.all())
 
 
 def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:

@@ -9,14 +9,19 @@ period.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner import checks
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.domains import Domain
 from polycorner.spaces.manifold import Array, Manifold
+
+if TYPE_CHECKING:
+    import sympy
 
 MARGIN = 1e-9  # by which w . q has to grow, in scale units
 MOST_ELEMENTS = 4096
@@ -151,7 +156,7 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     return tuple(names[i] for i in range(len(d.functions)))
 
 
-def _exact_half(period: float) -> object:
+def _exact_half(period: float) -> "sympy.Expr":
     import sympy
 
     if not np.isfinite(period):
@@ -161,18 +166,18 @@ def _exact_half(period: float) -> object:
     return whole / 2
 
 
-def _bound(f: object) -> object:
+def _bound(f: SmoothFunction) -> "sympy.Expr":
     """Return a function's expression with its parameters."""
     import sympy
 
-    expression = f.expression  # type: ignore[attr-defined]
-    pairs = zip(f.family.parameters, f.parameters, strict=True)  # type: ignore[attr-defined]
+    expression = f.expression
+    pairs = zip(f.family.parameters, f.parameters, strict=True)
     known = {name: sympy.Rational(value) for name, value in pairs}
     found = {s: known[s.name] for s in expression.free_symbols if s.name in known}
     return expression.xreplace(found)
 
 
-def _normal(expression: object) -> object:
+def _normal(expression: "sympy.Expr") -> "sympy.Expr":
     """Return a normal form: arguments of all functions expanded."""
     import sympy
 

@@ -2,9 +2,9 @@
 
 Let ``E`` depend on some coordinates ``z`` only, and ``y`` be the others.  In a box ``X`` of ``z``
 let ``E'`` vanish at ``z*`` and ``[H]`` enclose ``E''``, with the symmetric middle ``C``.  For each
-``z`` in ``X`` there is a matrix ``M`` in ``[H]`` with ``E'(z) = M (z - z*)``; if the symmetric parts
-of all products ``M^T C`` are positive definite, ``v = -C (z - z*)`` has ``E'(z) v < 0`` except at
-``z*``, whose only zero of ``E'`` it therefore is.
+``z`` in ``X`` there is a matrix ``M`` in ``[H]`` with ``E'(z) = M (z - z*)``; if the symmetric
+parts of all products ``M^T C`` are positive definite, ``v = -C (z - z*)`` has ``E'(z) v < 0``
+except at ``z*``, which is therefore the only zero of ``E'``.
 
 Now let ``u`` be a vector along ``y`` in which all functions that may vanish in a box grow, and let
 ``z`` of the box lie in ``X``.  At a point of the set with ``z != z*`` the direction ``(v, K u)``
@@ -12,7 +12,7 @@ descends, and for a large ``K`` it leads into the set: the point is not stationa
 the energy has no derivative.  The stationary points in the box are therefore those with ``z = z*``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inerti
 from polycorner.proofs.lists.candidates import newton
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
+
+SHARP = 1e-9  # reach in scale units of the box whose image is the enclosure of a locus
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,12 @@ def locus(problem: Problem, formulas: Formulas, z: tuple[int, ...], q: Array) ->
             radii = problem.scales[list(z)] * WIDEST / 4**power
             shown = _shown(formulas, z, found[0], radii)
             if shown is not None:
-                return shown
+                sharp = _shown(formulas, z, found[0], problem.scales[list(z)] * SHARP)
+                return replace(
+                    shown,
+                    sharp_lower=(sharp or shown).sharp_lower,
+                    sharp_upper=(sharp or shown).sharp_upper,
+                )
     return None
 
 

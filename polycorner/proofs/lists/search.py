@@ -20,8 +20,8 @@ from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.acceptance import Faces, Region
 from polycorner.proofs.lists.branches import Mask, conjunctions, items
 from polycorner.proofs.lists.candidates import active_set, newton
-from polycorner.proofs.lists.directions import covered, directions
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.images import Motion, dropped, weights
 from polycorner.proofs.lists.loci import Locus, locus, read_coordinates
 from polycorner.proofs.lists.tree import Tree
@@ -152,14 +152,15 @@ class Search:
         boxes = self._without_images(boxes)
         m, rows = self.problem.inequalities, self.problem.rows
         v_lo, v_hi, g_lo, g_hi = self.functions.gradients(boxes.lower, boxes.upper)
-        meets = ((v_lo[:, m : rows - 1] <= 0) & (v_hi[:, m : rows - 1] >= 0)).all(axis=1)
+        meets: Mask = np.all((v_lo[:, m : rows - 1] <= 0) & (v_hi[:, m : rows - 1] >= 0), axis=1)
         where, masks = items(self.conj, v_hi[:, :m] < 0, v_lo[:, :m] > 0)
         where, masks = where[meets[where]], masks[meets[where]]
         found, v, weights = directions(
             g_lo, g_hi, where, masks, rows - 1 - m, self.domain.units, -1.0
         )
         continuous = self.functions.continuous(boxes.lower, boxes.upper)[where]
-        smooth = (continuous[:, :m] | ~masks).all(axis=1) & continuous[:, m:].all(axis=1)
+        smooth: Mask = np.all(continuous[:, :m] | ~masks, axis=1)
+        smooth &= np.all(continuous[:, m:], axis=1)
         found &= smooth
         done = found | self._covered(boxes, where, masks)
         self._on_loci(boxes, where, masks, (g_lo, g_hi), (done, found, smooth, v))
@@ -204,8 +205,8 @@ class Search:
         units = self.domain.units.copy()
         units[z] = 0.0
         for place in self.loci:
-            near = (boxes.lower[:, z] >= place.lower).all(axis=1)
-            near &= (boxes.upper[:, z] <= place.upper).all(axis=1)
+            near: Mask = np.all(boxes.lower[:, z] > place.lower, axis=1)
+            near &= np.all(boxes.upper[:, z] < place.upper, axis=1)
             rest = np.flatnonzero(near[where] & ~done & smooth)
             if rest.size:
                 into, u, _ = directions(

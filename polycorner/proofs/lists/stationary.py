@@ -1,4 +1,4 @@
-"""All stationary points of an energy on a polyhedron in a box, with a proof that none is missing."""
+"""Lists of all stationary points of an energy on a polyhedron in a box, and what is proved."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -221,6 +221,6 @@ def _sample(search: Search, place: Locus, rng: np.random.Generator) -> Array | N
     upper = lower.copy()
     lower[:, z], upper[:, z] = place.sharp_lower, place.sharp_upper
     low = search.functions.values(lower, upper)[0][:, : search.problem.inequalities]
-    inside = (~((low <= 0)[:, None, :] & search.conj).any(axis=2)).any(axis=1)
-    found: Any = np.flatnonzero(inside)
+    missed = np.any((low <= 0)[:, None, :] & search.conj, axis=2)
+    found: Any = np.flatnonzero(~np.all(missed, axis=1))
     return 0.5 * (lower[found[0]] + upper[found[0]]) if found.size else None

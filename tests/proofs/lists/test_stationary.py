@@ -57,7 +57,8 @@ def test_camel_has_six_minima_also_by_its_symmetry():
     half = stationary_points(
         square, energy, box=box, symmetry=Symmetry(elements=[Element(negated, {})])
     )
-    assert whole.complete and half.complete
+    assert whole.complete
+    assert half.complete
     assert len(whole.minima) == len(half.minima) == 6
     assert sorted_points(whole) == sorted_points(half)
     assert len(whole) == 15
@@ -97,8 +98,10 @@ def test_distance_from_a_point_rests_there_and_behind_each_disc(problem):
 @given(st.lists(st.integers(1, 359), min_size=3, max_size=6, unique=True), st.integers(0, 359))
 def test_projection_onto_a_polygon_is_unique(degrees, way):
     """The nearest point of a convex set is the only stationary point of the distance."""
-    normals = [(sympy.Rational(round(1000 * math.cos(math.radians(g))), 1000),
-                sympy.Rational(round(1000 * math.sin(math.radians(g))), 1000)) for g in degrees]  # fmt: skip
+    normals = [
+        tuple(sympy.Rational(round(1000 * f(math.radians(g))), 1000) for f in (math.cos, math.sin))
+        for g in degrees
+    ]
     walls = [1 - u * X - v * Y for u, v in normals]
     frame = [3 - X, 3 + X, 3 - Y, 3 + Y]
     target = 2.5 * np.array([math.cos(math.radians(way)), math.sin(math.radians(way))])
@@ -187,8 +190,10 @@ def test_loci_along_coordinates_that_the_energy_does_not_read():
     assert found.complete
     assert not found.points
     (locus,) = found.loci
-    assert locus.is_minimum and locus.lower["y"] <= 0 <= locus.upper["y"]
-    assert locus.sample is not None and d.contains(locus.sample)
+    assert locus.is_minimum
+    assert locus.lower["y"] <= 0 <= locus.upper["y"]
+    assert locus.sample is not None
+    assert d.contains(locus.sample)
 
 
 @pytest.mark.parametrize(
@@ -216,7 +221,8 @@ def test_budget_leaves_boxes_undecided():
     d = Polyhedron(PLANE, {"disc": 9 - X**2 - Y**2})
     energy = sympy.cos(5 * X) + sympy.sin(7 * Y)
     found = stationary_points(d, energy, box=SIDES, max_boxes=3)
-    assert not found.complete and found.undecided_volume > 0
+    assert not found.complete
+    assert found.undecided_volume > 0
     assert "Not complete" in found.statement
 
 
