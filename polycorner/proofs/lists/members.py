@@ -52,9 +52,10 @@ def full(search: Search, region: Region) -> tuple[Array, Array]:
 def membership(search: Search, region: Region) -> str:
     """Decide whether a region's point is a stationary point of the set in the domain.
 
-    The signs of the other functions at the point say in which branches of the tree it lies.  It
-    is stationary if each of these asks for all active functions and for no other function that
-    may vanish there; it is not if one asks for fewer of them, as all multipliers are positive.
+    The signs of the other functions at the point say in which branches of the tree it lies.  As
+    all multipliers are positive, it is not stationary if a branch that contains it asks for fewer
+    than the active functions.  If every branch that may contain it asks for all of them it is
+    stationary, whatever else they ask for; it is in the set if one of them asks for no more.
     """
     lower, upper = full(search, region)
     m = search.problem.inequalities
@@ -72,12 +73,11 @@ def membership(search: Search, region: Region) -> str:
     possible = [c for c in search.conj if not (below & c).any()]
     if not possible:
         return OUT
-    decided = [c for c in possible if not (c & ~above & ~held).any()]
-    if any((held & ~c).any() for c in decided):
+    decided = [not (c & ~above & ~held).any() for c in possible]
+    fewer = [bool((held & ~c).any()) for c in possible]
+    if any(sure and less for sure, less in zip(decided, fewer, strict=True)):
         return OUT
-    if len(decided) == len(possible):
-        return IN
-    return OPEN
+    return IN if any(decided) and not any(fewer) else OPEN
 
 
 def _outside(found: Domain, lower: Array, upper: Array) -> bool:
