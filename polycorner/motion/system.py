@@ -265,9 +265,9 @@ class System(MechanicalSystem):
         if v is not None:
             speeds = self.manifold.points(v, "v").copy()
         for argument, array in (("q", places), ("v", speeds)):
-            shape = places.shape if self.count == 1 else (self.count, self.manifold.dimension)
-            if array.shape != shape or array.size != self.count * self.manifold.dimension:
-                refuse(argument, f"shape ({self.count}, {self.manifold.dimension})", array.shape)
+            shape = places.shape if self.count == 1 else (self.count, self.manifold.size)
+            if array.shape != shape or array.size != self.count * self.manifold.size:
+                refuse(argument, f"shape ({self.count}, {self.manifold.size})", array.shape)
         self.check_placement(places)
         check_velocities(self.polyhedron, places, speeds)
         return State(real("time", time, unit="s"), places, speeds, self.sticks(places, speeds))
@@ -298,7 +298,7 @@ class System(MechanicalSystem):
 
     def energies(self, state: State) -> tuple[float, float]:
         """Return kinetic and potential energy of all bodies."""
-        n = self.manifold.dimension
+        n = self.manifold.size
         each = [
             energies(self.formulation, self.parameters, q, v)
             for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
@@ -308,7 +308,7 @@ class System(MechanicalSystem):
 
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
-        n, scales = self.manifold.dimension, self.manifold.scale_array
+        n, scales = self.manifold.size, self.manifold.scale_array
         law, known, held = self.formulation, self.parameters, self.polyhedron
         squared = max(
             highest_square(law, known, scales, q, v, bends(held, q))

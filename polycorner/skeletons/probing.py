@@ -243,7 +243,7 @@ class Prober(EdgeTracer):
 
     def _near(self, q: Array, points: Array) -> bool:
         """Whether a point lies near the chords of an edge."""
-        apart = self.manifold.difference(q, points) / self.scales
+        apart = self.manifold.chord(q, points) / self.scales
         chords = np.diff(points, axis=0) / self.scales
         lengths = np.einsum("kn,kn->k", chords, chords)
         parts = np.einsum("kn,kn->k", apart[:-1], chords) / np.maximum(lengths, 1e-300)

@@ -111,7 +111,7 @@ class Surface:
 
     def sees(self, p: Array, q: Array) -> Any:
         """Whether straight ways from one point of the face to others stay on it."""
-        away = self.manifold.difference(q, p)
+        away = self.manifold.chord(q, p)
         way = p + WAY[:, None, None] * away
         found, on = self.projected(way.reshape(-1, len(p)))
         on &= self.contains(self.values(found))
@@ -171,7 +171,7 @@ class Surface:
         """Return displacements from embedded points ``q`` to embedded points ``p``."""
         if self.quotient.symmetry.invariants is not None:
             return np.asarray(p - q)
-        return self.manifold.difference(p * self.scales, q * self.scales) / self.scales
+        return self.manifold.chord(p * self.scales, q * self.scales) / self.scales
 
 
 def _is_elementwise(invariants: Callable[[Array], Array], q: Array) -> bool:

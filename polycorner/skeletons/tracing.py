@@ -146,7 +146,7 @@ class EdgeTracer:
         Singular corners are known less exactly than edges beside each other are apart there, so
         the distance is that from the corner in record, where it is not elsewhere on the orbit.
         """
-        moved = self.manifold.difference(record.point.q, walk.last.q)
+        moved = self.manifold.chord(record.point.q, walk.last.q)
         end = walk.last.q + moved * (abs(moved / self.scales).max() < NEAR)
         away = np.linalg.norm((walk.points - end) / self.scales, axis=1)
         beyond = np.flatnonzero(away > distance)
