@@ -29,22 +29,20 @@ def manifold_entry(manifold: Manifold) -> list[Entries]:
 
 def read_manifold(entry: Sequence[Entries]) -> Manifold:
     """Return the manifold of :func:`manifold_entry`."""
-    groups = {
-        kind: tuple(
-            tuple(c["name"] for c in some)
-            for first, some in groupby(entry, lambda c: c.get(kind))
-            if first is not None
-        )
-        for kind in ("sphere", "rotation")
-    }
     return Manifold(
         tuple(c["name"] for c in entry),
         tuple(read_number(c["period"]) for c in entry),
         tuple(float(c["scale"]) for c in entry),
         tuple(c["unit"] for c in entry),
-        groups["sphere"],
-        groups["rotation"],
+        _groups(entry, "sphere"),
+        _groups(entry, "rotation"),
     )
+
+
+def _groups(entry: Sequence[Entries], kind: str) -> tuple[tuple[str, ...], ...]:
+    """Return the names of the coordinates of every factor of a kind."""
+    parts = groupby(entry, lambda coordinate: coordinate.get(kind))
+    return tuple(tuple(c["name"] for c in some) for first, some in parts if first is not None)
 
 
 def polyhedron_entry(polyhedron: Polyhedron, energy: SmoothFunction | None = None) -> Entries:

@@ -110,7 +110,7 @@ class Prober(EdgeTracer):
     @staticmethod
     def _is_on(net: Net, q: Array) -> bool:
         _, gradients = net.surface.evaluated(q[None])
-        normals, _ = net.surface.normals(gradients)
+        normals = net.surface.across(gradients)
         return bool(net.covers(net.surface.embedded(q[None]), normals, WITHIN)[0])
 
     def _net(self, active: frozenset[int], q: Array) -> Net:

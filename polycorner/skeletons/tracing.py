@@ -245,6 +245,7 @@ class EdgeTracer:
     def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
         """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
         start, end = curve.points[k], curve.points[k + 1]
+        q = self.manifold.image(q, start)
         kept = self.quotient.at(start).basis(curve.active)
         along = self.symmetry.displacement(self.manifold, end, start)
 

@@ -311,7 +311,11 @@ class Manifold(Value):
         Images are points a period away on circles, and the negative quaternion of a rotation.
         """
         p, q = self.points(p, "p"), self.points(q)
-        return self._principal(self.factors.signs(p, q) * p - q if self.rotations else p - q)
+        return self._principal(self.image(p, q) - q)
+
+    def image(self, p: Array, q: Array) -> Array:
+        """Return ``p`` with the signs of its quaternions that bring it nearest to ``q``."""
+        return self.factors.signs(p, q) * p if self.rotations else p
 
     def frame(self, q: ArrayLike) -> Array:
         """Return a basis of the tangent space at ``q`` as columns, ``(..., N, n)``.
