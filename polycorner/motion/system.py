@@ -36,7 +36,8 @@ class System(MechanicalSystem):
         its contacts with the surroundings, and of ``h_j(q) = 0``, its joints and rails.  Forces
         of equations have either sign; that of ``h`` acts along its gradient.
     kinetic : sympy.Expr
-        ``T(q, v)`` of a body, a quadratic form in the velocities (:func:`velocities`).
+        ``T(q, v)`` of a body, a quadratic form in the velocities (:func:`velocities`); that of a
+        rotation is a :func:`rotational_energy`.
     potential : sympy.Expr, optional
         ``V(q)``; default 0.
     forces : mapping from str to sympy.Expr, optional
@@ -154,6 +155,11 @@ class System(MechanicalSystem):
         """The configuration manifold of a body."""
         return self.polyhedron.manifold
 
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Names of the equations that normalise vectors and quaternions."""
+        return self.polyhedron.hidden
+
     @cached_property
     def contacts(self) -> tuple[str, ...]:
         """Names of the unilateral contacts of a body with its surroundings."""
@@ -258,7 +264,7 @@ class System(MechanicalSystem):
             places = self.manifold.point(q).copy()
         else:
             # `points` itself refuses a mapping, which only one body may have.
-            places = self.manifold.points(q, "q").copy()  # type: ignore[arg-type]
+            places = self.manifold.placed(self.manifold.points(q, "q").copy())  # type: ignore[arg-type]
         speeds = np.zeros(places.shape)
         for name, speed in self.substrate.items():
             speeds[..., self.manifold.names.index(name)] = speed

@@ -185,13 +185,19 @@ def vector_field(manifold: Manifold, components: Any) -> "tuple[SmoothFunction, 
     if len(given) != manifold.size:
         expected = f"{manifold.size} components, for {', '.join(manifold.names)}"
         checks.refuse("symmetry", expected, len(given))
+    quaternions = {name for some in manifold.rotations for name in some}
+
+    def component(name: str, expression: Any) -> SmoothFunction:
+        # At the opposite quaternion a tangent vector has the opposite components.
+        made = SmoothFunction.quantity if name in quaternions else SmoothFunction
+        return made(name, expression, manifold)
+
     return tuple(
         f
         if isinstance(f, SmoothFunction)
-        else SmoothFunction(
+        else component(
             name,
             sympy.Rational(f.numerator, f.denominator) if isinstance(f, Fraction) else f,
-            manifold,
         )
         for name, f in zip(manifold.names, given, strict=True)
     )
