@@ -76,9 +76,7 @@ class TestPackings:
         start = M.onto(np.append(np.random.default_rng(3).standard_normal(3 * n), -1.0))
         c = minimise(Polyhedron(M, gaps), -M.symbols[-1], start)
         axes = np.eye(3, dtype=int).tolist()
-        fields = tuple(
-            (*(x for v in vectors for x in about(axis, v)), 0) for axis in axes
-        )
+        fields = tuple((*(x for v in vectors for x in about(axis, v)), 0) for axis in axes)
         p = prove(c, digits=12, symmetry=Symmetry(fields=fields))
         assert p.proved
         assert contains(p.enclosures["energy"], energy)
@@ -110,5 +108,5 @@ class TestRotations:
         c = minimise(Polyhedron(ROTATION, {}), -R[2, 2], ROTATION.wrap([1, 0.1, 0.2, 0.3]))
         assert not prove(c).proved
         turn = (-a[3], -a[2], a[1], a[0])  # (0, e_z) a, a turn about the vertical of space
-        p = prove(c, symmetry=Symmetry(fields=(turn, )))
+        p = prove(c, symmetry=Symmetry(fields=(turn,)))
         assert p.proved

@@ -23,7 +23,8 @@ def counts(found):
 
 def triangle(normals):
     return Polyhedron(
-        SPHERE, {f"n{k}": sum(a * b for a, b in zip(n, u, strict=True)) for k, n in enumerate(normals)}
+        SPHERE,
+        {f"n{k}": sum(a * b for a, b in zip(n, u, strict=True)) for k, n in enumerate(normals)},
     )
 
 
@@ -117,7 +118,9 @@ class TestRotations:
         assert found.euler_characteristic == 2
 
     def test_tilts_up_to_an_angle_are_a_solid_torus(self):
-        found = skeleton(Polyhedron(ROTATION, {"tilt": R[2, 2] - sp.Rational(1, 2)}), [[1, 0, 0, 0]])
+        found = skeleton(
+            Polyhedron(ROTATION, {"tilt": R[2, 2] - sp.Rational(1, 2)}), [[1, 0, 0, 0]]
+        )
         assert counts(found) == (0, 0, 1)
         assert found.euler_characteristic == 0
 
