@@ -36,8 +36,7 @@ class System(MechanicalSystem):
         its contacts with the surroundings, and of ``h_j(q) = 0``, its joints and rails.  Forces
         of equations have either sign; that of ``h`` acts along its gradient.
     kinetic : sympy.Expr
-        ``T(q, v)`` of a body, a quadratic form in the velocities (:func:`velocities`); that of a
-        rotation is a :func:`rotational_energy`.
+        ``T(q, v)`` of a body, quadratic in the :func:`velocities`; see :func:`rotational_energy`.
     potential : sympy.Expr, optional
         ``V(q)``; default 0.
     forces : mapping from str to sympy.Expr, optional
@@ -263,8 +262,8 @@ class System(MechanicalSystem):
         if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
             places = self.manifold.point(q).copy()
         else:
-            # `points` itself refuses a mapping, which only one body may have.
-            places = self.manifold.placed(self.manifold.points(q, "q").copy())  # type: ignore[arg-type]
+            # A mapping, which only one body may have, is refused.
+            places = self.manifold.placed(self.manifold.points(q).copy())  # type: ignore[arg-type]
         speeds = np.zeros(places.shape)
         for name, speed in self.substrate.items():
             speeds[..., self.manifold.names.index(name)] = speed

@@ -20,8 +20,8 @@ from polycorner.spaces.arguments import (
     units_of,
 )
 from polycorner.spaces.embedding import rotation_matrix
-from polycorner.spaces.factors import NEAR, Factors, factors
-from polycorner.values import Value, read_only
+from polycorner.spaces.factors import factors
+from polycorner.spaces.geometry import Geometry
 
 if TYPE_CHECKING:
     import sympy
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Manifold(Value):
+class Manifold(Geometry):
     """The configuration manifold ``X``: a product of lines, circles, spheres and rotations.
 
     A point is one vector of length ``N`` (:attr:`size`).  Points of a sphere are unit vectors, and
@@ -154,11 +154,6 @@ class Manifold(Value):
         return len(self.names) - len(self.spheres) - len(self.rotations)
 
     @cached_property
-    def factors(self) -> Factors:
-        """The spheres and rotations, in the order of their coordinates."""
-        return factors(self.names, self.spheres, self.rotations, self.periods, self.scales)
-
-    @cached_property
     def symbols(self) -> "tuple[sympy.Symbol, ...]":
         """The coordinates as real SymPy symbols, in order."""
         import sympy
@@ -177,19 +172,6 @@ class Manifold(Value):
             msg = f"copies: expected a positive whole number; got {copies!r}"
             raise ValueError(msg)
         return _product((self,) * copies)
-
-    @cached_property
-    def scale_array(self) -> Array:
-        """The scales as an array."""
-        scales: Array = read_only(np.array(self.scales))
-        return scales
-
-    @cached_property
-    def _circles(self) -> tuple[NDArray[np.intp], Array]:
-        """Positions and periods of the coordinates that are circles."""
-        periods = np.array(self.periods, dtype=np.float64)
-        positions = np.flatnonzero(periods < math.inf)
-        return positions, periods[positions]
 
     def points(self, q: ArrayLike, argument: str = "q") -> Array:
         """Check that ``q`` is one point ``(n,)`` or a batch ``(..., n)`` of finite reals.
@@ -232,21 +214,6 @@ class Manifold(Value):
             raise ValueError(msg)
         return self.placed(array, argument)
 
-    def placed(self, points: Array, argument: str = "q") -> Array:
-        """Return points ``(..., N)`` with vectors and quaternions normalised.
-
-        Raises
-        ------
-        ValueError
-            For lengths that differ from one by more than 1e-3.
-        """
-        self.factors.check(points, argument, NEAR)
-        return self.onto(points)
-
-    def onto(self, q: Array) -> Array:
-        """Return the nearest points of the manifold; lines and circles stay as they are."""
-        return self.factors.onto(q) if self.factors else q
-
     def wrap(self, q: ArrayLike) -> Array:
         """Bring points ``(..., N)`` into one form.
 
@@ -263,12 +230,6 @@ class Manifold(Value):
         self.factors.check(points, "q", None)
         return self.canonical(points)
 
-    def canonical(self, points: Array) -> Array:
-        """Return what :meth:`wrap` does, unchecked: vectors of length zero stay."""
-        points = self._principal(points.copy())
-        self.factors.wrap(points)
-        return points
-
     def difference(self, p: ArrayLike, q: ArrayLike) -> Array:
         """Return the shortest tangent vector at ``q`` that leads to ``p``, ``(..., N)``.
 
@@ -277,9 +238,10 @@ class Manifold(Value):
         """
         p, q = self.points(p, "p"), self.points(q)
         found = self._principal(p - q)
-        self.factors.check(p, "p", None)
-        self.factors.check(q, "q", None)
-        self.factors.difference(p, q, found)
+        if self.factors:
+            self.factors.check(p, "p", None)
+            self.factors.check(q, "q", None)
+            self.factors.difference(p, q, found)
         return found
 
     def shift(self, q: ArrayLike, v: ArrayLike) -> Array:
@@ -291,12 +253,6 @@ class Manifold(Value):
         self.factors.check(q, "q", None)
         return self.wrap(self.moved(q, v))
 
-    def moved(self, q: Array, v: Array) -> Array:
-        """Return what :meth:`shift` does, unchecked and without wrapping."""
-        found = np.asarray(q + v)
-        self.factors.shift(q, v, found)
-        return found
-
     def distance(self, p: ArrayLike, q: ArrayLike) -> Any:
         """Return the distance in scale units, by arcs and angles of rotation, ``(...)``.
 
@@ -304,18 +260,6 @@ class Manifold(Value):
         True
         """
         return scalar(np.linalg.norm(self.difference(p, q) / self.scale_array, axis=-1))
-
-    def chord(self, p: ArrayLike, q: ArrayLike) -> Array:
-        """Return the shortest displacement from ``q`` to an image of ``p``, in coordinates.
-
-        Images are points a period away on circles, and the negative quaternion of a rotation.
-        """
-        p, q = self.points(p, "p"), self.points(q)
-        return self._principal(self.image(p, q) - q)
-
-    def image(self, p: Array, q: Array) -> Array:
-        """Return ``p`` with the signs of its quaternions that bring it nearest to ``q``."""
-        return self.factors.signs(p, q) * p if self.rotations else p
 
     def frame(self, q: ArrayLike) -> Array:
         """Return a basis of the tangent space at ``q`` as columns, ``(..., N, n)``.
@@ -353,13 +297,6 @@ class Manifold(Value):
         import sympy
 
         return sympy.ImmutableMatrix(self.symbols[self.factors.named(name, turns=False).at])
-
-    def _principal(self, array: Array) -> Array:
-        circles, periods = self._circles
-        if circles.size:
-            values = array[..., circles]
-            array[..., circles] = values - periods * np.ceil(values / periods - 0.5)
-        return array
 
 
 def _product(parts: tuple[Manifold, ...]) -> Manifold:

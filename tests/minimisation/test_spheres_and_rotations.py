@@ -49,7 +49,7 @@ class TestStrata:
     def test_membership_does_not_count_rounding_of_the_length(self):
         assert OCTANT.contains([0.577, 0.577, 0.577])
         assert not OCTANT.contains([0.6, -0.8, 0.0])
-        with pytest.raises(ValueError, match="expected a vector .* length 1"):
+        with pytest.raises(ValueError, match=r"expected a vector .* length 1"):
             OCTANT.contains([1.0, 1.0, 1.0])
 
     def test_the_length_is_no_equation_of_the_user(self):
@@ -193,12 +193,12 @@ class TestRotations:
             parameters={f"m{i}{j}": moment[i, j] for i in range(3) for j in range(3)},
         )
         c = minimise(TURNS, energy, ROTATION.wrap(rng.standard_normal(4)))
-        U, sizes, Vt = np.linalg.svd(moment.T)
-        sign = np.array([1, 1, np.linalg.det(U @ Vt)])
+        U, sizes, V = np.linalg.svd(moment.T)
+        sign = np.array([1, 1, np.linalg.det(U @ V)])
         assert c.energy == pytest.approx(-sizes @ sign, abs=1e-9)
         found = Rotation.from_quat(c.point, scalar_first=True).as_matrix()
         if sizes[1] + sign[2] * sizes[2] > 0.05:  # else nearly a circle of minima
-            assert found == pytest.approx(U * sign @ Vt, abs=1e-5)
+            assert found == pytest.approx(U * sign @ V, abs=1e-5)
 
     def test_curvatures_are_by_the_angle_of_the_rotation(self):
         """Of ``-tr(S R)`` at ``R = 1``: about axis ``i`` the sum of the other entries of ``S``."""
@@ -331,7 +331,7 @@ class TestArguments:
             lambda q: stratum_at(OCTANT, q),
             lambda q: minima(OCTANT, u[0], starts=[q]),
         ):
-            with pytest.raises(ValueError, match="expected a vector .* got length 1.4"):
+            with pytest.raises(ValueError, match=r"expected a vector .* got length 1.4"):
                 call([1.0, 1.0, 0.0])
 
     def test_a_sphere_is_sampled_as_a_whole(self):

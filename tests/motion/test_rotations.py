@@ -83,7 +83,7 @@ class TestFormulas:
     def test_velocities_must_be_tangent(self):
         with pytest.raises(ValueError, match="v: expected velocities along"):
             top().state(ONE, [1.0, 0.0, 0.0, 0.0])
-        with pytest.raises(ValueError, match="q: expected a quaternion .* length 1"):
+        with pytest.raises(ValueError, match=r"q: expected a quaternion .* length 1"):
             top().state([1.0, 1.0, 0.0, 0.0])
 
 
@@ -169,7 +169,7 @@ class TestHeavyTop:
         body = top(J, weight * TURN.matrix()[2, 2])
         start = np.array([math.cos(tilt / 2), math.sin(tilt / 2), 0, 0])
         vertical = turned(start).inv().apply([0, 0, rate])
-        w = vertical + [0, 0, spin - rate * math.cos(tilt)]
+        w = vertical + np.array([0, 0, spin - rate * math.cos(tilt)])
         path = simulate(body, body.state(start, TURN.frame(start) @ w), 10.0, 0.002)
         axes = turned(path.q[:, 0]).apply([0, 0, 1.0])
         assert axes[:, 2] == pytest.approx(math.cos(tilt), abs=4e-5)
@@ -244,7 +244,7 @@ class TestDiscs:
         spin = (self.J[0] * rate**2 * sine - G) * cosine / ((self.J[2] + 1) * rate * sine)
         start = np.array([math.cos(tilt / 2), math.sin(tilt / 2), 0, 0])
         axis = turned(start).apply([0, 0, 1.0])
-        w = turned(start).inv().apply([0, 0, rate]) + [0, 0, spin - rate * cosine]
+        w = turned(start).inv().apply([0, 0, rate]) + np.array([0, 0, spin - rate * cosine])
         run = -spin * np.cross([0, 0, 1.0], axis) / sine
         return [0, 0, sine, *start], [*run, *(TURN.frame(start) @ w)], spin
 

@@ -126,5 +126,5 @@ class TestRotations:
 
 
 def test_starts_must_lie_on_the_sphere():
-    with pytest.raises(ValueError, match="starts: expected a vector .* got length 2"):
+    with pytest.raises(ValueError, match=r"starts: expected a vector .* got length 2"):
         skeleton(triangle(np.eye(3)), [[0, 0, 2]])

@@ -170,7 +170,7 @@ class TestRefusals:
             (lambda: SPHERE.point([1, 1, 0]), "q: expected a vector .* length 1 .* got .*1.41421"),
             (lambda: SPHERE.point([1, 0]), r"q: expected shape \(..., 3\)"),
             (lambda: POSE.point([0, 0, 0, 1]), r"q: expected shape \(..., 7\)"),
-            (lambda: SPHERE.matrix(), "name: expected a rotation among the factors"),
+            (SPHERE.matrix, "name: expected a rotation among the factors"),
             (lambda: (ROTATION**2).matrix("a"), "name: expected the name of a rotation: 'a1' or"),
             (lambda: Manifold.rotation("a b c"), "rotations: expected 4 coordinates"),
             (lambda: Manifold("xyz", spheres=["xyz"]), "spheres: expected tuples of names"),
