@@ -125,11 +125,8 @@ class System(MechanicalSystem):
             if not isinstance(friction, Friction):
                 refuse("friction", "Friction values", friction, TypeError)
             if isinstance(friction.load, str) and friction.load not in self._normals:
-                expected = (
-                    f"one of the contacts {', '.join(self._normals)} or an expression for "
-                    f"friction {friction.name!r}"
-                )
-                refuse("load", expected, friction.load)
+                known = f"one of the contacts {', '.join(self._normals)} or an expression"
+                refuse("load", f"{known} for friction {friction.name!r}", friction.load)
         whole("count", self.count, least=1)
         if self.between is not None:
             instance("between", self.between, ContactFamily)
@@ -156,7 +153,7 @@ class System(MechanicalSystem):
 
     @property
     def hidden(self) -> frozenset[str]:
-        """Names of the equations that normalise vectors and quaternions."""
+        """Names of the equations of unit vectors and quaternions."""
         return self.polyhedron.hidden
 
     @cached_property
@@ -262,7 +259,7 @@ class System(MechanicalSystem):
         if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
             places = self.manifold.point(q).copy()
         else:
-            # A mapping, which only one body may have, is refused.
+            # `points` refuses a mapping, which only one body may have.
             places = self.manifold.placed(self.manifold.points(q).copy())  # type: ignore[arg-type]
         speeds = np.zeros(places.shape)
         for name, speed in self.substrate.items():

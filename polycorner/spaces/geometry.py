@@ -60,7 +60,8 @@ class Geometry(Value):
     def canonical(self, points: Array) -> Array:
         """Return what :meth:`wrap` does, unchecked: vectors of length zero stay."""
         points = self._principal(points.copy())
-        self.factors.wrap(points)
+        if self.factors:
+            self.factors.wrap(points)
         return points
 
     def moved(self, q: Array, v: Array) -> Array:

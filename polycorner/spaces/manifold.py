@@ -212,7 +212,7 @@ class Manifold(Geometry):
         if array.ndim != 1:
             msg = f"{argument}: expected one point of shape ({self.size},); got {array.shape}"
             raise ValueError(msg)
-        return self.placed(array, argument)
+        return self.placed(array, argument) if self.factors else array
 
     def wrap(self, q: ArrayLike) -> Array:
         """Bring points ``(..., N)`` into one form.
@@ -227,7 +227,8 @@ class Manifold(Geometry):
             For a vector or a quaternion of length zero.
         """
         points = self.points(q)
-        self.factors.check(points, "q", None)
+        if self.factors:
+            self.factors.check(points, "q", None)
         return self.canonical(points)
 
     def difference(self, p: ArrayLike, q: ArrayLike) -> Array:
