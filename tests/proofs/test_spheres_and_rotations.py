@@ -2,7 +2,7 @@
 
 import math
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -112,3 +112,33 @@ class TestRotations:
         turn = (-a[3], -a[2], a[1], a[0])  # (0, e_z) a, a turn about the vertical of space
         p = prove(c, symmetry=Symmetry(fields=(turn,)))
         assert p.proved
+
+
+class TestBodies:
+    def test_a_cube_in_a_corner_of_twelve_contacts_is_proved(self):
+        M = Manifold.euclidean("x y z") * ROTATION
+        centre, turn = sp.Matrix(M.symbols[:3]), M.matrix()
+        vertices = [centre + turn * sp.Matrix(s) for s in product((-1, 1), repeat=3)]
+        gaps = {f"{'wsf'[i]}{k}": v[i] for k, v in enumerate(vertices) for i in range(3)}
+        energy = centre.dot(sp.Matrix([1, 1, 3]))
+        p = prove(certify(Polyhedron(M, gaps), energy, [1, 1, 1, 1, 0, 0, 0]), digits=12)
+        assert p.proved
+        assert len(p.active) == 6
+        assert contains(p.enclosures["energy"], 5)
+
+    def test_a_rod_along_an_edge_of_the_room_is_proved(self):
+        """A rod of half-length 1 by its direction: five contacts in the five dimensions."""
+        M = Manifold.euclidean("x y z") * SPHERE
+        centre, way = sp.Matrix(M.symbols[:3]), M.vector()
+        gaps = {
+            f"{wall}{end:+d}": (centre + end * way)[i]
+            for end in (1, -1)
+            for i, wall in enumerate(("west", "south", "floor"))
+        }
+        energy = centre[0] / 2 + centre[1] / 3 + centre[2]
+        c = minimise(Polyhedron(M, gaps), energy, M.wrap([2, 2, 2, 0.5, 0.3, 0.7]))
+        assert (c.stratum.dimension, c.signature) == (0, (5, 0, 0))
+        p = prove(c, digits=10)
+        assert p.proved
+        assert contains(p.enclosures["energy"], Fraction(1, 2))
+        assert contains(p.enclosures["multiplier south+1"], Fraction(1, 6))
