@@ -23,7 +23,7 @@ FRAMES = ("body", "space")
 def angular_velocity(
     manifold: Manifold, name: str | None = None, *, frame: Literal["body", "space"] = "body"
 ) -> "sympy.ImmutableMatrix":
-    """Return the angular velocity of a rotation, ``(3, 1)``, linear in the :func:`velocities`.
+    """Return the angular velocity of a rotation, ``(3, 1)``, linear in the velocities.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def angular_velocity(
 def rotational_energy(
     manifold: Manifold, inertia: Sequence[float], name: str | None = None
 ) -> "sympy.Expr":
-    """Return the kinetic energy ``omega . J omega / 2`` of a rotation.
+    """Return the kinetic energy ``omega J omega / 2`` of a rotation.
 
     It is written as ``omega . (J - j) omega / 2 + 2 j |a'|^2`` with the mean moment ``j``, the same
     for unit quaternions: the mass matrix is regular, and constant for a ball.

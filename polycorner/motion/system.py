@@ -36,7 +36,7 @@ class System(MechanicalSystem):
         its contacts with the surroundings, and of ``h_j(q) = 0``, its joints and rails.  Forces
         of equations have either sign; that of ``h`` acts along its gradient.
     kinetic : sympy.Expr
-        ``T(q, v)`` of a body, quadratic in the :func:`velocities`; see :func:`rotational_energy`.
+        ``T(q, v)`` of a body, quadratic in the :func:`velocities` (:func:`rotational_energy`).
     potential : sympy.Expr, optional
         ``V(q)``; default 0.
     forces : mapping from str to sympy.Expr, optional
