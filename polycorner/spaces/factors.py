@@ -117,7 +117,7 @@ class Factors(tuple[Factor, ...]):
         for f in self:
             found[..., f.at] = exponential(normalised(q[..., f.at]), v[..., f.at])
 
-    def scattered(self, q: Array, rng: np.random.Generator) -> Array:
+    def scattered(self, q: Array, rng: "np.random.Generator") -> Array:
         """Return points with uniformly distributed vectors and quaternions."""
         q = q.copy()
         for f in self:
