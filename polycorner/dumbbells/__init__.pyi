@@ -7,6 +7,7 @@ from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
 from .statics.keel import Keel, RestRegion
 from .statics.minima import DyadMinimum, dyad_minima, heading_curve, paper_heading
 from .statics.minima_map import MinimaMap, minima_map, pair_minima
+from .statics.relative import RelativePlacements
 from .statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from .statics.skeleton_map import PairMap, pair_map
 
@@ -20,6 +21,7 @@ __all__ = [
     "OutOfRound",
     "PairAtlas",
     "PairMap",
+    "RelativePlacements",
     "RestRegion",
     "Shaking",
     "UnevenFriction",

@@ -23,7 +23,7 @@ def emit_points(
     packed = ir.Function(module, ir.FunctionType(VOID, [POINTER] * 2), f"{name}_packed")
     builder = ir.IRBuilder(packed.append_basic_block())
     block, parameters = packed.args
-    starts = [_offset(builder, block, n) for n in np.cumsum([k, *sizes]).tolist()[:-1]]
+    starts = [at_offset(builder, block, n) for n in np.cumsum([k, *sizes]).tolist()[:-1]]
     missing = [ir.Constant(POINTER, None)] * (3 - len(starts))
     builder.call(point, [block, parameters, *starts, *missing])
     builder.ret_void()
@@ -67,8 +67,8 @@ def _emit_polynomial(
     q, p, *results = pointers
     n, zero = program.variables, ir.Constant(emit.F64, 0.0)
     count = ir.Constant(emit.I64, n)
-    slopes = _offset(b, p, 1)
-    curvature = _offset(b, p, 1 + n)
+    slopes = at_offset(b, p, 1)
+    curvature = at_offset(b, p, 1 + n)
     bent = b.alloca(emit.F64, count)
     total = b.alloca(emit.F64)
     b.store(b.load(p), total)
@@ -87,7 +87,7 @@ def _emit_polynomial(
             entry = b.load(at(b, curvature, b.add(start, i)))
             b.store(b.fadd(b.load(at(b, bent, i)), b.fmul(entry, x)), at(b, bent, i))
 
-        return _loop(b, first, count, 1, row)
+        return loop(b, first, count, 1, row)
 
     def term(b: ir.IRBuilder, i: ir.Value) -> None:
         slope, change, x = (b.load(at(b, pointer, i)) for pointer in (slopes, bent, q))
@@ -100,13 +100,13 @@ def _emit_polynomial(
         entry = b.load(at(b, curvature, i)) if program.degree == 2 else zero
         b.store(entry, at(b, results[2], i))
 
-    b = _loop(b, first, count, 1, clear)
+    b = loop(b, first, count, 1, clear)
     if program.degree == 2:
-        b = _loop(b, first, count, 1, column)
-    b = _loop(b, first, count, 1, term)
+        b = loop(b, first, count, 1, column)
+    b = loop(b, first, count, 1, term)
     b.store(b.load(total), results[0])
     if order >= 2:
-        b = _loop(b, first, ir.Constant(emit.I64, n * n), 1, second)
+        b = loop(b, first, ir.Constant(emit.I64, n * n), 1, second)
     return b
 
 
@@ -131,7 +131,7 @@ def _emit_rows(
         b.call(point, [moved(q, i, program.variables), parameters, *places])
 
     builder = ir.IRBuilder(rows.append_basic_block())
-    builder = _loop(builder, ir.Constant(emit.I64, 0), count, 1, one)
+    builder = loop(builder, ir.Constant(emit.I64, 0), count, 1, one)
     builder.ret_void()
 
 
@@ -160,12 +160,12 @@ def _emit_batch(
     def rest(b: ir.IRBuilder, i: ir.Value) -> None:
         b.call(point, moved(b, i))
 
-    builder = _loop(builder, ir.Constant(emit.I64, 0), whole, emit.LANES, blocks)
-    builder = _loop(builder, whole, count, 1, rest)
+    builder = loop(builder, ir.Constant(emit.I64, 0), whole, emit.LANES, blocks)
+    builder = loop(builder, whole, count, 1, rest)
     builder.ret_void()
 
 
-def _loop(
+def loop(
     b: ir.IRBuilder,
     start: ir.Value,
     stop: ir.Value,
@@ -201,7 +201,7 @@ def _emit_body(
     def leaf(op: str, position: int) -> ir.Value:
         if (op, position) not in leaves:
             stride = program.variables if op == "var" else 0
-            leaves[op, position] = _gather(b, q if op == "var" else p, position, stride, lanes)
+            leaves[op, position] = gather(b, q if op == "var" else p, position, stride, lanes)
         return leaves[op, position]
 
     # All leaves are loaded first, since LLVM must assume that stores may alias later loads.
@@ -237,20 +237,22 @@ def _store_sparse(
     b.call(clear, [block, ir.Constant(byte, 0), size, ir.Constant(flag, 0)])
     for position, node in enumerate(nodes):
         if node != zero:
-            b.store(emitter.value(node), _offset(b, pointer, position))
+            b.store(emitter.value(node), at_offset(b, pointer, position))
 
 
-def _offset(b: ir.IRBuilder, pointer: ir.Value, position: int) -> ir.Value:
+def at_offset(b: ir.IRBuilder, pointer: ir.Value, position: int) -> ir.Value:
+    """Return the address of a number after the one at an address."""
     return b.gep(pointer, [ir.Constant(emit.I64, position)])
 
 
-def _gather(b: ir.IRBuilder, pointer: ir.Value, position: int, stride: int, lanes: int) -> ir.Value:
+def gather(b: ir.IRBuilder, pointer: ir.Value, position: int, stride: int, lanes: int) -> ir.Value:
+    """Load a number at ``position`` for every lane; they lie ``stride`` numbers apart."""
     if lanes == 1:
-        return b.load(_offset(b, pointer, position))
+        return b.load(at_offset(b, pointer, position))
     result = ir.Constant(emit.lane_type(lanes), ir.Undefined)
-    shared = None if stride else b.load(_offset(b, pointer, position))
+    shared = None if stride else b.load(at_offset(b, pointer, position))
     for lane in range(lanes):
-        value = shared or b.load(_offset(b, pointer, position + lane * stride))
+        value = shared or b.load(at_offset(b, pointer, position + lane * stride))
         result = b.insert_element(result, value, ir.Constant(emit.I64, lane))
     return result
 
@@ -260,18 +262,18 @@ def _store(
 ) -> None:
     """Store consecutive results: lane ``l`` of value ``j`` goes to ``start + j + l * stride``."""
     if lanes > 1 and len(values) == lanes:
-        for lane, row in enumerate(_transpose(b, values)):
-            target = _offset(b, pointer, start + lane * stride)
+        for lane, row in enumerate(transpose(b, values)):
+            target = at_offset(b, pointer, start + lane * stride)
             vector = b.bitcast(target, ir.PointerType(emit.lane_type(lanes)))
             b.store(row, vector, align=8)
         return
     for j, value in enumerate(values):
         for lane in range(lanes):
             number = value if lanes == 1 else b.extract_element(value, ir.Constant(emit.I64, lane))
-            b.store(number, _offset(b, pointer, start + j + lane * stride))
+            b.store(number, at_offset(b, pointer, start + j + lane * stride))
 
 
-def _transpose(b: ir.IRBuilder, rows: list[ir.Value]) -> list[ir.Value]:
+def transpose(b: ir.IRBuilder, rows: list[ir.Value]) -> list[ir.Value]:
     """Transpose a square of lanes by exchanging blocks of half the size, then halving again."""
     lanes = len(rows)
     half = lanes // 2

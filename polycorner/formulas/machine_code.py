@@ -73,7 +73,7 @@ def _prepare() -> None:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "ucrtbase")
-    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY, "sqrt", "floor"):
+    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY, "sqrt", "floor", "ceil"):
         function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
         llvm.add_symbol(name, function.value)
 

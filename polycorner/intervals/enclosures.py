@@ -58,6 +58,7 @@ def exact_program(family: Family) -> Program:
         family.parameters,
         {name: fractions(e) for name, e in definitions.items()},
         family.names,
+        family.stationary,
     )
 
 
@@ -67,8 +68,23 @@ def write(graph: Graph, f: SmoothFunction, free: "Mapping[str, int] | None" = No
     Coordinates are the graph's first variables; ``free`` gives the positions of parameters that
     are variables, too.  All others are the exact numbers that the function is bound to.
     """
-    program, places = exact_program(f.family), free or {}
+    program = exact_program(f.family)
     output = program.outputs[f.family.names.index(f.member_name)]
+    return written(graph, f, program, [output], free)[output]
+
+
+def written(
+    graph: Graph,
+    f: SmoothFunction,
+    program: Program,
+    outputs: Sequence[int],
+    free: "Mapping[str, int] | None" = None,
+) -> dict[int, int]:
+    """Write nodes of the program of a function's family into a graph; return their places in it.
+
+    See :func:`write`; the program is :func:`exact_program`, or that with derivatives.
+    """
+    places = free or {}
     inputs = {("var", i): graph.node("var", k) for i, k in enumerate(f.reads)}
     for j, (name, value) in enumerate(zip(f.family.parameters, f.parameters, strict=True)):
         if name in places:
@@ -76,7 +92,7 @@ def write(graph: Graph, f: SmoothFunction, free: "Mapping[str, int] | None" = No
         else:
             inputs["par", j] = graph.const(Fraction(value))
     placed: dict[int, int] = {}
-    for a in needed(program.graph, [output]):
+    for a in needed(program.graph, outputs):
         op, args = program.graph.nodes[a]
         if op in {"var", "par"}:
             placed[a] = inputs[op, int(args[0])]
@@ -85,7 +101,7 @@ def write(graph: Graph, f: SmoothFunction, free: "Mapping[str, int] | None" = No
             raise ValueError(msg)
         else:
             placed[a] = _rebuilt(graph, op, args, placed)
-    return placed[output]
+    return placed
 
 
 def _rebuilt(graph: Graph, op: str, args: tuple[Payload, ...], placed: dict[int, int]) -> int:

@@ -1,3 +1,5 @@
+from .lists.enumeration import stationary_points
+from .lists.stationary import StationaryList, StationaryLocus, StationaryPoint
 from .parameter_boxes import ParameterCell
 from .proof import Proof
 from .statements import Status
@@ -6,6 +8,10 @@ from .verification import prove
 __all__ = [
     "ParameterCell",
     "Proof",
+    "StationaryList",
+    "StationaryLocus",
+    "StationaryPoint",
     "Status",
     "prove",
+    "stationary_points",
 ]

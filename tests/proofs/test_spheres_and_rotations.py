@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, Symmetry, certify, minimise, prove
+from polycorner.proofs import stationary_points
 
 SPHERE, ROTATION = Manifold.sphere("u"), Manifold.rotation("a")
 u = SPHERE.symbols
@@ -142,3 +143,9 @@ class TestBodies:
         assert p.proved
         assert contains(p.enclosures["energy"], Fraction(1, 2))
         assert contains(p.enclosures["multiplier south+1"], Fraction(1, 6))
+
+
+def test_lists_of_stationary_points_are_of_lines_and_circles():
+    D = Polyhedron(SPHERE, {"x": u[0]})
+    with pytest.raises(ValueError, match="polyhedron: expected one on lines and circles"):
+        stationary_points(D, u[2], [(-1, 1)] * 3)

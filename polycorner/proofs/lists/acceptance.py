@@ -1,0 +1,295 @@
+"""Boxes in which exactly one point is stationary, by Krawczyk's operator on the KKT equations.
+
+Let ``U`` be the inequalities that may vanish in a box ``X``, ``A`` some of them, and let all
+functions involved be smooth on ``X``.  The multipliers of a stationary point of the branch ``A``
+satisfy ``sum lam_i df_i = dE`` over ``A`` and the equations.  With ``Y`` near the pseudoinverse,
+``(Y G^T) lam = Y dE`` encloses them for all points of ``X`` at once, if this matrix is regular on
+``X``; then the gradients are independent there, so that stationary points are KKT points.  If all
+multipliers of inequalities are positive, every function of ``A`` vanishes at such a point, which
+therefore solves the KKT equations with multipliers in the enclosure ``L``.  Krawczyk's operator on
+``X x L`` shows that they have exactly one solution there ([Neumaier] sec. 5.1).
+
+For a branch whose open functions in a part of ``X`` are a subset of ``A`` this is the only
+candidate, and none if the subset is proper.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.intervals.balls import (
+    ball,
+    between,
+    column,
+    dot,
+    entries,
+    exact,
+    identity,
+    matrix,
+    middle_inverse,
+    narrower,
+    precision,
+)
+from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
+from polycorner.intervals.tapes import Box
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    from polycorner.intervals.balls import Ball, Matrix
+
+BITS = 128
+QUARTERINGS = 10
+SHARPENINGS = 6
+WIDENINGS = 3  # of a box towards the shape of its image
+MOST_WIDENING = 64.0
+GROWTH = 1.25
+SLACK = 16  # last binary digits of a multiplier that its enclosure covers at least
+WIDEST = 2.0  # reach of the widest box that is tried, in scale units
+
+
+@dataclass(frozen=True, eq=False)
+class Region(Value):
+    """A box in which a face carries exactly one solution of the KKT equations.
+
+    Attributes
+    ----------
+    lower, upper : (n,) arrays
+        The box ``X``.
+    active : tuple of int
+        ``A``.
+    sharp_lower, sharp_upper : (N,) arrays
+        Enclosure of the solution: the free coordinates, the multipliers of ``A`` and of the
+        equations.
+    index : int or None
+        Negative eigenvalues of the Hessian of the Lagrangian on the tangent space of the face.
+    """
+
+    lower: Array
+    upper: Array
+    active: tuple[int, ...]
+    sharp_lower: Array
+    sharp_upper: Array
+    index: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """The KKT equations of the faces of a problem, in the coordinates that are free.
+
+    Attributes
+    ----------
+    formulas : Formulas
+        Inequalities, equations, energy.
+    inequalities : int
+        ``m``.
+    free : tuple of int
+        Positions of the coordinates that are free.
+    scales : (n,) array
+    """
+
+    formulas: Formulas
+    inequalities: int
+    free: tuple[int, ...]
+    scales: Array
+
+    def rows(self, active: Sequence[int]) -> tuple[int, ...]:
+        """Return the rows of a face: active inequalities, equations, energy."""
+        return (*active, *range(self.inequalities, len(self.formulas.names)))
+
+    def region(self, q: Array, active: Sequence[int], widest: float = 1.0) -> Region | None:
+        """Return the widest box tried about ``q`` in which one solution is shown, or None.
+
+        Boxes reach ``widest`` scale units from ``q``, a quarter of it, and so on.
+        """
+        rows = self.rows(active)
+        with precision(BITS):
+            for power in range(QUARTERINGS):
+                found = self._within(q, rows, len(active), min(widest, WIDEST) / 4**power)
+                if found is not None:
+                    return found
+        return None
+
+    def _within(self, q: Array, rows: tuple[int, ...], count: int, reach: float) -> Region | None:
+        """Try boxes that reach ``reach`` scale units or more from ``q``.
+
+        Where the image of a box is wider than the box along a coordinate, the next is as wide.
+        """
+        radii = np.zeros_like(q)
+        radii[list(self.free)] = reach * self.scales[list(self.free)]
+        for _ in range(WIDENINGS):
+            lower, upper = q - radii, q + radii
+            found = self._shown(lower, upper, rows, count)
+            if found is None or isinstance(found, Region):
+                return found
+            if (found > MOST_WIDENING * radii[list(self.free)]).any():
+                break
+            radii[list(self.free)] = np.maximum(radii[list(self.free)], GROWTH * found)
+        return None
+
+    def _shown(
+        self, lower: Array, upper: Array, rows: tuple[int, ...], count: int
+    ) -> "Region | Array | None":
+        """Return the region of a box; the reach of its image if that is too wide; or None."""
+        sides = zip(lower.tolist(), upper.tolist(), strict=True)
+        box = Box([between(a, b) for a, b in sides])
+        forms = self.formulas.smooth(box, rows)
+        if isinstance(forms, Undecided):
+            return None
+        _, gradients, hessians = forms.evaluate(box, 2)
+        slopes = [[g[i] for i in self.free] for g in gradients]
+        multipliers = enclosed_multipliers(slopes)
+        if multipliers is None or not all(lam > 0 for lam in multipliers[:count]):
+            return None
+        n = len(self.free)
+        unknowns = [*(box.hull[i] for i in self.free), *(wider(lam) for lam in multipliers)]
+        residual, start, centre = self._at_centre(forms, box, unknowns)
+        _, jacobian = self._equations([], gradients, hessians, unknowns)
+        inverse = middle_inverse(start)
+        if inverse is None:
+            return None
+        image = krawczyk(residual, jacobian, inverse, unknowns, centre)
+        if not all(x.contains_interior(y) for x, y in zip(unknowns, image, strict=True)):
+            reach = [(y - c).abs_upper() for y, c in zip(image[:n], centre, strict=False)]
+            return np.array([float(x) for x in reach])
+        sharp = self._sharpened(forms, box, image)
+        index = self._index(start, len(rows) - 1)
+        ends = np.array([outward(x) for x in sharp])
+        return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
+
+    def _at_centre(
+        self, forms: SmoothForms, box: Box, unknowns: "list[Ball]"
+    ) -> "tuple[list[Ball], list[list[Ball]], list[Ball]]":
+        """Return the equations and their Jacobian in the middle of the unknowns, and the middle."""
+        centre = [x.mid() for x in unknowns]
+        point = list(box.hull)
+        for i, x in zip(self.free, centre, strict=False):
+            point[i] = x
+        values, gradients, hessians = forms.evaluate(Box(point), 2)
+        return *self._equations(values, gradients, hessians, centre), centre
+
+    def _equations(
+        self,
+        values: "list[Ball]",
+        gradients: "list[list[Ball]]",
+        hessians: "list[list[list[Ball]]]",
+        unknowns: "list[Ball]",
+    ) -> "tuple[list[Ball], list[list[Ball]]]":
+        """Return the residual of the KKT equations and their Jacobian."""
+        free, n = self.free, len(self.free)
+        weights = [*(-lam for lam in unknowns[n:]), ball(1)]
+        rows = [[g[i] for i in free] for g in gradients[:-1]]
+        slope = [dot(weights, [g[i] for g in gradients]) for i in free]
+        bent = [[dot(weights, [h[i][j] for h in hessians]) for j in free] for i in free]
+        nothing = [ball(0)] * len(rows)
+        jacobian = [
+            *([*bent[i], *(-row[i] for row in rows)] for i in range(n)),
+            *([*row, *nothing] for row in rows),
+        ]
+        return [*slope, *values[: len(rows)]], jacobian
+
+    def _sharpened(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball]":
+        """Apply the operator to its image again; return the intersections."""
+        n = len(self.free)
+        for _ in range(SHARPENINGS):
+            hull = list(box.hull)
+            for i, x in zip(self.free, unknowns[:n], strict=True):
+                hull[i] = x
+            _, gradients, hessians = forms.evaluate(Box(hull), 2)
+            residual, start, centre = self._at_centre(forms, box, unknowns)
+            _, jacobian = self._equations([], gradients, hessians, unknowns)
+            inverse = middle_inverse(start)
+            if inverse is None:
+                break
+            image = krawczyk(residual, jacobian, inverse, unknowns, centre)
+            unknowns = [narrower(x, y) for x, y in zip(unknowns, image, strict=True)]
+        return unknowns
+
+    def _index(self, jacobian: "list[list[Ball]]", rows: int) -> int | None:
+        """Return the number of negative eigenvalues on the tangent space, from the inertia.
+
+        Krawczyk's operator shows that all Jacobians in the box are regular, so that all have the
+        inertia of the one in the middle, in which each row of a function adds one negative and one
+        positive eigenvalue ([NW] thm 16.3).
+        """
+        n = len(self.free)
+        symmetric = [[(x if i < n else -x) for x in row] for i, row in enumerate(jacobian)]
+        signs = inertia(symmetric)
+        return None if signs is None else signs[0] - rows
+
+
+def krawczyk(
+    residual: "list[Ball]",
+    jacobian: "list[list[Ball]]",
+    inverse: "Matrix",
+    unknowns: "list[Ball]",
+    centre: "list[Ball]",
+) -> "list[Ball]":
+    """Return ``c - Y F(c) + (I - Y J) (Z - c)``."""
+    defect = identity(len(unknowns)) - inverse * matrix(jacobian)
+    apart = [x - c for x, c in zip(unknowns, centre, strict=True)]
+    moved = entries(defect * column(apart) - inverse * column(residual))
+    return [c + x for c, x in zip(centre, moved, strict=True)]
+
+
+def wider(x: "Ball") -> "Ball":
+    """Return a ball twice as wide, and by a little more."""
+    return x + ball(0, x.rad() + abs(x) * ball(2) ** (SLACK - BITS))
+
+
+def inertia(rows: "list[list[Ball]]") -> tuple[int, int] | None:
+    """Return the numbers of negative and positive eigenvalues of a symmetric matrix of balls."""
+    middle = np.array([[float(x.mid()) for x in row] for row in rows])
+    if not np.isfinite(middle).all():
+        return None
+    unit = np.sqrt(np.maximum(abs(middle).max(axis=1), 1e-300))
+    vectors = np.linalg.eigh((middle + middle.T) / 2 / np.outer(unit, unit))[1] / unit[:, None]
+    turn = matrix(vectors.tolist())
+    form = (turn.transpose() * matrix(rows) * turn).tolist()
+    if (turn.det()) == 0 or turn.det().contains(0):
+        return None
+    negative = positive = 0
+    for i, row in enumerate(form):
+        radius = sum((abs(x) for j, x in enumerate(row) if j != i), ball(0))
+        if row[i] > radius:
+            positive += 1
+        elif row[i] < -radius:
+            negative += 1
+        else:
+            return None
+    return negative, positive
+
+
+def enclosed_multipliers(slopes: "list[list[Ball]]") -> "list[Ball] | None":
+    """Enclose the solutions of ``sum lam_i g_i = dE``; None if the ``g_i`` may be dependent.
+
+    ``slopes`` are the gradients ``g_i``, the energy's last.
+    """
+    count = len(slopes) - 1
+    if not count:
+        return []
+    middle = np.array([[float(x.mid()) for x in row] for row in slopes[:-1]])
+    if not np.isfinite(middle).all():
+        return None
+    try:
+        left = matrix(np.linalg.pinv(middle.T).tolist())
+        square = left * matrix(slopes[:-1]).transpose()
+        return entries(square.solve(left * column(slopes[-1])))
+    except (ZeroDivisionError, np.linalg.LinAlgError):
+        return None
+
+
+def outward(x: "Ball") -> tuple[float, float]:
+    """Return doubles below and above a ball."""
+    return _double(exact(x.lower()), -np.inf), _double(exact(x.upper()), np.inf)
+
+
+def _double(value: object, towards: float) -> float:
+    from fractions import Fraction
+
+    assert isinstance(value, Fraction)
+    near = value.numerator / value.denominator
+    off = Fraction(near) > value if towards < 0 else Fraction(near) < value
+    return float(np.nextafter(near, towards)) if off else near

@@ -1,0 +1,64 @@
+"""Branches of an and/or tree in a box: which inequalities have to hold together there."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner import checks
+from polycorner.polyhedra.polyhedron import Polyhedron
+
+Mask = NDArray[np.bool_]
+MOST_BRANCHES = 4096
+
+
+def conjunctions(polyhedron: Polyhedron) -> Mask:
+    """Return the set as a union of intersections, ``(branches, m)``.
+
+    Raises
+    ------
+    ValueError
+        If there are too many.
+    """
+    m = len(polyhedron.functions)
+    pieces = polyhedron.signs_to_pieces([0] * m)
+    if len(pieces) > MOST_BRANCHES:
+        checks.refuse("polyhedron", f"a tree of at most {MOST_BRANCHES} branches", len(pieces))
+    masks = np.zeros((len(pieces), m), dtype=np.bool_)
+    for mask, piece in zip(masks, pieces, strict=True):
+        mask[list(piece)] = True
+    return masks
+
+
+def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]:
+    """Return the branches that points of the set in each box may lie in.
+
+    A function is ``below`` where it is negative on the whole box, ``above`` where it is positive.
+    A branch whose open functions include those of another one is contained in it, in this box.
+
+    Parameters
+    ----------
+    conj : (c, m) array
+        The union of intersections.
+    below, above : (B, m) arrays
+        Signs of the functions on boxes.
+
+    Returns
+    -------
+    boxes : (I,) array
+        A box for each item; boxes without any are outside the set.
+    masks : (I, m) array
+        The functions that are open there and have to hold in the branch.
+    """
+    if len(conj) == 1:
+        inside: NDArray[np.intp] = np.flatnonzero(~(below & conj[0]).any(axis=1))
+        return inside, ~above[inside] & conj[0]
+    alive: Mask = ~np.any(below[:, None, :] & conj, axis=2)  # (B, c)
+    open_: Mask = conj & ~above[:, None, :]  # (B, c, m)
+    kept: Mask = alive.copy()
+    for i in range(len(conj)):
+        for j in range(len(conj)):
+            if i != j:  # branch i is dropped if j is within it, the later one if they are equal
+                within: Mask = ~np.any(open_[:, j] & ~open_[:, i], axis=1)
+                equal: Mask = within & ~np.any(open_[:, i] & ~open_[:, j], axis=1)
+                kept[:, i] &= ~(alive[:, j] & within & ((j < i) | ~equal))
+    boxes, branches = np.nonzero(kept)
+    return boxes, open_[boxes, branches]

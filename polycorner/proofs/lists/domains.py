@@ -1,0 +1,116 @@
+"""Domains of a search: a side for each coordinate, an interval, a whole circle or one value."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from polycorner import checks
+from polycorner.spaces.arguments import reals
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
+
+
+@dataclass(frozen=True, eq=False)
+class Domain(Value):
+    """A box of configurations, closed.
+
+    Attributes
+    ----------
+    manifold : Manifold
+    lower, upper : (n,) arrays
+        Its sides; equal for coordinates that are fixed.
+    """
+
+    manifold: Manifold
+    lower: Array
+    upper: Array
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Positions of the coordinates that are not fixed."""
+        return tuple(np.flatnonzero(self.lower < self.upper).tolist())
+
+    @cached_property
+    def fixed(self) -> tuple[int, ...]:
+        """Positions of the coordinates that are fixed."""
+        return tuple(np.flatnonzero(self.lower == self.upper).tolist())
+
+    @cached_property
+    def units(self) -> Array:
+        """The scales of the coordinates, 0 for those that are fixed, ``(n,)``."""
+        return np.where(self.lower < self.upper, self.manifold.scale_array, 0.0)
+
+    def sides(self) -> dict[str, tuple[float, float]]:
+        """Return the sides by name."""
+        pairs = zip(self.lower.tolist(), self.upper.tolist(), strict=True)
+        return dict(zip(self.manifold.names, pairs, strict=True))
+
+
+def domain(manifold: Manifold, box: Any) -> Domain:
+    """Return the domain with given sides; whole circles where none is given.
+
+    Parameters
+    ----------
+    manifold : Manifold
+    box : sequence or mapping
+        A side for each coordinate, in their order or by name: two numbers, one number for a
+        coordinate that is fixed, or None (or no entry) for a whole circle.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For names that are no coordinates, sides that are no increasing pairs of numbers, and lines
+        without a side.
+    """
+    if manifold.factors:
+        curved = ", ".join(name for f in manifold.factors for name in f.names)
+        checks.refuse("polyhedron", "one on lines and circles", f"unit vectors ({curved})")
+    lower, upper = [], []
+    sides = _sides(manifold, box)
+    for name, period in zip(manifold.names, manifold.periods, strict=True):
+        side = sides.get(name)
+        if side is not None:
+            low, high = _side(name, side)
+            if high - low > period:
+                checks.refuse(f"box[{name!r}]", f"at most the period {period:g}", (low, high))
+        elif math.isfinite(period):
+            low, high = _circle(period)
+        else:
+            checks.refuse("box", f"two finite numbers for {name}, which is a line", side)
+        lower.append(low)
+        upper.append(high)
+    return Domain(manifold, np.array(lower), np.array(upper))
+
+
+def _sides(manifold: Manifold, box: Any) -> dict[str, Any]:
+    if isinstance(box, Mapping):
+        checks.names("box", box, manifold.names)
+        return dict(box)
+    if isinstance(box, str) or not isinstance(box, Sequence | np.ndarray):
+        checks.refuse("box", "sides in the order of the coordinates, or by name", box, TypeError)
+    if len(box) != manifold.size:
+        checks.refuse("box", f"{manifold.size} sides, one for each coordinate", len(box))
+    return dict(zip(manifold.names, box, strict=True))
+
+
+def _circle(period: float) -> tuple[float, float]:
+    """Return the principal interval, rounded outwards: it covers the circle."""
+    half = math.nextafter(period / 2, math.inf)
+    return -half, half
+
+
+def _side(name: str, side: Any) -> tuple[float, float]:
+    argument = f"box[{name!r}]"
+    values = reals(side, argument)
+    if values.ndim == 0:
+        values = np.array([values, values])
+    if values.shape != (2,) or not np.isfinite(values).all():
+        checks.refuse(argument, "a number, or two finite numbers", side)
+    low, high = values.tolist()
+    if low > high:
+        checks.refuse(argument, "a lower and an upper end", side)
+    return low, high

@@ -1,0 +1,292 @@
+"""The search for all stationary points, its symmetries, and what is made of the regions found."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polycorner import checks
+from polycorner.intervals.balls import between, precision
+from polycorner.intervals.enclosures import SmoothForms
+from polycorner.minimisation.problem import Problem, pose
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.progress import Progress, silent
+from polycorner.proofs.invariance import annihilated, generators, translations
+from polycorner.proofs.lists.acceptance import BITS, Region
+from polycorner.proofs.lists.domains import Domain, domain
+from polycorner.proofs.lists.images import Motion, closed, motion, permutation
+from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.members import OPEN, OUT, ROUNDING, Known, full, membership
+from polycorner.proofs.lists.search import Boxes, Search
+from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
+from polycorner.spaces.manifold import Array, Manifold
+
+if TYPE_CHECKING:
+    from polycorner.minimisation.problem import Energy
+
+RESOLUTION = 1e-6
+MOST_BOXES = 10_000_000
+
+
+def stationary_points(
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    *,
+    box: Any,
+    symmetry: Symmetry | None = None,
+    resolution: float = RESOLUTION,
+    max_boxes: int = MOST_BOXES,
+    max_seconds: float = np.inf,
+    progress: Progress = silent,
+) -> StationaryList:
+    """Find all stationary points of an energy on a polyhedron in a box, with proof.
+
+    A point ``q`` of the set ``D`` is stationary if no direction into ``D`` decreases the energy:
+    ``dE v >= 0`` for all ``v`` in the tangent cone.  At a corner with independent gradients these
+    are the KKT points.  Branch and bound over the box discards what cannot contain one and
+    isolates the others ([Neumaier] ch. 5); what it cannot decide is returned as boxes.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        The set ``D``; and/or trees and equations are allowed.
+    energy : SmoothFunction or SymPy expression
+        The energy ``E``.
+    box : sequence or mapping
+        A side for each coordinate, in their order or by name: two numbers; one number for a
+        coordinate that is fixed; None for a whole circle.  A coordinate may only be fixed where a
+        continuous symmetry of ``D`` and ``E`` moves it: one of ``symmetry.fields``, or a
+        translation, which need not be declared.  The list is then one modulo this symmetry.
+    symmetry : Symmetry, optional
+        Its ``elements`` (signed permutations of the coordinates with shifts by half periods) have
+        to preserve ``D``, ``E`` and the box, which is checked with the formulas; only a
+        part of the box that contains a point of each orbit is then searched.
+    resolution : float, optional
+        Largest side, in the manifold's scales, of boxes that are left undecided.
+    max_boxes, max_seconds : optional
+        Where the search ends at the latest; boxes that wait then are undecided.
+    progress : callable, optional
+        Called with the number of boxes treated, None, and what waits in words.
+
+    Returns
+    -------
+    StationaryList
+        After an interruption (Ctrl-C), with what was found so far and all waiting boxes undecided.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For arguments of a wrong kind, sides that are no intervals, coordinates that are fixed
+        without a symmetry, and elements that are not shown to be symmetries.
+
+    Examples
+    --------
+    >>> from polycorner import Manifold, Polyhedron
+    >>> M = Manifold.euclidean("x y")
+    >>> x, y = M.symbols
+    >>> D = Polyhedron(M, {"disc": 36 - x**2 - y**2})
+    >>> found = stationary_points(
+    ...     D, (x**2 + y - 11) ** 2 + (x + y**2 - 7) ** 2, box=[(-6, 6), (-6, 6)]
+    ... )
+    >>> found.complete, len(found.minima)
+    (True, 4)
+    """
+    search = prepared(polyhedron, energy, box, symmetry, resolution)
+    checks.whole("max_boxes", max_boxes, least=1)
+    checks.real("max_seconds", max_seconds, above=0, infinite=True)
+    if not callable(progress):
+        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
+
+    def report(s: Search) -> None:
+        note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
+        progress(float(s.tally.boxes), None, note)
+
+    try:
+        search.run(max_boxes, max_seconds, report)
+    except KeyboardInterrupt:
+        search.recover()
+    return listed(search)
+
+
+def prepared(
+    polyhedron: Polyhedron, energy: "Energy", box: Any, symmetry: Symmetry | None, resolution: float
+) -> Search:
+    """Return a search that has not begun, after checking its arguments."""
+    problem = pose(polyhedron, energy)
+    found = domain(polyhedron.manifold, box)
+    checks.real("resolution", resolution, above=0)
+    if symmetry is not None:
+        checks.instance("symmetry", symmetry, Symmetry)
+    motions, maps = _motions(problem, found, symmetry)
+    search = Search(problem, found, resolution, motions, maps)
+    _check_fixed(search, symmetry)
+    return search
+
+
+def _motions(
+    problem: Problem, found: Domain, symmetry: Symmetry | None
+) -> tuple[tuple[Motion, ...], tuple[tuple[int, ...], ...]]:
+    """Return the group of declared elements, and where they take inequalities."""
+    elements: Sequence[Any] = symmetry.elements if symmetry else ()
+    manifold = found.manifold
+    generating: dict[Motion, tuple[int, ...]] = {}
+    for element in elements:
+        g = motion(manifold, element.apply, "symmetry")
+        p = permutation(problem, g)
+        if p is None:
+            checks.refuse("symmetry", "elements that expanded formulas show to be symmetries", g)
+        image = g.signs * np.array([found.lower, found.upper])[:, list(g.order)]
+        ends = np.sort(image, axis=0) + g.shifts(manifold)
+        whole = found.upper - found.lower >= manifold.periods
+        if not (whole | (ends == [found.lower, found.upper]).all(axis=0)).all():
+            checks.refuse("box", "one that the symmetry carries to itself", found.sides())
+        generating[g] = p
+    group = closed(generating, manifold.dimension, problem.inequalities)
+    return tuple(group), tuple(group.values())
+
+
+def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:
+    """Raise ValueError unless continuous symmetries carry every point to the fixed values."""
+    fixed = search.domain.fixed
+    if not fixed:
+        return
+    formulas, manifold = search.faces.formulas, search.domain.manifold
+    forms = SmoothForms(formulas.graph, formulas.outputs, formulas.dimension, formulas.inputs)
+    with precision(BITS):
+        bases = translations(forms)
+        declared = generators(manifold, symmetry.fields if symmetry else ())
+        fields = [f for f in declared if all(annihilated(forms, f))]
+        fields += generators(manifold, bases)
+        sides = zip(search.domain.lower.tolist(), search.domain.upper.tolist(), strict=True)
+        hull = [between(a, b) for a, b in sides]
+        rows = [list(f.at(hull)) for f in fields]  # type: ignore[arg-type]
+        moved = [
+            [float(row[i].mid()) if row[i].rad() == 0 else np.nan for i in fixed] for row in rows
+        ]
+    for choice in _square(moved, len(fixed)):
+        if abs(np.linalg.det(choice)) > 1e-9:
+            return
+    names = ", ".join(manifold.names[i] for i in fixed)
+    checks.refuse(
+        "box", f"an interval for {names}, or a continuous symmetry that moves it", "one value"
+    )
+
+
+def _square(rows: list[list[float]], count: int) -> list[Array]:
+    usable = [row for row in rows if np.isfinite(row).all()]
+    return [np.array(chosen) for chosen in combinations(usable, count)]
+
+
+def listed(search: Search) -> StationaryList:
+    """Return what a search found."""
+    points: list[StationaryPoint] = []
+    open_points: list[StationaryPoint] = []
+    known = Known(search)
+    orbits = 0
+    for region in search.regions:
+        place = OUT if known.has(region) else membership(search, region)
+        if place == OUT:
+            continue
+        known.add(region)
+        if place == OPEN:
+            open_points.append(_point(search, region, orbits))
+            continue
+        points.append(_point(search, region, orbits))
+        for image in _images(search, region):
+            if not known.has(image):
+                known.add(image)
+                points.append(_point(search, image, orbits))
+        orbits += 1
+    rng = np.random.default_rng(0)
+    loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    return StationaryList(
+        search.problem,
+        search.domain,
+        tuple(points),
+        loci,
+        _undecided(search),
+        tuple(open_points),
+        search.tally,
+        search,
+    )
+
+
+def _undecided(search: Search) -> Array:
+    parts: list[Boxes] = [*search.undecided, search.waiting]
+    lower = np.concatenate([p.lower for p in parts])
+    upper = np.concatenate([p.upper for p in parts])
+    return np.stack([lower, upper], axis=1)
+
+
+def _images(search: Search, region: Region) -> list[Region]:
+    """Return the region carried along by all symmetries."""
+    found, manifold = [], search.domain.manifold
+    free, n = list(search.domain.free), len(search.domain.free)
+    for g, p in zip(search.motions, search.maps, strict=True):
+        inverse = {image: i for i, image in enumerate(p)}
+        lower, upper = _moved(g, *full(search, region), manifold)
+        wide = _moved(g, region.lower, region.upper, manifold)
+        turn = manifold.wrap(0.5 * (lower + upper)) - 0.5 * (lower + upper)
+        active = tuple(inverse[i] for i in region.active)
+        sharp = [
+            np.concatenate([(side + turn)[free], rest[n:]])
+            for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
+        ]
+        sides = wide[0] + turn, wide[1] + turn
+        found.append(Region(*sides, active, sharp[0], sharp[1], region.index))
+    return found
+
+
+def _loci(search: Search) -> list[Locus]:
+    """Return the loci that were found and their images, each once."""
+    manifold, z = search.domain.manifold, list(search.reads)
+    found: list[Locus] = []
+    for place in search.loci:
+        for g in (None, *search.motions):
+            image = place if g is None else _locus_image(search, place, g)
+            if not any(_same_locus(manifold, z, image, other) for other in found):
+                found.append(image)
+    return found
+
+
+def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
+    z, ends = list(place.z), []
+    for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
+        sides = search.domain.lower.copy(), search.domain.upper.copy()
+        sides[0][z], sides[1][z] = lower, upper
+        ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
+    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
+
+
+def _same_locus(manifold: Manifold, z: list[int], one: Locus, other: Locus) -> bool:
+    """Whether a locus lies in the box of another one, where there is only one."""
+    periods = np.array(manifold.periods)[z]
+    apart = 0.5 * (other.lower + other.upper - one.sharp_lower - one.sharp_upper)
+    circles = np.where(np.isfinite(periods), periods, 1.0)
+    turn = np.where(np.isfinite(periods), np.round(apart / circles) * circles, 0.0)
+    slack = ROUNDING * manifold.scale_array[z]
+    inside = (one.sharp_lower + turn - slack >= other.lower) & (
+        one.sharp_upper + turn + slack <= other.upper
+    )
+    return bool(inside.all())
+
+
+def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:
+    ends = g.signs * np.array([lower, upper])[:, list(g.order)]
+    shifted = np.sort(ends, axis=0) + g.shifts(manifold)
+    some = np.array(g.halves) != 0
+    return (
+        np.where(some, np.nextafter(shifted[0], -np.inf), shifted[0]),
+        np.where(some, np.nextafter(shifted[1], np.inf), shifted[1]),
+    )
+
+
+def _point(search: Search, region: Region, orbit: int) -> StationaryPoint:
+    lower, upper = full(search, region)
+    n, d = len(search.domain.free), search.problem.polyhedron
+    active = tuple(d.names[i] for i in region.active)
+    ends = zip(region.sharp_lower[n:].tolist(), region.sharp_upper[n:].tolist(), strict=True)
+    multipliers = dict(zip((*active, *d.equation_names), ends, strict=True))
+    return StationaryPoint(lower, upper, active, multipliers, region.index, orbit)

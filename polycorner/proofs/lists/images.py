@@ -1,0 +1,216 @@
+"""Boxes that need not be searched, because a symmetry carries them to others.
+
+A symmetry is a signed permutation of the coordinates with shifts by half a period.  Of each orbit
+in the domain a point with the largest ``w . q`` is kept: a box is dropped if some symmetry carries
+it into the domain and makes ``w . q`` larger at each of its points, circles being cut at half a
+period.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner import checks
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.minimisation.problem import Problem
+from polycorner.proofs.lists.domains import Domain
+from polycorner.spaces.manifold import Array, Manifold
+
+if TYPE_CHECKING:
+    import sympy
+
+MARGIN = 1e-9  # by which w . q has to grow, in scale units
+MOST_ELEMENTS = 4096
+CLOSE = 1e-9
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A symmetry ``q -> signs * q[order] + turns * periods``.
+
+    Attributes
+    ----------
+    order : tuple of int
+    signs : tuple of int
+        1 or -1.
+    halves : tuple of int
+        Half periods that are added: 0 or 1; 0 on lines.
+    """
+
+    order: tuple[int, ...]
+    signs: tuple[int, ...]
+    halves: tuple[int, ...]
+
+    def shifts(self, manifold: Manifold) -> Array:
+        """Return what is added, ``(n,)``."""
+        pairs = zip(self.halves, manifold.periods, strict=True)
+        return np.array([half * period / 2 if half else 0.0 for half, period in pairs])
+
+    def __call__(self, q: Array, manifold: Manifold) -> Array:
+        """Return the image of points ``(..., n)``."""
+        moved = np.array(self.signs) * q[..., list(self.order)] + self.shifts(manifold)
+        return manifold.wrap(moved)
+
+    def then(self, other: "Motion") -> "Motion":
+        """Return this motion followed by another one."""
+        order = tuple(self.order[i] for i in other.order)
+        signs = tuple(s * self.signs[i] for s, i in zip(other.signs, other.order, strict=True))
+        halves = tuple(
+            (h + self.halves[i]) % 2 for h, i in zip(other.halves, other.order, strict=True)
+        )
+        return Motion(order, signs, halves)
+
+
+def motion(manifold: Manifold, apply: Callable[[Array], Array], argument: str) -> Motion:
+    """Recognise a signed permutation with shifts by half periods.
+
+    Raises
+    ------
+    ValueError
+        For any other map.
+    """
+    n = manifold.dimension
+    at = np.asarray(apply(np.zeros(n)), dtype=np.float64)
+    periods = np.array(manifold.periods)
+    circle = np.isfinite(periods)
+    halves = np.zeros(n, dtype=int)
+    with np.errstate(invalid="ignore"):
+        turns = np.where(circle, 2 * at / np.where(circle, periods, 1.0), 0.0)
+    halves = np.round(turns).astype(int) % 2
+    steps = 0.125 * np.where(circle, periods, 1.0)
+    columns = np.array(
+        [manifold.difference(np.asarray(apply(step * unit)), at) / step
+         for step, unit in zip(steps, np.eye(n), strict=True)]
+    )  # fmt: skip
+    order = abs(columns).argmax(axis=0)
+    signs = np.sign(columns[order, np.arange(n)]).astype(int)
+    found = Motion(tuple(order.tolist()), tuple(signs.tolist()), tuple(halves.tolist()))
+    probe = np.array([0.1 * (k + 1) / n for k in range(n)]) * steps
+    error = abs(manifold.difference(np.asarray(apply(probe)), found(probe, manifold)))
+    same = bool((periods[order] == periods).all()) and sorted(order.tolist()) == list(range(n))
+    if not same or error.max() > CLOSE * max(1.0, abs(probe).max()):
+        checks.refuse(
+            argument, "a signed permutation of the coordinates with shifts by half periods", apply
+        )
+    return found
+
+
+def closed(
+    generating: Mapping[Motion, tuple[int, ...]], n: int, functions: int
+) -> dict[Motion, tuple[int, ...]]:
+    """Return the group that motions generate, without the identity, and its permutations.
+
+    ``f_i(g q) = f_{p(i)}(q)`` for the permutation ``p`` of ``g``; those of products are products.
+    """
+    identity = Motion(tuple(range(n)), (1,) * n, (0,) * n)
+    found, waiting = {identity: tuple(range(functions))}, [identity]
+    while waiting:
+        element = waiting.pop()
+        for g, p in generating.items():
+            new = element.then(g)
+            if new not in found:
+                found[new] = tuple(found[element][i] for i in p)
+                waiting.append(new)
+        if len(found) > MOST_ELEMENTS:
+            checks.refuse("symmetry", f"a group of at most {MOST_ELEMENTS} elements", "more")
+    ordered = sorted(found, key=lambda g: (g.order, g.signs, g.halves))
+    return {g: found[g] for g in ordered if g != identity}
+
+
+def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
+    """Return where a motion takes each inequality, if formulas show that it is a symmetry.
+
+    The energy stays the same, inequalities go to inequalities and their tree to itself; an
+    equation may change its sign.  ``f_i(g q) = f_{p(i)}(q)``.  None where expanding the formulas
+    does not show this.
+    """
+    import sympy
+
+    d = problem.polyhedron
+    symbols = d.manifold.symbols
+    moved = {}
+    for k, symbol in enumerate(symbols):
+        shift = g.halves[k] * _exact_half(d.manifold.periods[k])
+        moved[symbol] = g.signs[k] * symbols[g.order[k]] + shift
+    names = {}
+    before = {f: _normal(_bound(f)) for f in problem.functions}
+    after = {f: _normal(_bound(f).subs(moved, simultaneous=True)) for f in problem.functions}
+    if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
+        return None
+    for h in d.equations:
+        pairs = product(d.equations, (1, -1))
+        if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in pairs):
+            return None
+    for i, f in enumerate(d.functions):
+        images = [j for j, k in enumerate(d.functions) if before[k] == after[f]]
+        if not images:
+            return None
+        names[i] = images[0]
+    pieces = set(d.signs_to_pieces([0] * len(d.functions)))
+    if {frozenset(names[i] for i in piece) for piece in pieces} != pieces:
+        return None
+    return tuple(names[i] for i in range(len(d.functions)))
+
+
+def _exact_half(period: float) -> "sympy.Expr":
+    import sympy
+
+    if not np.isfinite(period):
+        return sympy.Integer(0)
+    turns = period / np.pi
+    whole = sympy.pi * round(turns) if turns == round(turns) else sympy.Rational(period)
+    return whole / 2
+
+
+def _bound(f: SmoothFunction) -> "sympy.Expr":
+    """Return a function's expression with its parameters."""
+    import sympy
+
+    expression = f.expression
+    pairs = zip(f.family.parameters, f.parameters, strict=True)
+    known = {name: sympy.Rational(value) for name, value in pairs}
+    found = {s: known[s.name] for s in expression.free_symbols if s.name in known}
+    return expression.xreplace(found)
+
+
+def _normal(expression: "sympy.Expr") -> "sympy.Expr":
+    """Return a normal form: arguments of all functions expanded."""
+    import sympy
+
+    return sympy.expand(expression, deep=True)
+
+
+def dropped(
+    lower: Array, upper: Array, motions: Sequence[Motion], weights: Array, domain: Domain
+) -> NDArray[np.bool_]:
+    """Return which boxes ``(B, n)`` a symmetry carries to others, see the module."""
+    manifold = domain.manifold
+    gone = np.zeros(len(lower), dtype=np.bool_)
+    half = np.array(manifold.periods) / 2
+    for g in motions:
+        order, signs = list(g.order), np.array(g.signs)
+        a, b = signs * lower[:, order], signs * upper[:, order]
+        low, high = np.minimum(a, b) + g.shifts(manifold), np.maximum(a, b) + g.shifts(manifold)
+        middle = 0.5 * (low + high)
+        turn = manifold.wrap(middle) - middle
+        low, high = low + turn, high + turn
+        least, most = np.maximum(domain.lower, -half), np.minimum(domain.upper, half)
+        inside = ((low >= least) & (high <= most)).all(axis=1)
+        # w . (g q) - w . q = (w' - w) . q + w . (shift + turn), with w' the weights carried back
+        back = np.zeros_like(weights)
+        back[order] = weights * signs
+        slope = back - weights
+        growth = (np.where(slope > 0, lower, upper) * slope).sum(axis=1)
+        gone |= inside & (growth + (g.shifts(manifold) + turn) @ weights > MARGIN)
+    return gone
+
+
+def weights(domain: Domain) -> Array:
+    """Return weights whose sums tell images apart: decreasing, without common multiples."""
+    n = len(domain.lower)
+    units = np.where(domain.units > 0, domain.units, np.inf)
+    return np.array([0.6180339887498949**k for k in range(n)]) / units

@@ -1,0 +1,119 @@
+"""Sets of stationary points along coordinates on which the energy does not depend.
+
+Let ``E`` depend on some coordinates ``z`` only, and ``y`` be the others.  In a box ``X`` of ``z``
+let ``E'`` vanish at ``z*`` and ``[H]`` enclose ``E''``, with the symmetric middle ``C``.  For each
+``z`` in ``X`` there is a matrix ``M`` in ``[H]`` with ``E'(z) = M (z - z*)``; if the symmetric
+parts of all products ``M^T C`` are positive definite, ``v = -C (z - z*)`` has ``E'(z) v < 0``
+except at ``z*``, which is therefore the only zero of ``E'``.
+
+Now let ``u`` be a vector along ``y`` in which all functions that may vanish in a box grow, and let
+``z`` of the box lie in ``X``.  At a point of the set with ``z != z*`` the direction ``(v, K u)``
+descends, and for a large ``K`` it leads into the set: the point is not stationary.  At ``z = z*``
+the energy has no derivative.  The stationary points in the box are therefore those with ``z = z*``.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from polycorner.intervals.balls import (
+    ball,
+    between,
+    matrix,
+    middle_inverse,
+    precision,
+)
+from polycorner.intervals.enclosures import Formulas, Undecided
+from polycorner.intervals.tapes import Box, needed
+from polycorner.minimisation.problem import Problem
+from polycorner.proofs.definite import pivots
+from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inertia, krawczyk, outward
+from polycorner.proofs.lists.candidates import newton
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+SHARP = 1e-9  # reach in scale units of the box whose image is the enclosure of a locus
+
+
+@dataclass(frozen=True, eq=False)
+class Locus(Value):
+    """A point ``z*`` where the derivative of the energy vanishes, whatever ``y`` is.
+
+    Attributes
+    ----------
+    z : tuple of int
+        Positions of the coordinates that the energy depends on.
+    lower, upper : (z,) arrays
+        The box ``X`` in which there is no other.
+    sharp_lower, sharp_upper : (z,) arrays
+        Enclosure of ``z*``.
+    index : int
+        Negative eigenvalues of the second derivative.
+    """
+
+    z: tuple[int, ...]
+    lower: Array
+    upper: Array
+    sharp_lower: Array
+    sharp_upper: Array
+    index: int
+
+
+def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the free coordinates that the energy depends on."""
+    nodes = (formulas.graph.nodes[a] for a in needed(formulas.graph, formulas.outputs[-1:]))
+    read = {int(args[0]) for op, args in nodes if op == "var"}
+    return tuple(i for i in free if i in read)
+
+
+def locus(problem: Problem, formulas: Formulas, z: tuple[int, ...], q: Array) -> Locus | None:
+    """Return the widest locus tried about a stationary point near ``q``, or None."""
+    found = newton(problem, q, [], z) if not problem.polyhedron.equations else None
+    if found is None:
+        return None
+    with precision(BITS):
+        for power in range(QUARTERINGS):
+            radii = problem.scales[list(z)] * WIDEST / 4**power
+            shown = _shown(formulas, z, found[0], radii)
+            if shown is not None:
+                sharp = _shown(formulas, z, found[0], problem.scales[list(z)] * SHARP)
+                return replace(
+                    shown,
+                    sharp_lower=(sharp or shown).sharp_lower,
+                    sharp_upper=(sharp or shown).sharp_upper,
+                )
+    return None
+
+
+def _shown(formulas: Formulas, z: tuple[int, ...], q: Array, radii: Array) -> Locus | None:
+    places = list(z)
+    lower, upper = q[places] - radii, q[places] + radii
+    hull = [ball(x) for x in q.tolist()]
+    for i, a, b in zip(places, lower.tolist(), upper.tolist(), strict=True):
+        hull[i] = between(a, b)
+    row = len(formulas.names) - 1
+    forms = formulas.smooth(Box(hull), [row])
+    if isinstance(forms, Undecided):
+        return None
+    hessian = forms.evaluate(Box(hull), 2)[2][0]
+    form = [[hessian[i][j] for j in places] for i in places]
+    middle = matrix([[x.mid() for x in line] for line in form])
+    product = matrix(form).transpose() * middle
+    symmetric = (product + product.transpose()).tolist()
+    found = pivots(symmetric)
+    if len(found) < len(places) or not all(p > 0 for p in found):
+        return None
+    unknowns = [hull[i] for i in places]
+    centre = [x.mid() for x in unknowns]
+    for i, x in zip(places, centre, strict=True):
+        hull[i] = x
+    _, slopes, bent = forms.evaluate(Box(hull), 2)
+    at = [[bent[0][i][j] for j in places] for i in places]
+    inverse, signs = middle_inverse(at), inertia(at)
+    if inverse is None or signs is None:
+        return None
+    image = krawczyk([slopes[0][i] for i in places], form, inverse, unknowns, centre)
+    if not all(x.contains_interior(y) for x, y in zip(unknowns, image, strict=True)):
+        return None
+    ends = np.array([outward(x) for x in image])
+    return Locus(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])

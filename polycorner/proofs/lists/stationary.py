@@ -1,0 +1,226 @@
+"""Lists of all stationary points of an energy on a polyhedron in a box, and what is proved."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polycorner.minimisation import Certificate, certify
+from polycorner.minimisation.problem import Problem
+from polycorner.printing import Printed, Sheet, Table, facts, number
+from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.search import Search, Tally
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class StationaryPoint(Value):
+    """A box with exactly one stationary point, which is a nondegenerate KKT point.
+
+    Attributes
+    ----------
+    lower, upper : (n,) arrays
+        Enclosure of the point.
+    active : tuple of str
+        Functions that vanish there; all their multipliers are positive.
+    multipliers : mapping from str to (float, float)
+        Enclosures of the multipliers, those of equations included: ``dE = sum lam_i df_i``.
+    index : int or None
+        Negative eigenvalues of the Hessian of the Lagrangian along the face; None where their
+        number is not shown.
+    orbit : int
+        Number of the orbit of the declared symmetries that it belongs to.
+    """
+
+    lower: Array
+    upper: Array
+    active: tuple[str, ...]
+    multipliers: Mapping[str, Bounds]
+    index: int | None
+    orbit: int
+
+    @property
+    def point(self) -> Array:
+        """The middle of the enclosure, ``(n,)``."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def is_minimum(self) -> bool:
+        """Whether it is shown to be a strict local minimum: no negative eigenvalue."""
+        return self.index == 0
+
+
+@dataclass(frozen=True, eq=False)
+class StationaryLocus(Value):
+    """Points with given values of some coordinates, all of them stationary.
+
+    The energy depends on these coordinates only; its derivative vanishes there, and at no other
+    stationary point nearby.
+
+    Attributes
+    ----------
+    lower, upper : mapping from str to float
+        Enclosures of the coordinates.
+    index : int
+        Negative eigenvalues of the second derivative by these coordinates.
+    sample : (n,) array or None
+        A point of the set on it, which shows that it is not empty; None where none was found.
+    """
+
+    lower: Mapping[str, float]
+    upper: Mapping[str, float]
+    index: int
+    sample: Array | None
+
+    @property
+    def is_minimum(self) -> bool:
+        """Whether its points are shown to be local minima, not strict ones."""
+        return self.index == 0
+
+
+@dataclass(frozen=True, eq=False)
+class StationaryList(Printed, Value):
+    """Stationary points of an energy on a polyhedron in a box; see :func:`stationary_points`.
+
+    Attributes
+    ----------
+    problem : Problem
+        Polyhedron and energy.
+    domain : Domain
+        The box.
+    points : tuple of StationaryPoint
+        Isolated ones, by orbit.
+    loci : tuple of StationaryLocus
+        Connected sets of them along coordinates that the energy does not depend on.
+    undecided : (k, 2, n) array
+        Boxes, by lower and upper ends, outside of which there is no other stationary point.
+    open_points : tuple of StationaryPoint
+        KKT points of faces for which it is not decided whether they lie in the polyhedron.
+    tally : Tally
+        Numbers of boxes.
+    search : Search
+        The run, for :meth:`save`.
+    """
+
+    problem: Problem
+    domain: Domain
+    points: tuple[StationaryPoint, ...]
+    loci: tuple[StationaryLocus, ...]
+    undecided: Array
+    open_points: tuple[StationaryPoint, ...]
+    tally: Tally
+    search: Search
+
+    @property
+    def complete(self) -> bool:
+        """Whether it is proved that these are all stationary points in the box."""
+        return not len(self.undecided) and not self.open_points
+
+    @property
+    def minima(self) -> tuple[StationaryPoint, ...]:
+        """The strict local minima among the isolated points."""
+        return tuple(p for p in self.points if p.is_minimum)
+
+    def __len__(self) -> int:
+        """Return the number of isolated points."""
+        return len(self.points)
+
+    def __iter__(self) -> Iterator[StationaryPoint]:
+        """Iterate over the isolated points."""
+        return iter(self.points)
+
+    @cached_property
+    def certificates(self) -> tuple[Certificate, ...]:
+        """Certificates at the middles of the isolated points."""
+        d, energy = self.problem.polyhedron, self.problem.energy
+        return tuple(certify(d, energy, p.point) for p in self.points)
+
+    @property
+    def undecided_volume(self) -> float:
+        """Volume of the undecided boxes, as a share of the domain's."""
+        free = list(self.domain.free)
+        widths = (self.undecided[:, 1] - self.undecided[:, 0])[:, free]
+        whole = (self.domain.upper - self.domain.lower)[free]
+        return float((widths / whole).prod(axis=1).sum())
+
+    @property
+    def statement(self) -> str:
+        """What is proved, in a sentence."""
+        count, n = len(self.points), self.problem.dimension
+        where = f"in the box ({n} coordinates)"
+        loci = f" and {len(self.loci)} loci" if self.loci else ""
+        if self.complete:
+            return (
+                f"Proved: the energy has exactly {count} isolated stationary points{loci} {where}."
+            )
+        rest = f"{len(self.undecided)} boxes and {len(self.open_points)} points are undecided"
+        return f"Not complete: {count} stationary points{loci} are shown {where}; {rest}."
+
+    def __repr__(self) -> str:
+        """Return the statement."""
+        return f"StationaryList({self.statement})"
+
+    def _sheet(self) -> Sheet:
+        names = self.problem.polyhedron.manifold.names
+        head = ("", *names, "energy", "index", "active")
+        rows = tuple(
+            (
+                str(k),
+                *(number(x) for x in p.point),
+                number(float(self.problem.energy.value(p.point))),
+                "?" if p.index is None else str(p.index),
+                " ".join(p.active) or "none",
+            )
+            for k, p in enumerate(self.points)
+        )
+        table = Table(head, rows, tuple(range(len(names) + 3)))
+        counts = facts(
+            [
+                ("boxes", str(self.tally.boxes)),
+                ("minima", str(len(self.minima))),
+                ("loci", str(len(self.loci))),
+                ("undecided volume", f"{self.undecided_volume:.1e}"),
+            ]
+        )
+        return Sheet("Stationary points", (self.statement, counts, *([table] if rows else [])))
+
+    def save(self, path: "str | Path") -> None:
+        """Write the proof to a file that an independent checker verifies; see ``docs``."""
+        from polycorner.proofs.lists.records import save
+
+        save(path, self.search)
+
+
+def locus_of(search: Search, place: Locus, rng: np.random.Generator) -> StationaryLocus:
+    """Return a locus with a sample of it that lies in the set, if one is found."""
+    names = search.domain.manifold.names
+    keys = [names[i] for i in place.z]
+    return StationaryLocus(
+        dict(zip(keys, place.sharp_lower.tolist(), strict=True)),
+        dict(zip(keys, place.sharp_upper.tolist(), strict=True)),
+        place.index,
+        _sample(search, place, rng),
+    )
+
+
+SAMPLES = 4096
+
+
+def _sample(search: Search, place: Locus, rng: np.random.Generator) -> Array | None:
+    domain, z = search.domain, list(place.z)
+    lower = rng.uniform(domain.lower, domain.upper, (SAMPLES, len(domain.lower)))
+    upper = lower.copy()
+    lower[:, z], upper[:, z] = place.sharp_lower, place.sharp_upper
+    low = search.functions.values(lower, upper)[0][:, : search.problem.inequalities]
+    missed = np.any((low <= 0)[:, None, :] & search.conj, axis=2)
+    found: Any = np.flatnonzero(~np.all(missed, axis=1))
+    return 0.5 * (lower[found[0]] + upper[found[0]]) if found.size else None

@@ -1,0 +1,92 @@
+"""The tree of a subdivision: how each box was split, or why it is closed.
+
+Nodes are numbered as they are made, the two halves of a box one after the other.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.spaces.manifold import Array
+
+CLOSED, OPEN = -1, -2
+
+
+@dataclass
+class Tree:
+    """Records of all nodes, in pieces that are joined on demand.
+
+    A node's code is the axis along which it was split, ``CLOSED``, or ``OPEN``.
+    """
+
+    count: int = 1
+    _split: list[tuple[NDArray[np.int64], NDArray[np.int8], Array, NDArray[np.int64]]] = field(
+        default_factory=list
+    )
+    _closed: list[NDArray[np.int64]] = field(default_factory=list)
+    _directions: list[tuple[NDArray[np.int64], NDArray[np.float32]]] = field(default_factory=list)
+
+    def close(self, nodes: NDArray[np.int64], owners: NDArray[np.int64], directions: Array) -> None:
+        """Record boxes as closed, and directions ``(I, n)`` for some nodes, ``owners``."""
+        self._closed.append(nodes)
+        self._directions.append((owners, directions.astype(np.float32)))
+
+    def split(
+        self, nodes: NDArray[np.int64], axes: NDArray[np.intp], positions: Array
+    ) -> NDArray[np.int64]:
+        """Record boxes as split; return the numbers of the first halves, the second follow them."""
+        first = self.count + 2 * np.arange(len(nodes))
+        self._split.append((nodes, axes.astype(np.int8), positions, first))
+        self.count += 2 * len(nodes)
+        return first
+
+    def preorder(self) -> tuple[NDArray[np.int8], Array, NDArray[np.uint8], NDArray[np.float32]]:
+        """Return the tree with each node before its halves.
+
+        Returns
+        -------
+        codes : (nodes,) array
+        positions : (splits,) array
+            Where boxes are split.
+        counts : (closed,) array
+            How many directions belong to each closed node.
+        directions : (I, n) array
+            All of them, in this order.
+        """
+        codes = np.full(self.count, OPEN, dtype=np.int8)
+        where, first = np.zeros(self.count), np.zeros(self.count, dtype=np.int64)
+        for nodes, axes, positions, children in self._split:
+            codes[nodes], where[nodes], first[nodes] = axes, positions, children
+        for nodes in self._closed:
+            codes[nodes] = CLOSED
+        order = _preorder(codes, first)
+        owners = np.concatenate([o for o, _ in self._directions] or [np.zeros(0, np.int64)])
+        vectors = [v for _, v in self._directions]
+        n = vectors[0].shape[1] if vectors else 0
+        joined = np.concatenate(vectors) if vectors else np.zeros((0, n), np.float32)
+        rank = np.empty(self.count, dtype=np.int64)
+        rank[order] = np.arange(len(order))
+        counts = np.bincount(owners, minlength=self.count)[order]
+        ordered = codes[order]
+        by_rank = np.argsort(rank[owners], kind="stable")
+        return (
+            ordered,
+            where[order][ordered >= 0],
+            counts[ordered == CLOSED].astype(np.uint8),
+            joined[by_rank],
+        )
+
+
+def _preorder(codes: NDArray[np.int8], first: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the nodes of a tree, each before its halves."""
+    order = np.empty(len(codes), dtype=np.int64)
+    waiting, place = [0], 0
+    split, children = (codes >= 0).tolist(), first.tolist()
+    while waiting:
+        node = waiting.pop()
+        order[place] = node
+        place += 1
+        if split[node]:
+            waiting += [children[node] + 1, children[node]]
+    return order[:place]
