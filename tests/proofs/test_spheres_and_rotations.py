@@ -148,4 +148,4 @@ class TestBodies:
 def test_lists_of_stationary_points_are_of_lines_and_circles():
     D = Polyhedron(SPHERE, {"x": u[0]})
     with pytest.raises(ValueError, match="polyhedron: expected one on lines and circles"):
-        stationary_points(D, u[2], [(-1, 1)] * 3)
+        stationary_points(D, u[2], box=[(-1, 1)] * 3)
