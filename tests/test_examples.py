@@ -24,6 +24,7 @@ from examples import (
     ex14_impact_and_stack,
     ex15_entrapment,
     ex16_dyad_climbs,
+    ex17_turning,
 )
 from polycorner.polyhedra import LocalType
 
@@ -148,6 +149,14 @@ def test_a_dyad_climbs():
     right, left = result.pairs.climb_rates(after=10.0)  # over few zigzags, the last one cut
     assert right == pytest.approx(result.law, rel=0.25)
     assert left == pytest.approx(-result.law, rel=0.25)
+
+
+def test_turning_on_the_sphere_and_in_space():
+    result = ex17_turning.main()
+    assert (len(result.parts.corners), len(result.parts.edges)) == (3, 4)
+    assert sorted(len(c.active) for c in result.wells) == [1, 2, 2]
+    assert result.flips == pytest.approx(result.period, rel=1e-5)
+    assert result.drift < 1e-6
 
 
 def test_a_bouncing_ball_comes_to_rest():

@@ -141,7 +141,7 @@ def _results(c: Certificate) -> Entries:
     return {
         "energy": rows[-1],
         "functions": rows[:m],
-        "equations": rows[m:-1],
+        "equations": rows[m : m + len(c.problem.polyhedron.stated)],
         "multipliers unique": bool(c.multipliers_unique),
         "signature": list(c.signature),
         "curvatures": [number(x) for x in c.curvatures.tolist()],

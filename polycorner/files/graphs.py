@@ -57,7 +57,7 @@ def skeleton_graph(skeleton: Skeleton) -> "nx.MultiGraph":
         start, stop = _ends(k, edge)
         for node, where, kind in ((start, 0, edge.kinds[0]), (stop, -1, edge.kinds[1])):
             if node not in graph:
-                point = skeleton.polyhedron.manifold.wrap(edge.polyline[where])
+                point = skeleton.polyhedron.manifold.canonical(edge.polyline[where])
                 graph.add_node(node, kind=kind.name.lower(), **_place(names, point))
         graph.add_edge(start, stop, key=k, **_edge(k, edge))
     return graph

@@ -1,6 +1,7 @@
 """Polyhedra and functions as entries of a file, formulas included, and made again from these."""
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from polycorner.container import number, read_number
@@ -15,10 +16,13 @@ Entries = dict[str, Any]
 
 
 def manifold_entry(manifold: Manifold) -> list[Entries]:
-    """Return coordinates with their units, periods and scales."""
+    """Return coordinates with their units, periods and scales, and the factors they belong to."""
     columns = zip(manifold.names, manifold.units, manifold.periods, manifold.scales, strict=True)
+    kinds = (("sphere", manifold.spheres), ("rotation", manifold.rotations))
+    curved = {name: {kind: some[0]} for kind, groups in kinds for some in groups for name in some}
     return [
         {"name": name, "unit": unit, "period": number(period), "scale": scale}
+        | curved.get(name, {})
         for name, unit, period, scale in columns
     ]
 
@@ -30,7 +34,15 @@ def read_manifold(entry: Sequence[Entries]) -> Manifold:
         tuple(read_number(c["period"]) for c in entry),
         tuple(float(c["scale"]) for c in entry),
         tuple(c["unit"] for c in entry),
+        _groups(entry, "sphere"),
+        _groups(entry, "rotation"),
     )
+
+
+def _groups(entry: Sequence[Entries], kind: str) -> tuple[tuple[str, ...], ...]:
+    """Return the names of the coordinates of every factor of a kind."""
+    parts = groupby(entry, lambda coordinate: coordinate.get(kind))
+    return tuple(tuple(c["name"] for c in some) for first, some in parts if first is not None)
 
 
 def polyhedron_entry(polyhedron: Polyhedron, energy: SmoothFunction | None = None) -> Entries:
@@ -38,7 +50,7 @@ def polyhedron_entry(polyhedron: Polyhedron, energy: SmoothFunction | None = Non
 
     Annotations are Python functions, of which only the names are written.
     """
-    functions = [*polyhedron.functions, *polyhedron.equations, *([energy] if energy else [])]
+    functions = [*polyhedron.functions, *polyhedron.stated, *([energy] if energy else [])]
     families = {id(f.family): f.family for f in functions}
     position = {key: k for k, key in enumerate(families)}
 
@@ -55,7 +67,7 @@ def polyhedron_entry(polyhedron: Polyhedron, energy: SmoothFunction | None = Non
         "coordinates": manifold_entry(polyhedron.manifold),
         "families": [_family_entry(family) for family in families.values()],
         "functions": [entry(f) for f in polyhedron.functions],
-        "equations": [entry(h) for h in polyhedron.equations],
+        "equations": [entry(h) for h in polyhedron.stated],
         "energy": None if energy is None else entry(energy),
         "tree": _tree_entry(polyhedron.tree),
         "annotations": list(polyhedron.annotations),
@@ -90,8 +102,14 @@ def mismatch(entry: Entries, polyhedron: Polyhedron) -> str:
         ("names of the coordinates", written.names, manifold.names),
         ("periods of the coordinates", written.periods, manifold.periods),
         ("scales of the coordinates", written.scales, manifold.scales),
+        ("spheres", sum(written.spheres, ()), sum(manifold.spheres, ())),
+        ("rotations", sum(written.rotations, ()), sum(manifold.rotations, ())),
         ("functions", tuple(f["name"] for f in entry["functions"]), polyhedron.names),
-        ("equations", tuple(h["name"] for h in entry["equations"]), polyhedron.equation_names),
+        (
+            "equations",
+            tuple(h["name"] for h in entry["equations"]),
+            tuple(h.name for h in polyhedron.stated),
+        ),
     ]
     for what, one, other in rows:
         if one != other:

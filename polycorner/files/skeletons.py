@@ -134,7 +134,7 @@ def load_skeleton(
 
 
 def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> Explorer:
-    extent, n = read_number(content["extent"]), polyhedron.dimension
+    extent, n = read_number(content["extent"]), polyhedron.manifold.size
     points = [_points(q, n, 1) for _, q in content["starts"]]
     points += [_points(entry["points"], n, 2)[0] for entry in content["edges"]]
     points += [_points(corner["point"], n, 1) for corner in content["corners"]]

@@ -187,7 +187,7 @@ def _told(system: System) -> dict[str, Any]:
         "potential": text(system.potential),
         "forces": {name: text(force) for name, force in system.forces.items()},
         "gaps": {f.name: [text(f.expression), *f.parameters] for f in polyhedron.functions},
-        "equations": {h.name: [text(h.expression), *h.parameters] for h in polyhedron.equations},
+        "equations": {h.name: [text(h.expression), *h.parameters] for h in polyhedron.stated},
     }
     between = system.between and {
         "gaps": {name: text(gap) for name, gap in system.between.gaps.items()},

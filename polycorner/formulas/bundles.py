@@ -122,7 +122,7 @@ class Bundle(Value):
         self._direct = only if only is not None and self._is_direct(only) else None
 
     def _is_direct(self, call: Call) -> bool:
-        n, m = self.manifold.dimension, len(call.family.names)
+        n, m = self.manifold.size, len(call.family.names)
         return call.reads == tuple(range(n)) and call.columns == tuple(range(m))
 
     @cached_property
@@ -161,5 +161,5 @@ class Bundle(Value):
         return results
 
     def _shapes(self, order: int) -> tuple[tuple[int, ...], ...]:
-        m, n = len(self.functions), self.manifold.dimension
+        m, n = len(self.functions), self.manifold.size
         return ((m,), (m, n), (m, n, n))[: order + 1]

@@ -12,7 +12,9 @@ from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.expressions import announce, check_periodic
 from polycorner.formulas.families import Family
-from polycorner.spaces.manifold import Array, Manifold, finite, reals, scalar
+from polycorner.formulas.signs import check_even
+from polycorner.spaces.arguments import finite, reals, scalar
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 if TYPE_CHECKING:
@@ -184,6 +186,11 @@ class SmoothFunction(Value):
             {s: renamed[s.name] for s in formal.free_symbols if s.name in renamed}
         )
 
+    @property
+    def parameter_values(self) -> dict[str, float]:
+        """The values of its parameters, by name."""
+        return dict(zip(self.family.parameters, self.parameters, strict=True))
+
     @cached_property
     def _bundle(self) -> Bundle:
         return Bundle(self.manifold, (self,))
@@ -207,6 +214,8 @@ def check_function(function: SmoothFunction, *, periodic: bool = True) -> None:
     A section, such as ``sin((a + b) / 2) = 0``, may change its sign, or fix an angle in one chart.
     """
     announce(function.name, function.kinks)
+    if periodic and function.manifold.rotations:
+        check_even(function.name, function.expression, function.manifold, function.parameter_values)
     if periodic and any(map(math.isfinite, (function.manifold.periods[i] for i in function.reads))):
         family = function.family
         check_periodic(

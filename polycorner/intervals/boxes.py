@@ -58,7 +58,7 @@ class BoxFunctions:
     ) -> None:
         checks.instance("manifold", manifold, Manifold)
         self.functions = tuple(functions)
-        self.names, self.dimension = tuple(f.name for f in self.functions), manifold.dimension
+        self.names, self.dimension = tuple(f.name for f in self.functions), manifold.size
         self.rounding = rounding
         self.graph = Graph()
         self._kernels: dict[tuple[int, str], IntervalKernel] = {}

@@ -134,7 +134,7 @@ class Formulas:
         self, functions: Sequence[SmoothFunction], manifold: Manifold, free: Sequence[str] = ()
     ) -> None:
         self.names = tuple(f.name for f in functions)
-        self.dimension, self.free = manifold.dimension, tuple(free)
+        self.dimension, self.free = manifold.size, tuple(free)
         self.inputs = self.dimension + len(self.free)
         self.graph = Graph()
         places = {name: self.dimension + k for k, name in enumerate(self.free)}

@@ -12,7 +12,7 @@ from polycorner.minimisation.conditions import (
     find_curvature,
     find_multipliers,
 )
-from polycorner.minimisation.constancy import symmetric_directions, without
+from polycorner.minimisation.constancy import symmetric_tangents, without
 from polycorner.minimisation.corner_degeneracy import decide
 from polycorner.minimisation.corners import beside_inflection, corner, seen_from
 from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
@@ -221,8 +221,10 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
     local, flat = a.local, a.curvature.flat
     numbers = [*a.active, *local.sections]
     rows = tuple(numbers[i] for i in strong)
-    if not a.weak and not without(flat, symmetric_directions(local.problem, rows)).shape[1]:
-        return symmetric(flat)
+    if not a.weak:
+        still = symmetric_tangents(local.problem, rows, local.point)
+        if not without(flat, still).shape[1]:
+            return symmetric(flat)
     held, values, exact = strong, a.multipliers.values, not a.blind
     if rank(a.gradients[strong], local.rank_tolerance) < len(strong):
         held, values = _basic_multipliers(a, strong)

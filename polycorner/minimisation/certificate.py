@@ -62,7 +62,7 @@ class Certificate(Value, Printed):
     problem : Problem
         The polyhedron and the energy.
     point : (n,) array
-        The point, circle coordinates wrapped; read-only.
+        The point, wrapped; read-only.
     tolerance : float
         Size up to which scaled distances, and derivatives relative to the energy's, count as zero.
     rank_tolerance : float
@@ -89,7 +89,7 @@ class Certificate(Value, Printed):
     note: str = ""
 
     def __post_init__(self) -> None:
-        point = self.problem.polyhedron.manifold.wrap(self.point)
+        point = self.problem.polyhedron.manifold.canonical(self.point)
         point.flags.writeable = False  # the only array: the base class would search for others
         object.__setattr__(self, "point", point)
 
@@ -121,12 +121,12 @@ class Certificate(Value, Printed):
     @property
     def multipliers(self) -> dict[str, float]:
         """``dE/df`` for each active function and equation; one choice if they are not unique."""
-        return self.analysis.named_multipliers
+        return self.analysis.stated(self.analysis.named_multipliers)
 
     @property
     def multiplier_ranges(self) -> dict[str, tuple[float, float]]:
         """The least and the largest value each multiplier can take."""
-        return self.analysis.named_ranges
+        return self.analysis.stated(self.analysis.named_ranges)
 
     @property
     def multipliers_unique(self) -> bool:
@@ -192,7 +192,7 @@ class Certificate(Value, Printed):
     @property
     def residuals(self) -> Residuals:
         """The residuals, recomputed from the functions and the multipliers."""
-        return residuals_at(self.problem, self.point, self.multipliers)
+        return residuals_at(self.problem, self.point, self.analysis.named_multipliers)
 
     def holds(self, tolerance: float | None = None) -> bool:
         """Whether this is a minimum with all recomputed residuals at most ``tolerance``."""

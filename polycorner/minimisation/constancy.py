@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 
@@ -34,16 +35,63 @@ def symmetric_directions(problem: Problem, rows: tuple[int, ...]) -> Array:
     an analytic function that vanishes at random points vanishes with probability one.  Columns are
     compared each with its own size, so that a slow change is not taken for none.
     """
+    return orthonormal(_combinations(_sampled(problem, rows)[1]))
+
+
+@lru_cache(maxsize=256)
+def _turning(problem: Problem, rows: tuple[int, ...]) -> Array:
+    """Return the combinations of :func:`_fields` along which nothing ever changes."""
+    points, gradients = _sampled(problem, rows)
+    slopes = np.einsum("kmn,knf->kmf", gradients, _fields(problem, points))
+    return _combinations(slopes)
+
+
+def symmetric_tangents(problem: Problem, rows: tuple[int, ...], q: Array) -> Array:
+    """Return an orthonormal basis ``(n, t)`` at ``q`` of motions along which nothing ever changes.
+
+    They are :func:`symmetric_directions`, and motions of spheres and rotations beside them.
+    """
+    if not problem.polyhedron.manifold.factors:
+        return symmetric_directions(problem, rows)
+    return orthonormal(_fields(problem, q[None])[0] @ _turning(problem, rows))
+
+
+def _fields(problem: Problem, points: Array) -> Array:
+    """Return translations of lines and circles, and turns of spheres and rotations, ``(k, n, f)``.
+
+    The turns are those in the planes of two coordinates: all isometries of the sphere, for
+    quaternions the products with others from the left and from the right.
+    """
+    manifold = problem.polyhedron.manifold
+    straight, turns = set(range(problem.dimension)), list[tuple[int, int]]()
+    for factor in manifold.factors:
+        places = range(factor.at.start, factor.at.stop)
+        straight -= set(places)
+        turns += combinations(places, 2)
+    found = np.zeros((len(points), problem.dimension, len(straight) + len(turns)))
+    found[:, sorted(straight), np.arange(len(straight))] = 1.0
+    for f, (i, j) in enumerate(turns, len(straight)):
+        found[:, i, f], found[:, j, f] = -points[:, j], points[:, i]
+    return found
+
+
+def _sampled(problem: Problem, rows: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return random points, and gradients of the energy and of functions there."""
     n, chosen = problem.dimension, [*rows, -1]
     generator = np.random.default_rng(0)
     directions = generator.normal(size=(len(RADII), POINTS, n))
     points = (np.array(RADII)[:, None, None] * directions).reshape(-1, n) * problem.scales
+    points = problem.polyhedron.manifold.onto(points)
     with np.errstate(all="ignore"):
-        gradients = problem.evaluate(points, 1)[1][:, chosen]
-    finite = np.isfinite(gradients).all(axis=2)
+        return points, problem.evaluate(points, 1)[1][:, chosen]
+
+
+def _combinations(slopes: Array) -> Array:
+    """Return the combinations of columns ``(n, t)`` along which all slopes ``(k, m, n)`` vanish."""
+    n, finite = slopes.shape[2], np.isfinite(slopes).all(axis=2)
     if (finite.sum(axis=0) < FEWEST).any():
         return np.empty((n, 0))
-    found = gradients[finite]
+    found = slopes[finite]
     largest = abs(found).max(axis=1)
     found = found[largest > 0] / largest[largest > 0, None]
     sizes = abs(found).max(axis=0, initial=0.0)
@@ -56,7 +104,7 @@ def symmetric_directions(problem: Problem, rows: tuple[int, ...]) -> Array:
         others = np.zeros((n, len(right) - level))
         others[moving] = right[level:].T / sizes[moving, None]
         basis = np.hstack([basis, others])
-    return orthonormal(basis)
+    return basis
 
 
 def orthonormal(vectors: Array) -> Array:

@@ -66,8 +66,8 @@ def crossing(
     lifted = Lifted(certificate)
     checks.choice("contact", contact, lifted.names)
     directions, which = lifted.directions(rates)[:, 0], lifted.names.index(contact)
-    scales, wrap = certificate.problem.scales, certificate.problem.polyhedron.manifold.wrap
-    lam = np.array(list(certificate.multipliers.values()))
+    scales, wrap = certificate.problem.scales, certificate.problem.polyhedron.manifold.canonical
+    lam = np.array(list(certificate.analysis.named_multipliers.values()))
     q, s, free, last = certificate.point, 0.0, None, False
     for _ in range(NEWTON):
         linear = lifted.linearise(q, s * directions, lam, directions[:, None])
@@ -78,7 +78,8 @@ def crossing(
         du, dlam, ds = step[: len(q)], step[len(q) : len(q) + len(lam)], float(step[-1])
         q, lam, s = q + scales * du, lam + dlam, s + ds
         if last:
-            return Crossing(s, wrap(q), dict(zip(lifted.names, lam.tolist(), strict=True)))
+            named = dict(zip(lifted.names, lam.tolist(), strict=True))
+            return Crossing(s, wrap(q), certificate.analysis.stated(named))
         last = max(abs(du).max(), abs(ds / (s or 1.0))) < CLOSE
     return None
 

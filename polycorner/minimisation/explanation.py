@@ -85,7 +85,7 @@ def _position(a: Analysis, stratum: Stratum, unit: str | None) -> str:
             f"({shown}); the following concerns the branch that decides, {_names(a.names)}."
         )
     dimension = stratum.dimension
-    if dimension == a.local.problem.dimension and not a.names:
+    if dimension == a.local.problem.polyhedron.dimension and not a.names:
         return "It lies in the interior of the polyhedron: no inequality is active."
     active = f"active: {_names(a.names)}" if a.names else "no inequality is active"
     return f"It lies in the polyhedron, on a face of dimension {dimension}; {active}."
@@ -133,7 +133,7 @@ def _first_order(a: Analysis, unit: str | None) -> Iterator[str]:
     if a.stationary:
         yield (
             f"The first-order conditions hold, up to {relative} of the energy's own size: "
-            + (f"dE is {_combination(a)}." if a.named_multipliers else "dE vanishes.")
+            + (f"dE is {shares}." if (shares := _combination(a)) else "dE vanishes.")
         )
         yield _complementarity(a)
         return
@@ -149,7 +149,7 @@ def _first_order(a: Analysis, unit: str | None) -> Iterator[str]:
         return
     if a.verdict is Verdict.NO_MULTIPLIER:
         yield (
-            f"The gradients of {_names(a.held_names)} are "
+            f"The gradients of {_names(tuple(a.stated(dict.fromkeys(a.held_names))))} are "
             "dependent and leave no inward direction, as at a cusp; no multipliers exist, and "
             "the conditions are inconclusive."
         )
@@ -158,7 +158,8 @@ def _first_order(a: Analysis, unit: str | None) -> Iterator[str]:
 
 
 def _combination(a: Analysis) -> str:
-    terms = (f"{number(value, DIGITS)} d({name})" for name, value in a.named_multipliers.items())
+    shown = a.stated(a.named_multipliers)
+    terms = (f"{number(value, DIGITS)} d({name})" for name, value in shown.items())
     return " + ".join(terms).replace("+ -", "- ")
 
 
@@ -219,8 +220,8 @@ def _dependence(a: Analysis) -> Iterator[str]:
         )
     if a.independent or len(a.blind) == len(a.gradients):
         return
-    names = a.held_names
-    size = rank(a.gradients, a.local.rank_tolerance)
+    names = tuple(a.stated(dict.fromkeys(a.held_names)))
+    size = rank(a.gradients, a.local.rank_tolerance) + len(names) - len(a.held_names)
     text = f"The {len(names)} gradients of {_names(names)} are dependent, of rank {size}"
     if not a.multipliers.exist:
         yield f"{text}."
@@ -229,7 +230,7 @@ def _dependence(a: Analysis) -> Iterator[str]:
     else:
         ranges = (
             f"{name} from {number(low, DIGITS)} to {number(high, DIGITS)}"
-            for name, (low, high) in a.named_ranges.items()
+            for name, (low, high) in a.stated(a.named_ranges).items()
         )
         yield f"{text}, so the multipliers are one choice of several: {'; '.join(ranges)}."
     implied = implied_functions(a)

@@ -1,9 +1,9 @@
 """What an analysis of the optimality conditions at a point has found."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
+T = TypeVar("T")
 Higher = Literal["series", "followed", "none"]  # how orders beyond the second are seen
 OPEN = 10  # a product of multiplier and gap beyond so many tolerances is not rounding
 
@@ -143,6 +144,11 @@ class Analysis(Value):
         sizes = np.linalg.norm(self.gradients, axis=1)
         safe = np.where(sizes > 0, sizes, 1.0)
         return dict(zip(self.held_names, (values / safe).tolist(), strict=True))
+
+    def stated(self, by_name: Mapping[str, T]) -> dict[str, T]:
+        """Return the entries but those of the equations that normalise vectors."""
+        hidden = self.local.problem.polyhedron.hidden
+        return {name: entry for name, entry in by_name.items() if name not in hidden}
 
     @property
     def named_multipliers(self) -> dict[str, float]:

@@ -66,8 +66,13 @@ class Quotient:
             return self.symmetry.invariants(q)
         u = q / self.problem.scales
         closed, radii = self._circles
-        turn = u[closed] / radii
-        return np.concatenate([u[~closed], radii * np.cos(turn), radii * np.sin(turn)])
+        turn, lines = u[closed] / radii, ~closed
+        turned = [radii * np.cos(turn), radii * np.sin(turn)]
+        for factor in self.problem.polyhedron.manifold.factors:
+            if factor.turns:
+                lines[factor.at] = False
+                turned.append(factor.even(q) / self.problem.scales[factor.at.start])
+        return np.concatenate([u[lines], *turned])
 
     def images(self, q: Array) -> list[Array]:
         """Return a point and its images under the finite group."""
@@ -93,11 +98,14 @@ class Quotient:
 
     def is_straight(self, p: Array, q: Array, energy: float, slack: float) -> bool:
         """Whether the segment from ``p`` to ``q`` stays in the set and on a level of the energy."""
-        way = self.problem.polyhedron.manifold.difference(q, p)
+        manifold = self.problem.polyhedron.manifold
+        way = manifold.difference(q, p)
         parts = math.ceil(float(abs(way / self.problem.scales).max()) / FINE) + 1
         if parts > LONGEST:
             return False
-        away, energies = self._along(p + np.linspace(0, 1, parts + 1)[1:-1, None] * way)
+        away, energies = self._along(
+            manifold.moved(p, np.linspace(0, 1, parts + 1)[1:-1, None] * way)
+        )
         if not (abs(energies - energy) <= slack).all():
             return False
         m = self.problem.inequalities
@@ -114,7 +122,8 @@ class Quotient:
         """Whether a step crosses no wall; contacts of ``p`` may be violated to second order."""
         parts = math.ceil(abs(step).max() / FINE)
         along = np.linspace(0, 1, parts + 1)[:, None]
-        away, _ = self._along(p + along * step * self.problem.scales)
+        manifold = self.problem.polyhedron.manifold
+        away, _ = self._along(manifold.moved(p, along * step * self.problem.scales))
         bent = np.where(abs(away[0]) <= SAME, (along * abs(step).max()) ** 2, 0.0)
         inside = (away + bent)[:, : self.problem.inequalities]
         return bool((self.problem.polyhedron.implicit_of(inside) >= -MISS).all())
@@ -163,9 +172,9 @@ class Quotient:
             if not self._is_clear(p, part * step):
                 continue
             length = part * abs(step).max()
-            guess = p + part * step * self.problem.scales
+            guess = manifold.moved(p, part * step * self.problem.scales)
             found = minimise(self.problem.polyhedron, self.problem.energy, guess)
-            away = manifold.difference(found.point, guess) / self.problem.scales
+            away = manifold.chord(found.point, guess) / self.problem.scales
             level = found.search is None and abs(found.energy - energy) <= slack
             gain = before - float(np.linalg.norm(goal - self.place(found.point)))
             if level and abs(away).max() <= 0.5 * length and gain >= GAIN * min(length, before):

@@ -54,8 +54,8 @@ def minima(
         onto it.  Or a number of points to sample independently and uniformly from the part of
         ``box`` in which the inequalities hold.
     box : sequence of (low, high), optional
-        Bounds for each coordinate of sampled points; None stands for a whole circle, and is the
-        default for circles.
+        Bounds for each coordinate of sampled points; None stands for a whole circle, sphere or
+        all rotations, and is the default for these.
     rng : Generator or int, optional
         Source of sampled points; default a generator with seed 0.
     symmetry : Symmetry, optional

@@ -45,7 +45,7 @@ class Problem(Value):
     @property
     def dimension(self) -> int:
         """The number of coordinates ``n``."""
-        return self.polyhedron.dimension
+        return self.polyhedron.manifold.size
 
     @property
     def inequalities(self) -> int:
@@ -210,9 +210,8 @@ class Problem(Value):
         d, m = self.polyhedron, self.inequalities
         chosen = independent_equations(d, points)
         parts = [d.functions[i] for i in sorted(piece)]
-        return pose(
-            Polyhedron(d.manifold, parts, [d.equations[i - m] for i in chosen]), self.energy
-        )
+        stated = [d.equations[i - m] for i in chosen if i - m < len(d.stated)]
+        return pose(Polyhedron(d.manifold, parts, stated), self.energy)
 
     def equations_hold(self, q: Array, tolerance: float) -> bool:
         """Whether ``q`` lies on all equations, to first order within a distance."""

@@ -8,9 +8,10 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.minimisation.problem import Problem
-from polycorner.spaces.manifold import Array, reals
+from polycorner.spaces.arguments import reals
+from polycorner.spaces.manifold import Array
 
-# Bounds for each coordinate; None for a whole circle.
+# Bounds for each coordinate; None for a whole circle or sphere.
 Box = Sequence[tuple[float, float] | None]
 
 TRIES = 10_000  # samples a start before a box is reported to miss the polyhedron
@@ -28,6 +29,7 @@ def start_points(
         msg = f"box: expected None with starts given as points; got {box!r}"
         raise ValueError(msg)
     points = manifold.points(np.atleast_2d(reals(starts, "starts")), "starts")
+    points = manifold.placed(points, "starts")
     if points.ndim != 2 or not len(points):
         msg = f"starts: expected points of shape (k, {problem.dimension}); got {points.shape}"
         raise ValueError(msg)
@@ -48,6 +50,7 @@ def _sampled(
     tries = 0
     while len(found) < count:
         q = rng.uniform(low, high, (4 * count, problem.dimension))
+        q = d.manifold.factors.scattered(q, rng) if d.manifold.factors else q
         inside = (d.implicit(q) >= 0) & np.isfinite(problem.energy.value(q))
         found = np.concatenate([found, q[inside]])
         tries += len(q)
@@ -66,10 +69,13 @@ def _bounds(problem: Problem, box: Any) -> tuple[Array, Array]:
             f"box: expected bounds (low, high) for each of {', '.join(manifold.names)}; got {box!r}"
         )
         raise ValueError(msg)
-    bounds = []
+    bounds, curved = [], {name for f in manifold.factors for name in f.names}
     for name, period, pair in zip(manifold.names, manifold.periods, given, strict=True):
         circle = pair is None and np.isfinite(period)
-        bound = (-period / 2, period / 2) if circle else pair
+        if name in curved and pair is not None:
+            msg = f"box: expected None for {name}, sampled from the whole sphere; got {pair!r}"
+            raise ValueError(msg)
+        bound = (-period / 2, period / 2) if circle else (0, 1) if name in curved else pair
         if not _is_interval(bound):
             msg = f"box: expected low < high for {name}, to sample points; got {pair!r}"
             raise ValueError(msg)

@@ -189,7 +189,7 @@ def sensitivity(
     _check_point(certificate)
     rates = check_rates(certificate, parameters)
     lifted, reference = Lifted(certificate), certificate.analysis.reference
-    multipliers = np.array(list(certificate.multipliers.values()))
+    multipliers = np.array(list(certificate.analysis.named_multipliers.values()))
     still, directions = np.zeros(len(lifted.slots)), lifted.directions(rates)
     linear = lifted.linearise(certificate.point, still, multipliers, directions)
     free = linear.free_directions(certificate)
@@ -209,7 +209,7 @@ def sensitivity(
         certificate=certificate,
         rates=rates,
         point=moved * certificate.problem.scales[:, None],
-        multipliers=dict(zip(lifted.names, changed, strict=True)),
+        multipliers=certificate.analysis.stated(dict(zip(lifted.names, changed, strict=True))),
         energy=linear.drift[-1] + linear.gradients[-1] @ moved,
         envelope=linear.drift[-1] - multipliers @ linear.drift[:-1],
         free=free,

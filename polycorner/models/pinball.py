@@ -18,7 +18,8 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.spaces.manifold import Array, Manifold, finite, reals
+from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
 from .mechanics import MechanicalSystem, State
 from .noise import Noise, Solver
 from .random_functions import random_field, random_signal
+from .rotations import angular_velocity, rotational_energy
 from .simulation import simulate, step
 from .system import System
 from .trajectory import Trajectory
@@ -38,10 +39,12 @@ __all__ = [
     "System",
     "Trajectory",
     "accelerations",
+    "angular_velocity",
     "pair_coordinates",
     "pair_velocities",
     "random_field",
     "random_signal",
+    "rotational_energy",
     "simulate",
     "step",
     "time_symbol",

@@ -120,7 +120,7 @@ def accelerations(system: System, state: State) -> Accelerations:
     else:
         verdict = Consistency.CONSISTENT
     names = (*system.contacts, *system.polyhedron.equation_names)
-    n = system.manifold.dimension
+    n = system.manifold.size
     return Accelerations(
         verdict,
         np.array([a for a, _ in found]).reshape(-1, n),

@@ -217,7 +217,7 @@ class ContactFamily(Value):
             for name in self.gaps
             if self.slip
         )
-        n = manifold.dimension
+        n = manifold.size
         return PairContacts(
             Family.of(self.gaps, coordinates),
             (),
@@ -248,7 +248,7 @@ def position_of(
     several: bool,
 ) -> tuple[int, int]:
     """Return the two coordinates of a position; the first is that of the substrate."""
-    known, n = manifold.names, manifold.dimension
+    known, n = manifold.names, manifold.size
     given = () if between is None else between.position
     chosen = [known.index(name) for name in given] or list(range(min(2, n)))
     moving = [known.index(name) for name in substrate]

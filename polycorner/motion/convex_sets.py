@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.spaces.manifold import Array, finite, reals, scalar
+from polycorner.spaces.arguments import finite, reals, scalar
+from polycorner.spaces.manifold import Array
 
 INTERVAL, DISC, ELLIPSE, CUT_DISC, POLYGON = range(5)
 Code = tuple[int, tuple[float, float, float, float], Array]

@@ -73,6 +73,11 @@ class MechanicalSystem(Value, ABC):
         """Return everything that a motion depends on, by name, as plain values."""
 
     @property
+    def hidden(self) -> frozenset[str]:
+        """Names of equations whose forces are not recorded."""
+        return frozenset()
+
+    @property
     def solver(self) -> Solver:
         """How exactly steps are solved unless something else is asked for."""
         return Solver()

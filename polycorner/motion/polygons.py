@@ -17,7 +17,8 @@ from polycorner.motion.convex_sets import (
     length,
     over,
 )
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.manifold import Array
 
 
 @dataclass(frozen=True, init=False)

@@ -51,6 +51,7 @@ class Recorder:
     def trajectory(self, system: "MechanicalSystem", **run: Any) -> Trajectory:
         """Return what was recorded; ``run`` are the arguments of the simulation."""
         bodies, columns = self.engine.bodies, self.columns
+        touching = [[t for t in some if t[1] not in system.hidden] for some in self.touching]
         sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
         work = {name: sums[:, i] for i, name in enumerate(WORK)}
         if bodies.exit_coordinate >= 0:
@@ -63,7 +64,7 @@ class Recorder:
             v=np.array(columns["v"]),
             rests=np.array(columns["rests"]),
             present=np.array(columns["alive"]),
-            touching=tuple(self.touching),
+            touching=tuple(map(tuple, touching)),
             kinetic=energies[:, 0],
             potential=energies[:, 1],
             dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(bodies.causes)},

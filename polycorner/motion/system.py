@@ -36,7 +36,7 @@ class System(MechanicalSystem):
         its contacts with the surroundings, and of ``h_j(q) = 0``, its joints and rails.  Forces
         of equations have either sign; that of ``h`` acts along its gradient.
     kinetic : sympy.Expr
-        ``T(q, v)`` of a body, a quadratic form in the velocities (:func:`velocities`).
+        ``T(q, v)`` of a body, quadratic in the :func:`velocities` (:func:`rotational_energy`).
     potential : sympy.Expr, optional
         ``V(q)``; default 0.
     forces : mapping from str to sympy.Expr, optional
@@ -125,11 +125,8 @@ class System(MechanicalSystem):
             if not isinstance(friction, Friction):
                 refuse("friction", "Friction values", friction, TypeError)
             if isinstance(friction.load, str) and friction.load not in self._normals:
-                expected = (
-                    f"one of the contacts {', '.join(self._normals)} or an expression for "
-                    f"friction {friction.name!r}"
-                )
-                refuse("load", expected, friction.load)
+                known = f"one of the contacts {', '.join(self._normals)} or an expression"
+                refuse("load", f"{known} for friction {friction.name!r}", friction.load)
         whole("count", self.count, least=1)
         if self.between is not None:
             instance("between", self.between, ContactFamily)
@@ -153,6 +150,11 @@ class System(MechanicalSystem):
     def manifold(self) -> Manifold:
         """The configuration manifold of a body."""
         return self.polyhedron.manifold
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Names of the equations of unit vectors and quaternions."""
+        return self.polyhedron.hidden
 
     @cached_property
     def contacts(self) -> tuple[str, ...]:
@@ -257,17 +259,17 @@ class System(MechanicalSystem):
         if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
             places = self.manifold.point(q).copy()
         else:
-            # `points` itself refuses a mapping, which only one body may have.
-            places = self.manifold.points(q, "q").copy()  # type: ignore[arg-type]
+            # `points` refuses a mapping, which only one body may have.
+            places = self.manifold.placed(self.manifold.points(q).copy())  # type: ignore[arg-type]
         speeds = np.zeros(places.shape)
         for name, speed in self.substrate.items():
             speeds[..., self.manifold.names.index(name)] = speed
         if v is not None:
             speeds = self.manifold.points(v, "v").copy()
         for argument, array in (("q", places), ("v", speeds)):
-            shape = places.shape if self.count == 1 else (self.count, self.manifold.dimension)
-            if array.shape != shape or array.size != self.count * self.manifold.dimension:
-                refuse(argument, f"shape ({self.count}, {self.manifold.dimension})", array.shape)
+            shape = places.shape if self.count == 1 else (self.count, self.manifold.size)
+            if array.shape != shape or array.size != self.count * self.manifold.size:
+                refuse(argument, f"shape ({self.count}, {self.manifold.size})", array.shape)
         self.check_placement(places)
         check_velocities(self.polyhedron, places, speeds)
         return State(real("time", time, unit="s"), places, speeds, self.sticks(places, speeds))
@@ -298,7 +300,7 @@ class System(MechanicalSystem):
 
     def energies(self, state: State) -> tuple[float, float]:
         """Return kinetic and potential energy of all bodies."""
-        n = self.manifold.dimension
+        n = self.manifold.size
         each = [
             energies(self.formulation, self.parameters, q, v)
             for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
@@ -308,7 +310,7 @@ class System(MechanicalSystem):
 
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
-        n, scales = self.manifold.dimension, self.manifold.scale_array
+        n, scales = self.manifold.size, self.manifold.scale_array
         law, known, held = self.formulation, self.parameters, self.polyhedron
         squared = max(
             highest_square(law, known, scales, q, v, bends(held, q))

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from polycorner.checks import instance, refuse, whole
 from polycorner.models.spheres import SphereCluster
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.manifold import Array
 
 BALL, SINGULAR_BALL = "#56B4E9", "#E69F00"  # Okabe and Ito
 BAR, OPENING, CLOSING = "0.25", "#D55E00", "#009E73"

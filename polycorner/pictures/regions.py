@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from polycorner.checks import instance, refuse, whole
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, stratum_at
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.manifold import Array
 
 Labelled = Sequence[tuple[str, ArrayLike]]
 Edges = Sequence[ArrayLike | tuple[str, ArrayLike]]

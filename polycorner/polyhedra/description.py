@@ -1,15 +1,16 @@
 """Polyhedra as tables: their functions with formulas, and how they are joined."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.printing import MOST, Sheet, Table
+from polycorner.spaces.manifold import Manifold
 
 LONGEST = 72  # characters of a formula beyond which only its coordinates are listed
 
 
 def description(
-    coordinates: Sequence[str],
+    manifold: Manifold,
     functions: Sequence[SmoothFunction],
     equations: Sequence[SmoothFunction],
     joined: str,
@@ -18,21 +19,31 @@ def description(
 
     Parameters
     ----------
-    coordinates : sequence of str
-        Names of the coordinates.
+    manifold : Manifold
+        The space of its points.
     functions, equations : sequence of SmoothFunction
         The inequalities ``f >= 0`` and the equations ``h = 0``.
     joined : str
         The and/or tree in words; empty where all inequalities hold together.
     """
     return Sheet(
-        f"Polyhedron in {', '.join(coordinates)}",
+        f"Polyhedron in {', '.join(_coordinates(manifold))}",
         (
             _table(("inequality", "f >= 0"), functions),
             _table(("equation", "h = 0"), equations),
             f"Joined as {joined}." if joined else "",
         ),
     )
+
+
+def _coordinates(manifold: Manifold) -> Iterator[str]:
+    """Yield the names of the coordinates, those of a sphere or rotation together."""
+    for name in manifold.names:
+        factor = next((f for f in manifold.factors if name in f.names), None)
+        if factor is None:
+            yield name
+        elif name == factor.names[0]:
+            yield f"the unit {factor.kind} ({', '.join(factor.names)})"
 
 
 def _table(head: tuple[str, str], functions: Sequence[SmoothFunction]) -> Table:

@@ -22,7 +22,8 @@ def independent_equations(polyhedron: Polyhedron, points: Iterable[Array]) -> tu
     The rank of equations on the set is the largest near given points: near, because it may fall
     short at the points themselves; on the set, because beside it dependent equations, such as one
     equation and its square, may have independent gradients.  Equations whose gradients vary least
-    in size come first: those of squares vanish on the set, those of multiples may.
+    in size come first: those of squares vanish on the set, those of multiples may.  Before them
+    come those that normalise vectors and quaternions, so that these are always among them.
 
     Parameters
     ----------
@@ -43,7 +44,8 @@ def independent_equations(polyhedron: Polyhedron, points: Iterable[Array]) -> tu
         return tuple(range(first, first + count))
     sizes = np.linalg.norm(samples, axis=2)
     steady = sizes.min(axis=0) / np.maximum(sizes.max(axis=0), 1e-300)
-    order = np.argsort(-steady, kind="stable").tolist()
+    normalising = np.arange(count) >= count - polyhedron.normalised
+    order = np.lexsort((-steady, ~normalising)).tolist()
     most = max((_first_independent(gradients, order) for gradients in samples), key=len)
     return tuple(first + i for i in sorted(most))
 

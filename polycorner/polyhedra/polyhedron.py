@@ -14,8 +14,10 @@ from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.description import description
 from polycorner.polyhedra.groups import AnyOf, Part, collect
+from polycorner.polyhedra.normalisation import normalisations
 from polycorner.printing import Printed, Sheet
-from polycorner.spaces.manifold import Array, Manifold, scalar
+from polycorner.spaces.arguments import scalar
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 # A model's remark on a point.
@@ -78,10 +80,12 @@ class Polyhedron(Printed, Value):
         if any(isinstance(node, AnyOf) for node in _groups(flat)):
             msg = "equations: expected functions that all vanish; got an AnyOf"
             raise ValueError(msg)
-        if not functions and not sections:
+        if not functions and not sections and not manifold.factors:
             msg = "parts: expected at least one inequality or equation; got none"
             raise ValueError(msg)
-        self.functions, self.equations = tuple(functions), tuple(sections)
+        own = normalisations(manifold)
+        self.normalised = len(own)
+        self.functions, self.equations = tuple(functions), (*sections, *own)
         self.names = tuple(f.name for f in self.functions)
         self.equation_names = tuple(h.name for h in self.equations)
         _check_distinct(self.names + self.equation_names)
@@ -91,17 +95,28 @@ class Polyhedron(Printed, Value):
 
     def __repr__(self) -> str:
         """Return the coordinates and the names of the functions."""
-        equations = f", equations {list(self.equation_names)}" if self.equations else ""
+        names = [h.name for h in self.stated]
+        equations = f", equations {names}" if names else ""
         return f"Polyhedron({list(self.manifold.names)}: {list(self.names)} >= 0{equations})"
 
     def _sheet(self) -> Sheet:
         joined = _words(self.tree, self.names)[1:-1] if self.is_union else ""
-        return description(self.manifold.names, self.functions, self.equations, joined)
+        return description(self.manifold, self.functions, self.stated, joined)
 
     @property
     def dimension(self) -> int:
         """The dimension of the manifold around it."""
         return self.manifold.dimension
+
+    @property
+    def stated(self) -> tuple[SmoothFunction, ...]:
+        """The equations without those that normalise vectors and quaternions, the last ones."""
+        return self.equations[: len(self.equations) - self.normalised]
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """The names of the equations that normalise vectors and quaternions."""
+        return frozenset(self.equation_names[len(self.equations) - self.normalised :])
 
     @cached_property
     def is_union(self) -> bool:
@@ -132,7 +147,7 @@ class Polyhedron(Printed, Value):
         return self._bundle.evaluate(self.manifold.points(q), order)
 
     def equation_values(self, q: ArrayLike) -> Array:
-        """Return ``h_j(q)``, shape ``(..., k)``."""
+        """Return ``h_j(q)``, shape ``(..., k)``, those that normalise vectors last."""
         points = self.manifold.points(q)
         if not self.equations:
             return np.empty((*points.shape[:-1], 0))
@@ -148,8 +163,10 @@ class Polyhedron(Printed, Value):
 
     def contains(self, q: ArrayLike, *, tolerance: float = 0.0) -> Any:
         """Whether ``q`` lies in ``D``, functions allowed to miss by ``tolerance``."""
-        inside = self.implicit_of(self.values(q)) >= -tolerance
-        return scalar(inside & (abs(self.equation_values(q)) <= tolerance).all(axis=-1))
+        points = self.manifold.placed(self.manifold.points(q))
+        inside = self.implicit_of(self.values(points)) >= -tolerance
+        off = abs(self.equation_values(points)[..., : len(self.stated)])
+        return scalar(inside & (off <= tolerance).all(axis=-1))
 
     def signs_to_pieces(self, signs: Sequence[int]) -> list[Piece]:
         """Return ``D`` near a point as a union of pieces, from the sign of every function there.

@@ -41,9 +41,10 @@ class Stratum(Printed, Value):
     pieces : tuple of tuple of str
         The polyhedron near the point as a union: each piece is where its functions are >= 0.
     rank : int
-        Rank of the gradients of active functions and equations, as far as they are finite.
+        Rank of the gradients of active functions and equations on the manifold, as far as they
+        are finite.
     dimension : int
-        Dimension of the face, ``n - rank``.
+        Dimension of the face, that of the manifold minus the rank.
     local_type : LocalType
         Interior, quadrant, cone, union, degenerate, not smooth, or outside.
     annotations : mapping from str to str or None
@@ -129,16 +130,16 @@ def stratum_of(
     """Classify a point by values and scaled gradients there; see :func:`stratum_at`."""
     pieces = local_pieces(polyhedron, values, gradients, tolerance)
     active = sorted(set().union(*pieces))
-    m, n = len(polyhedron.functions), polyhedron.dimension
+    m, hidden = len(polyhedron.functions), polyhedron.normalised
     jacobian = gradients[[*active, *range(m, len(values))]]
     known = np.isfinite(jacobian).all(axis=1)
-    r = rank(jacobian[known], rank_tolerance)
+    r = rank(jacobian[known], rank_tolerance) - hidden
     kind = _local_type(pieces, gradients, m, rank_tolerance) if known.all() else None
     return Stratum(
         active=tuple(polyhedron.names[i] for i in active),
         pieces=tuple(tuple(polyhedron.names[i] for i in sorted(piece)) for piece in pieces),
         rank=r,
-        dimension=n - r,
+        dimension=polyhedron.dimension - r,
         local_type=kind or LocalType.NOT_SMOOTH,
         annotations={name: label(point) for name, label in polyhedron.annotations.items()},
     )

@@ -98,12 +98,12 @@ class Symmetry(Value):
         if manifold not in self._compiled:
             self._compiled[manifold] = [vector_field(manifold, field) for field in self.fields]
         vectors = [[f.value(q) for f in field] for field in self._compiled[manifold]]
-        return np.array(vectors).reshape(-1, manifold.dimension) / manifold.scale_array
+        return np.array(vectors).reshape(-1, manifold.size) / manifold.scale_array
 
     def displacement(self, manifold: Manifold, p: Array, q: Array) -> Array:
         """Return the displacement from one continuous orbit to another, by the invariants."""
         if self.invariants is None:
-            return manifold.difference(p, q) / manifold.scale_array
+            return manifold.chord(p, q) / manifold.scale_array
         return self.invariants(p) - self.invariants(q)
 
     def separation(self, manifold: Manifold, p: Array, q: Array) -> float:
@@ -113,7 +113,7 @@ class Symmetry(Value):
     def separations(self, manifold: Manifold, p: Array, points: Array) -> Array:
         """Return how far the orbit of ``p`` is apart from those of points ``(k, n)``, ``(k,)``."""
         if self.invariants is None:
-            apart = manifold.difference(p, points) / manifold.scale_array
+            apart = manifold.chord(p, points) / manifold.scale_array
         else:
             apart = np.array([self.invariants(q) for q in points]) - self.invariants(p)
         return np.asarray(abs(apart).max(axis=1))
@@ -127,7 +127,7 @@ class Symmetry(Value):
         if self.relabel is not None or self.invariants is not None:
             return list(range(len(points)))
         moved = np.array([element.apply(p) for element in self.group])
-        away = abs(manifold.difference(moved[:, None], points)) / manifold.scale_array
+        away = abs(manifold.chord(moved[:, None], points)) / manifold.scale_array
         found: list[int] = np.flatnonzero((away.max(axis=-1) <= tolerance).any(axis=0)).tolist()
         return found
 
@@ -182,16 +182,22 @@ def vector_field(manifold: Manifold, components: Any) -> "tuple[SmoothFunction, 
             "symmetry", "components by name, or a sequence of them", components, TypeError
         )
     given = list(components)
-    if len(given) != manifold.dimension:
-        expected = f"{manifold.dimension} components, for {', '.join(manifold.names)}"
+    if len(given) != manifold.size:
+        expected = f"{manifold.size} components, for {', '.join(manifold.names)}"
         checks.refuse("symmetry", expected, len(given))
+    quaternions = {name for some in manifold.rotations for name in some}
+
+    def component(name: str, expression: Any) -> SmoothFunction:
+        # At the opposite quaternion a tangent vector has the opposite components.
+        made = SmoothFunction.quantity if name in quaternions else SmoothFunction
+        return made(name, expression, manifold)
+
     return tuple(
         f
         if isinstance(f, SmoothFunction)
-        else SmoothFunction(
+        else component(
             name,
             sympy.Rational(f.numerator, f.denominator) if isinstance(f, Fraction) else f,
-            manifold,
         )
         for name, f in zip(manifold.names, given, strict=True)
     )

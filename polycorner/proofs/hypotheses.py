@@ -44,8 +44,8 @@ def check_hypotheses(claim: Claim, enclosure: Enclosure) -> dict[str, ConditionR
     found = {
         UNIQUE: proved(f"Krawczyk's operator maps a box of {claim.system.size} unknowns inside"),
         INDEPENDENT: proved(
-            f"{', '.join(claim.names)}: rows of a regular KKT matrix"
-            if claim.names
+            f"{', '.join(claim.stated)}: rows of a regular KKT matrix"
+            if claim.stated
             else "no function is active",
         ),
     }

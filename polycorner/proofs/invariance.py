@@ -53,7 +53,7 @@ class Generator:
     def at(self, q: "Sequence[Ball]") -> "list[Ball] | Undecided":
         """Return enclosures of the components on a box, or why smoothness is undecided."""
         rows = range(len(self.components))
-        box = Box(q[: self.manifold.dimension])
+        box = Box(q[: self.manifold.size])
         forms = self._formulas.smooth(box, rows)
         return forms if isinstance(forms, Undecided) else list(forms.evaluate(box, 0)[0])
 

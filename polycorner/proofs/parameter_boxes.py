@@ -183,11 +183,12 @@ def _over_all(cells: Sequence[ParameterCell], name: str) -> ConditionResult:
 
 def _bounds(claim: Claim, enclosure: Enclosure) -> dict[str, Interval]:
     d = claim.problem.polyhedron
-    n = d.dimension
+    n = d.manifold.size
     found = dict(zip(d.manifold.names, enclosure.solution[:n], strict=True))
     found["energy"] = enclosure.linear.energy
     for name, value in zip(claim.names, enclosure.solution[n:], strict=False):
-        found[f"multiplier {name}"] = value
+        if name not in d.hidden:
+            found[f"multiplier {name}"] = value
     return {name: _outwards(value) for name, value in found.items()}
 
 

@@ -87,6 +87,11 @@ class Claim:
         """Names of the active inequalities, then of the equations."""
         return self.named(self.system.held)
 
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """These names but those of equations that normalise vectors and quaternions."""
+        return tuple(name for name in self.names if name not in self.problem.polyhedron.hidden)
+
     def named(self, rows: Sequence[int]) -> tuple[str, ...]:
         """Return the names of some rows."""
         d = self.problem.polyhedron

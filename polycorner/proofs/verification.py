@@ -166,7 +166,9 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
         values = [bounds(x) for x in enclosure.solution]
         energy = bounds(enclosure.linear.energy)
     named = _named(posed, values)
+    hidden = {f"multiplier {name}" for name in d.hidden}
     sides = {name: named[name] for name in d.manifold.names} | {"energy": energy} | named
+    sides = {name: side for name, side in sides.items() if name not in hidden}
     box = _named(posed, _uniqueness_box(enclosure))
     return replace(
         _proof(certificate, digits, active, symmetry, found),
@@ -174,7 +176,7 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
         box={
             name: decimals(*side, digits + BOX_DIGITS, inwards=True) for name, side in box.items()
         },
-        region=tuple(values[: d.dimension]),
+        region=tuple(values[: d.manifold.size]),
     )
 
 

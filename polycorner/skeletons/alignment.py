@@ -62,4 +62,4 @@ def _covered(net: Net, points: Array) -> bool:
     """Whether a net covers any of the points."""
     q, _ = net.surface.projected(points)
     _, gradients = net.surface.evaluated(q)
-    return bool(net.covers(net.surface.embedded(q), net.surface.normals(gradients)[0]).any())
+    return bool(net.covers(net.surface.embedded(q), net.surface.across(gradients)).any())

@@ -73,7 +73,7 @@ def _ordered(explorer: Explorer, names: frozenset[str]) -> tuple[str, ...]:
 def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
     ends = [record.edges.get(representative) for representative in record.orbit]
     return Corner(
-        point=explorer.manifold.wrap(record.point.q),
+        point=explorer.manifold.canonical(record.point.q),
         stratum=stratum_of(
             explorer.polyhedron,
             record.point.q,
@@ -296,7 +296,7 @@ def _components(
         return {}
     point = explorer.quotient.at(points[0])
     fixed = len(point.matrix([])) - len(explorer.quotient.equations)
-    free = explorer.manifold.dimension - len(point.matrix([]))
+    free = explorer.manifold.size - len(point.matrix([]))
     counts = {fixed: len(explorer.records), fixed + 1: len(explorer.curves)}
     if free >= 2:
         counts[fixed + 2] = faces

@@ -141,7 +141,7 @@ def _euler(found: Skeleton) -> str:
 
 def _corner_table(found: Skeleton) -> Table:
     manifold = found.polyhedron.manifold
-    shown = manifold.dimension if manifold.dimension <= MOST_COORDINATES else 0
+    shown = manifold.size if manifold.size <= MOST_COORDINATES else 0
     rows = (
         (
             corner_name(k),

@@ -256,7 +256,7 @@ class Explorer(Prober):
             for i, sector in enumerate(record.figure.sectors):
                 flag = ("apex", (k, i), self.registry.names(sector.active))
                 if not sector.rays and sector.sample is not None and flag not in self.tried:
-                    way = self.manifold.difference(sector.sample.q, record.point.q) / self.scales
+                    way = self.manifold.chord(sector.sample.q, record.point.q) / self.scales
                     yield flag, sector.sample, way
 
     def faces_beside(self, k: int) -> Mapping[frozenset[int], Ray]:

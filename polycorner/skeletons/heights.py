@@ -13,6 +13,7 @@ STENCIL = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]])
 class Height:
     """A random linear function of the lines and a wave on every circle, or of the invariants.
 
+    On rotations it is a quadratic form in the quaternion, the same at opposite ones.
     Derivatives are in scaled coordinates; those of invariants are central differences.
     """
 
@@ -25,6 +26,12 @@ class Height:
         self._invariant = surface.quotient.symmetry.invariants is not None
         self._weights, self._phases = rng.standard_normal(n), rng.uniform(0, 2 * np.pi, n)
         self._rng, self._shares = rng, np.zeros(0)
+        self._form = np.zeros((n, n))
+        for factor in surface.manifold.factors:
+            if factor.turns:
+                form = rng.standard_normal((len(factor.names),) * 2)
+                self._form[factor.at, factor.at] = form + form.T
+                self._weights[factor.at] = 0.0
 
     def slopes(self, q: Array, directions: Array) -> Array:
         """Return the slopes ``(k, d)`` along scaled directions ``(k, n, d)``."""
@@ -44,6 +51,7 @@ class Height:
         first = self._gradient(q)
         waves = np.where(self._circles, -np.cos(self._angles(q)) * self._rates, 0.0)
         curvature = np.einsum("knt,kn,kns->kts", tangents, waves * self._weights, tangents)
+        curvature += np.einsum("knt,nm,kms->kts", tangents, self._form, tangents)
         held = self.surface.held
         if held:
             with np.errstate(all="ignore"):
@@ -68,7 +76,7 @@ class Height:
 
     def _gradient(self, q: Array) -> Array:
         waves = np.where(self._circles, -np.sin(self._angles(q)), 1.0)
-        return np.asarray(waves * self._weights)
+        return np.asarray(waves * self._weights + q / self.surface.scales @ self._form)
 
     def _angles(self, q: Array) -> Array:
         return np.asarray(self._rates * q / self.surface.scales + self._phases)

@@ -68,7 +68,7 @@ def face_euler_characteristic(border: Border) -> int | None:
     if len(found) < AGREEING or len(set(found)) > 1:
         return None
     handles = 2 - border.curves - found[0]
-    orientable = symmetry.invariants is None
+    orientable = symmetry.invariants is None and not surface.manifold.rotations
     return found[0] if handles >= 0 and not (orientable and handles % 2) else None
 
 

@@ -84,7 +84,7 @@ class Net:
         if tangents is None:
             return False
         frames, images = self.surface.frames(points, tangents)
-        normals, _ = self.surface.normals(gradients)
+        normals = self.surface.across(gradients)
         where = self.surface.embedded(points)
         free = ~self.covers(where, normals)
         for k in np.flatnonzero(free):
@@ -121,14 +121,20 @@ class Net:
     def _covered(
         self, p: Array, normals: Array, q: Array, images: Array, others: Array, radii: Array
     ) -> Flags:
-        apart = self.surface.apart(p[:, None], q[None])
+        surface = self.surface
+        apart = surface.apart(p[:, None], q[None])
         flat = np.einsum("abn,bnt->abt", apart, images)
         along = np.einsum("abt,abt->ab", flat, flat)
         height = np.einsum("abn,abn->ab", apart, apart) - along
         near = (along < (COVERED * radii) ** 2) & (height < (HEIGHT * radii) ** 2)
-        if self.surface.quotient.symmetry.invariants is None and normals.shape[1]:
-            cosines = np.einsum("arn,brn->abr", normals, others)
-            near &= (cosines > TURN - 0.15).all(axis=2)
+        if surface.quotient.symmetry.invariants is None and normals.shape[1]:
+            if surface.polyhedron.normalised:
+                signs = surface.manifold.factors.signs(p[:, None], q[None])
+                turned = np.linalg.det(np.einsum("abn,arn,bsn->abrs", signs, normals, others))
+                near &= turned > TURN - 0.15
+            else:
+                cosines = np.einsum("arn,brn->abr", normals, others)
+                near &= (cosines > TURN - 0.15).all(axis=2)
         found: Flags = near.any(axis=1)
         return found
 
@@ -145,14 +151,15 @@ class Net:
             shape = guess.shape[:3]
             q, found = self.surface.projected(guess.reshape(-1, guess.shape[-1]))
             values, gradients = self.surface.evaluated(q)
-            normals, _ = self.surface.normals(gradients)
+            normals = self.surface.across(gradients)
             inside = (found & self.surface.contains(values)).reshape(shape)
             inside &= self._joined(new, values.reshape(*shape, -1))
-            cosines = np.einsum(
-                "kxrn,krn->kxr",
-                normals.reshape(len(new), RAYS * self.levels, *normals.shape[1:]),
-                self.normals[new],
-            ).min(axis=2, initial=1.0)
+            along = normals.reshape(len(new), RAYS * self.levels, *normals.shape[1:])
+            if self.surface.polyhedron.normalised:
+                cosines = np.linalg.det(np.einsum("kxrn,ksn->kxrs", along, self.normals[new]))
+            else:
+                cosines = np.einsum("kxrn,krn->kxr", along, self.normals[new])
+                cosines = cosines.min(axis=2, initial=1.0)
             flat = (cosines > TURN).reshape(shape) & found.reshape(shape)
             reached = np.logical_and.accumulate(inside & flat, axis=2)
             # Levels up to the first outside the face must be seen without a doubt.

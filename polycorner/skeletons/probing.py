@@ -110,7 +110,7 @@ class Prober(EdgeTracer):
     @staticmethod
     def _is_on(net: Net, q: Array) -> bool:
         _, gradients = net.surface.evaluated(q[None])
-        normals, _ = net.surface.normals(gradients)
+        normals = net.surface.across(gradients)
         return bool(net.covers(net.surface.embedded(q[None]), normals, WITHIN)[0])
 
     def _net(self, active: frozenset[int], q: Array) -> Net:
@@ -243,7 +243,7 @@ class Prober(EdgeTracer):
 
     def _near(self, q: Array, points: Array) -> bool:
         """Whether a point lies near the chords of an edge."""
-        apart = self.manifold.difference(q, points) / self.scales
+        apart = self.manifold.chord(q, points) / self.scales
         chords = np.diff(points, axis=0) / self.scales
         lengths = np.einsum("kn,kn->k", chords, chords)
         parts = np.einsum("kn,kn->k", apart[:-1], chords) / np.maximum(lengths, 1e-300)

@@ -14,7 +14,7 @@ from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
-from polycorner.spaces.manifold import reals
+from polycorner.spaces.arguments import reals
 
 EXTENT = 1000.0
 BUDGET = 100_000
@@ -93,6 +93,7 @@ def skeleton(
     if points.ndim != 2:
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)
+    points = polyhedron.manifold.placed(points, "starts")
     quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerance, float(extent), points)
     explorer = Explorer(quotient, points, checks.generator("rng", rng))
     return _run(explorer, budget, progress)

@@ -67,6 +67,21 @@ class Surface:
         with np.errstate(all="ignore"):
             return np.nan_to_num(rows / sizes[..., None]), sizes
 
+    def across(self, gradients: Array) -> Array:
+        """Return unit vectors that span the normals of the surface, ``(k, r, n)``.
+
+        On spheres and rotations gradients may be nearly parallel to the vector itself, so that
+        they hardly turn where the surface does: there each is taken orthogonal to those after it,
+        and the determinant of the products of two such frames is that of the cosines of the angles
+        between the tangent planes.
+        """
+        units, _ = self.normals(gradients)
+        if not self.polyhedron.normalised or not len(units):
+            return units
+        frames, factors = np.linalg.qr(units[:, ::-1].transpose(0, 2, 1))
+        signs = np.where(np.diagonal(factors, axis1=1, axis2=2) < 0, -1.0, 1.0)
+        return np.asarray((frames * signs[:, None]).transpose(0, 2, 1)[:, ::-1])
+
     def projected(self, q: Array) -> tuple[Array, Flags]:
         """Return the nearest points of the surface, and which of them were found."""
         size = np.zeros(len(q))
@@ -111,7 +126,7 @@ class Surface:
 
     def sees(self, p: Array, q: Array) -> Any:
         """Whether straight ways from one point of the face to others stay on it."""
-        away = self.manifold.difference(q, p)
+        away = self.manifold.chord(q, p)
         way = p + WAY[:, None, None] * away
         found, on = self.projected(way.reshape(-1, len(p)))
         on &= self.contains(self.values(found))
@@ -171,7 +186,7 @@ class Surface:
         """Return displacements from embedded points ``q`` to embedded points ``p``."""
         if self.quotient.symmetry.invariants is not None:
             return np.asarray(p - q)
-        return self.manifold.difference(p * self.scales, q * self.scales) / self.scales
+        return self.manifold.chord(p * self.scales, q * self.scales) / self.scales
 
 
 def _is_elementwise(invariants: Callable[[Array], Array], q: Array) -> bool:

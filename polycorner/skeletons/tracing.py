@@ -146,7 +146,7 @@ class EdgeTracer:
         Singular corners are known less exactly than edges beside each other are apart there, so
         the distance is that from the corner in record, where it is not elsewhere on the orbit.
         """
-        moved = self.manifold.difference(record.point.q, walk.last.q)
+        moved = self.manifold.chord(record.point.q, walk.last.q)
         end = walk.last.q + moved * (abs(moved / self.scales).max() < NEAR)
         away = np.linalg.norm((walk.points - end) / self.scales, axis=1)
         beyond = np.flatnonzero(away > distance)
@@ -245,6 +245,7 @@ class EdgeTracer:
     def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
         """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
         start, end = curve.points[k], curve.points[k + 1]
+        q = self.manifold.image(q, start)
         kept = self.quotient.at(start).basis(curve.active)
         along = self.symmetry.displacement(self.manifold, end, start)
 

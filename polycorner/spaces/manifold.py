@@ -1,31 +1,43 @@
-"""Products of lines and circles, with a length scale for each coordinate."""
+"""Products of lines, circles, spheres and rotations, with a length scale for each coordinate."""
 
 import math
-import re
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import refuse
-from polycorner.values import Value, read_only
+from polycorner.spaces.arguments import (
+    finite,
+    given,
+    groups_of,
+    names_of,
+    positive,
+    reals,
+    scalar,
+    units_of,
+)
+from polycorner.spaces.embedding import rotation_matrix
+from polycorner.spaces.factors import factors
+from polycorner.spaces.geometry import Geometry
 
 if TYPE_CHECKING:
     import sympy
 
 Array = NDArray[np.float64]
 
-FEW = 24
-_IDENTIFIER = re.compile(r"[^\W\d]\w*")
-
 
 @dataclass(frozen=True)
-class Manifold(Value):
-    """The configuration manifold ``X``: a product of lines and circles with one chart.
+class Manifold(Geometry):
+    """The configuration manifold ``X``: a product of lines, circles, spheres and rotations.
+
+    A point is one vector of length ``N`` (:attr:`size`).  Points of a sphere are unit vectors, and
+    rotations unit quaternions ``(w, x, y, z)``, of which ``a`` and ``-a`` are the same; they count
+    with two and three to the :attr:`dimension` ``n``.  Formulas are written in all ``N``
+    coordinates, and tangent vectors have ``N`` components; :meth:`frame` gives bases.
+    :meth:`euclidean`, :meth:`sphere` and :meth:`rotation` make the factors.
 
     Parameters
     ----------
@@ -40,6 +52,9 @@ class Manifold(Value):
         Unit of each coordinate, such as ``"mm"``, and ``""`` where none is stated; default
         ``"rad"`` for circles of period ``2 pi``.  Tables and files show it; two manifolds that
         differ in nothing else are equal.
+    spheres, rotations : sequence of tuple of str, optional
+        The names of coordinates, in succession and of one scale, that are unit vectors and unit
+        quaternions.
 
     Raises
     ------
@@ -54,22 +69,36 @@ class Manifold(Value):
     [-0.283, 1.0]
     >>> (M * M).names
     ('phi1', 'eta1', 'phi2', 'eta2')
+    >>> pose = Manifold.euclidean("x y z", unit="mm") * Manifold.rotation("a")
+    >>> pose.names, pose.size, pose.dimension
+    (('x', 'y', 'z', 'aw', 'ax', 'ay', 'az'), 7, 6)
     """
 
     names: tuple[str, ...]
     periods: tuple[float, ...] = ()
     scales: tuple[float, ...] = ()
     units: tuple[str, ...] = field(default=(), compare=False)
+    spheres: tuple[tuple[str, ...], ...] = ()
+    rotations: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        names = _names(self.names)
+        names = names_of(self.names)
         n = len(names)
         object.__setattr__(self, "names", names)
-        periods = _positive("periods", _given(self.periods, math.inf, n), n, finite=False)
-        scales = _positive("scales", _given(self.scales, 1.0, n), n, finite=True)
+        periods = positive("periods", given(self.periods, math.inf, n), n, finite=False)
+        scales = positive("scales", given(self.scales, 1.0, n), n, finite=True)
         object.__setattr__(self, "periods", periods)
         object.__setattr__(self, "scales", scales)
-        object.__setattr__(self, "units", _units(self.units, periods))
+        object.__setattr__(self, "units", units_of(self.units, periods))
+        for kind in ("spheres", "rotations"):
+            object.__setattr__(self, kind, groups_of(kind, getattr(self, kind)))
+        factors(names, self.spheres, self.rotations, periods, scales)
+
+    def __repr__(self) -> str:
+        """Return the arguments that make it; spheres and rotations only where there are any."""
+        shown = [f for f in fields(self) if getattr(self, f.name) != ()]
+        arguments = ", ".join(f"{f.name}={getattr(self, f.name)!r}" for f in shown)
+        return f"Manifold({arguments})"
 
     @classmethod
     def euclidean(
@@ -80,14 +109,49 @@ class Manifold(Value):
         >>> Manifold.euclidean("x y").dimension
         2
         """
-        parsed = _names(names)
+        parsed = names_of(names)
         n = len(parsed)
         return cls(parsed, (math.inf,) * n, (scale,) * n, (unit,) * n)
 
+    @classmethod
+    def sphere(cls, names: str | Sequence[str], *, scale: float = 1.0) -> "Manifold":
+        """``S^k``, unit vectors; one name ``"u"`` stands for the coordinates ``ux uy uz`` of S^2.
+
+        ``scale`` is the arc, in radians, that counts as a unit displacement.
+
+        >>> Manifold.sphere("u").names, Manifold.sphere("p q r s").dimension
+        (('ux', 'uy', 'uz'), 3)
+        """
+        parsed = names_of(names)
+        parsed = tuple(parsed[0] + axis for axis in "xyz") if len(parsed) == 1 else parsed
+        n = len(parsed)
+        return cls(parsed, (math.inf,) * n, (scale,) * n, spheres=(parsed,))
+
+    @classmethod
+    def rotation(cls, names: str | Sequence[str], *, scale: float = 1.0) -> "Manifold":
+        """``SO(3)``, unit quaternions; ``"a"`` stands for the coordinates ``aw ax ay az``.
+
+        ``scale`` is the angle, in radians, that counts as a unit displacement.  Quaternions are
+        half the angle of the rotation apart, so that their coordinates have half that scale.
+
+        >>> M = Manifold.rotation("a")
+        >>> M.distance([1, 0, 0, 0], [0.6, 0.8, 0, 0]) == 2 * math.acos(0.6)
+        True
+        """
+        parsed = names_of(names)
+        parsed = tuple(parsed[0] + axis for axis in "wxyz") if len(parsed) == 1 else parsed
+        n = len(parsed)
+        return cls(parsed, (math.inf,) * n, (scale / 2,) * n, rotations=(parsed,))
+
+    @property
+    def size(self) -> int:
+        """The number ``N`` of coordinates."""
+        return len(self.names)
+
     @property
     def dimension(self) -> int:
-        """The number of coordinates."""
-        return len(self.names)
+        """The dimension ``n``: one less than coordinates for every sphere and rotation."""
+        return len(self.names) - len(self.spheres) - len(self.rotations)
 
     @cached_property
     def symbols(self) -> "tuple[sympy.Symbol, ...]":
@@ -109,19 +173,6 @@ class Manifold(Value):
             raise ValueError(msg)
         return _product((self,) * copies)
 
-    @cached_property
-    def scale_array(self) -> Array:
-        """The scales as an array."""
-        scales: Array = read_only(np.array(self.scales))
-        return scales
-
-    @cached_property
-    def _circles(self) -> tuple[NDArray[np.intp], Array]:
-        """Positions and periods of the coordinates that are circles."""
-        periods = np.array(self.periods, dtype=np.float64)
-        positions = np.flatnonzero(periods < math.inf)
-        return positions, periods[positions]
-
     def points(self, q: ArrayLike, argument: str = "q") -> Array:
         """Check that ``q`` is one point ``(n,)`` or a batch ``(..., n)`` of finite reals.
 
@@ -139,14 +190,17 @@ class Manifold(Value):
         array = reals(q, argument)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             msg = (
-                f"{argument}: expected shape (..., {self.dimension}) for the coordinates "
+                f"{argument}: expected shape (..., {self.size}) for the coordinates "
                 f"{', '.join(self.names)}; got shape {array.shape}"
             )
             raise ValueError(msg)
         return finite(array, argument)
 
     def point(self, q: ArrayLike | Mapping[str, float], argument: str = "q") -> Array:
-        """Check one point: ``n`` finite reals, or a mapping from coordinate names to them."""
+        """Check one point: ``N`` finite reals, or a mapping from coordinate names to them.
+
+        Vectors and quaternions must have a length near one, and are normalised.
+        """
         if isinstance(q, Mapping):
             if set(q) != set(self.names):
                 msg = (
@@ -156,118 +210,109 @@ class Manifold(Value):
             q = [q[name] for name in self.names]
         array = self.points(q, argument)
         if array.ndim != 1:
-            msg = f"{argument}: expected one point of shape ({self.dimension},); got {array.shape}"
+            msg = f"{argument}: expected one point of shape ({self.size},); got {array.shape}"
             raise ValueError(msg)
-        return array
+        return self.placed(array, argument) if self.factors else array
 
     def wrap(self, q: ArrayLike) -> Array:
-        """Bring circle coordinates into ``(-period/2, period/2]``; lines stay as they are."""
-        return self._principal(self.points(q).copy())
+        """Bring points ``(..., N)`` into one form.
+
+        Circle coordinates are brought into ``(-period/2, period/2]``; lines stay as they are;
+        vectors and quaternions are normalised, with a sign of quaternions that makes the first
+        component positive that is not zero.
+
+        Raises
+        ------
+        ValueError
+            For a vector or a quaternion of length zero.
+        """
+        points = self.points(q)
+        if self.factors:
+            self.factors.check(points, "q", None)
+        return self.canonical(points)
 
     def difference(self, p: ArrayLike, q: ArrayLike) -> Array:
-        """Return the shortest tangent vector that leads from ``q`` to ``p``."""
-        return self._principal(self.points(p, "p") - self.points(q))
+        """Return the shortest tangent vector at ``q`` that leads to ``p``, ``(..., N)``.
 
-    def _principal(self, array: Array) -> Array:
-        circles, periods = self._circles
-        if circles.size:
-            values = array[..., circles]
-            array[..., circles] = values - periods * np.ceil(values / periods - 0.5)
-        return array
+        On spheres and rotations it is tangent to the great circle at ``q``, in the coordinates of
+        the space around them, and as long as the arc: half the angle of a rotation.
+        """
+        p, q = self.points(p, "p"), self.points(q)
+        found = self._principal(p - q)
+        if self.factors:
+            self.factors.check(p, "p", None)
+            self.factors.check(q, "q", None)
+            self.factors.difference(p, q, found)
+        return found
 
     def shift(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """Return the point reached from ``q`` along the tangent vector ``v``."""
-        return self.wrap(self.points(q) + self.points(v, "v"))
+        """Return the point reached from ``q`` along the tangent vector ``v``, wrapped.
+
+        On spheres and rotations the way is a great circle, along the tangent part of ``v``.
+        """
+        q, v = self.points(q), self.points(v, "v")
+        self.factors.check(q, "q", None)
+        return self.wrap(self.moved(q, v))
+
+    def distance(self, p: ArrayLike, q: ArrayLike) -> Any:
+        """Return the distance in scale units, by arcs and angles of rotation, ``(...)``.
+
+        >>> Manifold.sphere("u").distance([1, 0, 0], [0, 1, 0]) == math.pi / 2
+        True
+        """
+        return scalar(np.linalg.norm(self.difference(p, q) / self.scale_array, axis=-1))
+
+    def frame(self, q: ArrayLike) -> Array:
+        """Return a basis of the tangent space at ``q`` as columns, ``(..., N, n)``.
+
+        Lines and circles contribute their unit vectors, a sphere an orthonormal basis, and a
+        rotation the derivatives by the angular velocity in the axes of the body: ``frame @ w`` is
+        the velocity ``q'`` for components ``w``, and ``frame.T`` takes gradients ``dE/dq`` to
+        slopes, of rotations to torques.
+
+        >>> Manifold.rotation("a").frame([1, 0, 0, 0])[1:].tolist()
+        [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5]]
+        """
+        q = self.points(q)
+        self.factors.check(q, "q", None)
+        found = np.zeros((*q.shape[:-1], self.size, self.dimension))
+        self.factors.frame(q, found)
+        return found
+
+    def matrix(self, name: str | None = None) -> "sympy.ImmutableMatrix":
+        """Return the matrix of a rotation as formulas in its quaternion, from body to space.
+
+        Parameters
+        ----------
+        name : str, optional
+            The name of the rotation, ``"a"`` for the coordinates ``aw ax ay az``; of ``M * M``,
+            ``"a1"`` and ``"a2"``.  Needed where there are several.
+
+        >>> Manifold.rotation("a").matrix()[0, 1]
+        -2*aw*az + 2*ax*ay
+        """
+        return rotation_matrix(self.symbols[self.factors.named(name, turns=True).at])
+
+    def vector(self, name: str | None = None) -> "sympy.ImmutableMatrix":
+        """Return the coordinates of a sphere as a column; ``name`` as for :meth:`matrix`."""
+        import sympy
+
+        return sympy.ImmutableMatrix(self.symbols[self.factors.named(name, turns=False).at])
 
 
-def reals(values: ArrayLike, argument: str) -> Array:
-    """Turn ``values`` into an array of float64, refusing anything that is not real numbers."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        return values
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        msg = f"{argument}: expected a rectangular array of real numbers; got ragged nesting"
-        raise ValueError(msg) from error
-    if array.dtype.kind not in "iuf":
-        msg = f"{argument}: expected real numbers; got dtype {array.dtype}"
-        raise TypeError(msg)
-    return array.astype(np.float64)
+def _product(parts: tuple[Manifold, ...]) -> Manifold:
+    names = [name for factor in parts for name in factor.names]
+    repeated = len(set(names)) < len(names)
 
+    def renamed(given: Sequence[str], k: int) -> tuple[str, ...]:
+        return tuple(f"{name}{k}" if repeated else name for name in given)
 
-def scalar(values: Any) -> Any:
-    """Return a plain Python number for an array of no dimension, any other array as it is."""
-    return values.item() if values.ndim == 0 else values
-
-
-def finite(array: Array, argument: str) -> Array:
-    """Return ``array`` unchanged, refusing NaN and infinities."""
-    # For a single point a Python loop is faster than two passes of NumPy.
-    few = array.size <= FEW
-    if not (all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()):
-        msg = f"{argument}: expected finite numbers; got {_first_bad(array)}"
-        raise ValueError(msg)
-    return array
-
-
-def _first_bad(array: Array) -> str:
-    position = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-    return f"{array[position]} at index {position[0] if len(position) == 1 else position}"
-
-
-def _names(names: str | Sequence[str]) -> tuple[str, ...]:
-    if not isinstance(names, Iterable):
-        msg = f"names: expected a string or a sequence of strings; got {names!r}"
-        raise TypeError(msg)
-    parsed = tuple(names.replace(",", " ").split()) if isinstance(names, str) else tuple(names)
-    if not parsed:
-        msg = "names: expected at least one coordinate name; got none"
-        raise ValueError(msg)
-    for name in parsed:
-        if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
-            msg = f"names: expected identifiers; got {name!r}"
-            raise ValueError(msg)
-    repeated = [name for name, count in Counter(parsed).items() if count > 1]
-    if repeated:
-        msg = f"names: expected distinct names; got {', '.join(repeated)} more than once"
-        raise ValueError(msg)
-    return parsed
-
-
-def _units(units: Any, periods: Sequence[float]) -> tuple[str, ...]:
-    given = tuple("rad" if period == math.tau else "" for period in periods)
-    if isinstance(units, tuple) and not units:
-        return given
-    words = () if isinstance(units, str) else tuple(units)
-    if len(words) != len(given) or not all(isinstance(unit, str) for unit in words):
-        refuse("units", f"{len(given)} strings, one for each coordinate", units)
-    return words
-
-
-def _given(values: Any, default: float, n: int) -> Any:
-    return (default,) * n if isinstance(values, tuple) and not values else values
-
-
-def _positive(argument: str, values: Any, n: int, *, finite: bool) -> tuple[float, ...]:
-    array = reals(values, argument)
-    if array.shape != (n,):
-        msg = f"{argument}: expected {n} numbers, one for each coordinate; got {values!r}"
-        raise ValueError(msg)
-    numbers = tuple(array.tolist())
-    if not all(v > 0 and (v < math.inf or not finite) for v in numbers):
-        kind = "positive finite numbers" if finite else "positive numbers or inf"
-        msg = f"{argument}: expected {kind}; got {numbers}"
-        raise ValueError(msg)
-    return numbers
-
-
-def _product(factors: tuple[Manifold, ...]) -> Manifold:
-    names = [name for factor in factors for name in factor.names]
-    if len(set(names)) < len(names):
-        names = [f"{name}{k}" for k, factor in enumerate(factors, 1) for name in factor.names]
+    numbered = list(enumerate(parts, 1))
     return Manifold(
-        tuple(names),
-        tuple(period for factor in factors for period in factor.periods),
-        tuple(scale for factor in factors for scale in factor.scales),
-        tuple(unit for factor in factors for unit in factor.units),
+        tuple(name for k, factor in numbered for name in renamed(factor.names, k)),
+        tuple(period for factor in parts for period in factor.periods),
+        tuple(scale for factor in parts for scale in factor.scales),
+        tuple(unit for factor in parts for unit in factor.units),
+        tuple(renamed(some, k) for k, factor in numbered for some in factor.spheres),
+        tuple(renamed(some, k) for k, factor in numbered for some in factor.rotations),
     )

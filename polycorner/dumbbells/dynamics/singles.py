@@ -20,7 +20,8 @@ from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array, reals
+from polycorner.spaces.arguments import reals
+from polycorner.spaces.manifold import Array
 
 APART = 1e4  # mm along the drum, so that dumbbells of one run never meet
 STRIDE = 10  # steps between records; shorter rests count as parts of one slip

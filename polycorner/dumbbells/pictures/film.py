@@ -19,7 +19,8 @@ from polycorner.dumbbells.pictures.symbols import energy_unit
 from polycorner.motion.trajectory import Trajectory
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 if TYPE_CHECKING:

@@ -32,7 +32,8 @@ from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, KIND_WORDS, KI
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.pictures.style import BODIES
 from polycorner.polyhedra.strata import stratum_at
-from polycorner.spaces.manifold import Array, finite, reals
+from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import trimesh

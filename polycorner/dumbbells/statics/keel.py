@@ -29,7 +29,8 @@ from polycorner import checks
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells.statics.keel_formulas import force_ratio
 from polycorner.formulas import kernels
-from polycorner.spaces.manifold import Array, reals, scalar
+from polycorner.spaces.arguments import reals, scalar
+from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 BISECTIONS = 60  # these bracket an azimuth in a quarter turn to one unit in the last place

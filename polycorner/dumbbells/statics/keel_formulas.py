@@ -24,7 +24,8 @@ from numpy.typing import ArrayLike
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.formulas import cache, families, kernels
-from polycorner.spaces.manifold import Array, reals, scalar
+from polycorner.spaces.arguments import reals, scalar
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import sympy

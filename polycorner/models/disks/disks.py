@@ -21,7 +21,8 @@ from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrappe
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.progress import Progress
-from polycorner.spaces.manifold import Array, Manifold, scalar
+from polycorner.spaces.arguments import scalar
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 Lattice = Literal["square", "hexagonal"]

@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.minimisation import Entrapment
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.spaces.manifold import Array, Manifold, reals, scalar
+from polycorner.spaces.arguments import reals, scalar
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 if TYPE_CHECKING:

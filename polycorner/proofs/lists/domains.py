@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from polycorner import checks
-from polycorner.spaces.manifold import Array, Manifold, reals
+from polycorner.spaces.arguments import reals
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 
@@ -65,6 +66,9 @@ def domain(manifold: Manifold, box: Any) -> Domain:
         For names that are no coordinates, sides that are no increasing pairs of numbers, and lines
         without a side.
     """
+    if manifold.factors:
+        curved = ", ".join(name for f in manifold.factors for name in f.names)
+        checks.refuse("polyhedron", "one on lines and circles", f"unit vectors ({curved})")
     lower, upper = [], []
     sides = _sides(manifold, box)
     for name, period in zip(manifold.names, manifold.periods, strict=True):
@@ -88,8 +92,8 @@ def _sides(manifold: Manifold, box: Any) -> dict[str, Any]:
         return dict(box)
     if isinstance(box, str) or not isinstance(box, Sequence | np.ndarray):
         checks.refuse("box", "sides in the order of the coordinates, or by name", box, TypeError)
-    if len(box) != manifold.dimension:
-        checks.refuse("box", f"{manifold.dimension} sides, one for each coordinate", len(box))
+    if len(box) != manifold.size:
+        checks.refuse("box", f"{manifold.size} sides, one for each coordinate", len(box))
     return dict(zip(manifold.names, box, strict=True))
 
 
