@@ -1,9 +1,9 @@
 """A chain of linear programmes that ends at a corner, and the corner to machine precision.
 
 Every programme minimises the linearised energy over the linearised polyhedron within a box
-([NW] sec. 18.5, [ADPR]).  The functions with positive multipliers are a guess at the corner; Newton's
-method on them either leaves the polyhedron, and the chain goes on, or ends at a corner with
-positive multipliers, which is then a strict local minimum.
+([NW] sec. 18.5, [ADPR]).  The functions with positive multipliers are a guess at the corner.
+Newton's method on them either leaves the polyhedron, and the chain goes on, or ends at a corner
+with positive multipliers, which is then a strict local minimum.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from polycorner.minimisation.sparse.faces import FacePoint, on_corner
 from polycorner.minimisation.sparse.programmes import Linearised, step
-from polycorner.minimisation.sparse.rows import Indices, SparseRows
+from polycorner.minimisation.sparse.rows import Indices, Mask, SparseRows
 from polycorner.spaces.manifold import Array
 
 STRONG = 1e-9  # multiplier, relative to the largest, above which a function counts as held
@@ -45,8 +45,8 @@ class Landscape:
 
     gradient: Array
     near: Callable[[Array, float], SparseRows]
-    level: Callable[[Array, Array], Array]
-    pinned: Callable[[Array], Indices]
+    level: Callable[[Array, Mask], Array]
+    pinned: Callable[[Mask], Indices]
 
 
 @dataclass(frozen=True)

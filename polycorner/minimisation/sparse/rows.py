@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from polycorner.formulas.functions import SmoothFunction
 
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,7 @@ class SparseRows(Value):
         return SparseRows(tuple(groups), len(positions), self.dimension)
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Mask:
         """The mask ``(n,)`` of the coordinates that any row reads."""
         used = np.zeros(self.dimension, dtype=np.bool_)
         for group in self.groups:

@@ -59,7 +59,7 @@ def neighbours(
 
     Of every pair the nearest image is taken; ``x_j - x_i + image`` is the vector between them.
     """
-    tree = cKDTree(centres % box, boxsize=box)
+    tree = cKDTree(centres % box, boxsize=np.full(centres.shape[1], box))
     longest = min(2 * inflation * radii.max() + reach, box / 2)
     pairs = tree.query_pairs(longest, output_type="ndarray").astype(np.int64).reshape(-1, 2)
     between = centres[pairs[:, 1]] - centres[pairs[:, 0]]

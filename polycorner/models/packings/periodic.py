@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from polycorner.minimisation.sparse.chain import ChainEnd, Landscape, descend
 from polycorner.minimisation.sparse.rows import SparseRows
 from polycorner.models.packings.contacts import neighbours, rows_of
 from polycorner.models.packings.jammed import JammedPacking
-from polycorner.models.packings.starts import largest_inflation, pushed_apart
+from polycorner.models.packings.starts import decompressed, largest_inflation
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -101,16 +101,30 @@ class PeriodicPacking(Value):
         return np.asarray(rng.random((self.count, self.dimension)) * self.box)
 
     def soft_start(
-        self, rng: "np.random.Generator | int | None" = None, *, iterations: int = 2000
+        self,
+        rng: "np.random.Generator | int | None" = None,
+        *,
+        iterations: int = 1500,
+        overlap: float = 1e-5,
     ) -> Array:
-        """Return centres ``(N, d)`` at which soft bodies, a little too dense, push little.
+        """Return centres ``(N, d)`` of soft bodies that push each other apart, nearly jammed.
 
-        From scattered centres they are pushed apart by L-BFGS; what is left of overlaps is
-        removed by a smaller inflation.  This saves most of the linear programmes.
+        From scattered centres they are pushed apart by L-BFGS and deflated in turn.  This saves
+        most of the linear programmes.
+
+        Parameters
+        ----------
+        rng : random generator or seed, optional
+            For the scattered centres.
+        iterations : int, optional
+            Limit on the iterations after each deflation.
+        overlap : float, optional
+            Mean overlap, relative to the sum of radii, at which the deflations end.
         """
         iterations = checks.whole("iterations", iterations, least=1)
+        checks.real("overlap", overlap, above=0)
         radii = self.radii * self._inflation_at(SOFT_DENSITY[self.dimension])
-        return pushed_apart(self.scattered(rng), radii, self.box, iterations)
+        return decompressed(self.scattered(rng), radii, self.box, iterations, overlap=overlap)
 
     def jam(
         self,
@@ -137,7 +151,7 @@ class PeriodicPacking(Value):
             Its verdict says whether a strict maximum was reached.
         """
         checks.whole("max_programmes", max_programmes, least=1)
-        if start is None or isinstance(start, np.random.Generator | int | np.integer):
+        if start is None or isinstance(start, np.random.Generator | int):
             centres = self.soft_start(start)
         else:
             centres = self._centres(start)
