@@ -21,6 +21,11 @@ from polycorner.minimisation.explanation import explanation
 from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
 from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.sparse_analysis import (
+    SparseAnalysis,
+    analyse_sparse,
+    sparse_explanation,
+)
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.strata import (
     RANK_TOLERANCE,
@@ -48,6 +53,7 @@ if TYPE_CHECKING:
     from polycorner.polyhedra.polyhedron import Polyhedron
 
 # What an analysis finds where a search has stopped says less than that it has not converged.
+SHOWN = 100  # coordinates that are shown in one line
 VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALONG_LOCUS})
 
 
@@ -94,8 +100,11 @@ class Certificate(Value, Printed):
         object.__setattr__(self, "point", point)
 
     @cached_property
-    def analysis(self) -> Analysis:
+    def analysis(self) -> Analysis | SparseAnalysis:
         """First and second order at the point, in scaled coordinates."""
+        if self.problem.is_sparse:
+            tolerances = self.tolerance, self.rank_tolerance
+            return analyse_sparse(self.problem, self.point, *tolerances)
         return analyse(self.problem, self.point, self.tolerance, self.rank_tolerance)
 
     @property
@@ -105,7 +114,10 @@ class Certificate(Value, Printed):
 
     @cached_property
     def stratum(self) -> Stratum:
-        """The face the point lies on."""
+        """The face the point lies on; not computed for large sparse polyhedra."""
+        if self.problem.is_sparse:
+            msg = "stratum: expected a small polyhedron; its cones are computed with full matrices"
+            raise ValueError(msg)
         return stratum_at(
             self.problem.polyhedron,
             self.point,
@@ -217,11 +229,19 @@ class Certificate(Value, Printed):
         Opening wall, all other contacts kept closed, lowers the energy at the rate 3 per mm:
         its multiplier is negative.
         """
+        if isinstance(self.analysis, SparseAnalysis):
+            return sparse_explanation(self.analysis, self.verdict)
         return explanation(self.analysis, self.stratum, self.verdict, self.search, unit, self.note)
 
     def __repr__(self) -> str:
         """Return the verdict, the point, the energy and the active functions in one line."""
         manifold = self.problem.polyhedron.manifold
+        if manifold.dimension > SHOWN:
+            held = f"{len(self.active)} of {self.problem.inequalities} functions"
+            return (
+                f"Certificate({self.verdict.name} in {manifold.dimension} coordinates; energy "
+                f"{number(self.energy, 6)}; on {held})"
+            )
         point = ", ".join(
             f"{name} = {number(x, 6)} {angle_unit(period)}".rstrip()
             for name, period, x in zip(manifold.names, manifold.periods, self.point, strict=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.minimisation.sparse.rows import SparseRows
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
@@ -29,6 +30,9 @@ Flat = tuple[
     NDArray[np.float64],
     NDArray[np.float64],
 ]
+
+MOST_NUMBERS = 20_000_000  # second derivatives that are kept as a full array
+MOST_READ = 0.1  # share of the coordinates that a function of a sparse polyhedron reads
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +110,26 @@ class Problem(Value):
         if not np.isfinite(value):
             msg = f"{argument}: expected a point with a finite energy; its energy is {value}"
             raise ValueError(msg)
+
+    @cached_property
+    def is_sparse(self) -> bool:
+        """Whether all second derivatives would be too many numbers, nearly all of them zero."""
+        n = self.dimension
+        if self.polyhedron.is_union or self.rows * n * n < MOST_NUMBERS:
+            return False
+        read = sum(len(call.reads) * len(call.rows) for call in self._bundle.calls)
+        return read < MOST_READ * self.rows * n
+
+    @cached_property
+    def sparse_rows(self) -> SparseRows:
+        """Inequalities, then equations, as sparse rows; derivatives not scaled."""
+        d = self.polyhedron
+        return SparseRows.of((*d.functions, *d.equations), self.dimension)
+
+    @cached_property
+    def sparse_energy(self) -> SparseRows:
+        """The energy as a sparse row."""
+        return SparseRows.of((self.energy,), self.dimension)
 
     @cached_property
     def flat(self) -> tuple[Flat, int]:

@@ -93,7 +93,7 @@ def descend(
         rows = land.near(q, reach)
         values, jacobian = rows.evaluate(q)
         nothing = np.empty(0), csr_array((0, len(q)))
-        at = Linearised(values, jacobian, *nothing, land.gradient, np.arange(rows.count))
+        at = Linearised(values, jacobian, *nothing, land.gradient)
         found = step(at, np.full(len(q), reach))
         if found is None or reach < LEAST:
             return ChainEnd(q, held, lam, count, None)

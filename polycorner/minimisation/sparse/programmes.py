@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
@@ -22,8 +21,6 @@ class Linearised:
         Of the equations.
     gradient : (n,) array
         Of the energy.
-    labels : (m,) array of int
-        What the inequalities are called by whoever states them.
     """
 
     values: Array
@@ -31,7 +28,6 @@ class Linearised:
     sections: Array
     section_rows: csr_array
     gradient: Array
-    labels: NDArray[np.int64]
 
 
 @dataclass(frozen=True)

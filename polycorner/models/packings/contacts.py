@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.sparse.rows import Group, SparseRows
-from polycorner.spaces.manifold import Array
+from polycorner.polyhedra.groups import AllOf
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
     import sympy
@@ -83,3 +86,36 @@ def rows_of(
     parameters = np.column_stack([images, sums])
     group = Group(gap(dimension), 0, np.arange(len(pairs)), reads, parameters)
     return SparseRows((group,) if len(pairs) else (), len(pairs), n)
+
+
+def gaps_polyhedron(
+    radii: Array, box: float, centres: Array, inflation: float, held: int, reach: float = 0.5
+) -> Polyhedron:
+    """Return the gaps of pairs up to ``reach`` mean diameters apart, as functions of a manifold.
+
+    The equations hold one body in place, since a translation of all changes nothing.
+    """
+    count, d = centres.shape
+    diameter = float(2 * inflation * radii.mean())
+    names = [f"{a}{i}" for i in range(1, count + 1) for a in AXES[:d]]
+    manifold = Manifold(
+        (*names, "s"),
+        scales=(*[diameter] * (count * d), inflation),
+    )
+    pairs, images, _ = neighbours(centres, radii, inflation, box, reach * diameter)
+    parts = []
+    for (i, j), image in zip(pairs.tolist(), images.tolist(), strict=True):
+        reads = [*names[i * d : (i + 1) * d], *names[j * d : (j + 1) * d], "s"]
+        parameters = [*image, float(radii[i] + radii[j])]
+        label = f"{i + 1}-{j + 1}"
+        parts.append(
+            SmoothFunction.member(
+                gap(d), "gap", manifold, parameters=parameters, reads=reads, label=label
+            )
+        )
+    symbols = manifold.symbols[held * d : (held + 1) * d]
+    pins = {
+        f"hold {names[held * d + axis]}": symbol - float(centres[held, axis])
+        for axis, symbol in enumerate(symbols)
+    }
+    return Polyhedron(manifold, AllOf(*parts), pins)

@@ -3,14 +3,20 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.minimisation.certificate import Certificate, certify
 from polycorner.minimisation.verdicts import Verdict
-from polycorner.models.packings.contacts import neighbours
+from polycorner.models.packings.contacts import gaps_polyhedron, neighbours
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
+
+if TYPE_CHECKING:
+    import sympy
 
 
 @dataclass(frozen=True)
@@ -174,6 +180,32 @@ class JammedPacking(Value):
         if not self.converged:
             return Verdict.NOT_CONVERGED
         return Verdict.MINIMUM_ALONG_LOCUS if len(self.rattlers) else Verdict.STRICT_MINIMUM
+
+    @cached_property
+    def polyhedron(self) -> Polyhedron:
+        """The gaps of all pairs near one another, one body that carries force held in place.
+
+        Coordinates are ``x1 y1 ... xN yN s``; gaps are called ``i-j``, bodies counted from 1.
+        A polyhedron of more functions is the same near the packing.
+        """
+        return gaps_polyhedron(
+            self.radii, self.box, self.centres, self.inflation, int(self.pairs[0, 0])
+        )
+
+    @property
+    def energy(self) -> "sympy.Expr":
+        """``-s``."""
+        return -self.polyhedron.manifold.symbols[-1]
+
+    @property
+    def point(self) -> Array:
+        """The packing as a point of its polyhedron, ``(d N + 1,)``."""
+        return np.append(self.centres.ravel(), self.inflation)
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """The certificate of the packing as a minimum of ``-s``, computed anew by ``certify``."""
+        return certify(self.polyhedron, self.energy, self.point)
 
     def __repr__(self) -> str:
         """Return numbers, density and verdict in one line."""
