@@ -289,9 +289,9 @@ def sparse_explanation(a: SparseAnalysis, verdict: Verdict) -> str:
         f"{words[0].upper()}{words[1:]}.",
         (
             f"Of {problem.inequalities} inequalities {len(a.active)} are active; with "
-            f"{len(problem.polyhedron.equations)} equations their gradients have rank {first.rank}.  "
-            f"{len(a.unmoved)} of {problem.dimension} coordinates are read by no function with a "
-            "positive multiplier."
+            f"{len(problem.polyhedron.equations)} equations their gradients have rank "
+            f"{first.rank}. {len(a.unmoved)} of {problem.dimension} coordinates are read by no "
+            "function with a positive multiplier."
         ),
     ]
     if a.obstacle:
