@@ -24,6 +24,7 @@ from examples import (
     ex14_impact_and_stack,
     ex15_entrapment,
     ex16_dyad_climbs,
+    ex17_packing,
 )
 from polycorner.polyhedra import LocalType
 
@@ -83,6 +84,12 @@ def test_disks():
     signed = sum((-1) ** k * n for k, n in zip(indices, ex06_disks.COPIES, strict=True))
     assert signed == 2
     assert found[2, "square"][0][0] == pytest.approx(math.sqrt(2) / 4)
+
+
+def test_packing():
+    jammed = ex17_packing.main(128)
+    assert jammed.is_isostatic
+    assert jammed.residuals.worst < 1e-12
 
 
 def test_pinball():
