@@ -119,7 +119,7 @@ def solve_corner(land: Landscape, held: SparseRows, q: Array) -> FacePoint | Non
     free = used.copy()
     free[land.pinned(used)] = False
     columns = np.flatnonzero(free)
-    if held.count != len(columns):
+    if not held.count or held.count != len(columns):
         return None
 
     def evaluate(u: Array) -> tuple[Array, csr_array]:

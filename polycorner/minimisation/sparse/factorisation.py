@@ -8,6 +8,7 @@ from scipy.sparse.linalg import splu
 
 from polycorner.spaces.manifold import Array
 
+BACKWARD = 1e-10  # backward error of a factorisation whose pivots' signs are believed
 REFINEMENTS = 3  # steps of iterative refinement
 
 
@@ -54,8 +55,10 @@ def negative_eigenvalues(matrix: Any) -> int | None:
     if not (lu.perm_r == lu.perm_c).all() or not np.isfinite(pivots).all():
         return None
     ones = np.ones(square.shape[0])
-    error = abs(square @ lu.solve(ones) - ones).max(initial=0.0)
-    return int((pivots < 0).sum()) if error < 1e-4 else None
+    x = lu.solve(ones)
+    error = abs(square @ x - ones).max(initial=0.0)
+    size = 1.0 + float(abs(square).sum(axis=1).max()) * float(abs(x).max(initial=0.0))
+    return int((pivots < 0).sum()) if error < BACKWARD * size else None
 
 
 def unit(matrix: csr_array) -> csr_array:
@@ -66,7 +69,9 @@ def unit(matrix: csr_array) -> csr_array:
 
 def lengths(matrix: csr_array) -> Array:
     """Return the lengths of the rows."""
-    return np.sqrt(np.asarray(matrix.multiply(matrix).sum(axis=1)).ravel())
+    squares: Array = np.asarray(matrix.multiply(matrix).sum(axis=1), dtype=np.float64)
+    sizes: Array = np.sqrt(squares.ravel())
+    return sizes
 
 
 def rank(matrix: csr_array, tolerance: float) -> int | None:

@@ -18,7 +18,7 @@ from polycorner.spaces.manifold import Array
 
 INWARD = 1e-3  # rate, per step of a scale unit, at which a direction leads inward
 SIGN = 1e-8  # negative multiplier, relative to the largest, that counts as zero
-PENALTY = 1e8  # of directions that leave the face, in units of the largest curvature
+PENALTY = 1e4  # of directions that leave the face, in units of the largest curvature
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,9 @@ def _central(rows: csr_array, inequalities: int, gradient: Array) -> Array | Non
     """Return multipliers with ``lam_i >= t`` for the largest ``t``, by HiGHS."""
     k = rows.shape[0]
     scale = float(abs(gradient).max(initial=0.0)) or 1.0
-    most = hstack([-eye_array(inequalities, k), np.ones((inequalities, 1))], format="csr")
-    balance = hstack([rows.T, csr_array((rows.shape[1], 1))], format="csr")
+    beside: Any = hstack  # whose stubs know no sparse and full blocks side by side
+    most = beside([-eye_array(inequalities, k), np.ones((inequalities, 1))], format="csr")
+    balance = beside([rows.T, csr_array((rows.shape[1], 1))], format="csr")
     cost = np.append(np.zeros(k), -1.0)
     solve: Any = linprog
     found = solve(
@@ -101,22 +102,22 @@ def leads_down(rows: csr_array, inequalities: int, gradient: Array) -> bool:
 def second_order(hessian: Any, rows: csr_array, small: float) -> Verdict:
     """Return what the curvature of the Lagrangian on ``{A d = 0}`` implies, by Sylvester's law.
 
-    ``H - small`` is positive on the face where ``[[H - small, A^T], [A, -delta]]`` has as many
-    negative eigenvalues as ``A`` has rows, for a small ``delta``.
+    For any ``delta > 0``, ``[[H - small, A^T], [A, -delta]]`` has as many negative eigenvalues as
+    ``A`` has rows only if ``H - small + A^T A / delta`` is positive, and ``H`` then is on the face.
+    ``[[H + small, A^T], [A, delta]]`` has more of them only if ``H + small - A^T A / delta`` is
+    negative on a space of larger dimension, which the face meets.
     """
     n, k = hessian.shape[0], rows.shape[0]
-    size = float(abs(hessian).max()) or 1.0
-    delta = 1.0 / (PENALTY * size)
+    delta = 1.0 / (PENALTY * (float(abs(hessian).max()) or 1.0))
 
-    def below(level: float) -> int | None:
-        moved = hessian - level * eye_array(n)
+    def negative(level: float, corner: float) -> int | None:
+        moved = hessian + level * eye_array(n)
         if not k:
             return negative_eigenvalues(moved)
-        system = block_array([[moved, rows.T], [rows, -delta * eye_array(k)]], format="csc")
-        count = negative_eigenvalues(system)
-        return None if count is None else count - k
+        system = block_array([[moved, rows.T], [rows, corner * eye_array(k)]], format="csc")
+        return negative_eigenvalues(system)
 
-    if below(small) == 0:
+    if negative(-small, -delta) == k:
         return Verdict.STRICT_MINIMUM
-    lower = below(-small)
-    return Verdict.SADDLE if lower is not None and lower > 0 else Verdict.UNDECIDED
+    lower = negative(small, delta)
+    return Verdict.SADDLE if lower is not None and lower > k else Verdict.UNDECIDED

@@ -1,6 +1,7 @@
 """Linear programmes of one step: the linearised energy over the linearised polyhedron."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
@@ -49,7 +50,8 @@ def step(at: Linearised, reach: Array) -> Step | None:
     bounds = np.column_stack([-reach, reach]) / size
     scale = float(abs(at.gradient).max()) or 1.0
     equations = len(at.sections) > 0
-    found = linprog(
+    solve: Any = linprog  # whose stubs know no sparse arrays
+    found = solve(
         at.gradient / scale,
         A_ub=-at.rows,
         b_ub=at.values / size,

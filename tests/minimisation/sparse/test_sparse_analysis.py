@@ -55,7 +55,8 @@ def test_densest_packings_in_a_square_are_certified(count):
         if best.energy < -DISTANCES[count] + 1e-9:
             break
     assert -best.energy == pytest.approx(DISTANCES[count], abs=1e-10)
-    assert best.is_minimum
+    # A free point that happens to lie on a wall is beyond the analysis with full matrices.
+    assert best.is_minimum or (count in {7, 11} and best.verdict is Verdict.UNDECIDED)
     found = analyse_sparse(best.problem, best.point, 1e-8, 1e-6)
     assert found.verdict.is_minimum
     assert found.names == best.active
@@ -106,8 +107,8 @@ def test_rank_and_inertia_are_those_of_full_matrices(seed):
     left, right = rng.normal(size=(k, min(r, k, n))), rng.normal(size=(min(r, k, n), n))
     matrix = left @ right
     assert rank(csr_array(matrix), 1e-6) == np.linalg.matrix_rank(matrix)
-    square_ = rng.normal(size=(n, n))
-    symmetric = square_ + square_.T
+    full = rng.normal(size=(n, n))
+    symmetric = full + full.T
     expected = int((np.linalg.eigvalsh(symmetric) < 0).sum())
     assert negative_eigenvalues(csr_array(symmetric)) in {expected, None}
 
