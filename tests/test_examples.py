@@ -25,6 +25,7 @@ from examples import (
     ex15_entrapment,
     ex16_dyad_climbs,
     ex17_turning,
+    ex18_packing,
 )
 from polycorner.polyhedra import LocalType
 
@@ -84,6 +85,12 @@ def test_disks():
     signed = sum((-1) ** k * n for k, n in zip(indices, ex06_disks.COPIES, strict=True))
     assert signed == 2
     assert found[2, "square"][0][0] == pytest.approx(math.sqrt(2) / 4)
+
+
+def test_packing():
+    jammed = ex18_packing.main(128)
+    assert jammed.is_isostatic
+    assert jammed.residuals.worst < 1e-12
 
 
 def test_pinball():

@@ -21,6 +21,11 @@ from polycorner.minimisation.explanation import explanation
 from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
 from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.sparse_analysis import (
+    SparseAnalysis,
+    analyse_sparse,
+    sparse_explanation,
+)
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.strata import (
     RANK_TOLERANCE,
@@ -48,6 +53,7 @@ if TYPE_CHECKING:
     from polycorner.polyhedra.polyhedron import Polyhedron
 
 # What an analysis finds where a search has stopped says less than that it has not converged.
+SHOWN = 100  # coordinates that are shown in one line
 VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALONG_LOCUS})
 
 
@@ -94,8 +100,19 @@ class Certificate(Value, Printed):
         object.__setattr__(self, "point", point)
 
     @cached_property
+    def found(self) -> Analysis | SparseAnalysis:
+        """First and second order at the point, with sparse matrices for a large polyhedron."""
+        if self.problem.is_sparse:
+            tolerances = self.tolerance, self.rank_tolerance
+            return analyse_sparse(self.problem, self.point, *tolerances)
+        return self.analysis
+
+    @cached_property
     def analysis(self) -> Analysis:
-        """First and second order at the point, in scaled coordinates."""
+        """First and second order at the point, in scaled coordinates, with full matrices."""
+        if self.problem.is_sparse:
+            msg = "analysis: expected a small polyhedron; full matrices of this one are too large"
+            raise ValueError(msg)
         return analyse(self.problem, self.point, self.tolerance, self.rank_tolerance)
 
     @property
@@ -105,7 +122,10 @@ class Certificate(Value, Printed):
 
     @cached_property
     def stratum(self) -> Stratum:
-        """The face the point lies on."""
+        """The face the point lies on; not computed for large sparse polyhedra."""
+        if self.problem.is_sparse:
+            msg = "stratum: expected a small polyhedron; its cones are computed with full matrices"
+            raise ValueError(msg)
         return stratum_at(
             self.problem.polyhedron,
             self.point,
@@ -116,45 +136,45 @@ class Certificate(Value, Printed):
     @property
     def active(self) -> tuple[str, ...]:
         """Names of the active functions."""
-        return self.analysis.names
+        return self.found.names
 
     @property
     def multipliers(self) -> dict[str, float]:
         """``dE/df`` for each active function and equation; one choice if they are not unique."""
-        return self.analysis.stated(self.analysis.named_multipliers)
+        return self.problem.stated(self.found.named_multipliers)
 
     @property
     def multiplier_ranges(self) -> dict[str, tuple[float, float]]:
         """The least and the largest value each multiplier can take."""
-        return self.analysis.stated(self.analysis.named_ranges)
+        return self.problem.stated(self.found.named_ranges)
 
     @property
     def multipliers_unique(self) -> bool:
         """Whether the multipliers are determined by the first-order condition."""
-        return self.analysis.multipliers.unique
+        return self.found.multipliers.unique
 
     @property
     def licq(self) -> bool:
         """Whether the active gradients are independent."""
-        return self.analysis.independent
+        return self.found.independent
 
     @property
     def strictly_complementary(self) -> bool:
         """Whether every active function has a strictly positive multiplier."""
-        values = self.analysis.multipliers.values[: len(self.active)]
-        return bool((values > self.analysis.local.small).all())
+        values = self.found.multipliers.values[: len(self.active)]
+        return bool((values > self.found.local.small).all())
 
     @property
     def curvatures(self) -> Array:
         """Eigenvalues of the Lagrangian's Hessian along the face, in scaled coordinates."""
-        return self.analysis.curvature.values
+        return self.found.curvature.values
 
     @property
     def verdict(self) -> Verdict:
         """The verdict; its value is a sentence."""
         if self.search in SEARCHES:
             return self.search
-        found = self.analysis.verdict
+        found = self.found.verdict
         if self.search is not None and found in VAGUE:
             return self.search
         return found
@@ -167,7 +187,7 @@ class Certificate(Value, Printed):
     @property
     def signature(self) -> tuple[int, int, int]:
         """The lemma's ``(p, q, r)``: first order, second order, no dependence."""
-        return self.analysis.signature
+        return self.found.signature
 
     @property
     def entrapment(self) -> dict[str, Entrapment]:
@@ -176,18 +196,18 @@ class Certificate(Value, Printed):
         Keys are the contacts that hold the point, then the principal directions along the face,
         named by the coordinates that change most.
         """
-        return dict(self.analysis.entrapment)
+        return dict(self.found.entrapment)
 
     @property
     def entrapment_counts(self) -> dict[str, int]:
         """The numbers of directions that are half-V, half-U, U and free."""
-        kinds = list(self.analysis.entrapment.values())
+        kinds = list(self.found.entrapment.values())
         return {kind.value: kinds.count(kind) for kind in Entrapment if kind is not Entrapment.NONE}
 
     @property
     def lemma(self) -> tuple[Condition, ...]:
         """The four hypotheses of the minimisation lemma, each with its deciding number."""
-        return hypotheses(self.analysis)
+        return hypotheses(self.found)
 
     @property
     def residuals(self) -> Residuals:
@@ -217,11 +237,16 @@ class Certificate(Value, Printed):
         Opening wall, all other contacts kept closed, lowers the energy at the rate 3 per mm:
         its multiplier is negative.
         """
+        if isinstance(self.found, SparseAnalysis):
+            return sparse_explanation(self.found, self.verdict)
         return explanation(self.analysis, self.stratum, self.verdict, self.search, unit, self.note)
 
     def __repr__(self) -> str:
         """Return the verdict, the point, the energy and the active functions in one line."""
         manifold = self.problem.polyhedron.manifold
+        if manifold.dimension > SHOWN:
+            where = f"in {manifold.dimension} coordinates; energy {number(self.energy, 6)}"
+            return f"Certificate({self.verdict.name} {where}; on {len(self.active)} functions)"
         point = ", ".join(
             f"{name} = {number(x, 6)} {angle_unit(period)}".rstrip()
             for name, period, x in zip(manifold.names, manifold.periods, self.point, strict=True)
@@ -262,7 +287,7 @@ class Certificate(Value, Printed):
         )
 
     def _multiplier_table(self) -> Table:
-        d, values = self.problem.polyhedron, self.analysis.local.values[:-1].tolist()
+        d, values = self.problem.polyhedron, self.found.local.values[:-1].tolist()
         value = dict(zip((*d.names, *d.equation_names), values, strict=True))
         rows = [(name, number(value[name], 3), number(x)) for name, x in self.multipliers.items()]
         head = ("active function", "value", "multiplier dE/df")

@@ -147,8 +147,7 @@ class Analysis(Value):
 
     def stated(self, by_name: Mapping[str, T]) -> dict[str, T]:
         """Return the entries but those of the equations that normalise vectors."""
-        hidden = self.local.problem.polyhedron.hidden
-        return {name: entry for name, entry in by_name.items() if name not in hidden}
+        return self.local.problem.stated(by_name)
 
     @property
     def named_multipliers(self) -> dict[str, float]:

@@ -7,7 +7,8 @@ import numpy as np
 
 from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.problem import Problem
-from polycorner.polyhedra.strata import distances
+from polycorner.minimisation.sparse_analysis import SparseAnalysis, SparseLocal
+from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
 from polycorner.spaces.manifold import Array
 
 
@@ -57,6 +58,8 @@ class Condition:
 
 def residuals_at(problem: Problem, q: Array, multipliers: Mapping[str, float]) -> Residuals:
     """Return the residuals of the first-order conditions with given multipliers ``dE/df``."""
+    if problem.is_sparse:
+        return _sparse_residuals(problem, q, multipliers)
     d, m = problem.polyhedron, problem.inequalities
     values, gradients, hessians = problem.evaluate(q, 2)
     pull, product = gradients[-1].copy(), 0.0
@@ -75,7 +78,21 @@ def residuals_at(problem: Problem, q: Array, multipliers: Mapping[str, float]) -
     )
 
 
-def hypotheses(a: Analysis) -> tuple[Condition, ...]:
+def _sparse_residuals(problem: Problem, q: Array, multipliers: Mapping[str, float]) -> Residuals:
+    d, m = problem.polyhedron, problem.inequalities
+    local = SparseLocal.at(problem, q, TOLERANCE, RANK_TOLERANCE)
+    weights = np.array([multipliers.get(name, 0.0) for name in (*d.names, *d.equation_names)])
+    pull = local.gradient - local.rows.T @ weights
+    return Residuals(
+        infeasibility=float(
+            max(0.0, -local.away[:m].min(initial=0.0), abs(local.away[m:]).max(initial=0.0))
+        ),
+        stationarity=float(abs(pull).max() / local.reference),
+        complementarity=float(abs(weights * local.values[:-1]).max() / local.reference),
+    )
+
+
+def hypotheses(a: Analysis | SparseAnalysis) -> tuple[Condition, ...]:
     """Return the four hypotheses of the minimisation lemma, each with its deciding number."""
     held = a.multipliers.values[[*a.strong_positions]]
     curved = a.curvature.values[abs(a.curvature.values) > a.small_curvature]

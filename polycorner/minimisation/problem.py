@@ -1,9 +1,9 @@
 """Energies on polyhedra, and their layout as flat arrays for the compiled descent."""
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.minimisation.sparse.rows import SparseRows
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     Energy: TypeAlias = SmoothFunction | sympy.Expr
 
+T = TypeVar("T")
 Flat = tuple[
     NDArray[np.int64],
     NDArray[np.int64],
@@ -29,6 +31,9 @@ Flat = tuple[
     NDArray[np.float64],
     NDArray[np.float64],
 ]
+
+MOST_NUMBERS = 20_000_000  # second derivatives that are kept as a full array
+MOST_READ = 0.1  # share of the coordinates that a function of a sparse polyhedron reads
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +85,11 @@ class Problem(Value):
             results[2] *= np.outer(self.scales, self.scales)  # (M, n, n) may be large: no copy
         return tuple(results)
 
+    def stated(self, by_name: Mapping[str, T]) -> dict[str, T]:
+        """Return the entries but those of the equations that normalise vectors."""
+        hidden = self.polyhedron.hidden
+        return {name: entry for name, entry in by_name.items() if name not in hidden}
+
     @cached_property
     def parameter_values(self) -> dict[str, frozenset[float]]:
         """The values of every parameter of the functions, by name."""
@@ -106,6 +116,26 @@ class Problem(Value):
         if not np.isfinite(value):
             msg = f"{argument}: expected a point with a finite energy; its energy is {value}"
             raise ValueError(msg)
+
+    @cached_property
+    def is_sparse(self) -> bool:
+        """Whether all second derivatives would be too many numbers, nearly all of them zero."""
+        n = self.dimension
+        if self.polyhedron.is_union or self.rows * n * n < MOST_NUMBERS:
+            return False
+        read = sum(len(call.reads) * len(call.rows) for call in self._bundle.calls)
+        return read < MOST_READ * self.rows * n
+
+    @cached_property
+    def sparse_rows(self) -> SparseRows:
+        """Inequalities, then equations, as sparse rows; derivatives not scaled."""
+        d = self.polyhedron
+        return SparseRows.of((*d.functions, *d.equations), self.dimension)
+
+    @cached_property
+    def sparse_energy(self) -> SparseRows:
+        """The energy as a sparse row."""
+        return SparseRows.of((self.energy,), self.dimension)
 
     @cached_property
     def flat(self) -> tuple[Flat, int]:

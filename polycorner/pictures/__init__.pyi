@@ -1,5 +1,6 @@
 from .clusters import draw_clusters, draw_motion
 from .disks import draw_critical
+from .packings import draw_packing
 from .parameter_boxes import draw_cells
 from .regions import draw_region
 from .solids import (
@@ -25,6 +26,7 @@ __all__ = [
     "draw_clusters",
     "draw_critical",
     "draw_motion",
+    "draw_packing",
     "draw_region",
     "draw_solid",
     "isosurface",

@@ -71,6 +71,7 @@ class _Collection:
     branching: bool
     plain: "dict[str, sympy.Expr]" = field(default_factory=dict)
     functions: list[SmoothFunction] = field(default_factory=list)
+    known: set[int] = field(default_factory=set)
     counts: Counter[str] = field(default_factory=Counter)
 
     def named(self, name: str, part: Any, letter: str) -> Any:
@@ -117,7 +118,8 @@ class _Collection:
             assert family is not None
             part = SmoothFunction.member(family, part.name, self.manifold)
             check_function(part, periodic=self.branching)  # an equation may be a section
-        if all(part is not f for f in self.functions):
+        if id(part) not in self.known:  # the list keeps it alive
+            self.known.add(id(part))
             self.functions.append(part)
         return part
 

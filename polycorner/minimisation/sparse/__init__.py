@@ -1,0 +1,1 @@
+"""Sparse linear algebra for polyhedra with thousands of coordinates and functions."""

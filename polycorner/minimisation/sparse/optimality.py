@@ -1,0 +1,123 @@
+"""Optimality conditions of first and second order with sparse matrices."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import block_array, csr_array, eye_array, hstack
+
+from polycorner.minimisation.sparse.factorisation import (
+    least_squares,
+    negative_eigenvalues,
+    rank,
+)
+from polycorner.minimisation.sparse.programmes import Linearised, step
+from polycorner.minimisation.verdicts import Verdict
+from polycorner.spaces.manifold import Array
+
+INWARD = 1e-3  # rate, per step of a scale unit, at which a direction leads inward
+SIGN = 1e-8  # negative multiplier, relative to the largest, that counts as zero
+PENALTY = 1e4  # of directions that leave the face, in units of the largest curvature
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """Multipliers of unit gradients ``g = A^T lam``.
+
+    Attributes
+    ----------
+    values : (k,) array
+        Those of inequalities first.
+    residual : float
+        Largest component of ``g - A^T lam``.
+    rank : int or None
+        Of ``A``; None where it cannot be decided.
+    exist : bool
+        Whether the conditions hold with these values.
+    """
+
+    values: Array
+    residual: float
+    rank: int | None
+    exist: bool
+
+    @property
+    def independent(self) -> bool:
+        """Whether the gradients are independent, and the multipliers unique."""
+        return self.rank == len(self.values)
+
+
+def first_order(
+    rows: csr_array, inequalities: int, gradient: Array, small: float, rank_tolerance: float
+) -> FirstOrder:
+    """Return the multipliers of unit gradients.
+
+    Where they are not unique, those whose least is the largest.
+    """
+    found = rank(rows, rank_tolerance)
+    k = rows.shape[0]
+    if found == k:
+        lam = least_squares(rows, gradient) if k else np.empty(0)
+    else:
+        lam = _central(rows, inequalities, gradient)
+    if lam is None:
+        return FirstOrder(np.zeros(k), np.inf, found, exist=False)
+    residual = float(abs(gradient - rows.T @ lam).max(initial=0.0))
+    least = float(lam[:inequalities].min(initial=0.0))
+    return FirstOrder(
+        lam, residual, found, exist=residual <= small and least >= -SIGN * abs(lam).max(initial=0.0)
+    )
+
+
+def _central(rows: csr_array, inequalities: int, gradient: Array) -> Array | None:
+    """Return multipliers with ``lam_i >= t`` for the largest ``t``, by HiGHS."""
+    k = rows.shape[0]
+    scale = float(abs(gradient).max(initial=0.0)) or 1.0
+    beside: Any = hstack  # whose stubs know no sparse and full blocks side by side
+    most = beside([-eye_array(inequalities, k), np.ones((inequalities, 1))], format="csr")
+    balance = beside([rows.T, csr_array((rows.shape[1], 1))], format="csr")
+    cost = np.append(np.zeros(k), -1.0)
+    solve: Any = linprog
+    found = solve(
+        cost,
+        A_ub=most if inequalities else None,
+        b_ub=np.zeros(inequalities) if inequalities else None,
+        A_eq=balance,
+        b_eq=gradient / scale,
+        bounds=[*[(None, None)] * k, (None, 1.0)],
+    )
+    return found.x[:k] * scale if found.status == 0 else None
+
+
+def leads_down(rows: csr_array, inequalities: int, gradient: Array) -> bool:
+    """Whether a direction leads into the polyhedron and lowers the energy to first order."""
+    empty = np.full(inequalities, -INWARD), rows[:inequalities]
+    sections = np.zeros(rows.shape[0] - inequalities), rows[inequalities:]
+    at = Linearised(*empty, *sections, gradient)
+    found = step(at, np.ones(len(gradient)))
+    return found is not None and float(gradient @ found.displacement) < 0
+
+
+def second_order(hessian: Any, rows: csr_array, small: float) -> Verdict:
+    """Return what the curvature of the Lagrangian on ``{A d = 0}`` implies, by Sylvester's law.
+
+    For any ``delta > 0``, ``[[H - small, A^T], [A, -delta]]`` has as many negative eigenvalues as
+    ``A`` has rows only if ``H - small + A^T A / delta`` is positive, and ``H`` then is on the face.
+    ``[[H + small, A^T], [A, delta]]`` has more of them only if ``H + small - A^T A / delta`` is
+    negative on a space of larger dimension, which the face meets.
+    """
+    n, k = hessian.shape[0], rows.shape[0]
+    delta = 1.0 / (PENALTY * (float(abs(hessian).max()) or 1.0))
+
+    def negative(level: float, corner: float) -> int | None:
+        moved = hessian + level * eye_array(n)
+        if not k:
+            return negative_eigenvalues(moved)
+        system = block_array([[moved, rows.T], [rows, corner * eye_array(k)]], format="csc")
+        return negative_eigenvalues(system)
+
+    if negative(-small, -delta) == k:
+        return Verdict.STRICT_MINIMUM
+    lower = negative(small, delta)
+    return Verdict.SADDLE if lower is not None and lower > k else Verdict.UNDECIDED

@@ -1,0 +1,1 @@
+"""Jammed packings of discs and spheres."""

@@ -1,0 +1,242 @@
+"""Discs or spheres in a periodic box, inflated together until they jam."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from polycorner import checks
+from polycorner.minimisation.sparse.chain import ChainEnd, Landscape, descend
+from polycorner.minimisation.sparse.rows import SparseRows
+from polycorner.models.packings.contacts import neighbours, rows_of
+from polycorner.models.packings.jammed import JammedPacking
+from polycorner.models.packings.starts import decompressed, largest_inflation
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+# Densities at which soft bodies are pushed apart: a little above those at which they jam.
+SOFT_DENSITY = {2: 0.85, 3: 0.65}
+REACH = 0.3  # first box of the linear programmes, in mean diameters
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicPacking(Value):
+    """Discs (``d = 2``) or spheres (``d = 3``) in a periodic square or cube.
+
+    Their radii are ``s radii``, and the inflation ``s`` is to be as large as possible while no two
+    of them overlap: the energy ``-s`` on ``{|x_j - x_i| - s (r_i + r_j) >= 0}``.
+
+    Parameters
+    ----------
+    radii : (N,) array_like
+        Radii up to the common factor.
+    dimension : {2, 3}
+        ``d``.
+    box : float, optional
+        Edge of the box.
+
+    Raises
+    ------
+    ValueError
+        If radii are not positive, or one body is so large that it might touch another in two
+        images.
+
+    Examples
+    --------
+    >>> jammed = PeriodicPacking.bidisperse(64).jam(1)
+    >>> jammed.is_isostatic, bool((jammed.forces > 0).all())
+    (True, True)
+    """
+
+    radii: Array
+    dimension: int = 2
+    box: float = 1.0
+
+    def __post_init__(self) -> None:
+        radii = np.array(self.radii, dtype=np.float64)
+        if radii.ndim != 1 or len(radii) < 2 or not (np.isfinite(radii) & (radii > 0)).all():
+            checks.refuse("radii", "at least two positive numbers", self.radii)
+        checks.whole("dimension", self.dimension, least=2, most=3)
+        checks.real("box", self.box, above=0)
+        object.__setattr__(self, "radii", radii)
+        super().__post_init__()
+        if 2 * self._inflation_at(SOFT_DENSITY[self.dimension]) * radii.max() > self.box / 3:
+            msg = (
+                "radii: expected bodies that are small beside the box, their jammed diameters at "
+                f"most a third of its edge; got {len(radii)} bodies"
+            )
+            raise ValueError(msg)
+
+    @classmethod
+    def monodisperse(cls, count: int, dimension: int = 3, box: float = 1.0) -> "PeriodicPacking":
+        """Return ``count`` equal bodies."""
+        checks.whole("count", count, least=2)
+        return cls(np.ones(count), dimension, box)
+
+    @classmethod
+    def bidisperse(
+        cls, count: int, dimension: int = 2, ratio: float = 1.4, box: float = 1.0
+    ) -> "PeriodicPacking":
+        """Return equal numbers of small and large bodies, which do not crystallise ([OSLN])."""
+        checks.whole("count", count, least=2)
+        checks.real("ratio", ratio, above=0)
+        return cls(np.where(np.arange(count) % 2, ratio, 1.0), dimension, box)
+
+    @property
+    def count(self) -> int:
+        """The number of bodies ``N``."""
+        return len(self.radii)
+
+    def density(self, inflation: float) -> float:
+        """Return the part of the box that the inflated bodies fill."""
+        ball = math.pi if self.dimension == 2 else 4 * math.pi / 3
+        filled = ball * ((inflation * self.radii) ** self.dimension).sum()
+        return float(filled / self.box**self.dimension)
+
+    def scattered(self, rng: "np.random.Generator | int | None" = None) -> Array:
+        """Return ``N`` independent uniform centres, ``(N, d)``."""
+        rng = checks.generator("rng", rng)
+        return np.asarray(rng.random((self.count, self.dimension)) * self.box)
+
+    def soft_start(
+        self,
+        rng: "np.random.Generator | int | None" = None,
+        *,
+        iterations: int = 1500,
+        overlap: float = 1e-5,
+    ) -> Array:
+        """Return centres ``(N, d)`` of soft bodies that push each other apart, nearly jammed.
+
+        From scattered centres they are pushed apart by L-BFGS and deflated in turn.  This saves
+        most of the linear programmes.
+
+        Parameters
+        ----------
+        rng : random generator or seed, optional
+            For the scattered centres.
+        iterations : int, optional
+            Limit on the iterations after each deflation.
+        overlap : float, optional
+            Mean overlap, relative to the sum of radii, at which the deflations end.
+        """
+        iterations = checks.whole("iterations", iterations, least=1)
+        checks.real("overlap", overlap, above=0)
+        radii = self.radii * self._inflation_at(SOFT_DENSITY[self.dimension])
+        return decompressed(self.scattered(rng), radii, self.box, iterations, overlap=overlap)
+
+    def jam(
+        self,
+        start: "ArrayLike | np.random.Generator | int | None" = None,
+        *,
+        max_programmes: int = 500,
+        progress: Callable[[int, float], None] | None = None,
+    ) -> JammedPacking:
+        """Inflate until nothing moves: a chain of linear programmes, then Newton's method.
+
+        Parameters
+        ----------
+        start : (N, d) array, random generator or seed, optional
+            Where to start; a generator or seed chooses a :meth:`soft_start`.
+        max_programmes : int, optional
+            Limit on the linear programmes.
+        progress : callable, optional
+            Called after every programme with its number and the largest displacement of a body
+            that carries force, in mean diameters.
+
+        Returns
+        -------
+        JammedPacking
+            Its verdict says whether a strict maximum was reached.
+        """
+        checks.whole("max_programmes", max_programmes, least=1)
+        if start is None or isinstance(start, np.random.Generator | int):
+            centres = self.soft_start(start)
+        else:
+            centres = self._centres(start)
+        guess = self._inflation_at(0.95)
+        unit = 2 * self._inflation_at(SOFT_DENSITY[self.dimension]) * float(self.radii.mean())
+        scaled = _Scaled(self, unit, unit / (2 * float(self.radii.mean())))
+        inflation = largest_inflation(centres, self.radii, self.box, guess)
+        q = np.append(centres.ravel() / unit, inflation / scaled.factor)
+        end = descend(scaled.landscape(), q, reach=REACH, limit=max_programmes, progress=progress)
+        return scaled.jammed(end)
+
+    def _centres(self, start: ArrayLike) -> Array:
+        centres = np.array(start, dtype=np.float64)
+        if centres.shape != (self.count, self.dimension) or not np.isfinite(centres).all():
+            expected = f"finite centres of shape ({self.count}, {self.dimension})"
+            checks.refuse("start", expected, np.shape(start))
+        return centres
+
+    def _inflation_at(self, density: float) -> float:
+        return float((density / self.density(1.0)) ** (1 / self.dimension))
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """The packing with lengths in units of ``unit`` and inflations in units of ``factor``."""
+
+    packing: PeriodicPacking
+    unit: float
+    factor: float
+
+    @property
+    def radii(self) -> Array:
+        return self.packing.radii * (self.factor / self.unit)
+
+    @property
+    def box(self) -> float:
+        return self.packing.box / self.unit
+
+    def near(self, q: Array, reach: float) -> SparseRows:
+        """Return the gaps that may close within a box of the size ``reach`` around ``q``."""
+        d, s = self.packing.dimension, float(q[-1])
+        # Two bodies approach by at most 2 sqrt(d) reach; the inflation closes gaps, too.
+        farthest = 2 * math.sqrt(d) * reach + 1e-6 + 2 * reach * float(self.radii.max())
+        pairs, images, _ = neighbours(q[:-1].reshape(-1, d), self.radii, s, self.box, farthest)
+        sums = self.radii[pairs].sum(axis=1)
+        return rows_of(pairs, images, sums, self.packing.count, d)
+
+    def level(self, displacement: Array, used: NDArray[np.bool_]) -> Array:
+        """Return a step without the mean translation of the bodies that carry force."""
+        d = self.packing.dimension
+        moved = displacement[:-1].reshape(-1, d)
+        carrying = used[:-1].reshape(-1, d)[:, 0]
+        if not carrying.any():
+            return displacement
+        return np.append((moved - moved[carrying].mean(axis=0)).ravel(), displacement[-1])
+
+    def pinned(self, used: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the coordinates of one body that carries force."""
+        d = self.packing.dimension
+        first = int(np.argmax(used[:-1])) // d
+        return np.arange(first * d, (first + 1) * d)
+
+    def landscape(self) -> Landscape:
+        gradient = np.zeros(self.packing.count * self.packing.dimension + 1)
+        gradient[-1] = -1.0
+        return Landscape(gradient, self.near, self.level, self.pinned)
+
+    def jammed(self, end: ChainEnd) -> JammedPacking:
+        """Return what a chain has ended at, in units of the packing."""
+        d = self.packing.dimension
+        centres = end.point[:-1].reshape(-1, d) * self.unit
+        (group,) = end.held.groups or (None,)
+        pairs = np.empty((0, 2), dtype=np.int64)
+        images = np.empty((0, d))
+        if group is not None:
+            pairs = group.reads[:, [0, d]] // d
+            images = group.parameters[:, :d] * self.unit
+        return JammedPacking(
+            radii=self.packing.radii,
+            box=self.packing.box,
+            centres=centres,
+            inflation=float(end.point[-1]) * self.factor,
+            pairs=pairs,
+            images=images,
+            forces=end.multipliers * (self.factor / self.unit),
+            programmes=end.programmes,
+            converged=end.corner is not None,
+        )
