@@ -1,11 +1,10 @@
-"""Newton's method on a face of a polyhedron with thousands of coordinates."""
+"""Newton's method for a corner of a polyhedron with thousands of coordinates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.sparse import block_array, csr_array
+from scipy.sparse import csr_array
 
 from polycorner.minimisation.sparse.factorisation import factorised, least_squares, refined
 from polycorner.spaces.manifold import Array
@@ -14,7 +13,6 @@ MOST_STEPS = 20
 FAR = 0.3  # in scale units: a step this long has left the neighbourhood of the face's point
 
 Evaluate = Callable[[Array], tuple[Array, csr_array]]
-Curve = Callable[[Array, Array], Any]
 
 
 @dataclass(frozen=True)
@@ -47,26 +45,3 @@ def on_corner(held: Evaluate, gradient: Array, q: Array) -> FacePoint | None:
         values, rows = held(q)
     lam = least_squares(rows, gradient)
     return None if lam is None else FacePoint(q, lam, last, float(abs(values).max(initial=0.0)))
-
-
-def on_face(
-    held: Evaluate, slope: Callable[[Array], Array], curve: Curve, q: Array, lam: Array
-) -> FacePoint | None:
-    """Solve ``g = A^T lam``, ``f = 0`` by Newton's method from ``q`` and ``lam``.
-
-    ``curve(q, lam)`` is the Hessian of the Lagrangian ``E - sum lam_i f_i``.
-    """
-    last, n = np.inf, len(q)
-    for _ in range(MOST_STEPS):
-        values, rows = held(q)
-        system = block_array([[curve(q, lam), -rows.T], [rows, None]], format="csc")
-        right = np.concatenate([rows.T @ lam - slope(q), -values])
-        lu = factorised(system)
-        change = None if lu is None else refined(lu, system, right)
-        if change is None or abs(change[:n]).max(initial=0.0) > FAR:
-            return None
-        size = float(abs(change[:n]).max(initial=0.0))
-        if size >= last and size < 1e-9:
-            break
-        q, lam, last = q + change[:n], lam + change[n:], size
-    return FacePoint(q, lam, last, float(abs(held(q)[0]).max(initial=0.0)))
