@@ -63,7 +63,11 @@ def arguments(graph: Graph, a: int) -> list[int]:
     return [] if op in {"const", "var", "par"} else [int(arg) for arg in args]
 
 
-def needed(graph: Graph, outputs: Sequence[int]) -> list[int]:
+def needed(
+    graph: Graph,
+    outputs: Sequence[int],
+    reads: Callable[[Graph, int], Sequence[int]] = arguments,
+) -> list[int]:
     """Return the nodes that some nodes depend on, arguments before results."""
     seen: set[int] = set()
     waiting = list(outputs)
@@ -71,7 +75,7 @@ def needed(graph: Graph, outputs: Sequence[int]) -> list[int]:
         a = waiting.pop()
         if a not in seen:
             seen.add(a)
-            waiting += arguments(graph, a)
+            waiting += reads(graph, a)
     return sorted(seen)
 
 

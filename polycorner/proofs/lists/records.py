@@ -121,7 +121,7 @@ def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list
     """
     places: dict[int, int] = {}
     nodes: list[list[Any]] = []
-    for a in _needed(graph, outputs):
+    for a in needed(graph, outputs, _reads):
         op, args = graph.nodes[a]
         found = pattern(graph, a)
         if found:
@@ -139,18 +139,6 @@ def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list
 def _reads(graph: Graph, a: int) -> tuple[int, ...]:
     found = pattern(graph, a)
     return found.nodes if found else tuple(arguments(graph, a))
-
-
-def _needed(graph: Graph, outputs: Sequence[int]) -> list[int]:
-    """Return the nodes that outputs depend on, arguments before results."""
-    seen: set[int] = set()
-    waiting = list(outputs)
-    while waiting:
-        a = waiting.pop()
-        if a not in seen:
-            seen.add(a)
-            waiting += _reads(graph, a)
-    return sorted(seen)
 
 
 def period(value: float) -> str | None:
