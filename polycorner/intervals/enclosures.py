@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph, Payload, Program
+from polycorner.formulas.ranges import arguments
 from polycorner.formulas.translate import UNARY, compile_expressions
 from polycorner.intervals.balls import ANALYTIC, constant, operations
-from polycorner.intervals.tapes import Box, Tape, arguments, needed
+from polycorner.intervals.tapes import Box, Tape, needed
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.programs import Graph, Payload
+from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import (
     ANALYTIC,
     PARTIALS,
@@ -55,12 +56,6 @@ class Box:
         """Return the parallelotope ``middle + slopes delta``."""
         hull = [m + dot(row, reach) for m, row in zip(middle, slopes, strict=True)]
         return cls(hull, middle, slopes, reach)
-
-
-def arguments(graph: Graph, a: int) -> list[int]:
-    """Return the nodes that a node is computed from."""
-    op, args = graph.nodes[a]
-    return [] if op in {"const", "var", "par"} else [int(arg) for arg in args]
 
 
 def needed(

@@ -23,9 +23,10 @@ from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.programs import Graph, Payload
+from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import ball, constant, integer_relation, operations
 from polycorner.intervals.enclosures import Formulas
-from polycorner.intervals.tapes import arguments, needed
+from polycorner.intervals.tapes import needed
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.krawczyk import Enclosure
 from polycorner.proofs.polynomials import Polynomial, TooLargeError

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph
+from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import dot
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided, write
-from polycorner.intervals.tapes import Box, arguments, needed
+from polycorner.intervals.tapes import Box, needed
 from polycorner.polyhedra.symmetry import vector_field
 from polycorner.proofs.polynomials import Polynomial, TooLargeError, product, total
 from polycorner.spaces.manifold import Manifold

@@ -31,6 +31,7 @@ import numpy as np
 from polycorner.atomic import write_atomically
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import arguments, pattern
+from polycorner.intervals.tapes import needed
 from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
