@@ -1,11 +1,14 @@
 """Never a false theorem: random problems with exactly known answers, many of them on the edge."""
 
 from collections import Counter
+from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from exact_kinds import KINDS, departures, programme
 from exact_oracle import holds
+from exact_problems import Programme
 from hypothesis import settings
 
 from polycorner.proofs import prove
@@ -72,6 +75,23 @@ def test_no_false_theorem_in_hundreds_of_problems_or_thousands():
 def test_minima_found_by_a_search_are_proved():
     found = tried("minimum", 40, seed=3)
     assert found["minima proved"] >= LEAST_PROVED * found["minima"] > 0
+
+
+@pytest.mark.parametrize(("curvature", "true"), [(1, True), (-1, False)])
+@pytest.mark.parametrize(("multiplier", "allowed"), [(1, True), (0, True), (-1, False)])
+def test_the_oracle_allows_a_multiplier_of_zero_where_the_form_is_positive(
+    curvature, true, multiplier, allowed
+):
+    """``E = 2 x + m y + x^2/2 + c y^2/2`` on ``x >= 0, y >= 0``: at 0 the multipliers are 2, m."""
+    one, nil = Fraction(1), Fraction(0)
+    form = ((one, nil), (nil, Fraction(curvature)))
+    rows, flat = ((one, nil), (nil, one)), (nil, nil)
+    slope = (Fraction(2), Fraction(multiplier))
+    problem = Programme("weak", form, slope, rows, flat, flat, (flat,) * 3)
+    said = SimpleNamespace(
+        active=("f0", "f1"), symmetry=None, enclosures={"q1": (0, 0), "q2": (0, 0)}
+    )
+    assert holds(problem, said) == (allowed and (true or multiplier > 0))
 
 
 def test_the_oracle_tells_true_theorems_from_false_ones():

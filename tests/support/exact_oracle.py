@@ -46,10 +46,15 @@ def _exactly_holds(problem, slope, proof, bounds, beyond):
     matrix += [[*row, *[ZERO] * k] for row in rows]
     right = [*(-g for g in slope), *(problem.offsets[j] for j in active)]
     answer = solved(matrix, right)
-    if answer is None or not all(lam > 0 for lam in answer[0][n:]):
+    if answer is None or not all(lam >= 0 for lam in answer[0][n:]):
         return False
     z, alone = answer
-    basis = null_space(rows or [[ZERO] * n], n)
+    # A multiplier of 0 holds nothing: the form has to be positive where the others alone hold.
+    # That suffices, and is more than a minimum needs, so a false theorem never passes by it.
+    strong = [row for row, lam in zip(rows, z[n:], strict=True) if lam]
+    if len(strong) < k and not alone:
+        return False
+    basis = null_space(strong or [[ZERO] * n], n)
     form = restricted(problem.form, basis)
     positive, negative = inertia(form)
     if alone:
