@@ -212,7 +212,7 @@ class Certificate(Value, Printed):
     @property
     def residuals(self) -> Residuals:
         """The residuals, recomputed from the functions and the multipliers."""
-        return residuals_at(self.problem, self.point, self.analysis.named_multipliers)
+        return residuals_at(self.problem, self.point, self.found.named_multipliers)
 
     def holds(self, tolerance: float | None = None) -> bool:
         """Whether this is a minimum with all recomputed residuals at most ``tolerance``."""
