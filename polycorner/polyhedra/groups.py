@@ -164,7 +164,7 @@ def _count(expression: "sympy.Expr") -> int:
 def _branched(expression: "sympy.Expr") -> Any:
     for term in _terms(expression):
         group, choices = _choices(term)
-        if choices and (expression.is_Add or type(term).__name__ != "Abs"):
+        if choices:
             rest = expression - term
             return group(*[_branched(rest + choice) for choice in choices])
     return expression

@@ -73,6 +73,13 @@ class TestGroups:
         values = sympy.lambdify((X, Y), expression, "numpy")(*points.T)
         np.testing.assert_allclose(d.implicit(points), values, rtol=1e-12, atol=1e-12)
 
+    def test_have_no_kink_where_the_other_terms_cancel(self):
+        """In one of the branches of ``|x + 1|`` nothing but ``|x - 1|`` is left."""
+        expression = Abs(X + 1) + Abs(X - 1) - X - 1
+        d = Polyhedron(M, [outermost(expression)])
+        assert not any(f.kinks for f in d.functions)
+        assert d.implicit([3.0, 0.0]) == float(expression.subs(X, 3))
+
     def test_are_made_of_what_stands_outermost(self):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
