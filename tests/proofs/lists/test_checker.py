@@ -2,6 +2,7 @@
 
 import ast
 import json
+import shutil
 import subprocess
 import sys
 import warnings
@@ -15,13 +16,15 @@ import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import polycorner.proofs.lists.checker as script
 from polycorner import AnyOf, Manifold, Polyhedron
 from polycorner.errors import NonsmoothWarning
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.enclosures import Formulas
 from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.proofs.lists import records
+from polycorner.proofs.lists import checker, records
+from polycorner.proofs.lists.checker import balls, problem
+from polycorner.proofs.lists.checker.__main__ import main
+from polycorner.proofs.lists.checker.proof import Proof
 from polycorner.proofs.lists.enumeration import stationary_points
 
 PLANE = Manifold.euclidean("x y")
@@ -107,7 +110,7 @@ def verdict(capsys):
 
     def run(path, *options):
         before = flint.ctx.prec
-        code = script.main([str(path), *options])
+        code = main([str(path), *options])
         flint.ctx.prec = before
         line = capsys.readouterr().out.strip()
         assert line.startswith("verified" if code == 0 else "NOT VERIFIED")
@@ -125,16 +128,37 @@ def test_proofs_are_verified(name, proofs, verdict):
         assert line.startswith(f"verified: {CASES[name][4]} stationary points")
 
 
-def test_it_stands_alone(proofs):
-    tree = ast.parse(Path(script.__file__).read_text(encoding="utf-8"))
-    names = {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
-    names |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    roots = {name.split(".")[0] for name in names}
+def test_it_stands_alone(proofs, tmp_path):
+    """A copy of the folder runs where python-flint is, importing nothing of polycorner."""
+    folder = Path(checker.__file__).parent
+    shutil.copytree(folder, tmp_path / "checker", ignore=shutil.ignore_patterns("__pycache__"))
+    roots = set()
+    for file in folder.glob("*.py"):
+        nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+        roots |= {a.name.split(".")[0] for n in nodes if isinstance(n, ast.Import) for a in n.names}
+        wanted = [n for n in nodes if isinstance(n, ast.ImportFrom)]
+        assert all(n.level <= 1 for n in wanted)
+        roots |= {n.module.split(".")[0] for n in wanted if n.level == 0}
+    assert "flint" in roots
     assert roots <= sys.stdlib_module_names | {"flint"}
-    command = [sys.executable, "-I", script.__file__, str(proofs("parabola")), "--jobs", "2"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "checker", str(proofs("parabola")), "--jobs", "2"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert result.returncode == 0
     assert result.stdout.startswith("verified: 1 stationary points")
+
+
+@pytest.mark.parametrize("option", ["--sample", "--jobs"])
+@pytest.mark.parametrize("number", ["0", "-3", "two"])
+def test_options_that_are_no_positive_numbers_are_named(option, number, capsys):
+    with pytest.raises(SystemExit):
+        main(["proof.zip", option, number])
+    assert f"argument {option}: invalid positive whole number value" in capsys.readouterr().err
+
+
+def test_a_file_that_is_not_there_is_no_malformed_one(tmp_path, verdict):
+    fine, line = verdict(tmp_path / "nothing.zip")
+    assert not fine
+    assert "cannot be read" in line
 
 
 def test_a_sample_is_called_a_sample(proofs, verdict):
@@ -473,11 +497,11 @@ def test_derivatives_are_those_of_sympy(formula, monkeypatch):
     monkeypatch.setattr(flint.ctx, "prec", 128)
     formulas = Formulas([SmoothFunction("f", formula, PLANE)], PLANE)
     nodes, outputs = records.program(formulas.graph, formulas.outputs)
-    problem = stated(nodes, outputs)
+    posed = stated(nodes, outputs).p
     place = {x: sp.Rational(5, 8), y: sp.Rational(7, 4)}
     box = [flint.arb(float(value), 2.0**-30) for value in place.values()]
-    v = problem.values(box)
-    gradient, hessian = problem.forms(v, 0, {}, 2)
+    v = posed.values(box)
+    gradient, hessian = posed.forms(v, 0, {}, 2)
 
     def holds(ball, expression):
         exact = flint.arb(str(sp.N(expression.doit().subs(place), 30)), 1e-25)
@@ -492,12 +516,12 @@ def test_derivatives_are_those_of_sympy(formula, monkeypatch):
 
 
 def stated(nodes, outputs, **more):
-    """Return a problem without inequalities in the unit square."""
+    """Return a problem without inequalities in the unit square, with its proof."""
     sides = {"lower": [(0.0).hex()] * 2, "upper": [(1.0).hex()] * 2}
     empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed")}
-    data = {"format": script.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
+    data = {"format": problem.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
     data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
-    return script.Problem({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
+    return Proof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
 
 
 @pytest.mark.parametrize("level", ["-1", "1/2"])
@@ -513,7 +537,7 @@ def test_a_locus_of_an_energy_that_selects_by_another_coordinate_is_refused(leve
     if level == "-1":  # which no point of the domain is below
         assert stated(nodes, [10], loci=[locus]).loci[0].index == 0
     else:
-        with pytest.raises(script.RefusedError, match="locus"):
+        with pytest.raises(balls.RefusedError, match="locus"):
             stated(nodes, [10], loci=[locus])
 
 
@@ -525,12 +549,12 @@ def test_boxes_enclose_what_their_points_give(formula, seed):
     rng, before = np.random.default_rng(seed), flint.ctx.prec
     formulas = Formulas([SmoothFunction("f", formula, PLANE)], PLANE)
     nodes, outputs = records.program(formulas.graph, formulas.outputs)
-    problem = stated(nodes, outputs)
+    posed = stated(nodes, outputs).p
     lower = rng.uniform(-1, 2, 2)
     upper = lower + rng.exponential(0.5, 2)
     points = [rng.uniform(lower, upper) for _ in range(8)]
-    found = [forms(problem, script.hull(lower, upper))]
-    found += [forms(problem, script.hull(q, q)) for q in points]
+    found = [forms(posed, balls.hull(lower, upper))]
+    found += [forms(posed, balls.hull(q, q)) for q in points]
     flint.ctx.prec = before
     (value, slopes), *inside = found
     for v, g in inside:

@@ -1,0 +1,21 @@
+"""Checker of saved lists of stationary points and their proofs; needs python-flint alone.
+
+``python -m checker FILE [--sample K] [--jobs J]``, run where this folder or a copy of it is,
+differentiates the program in the file itself, walks the subdivision and shows of every closed box,
+in ball arithmetic of 128 bits, that
+
+- no point of the set lies in it; or
+- in each branch of the set, some stored direction, made tangent to the equations, increases all
+  functions that may vanish and decreases the energy, for all elements of their generalised
+  gradients ([Clarke] sec. 2.3); or the functions that may vanish are active in a region around the
+  box; or the box is at a locus, and a direction along the other coordinates leads into the set; or
+- a symmetry carries it into the domain and increases ``w . q``.
+
+Boxes for which this is not shown at once are bisected.  Krawczyk's operator ([Neumaier] sec. 5.1)
+shows that a region has one KKT point with positive multipliers, and a locus one zero of the
+derivative of the energy in the coordinates that it depends on.  The list must consist of all
+regions whose point is stationary and not outside the domain, with their indices.
+
+What is shown is about the problem that the file states.  That its symmetries preserve this problem
+is tested at random points and not proved.
+"""

@@ -1,0 +1,88 @@
+"""Numbers, boxes and matrices as balls, and what cannot be shown."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from flint import arb, arb_mat, fmpq
+
+BITS, STEPS = 128, 10
+ZERO, NAN = arb(0), arb("nan")
+
+
+class RefusedError(Exception):
+    """Something in the file could not be shown."""
+
+
+def need(condition: object, message: str) -> None:
+    if not condition:
+        raise RefusedError(message)
+
+
+def square(x: arb) -> arb:
+    return (x.abs_lower() ** 2).union(x.abs_upper() ** 2)
+
+
+def number(text: str) -> arb:
+    """Return a ball for ``"3/2"``, ``"pi"``, ``"e"`` or ``"2 pi"``."""
+    *factors, last = text.split()
+    units = {"pi": arb.pi(), "e": arb.const_e()}
+    ratios = factors if last in units else [last]
+    ratio = arb(fmpq(*map(int, ratios[0].split("/")))) if ratios else arb(1)
+    return ratio * units.get(last, arb(1))
+
+
+def sides(record: dict[str, Any], names: Sequence[str], count: int) -> list[list[float]]:
+    """Return sides of a box in a record, as doubles."""
+    found = [[float.fromhex(text) for text in record[name]] for name in names]
+    fine = all(len(side) == count and all(map(math.isfinite, side)) for side in found)
+    need(fine and all(a <= b for a, b in zip(*found, strict=True)), f"{record}: sides of a box")
+    return found
+
+
+def hull(lower: Sequence[float], upper: Sequence[float]) -> list[arb]:
+    return [arb(a).union(arb(b)) for a, b in zip(lower, upper, strict=True)]
+
+
+def moved(side: Sequence[float], axis: int, position: float) -> list[float]:
+    return [*side[:axis], position, *side[axis + 1 :]]
+
+
+def dot(x: Sequence[Any], y: Sequence[Any]) -> arb:
+    return sum((a * b for a, b in zip(x, y, strict=True)), ZERO)
+
+
+def turn(x: arb, lower: float, upper: float, period: arb | None) -> arb:
+    """Return the multiple of a period that brings ``x`` nearest to the middle of an interval."""
+    away = (arb(lower) + arb(upper)) / 2 - x
+    return round(float((away / period).mid())) * period if period else ZERO
+
+
+def definite(rows: list[list[arb]]) -> bool:
+    """Whether all symmetric matrices in an enclosure are positive definite, by elimination."""
+    if not rows:
+        return True
+    (pivot, *row), *rest = rows
+    left = [[x - r[0] * y / pivot for x, y in zip(r[1:], row, strict=True)] for r in rest]
+    return pivot > 0 and definite(left)
+
+
+def zero(equations: Callable[..., Any], unknowns: list[arb]) -> list[arb] | None:
+    """Return a small enclosure of the only zero in a box by Krawczyk's operator, or None."""
+    shown = False
+    for _ in range(STEPS):
+        centre = [x.mid() for x in unknowns]
+        here, there = equations(centre), equations(unknowns)
+        try:
+            inverse = arb_mat(here[1]).mid().inv().mid()
+        except (TypeError, ZeroDivisionError):
+            return None
+        apart = arb_mat([[x - c] for x, c in zip(unknowns, centre, strict=True)])
+        defect = arb_mat(len(centre), len(centre), 1) - inverse * arb_mat(there[1])
+        steps = defect * apart - inverse * arb_mat([[r] for r in here[0]])
+        image = [c + x for c, x in zip(centre, steps.entries(), strict=True)]
+        pairs = list(zip(unknowns, image, strict=True))
+        if not shown and not all(x.contains_interior(y) for x, y in pairs):
+            return None
+        shown, unknowns = True, [y if y.rad() < x.rad() else x for x, y in pairs]
+    return unknowns

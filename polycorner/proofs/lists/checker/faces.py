@@ -1,0 +1,135 @@
+"""Regions with one KKT point, and loci, by Krawczyk's operator."""
+
+from typing import Any
+
+from flint import acb_mat, arb, arb_mat
+
+from .balls import ZERO, definite, dot, hull, need, sides, turn, zero
+from .problem import Problem
+
+
+class Face:
+    """A region, or a locus: a box with one KKT point on a face, all multipliers positive.
+
+    Of a locus the face is the whole space of the coordinates that the energy depends on.
+    """
+
+    def __init__(self, p: Problem, record: dict[str, Any], places: list[int], active: Any) -> None:
+        self.p, self.places, self.active = p, places, frozenset(active or ())
+        self.name = f"{'locus' if active is None else 'region'} {record}"
+        need(self.active <= set(range(p.m)) and set(places) <= set(p.free), self.name)
+        self.rows = [*sorted(self.active), *range(p.m, p.m + p.k + 1)]
+        count = p.n if active is not None else len(places)
+        self.lower, self.upper = sides(record, ("lower", "upper"), count)
+        if active is not None:
+            self.lower, self.upper = (
+                [side[i] for i in places] for side in (self.lower, self.upper)
+            )
+        sharp = sides(record, ("sharp_lower", "sharp_upper"), len(places) + len(self.rows) - 1)
+        starts = filter(None, map(self.start, (1, 4, 16)))
+        solved = next(filter(None, (zero(self.equations, start) for start in starts)), None)
+        need(solved, f"{self.name}: no single solution with positive multipliers is shown")
+        self.unknowns: list[arb] = solved or []
+        slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in self.unknowns]
+        near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
+        inside = all(x.contains(y) for x, y in zip(near, self.unknowns, strict=True))
+        need(inside, f"{self.name}: the solution is elsewhere")
+        self.index = self.negative()
+        need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
+        self.point = self.at(self.unknowns)
+        whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
+        some = [(x, p.lower[i], p.upper[i]) for i, x in enumerate(self.point) if not whole[i]]
+        self.outside = any(x < a or x > b for x, a, b in some)
+        branches = p.open_sets(p.signs(p.values(self.point)), self.active)
+        self.stationary = branches == [self.active]
+        self.absent = not branches or any(u < self.active for u in branches)
+        if active is None:
+            self.descends()
+
+    def at(self, unknowns: list[arb]) -> list[arb]:
+        """Return all coordinates; those that are no unknowns may be anywhere in the domain."""
+        known = dict(zip(self.places, unknowns, strict=False))
+        return [known.get(i, x) for i, x in enumerate(self.p.anywhere)]
+
+    def holds(self, lower: list[float], upper: list[float]) -> bool:
+        ends = zip(self.lower, self.upper, self.places, strict=True)
+        return all(a <= lower[i] and upper[i] <= b for a, b, i in ends)
+
+    def rows_at(self, unknowns: list[arb]) -> Any:
+        """Return values of the functions, and gradients and Hessians in the free coordinates."""
+        v, memo = self.p.values(self.at(unknowns)), dict[int, Any]()
+        found = [self.p.forms(v, row, memo, 2) for row in self.rows]
+        if None in found:
+            return None
+        slopes = [[g.get(i, ZERO) for i in self.places] for g, _ in found]
+        pairs = [[(i, j) for j in self.places] for i in self.places]
+        bends = [[[h.get(ij, ZERO) for ij in row] for row in pairs] for _, h in found]
+        return [v[self.p.outputs[row]] for row in self.rows], slopes, bends
+
+    def start(self, growth: int) -> list[arb] | None:
+        """Return the box, and more than an enclosure of the multipliers at all of its points."""
+        box = hull(self.lower, self.upper)
+        found = self.rows_at(box)
+        if not found or len(self.rows) == 1:
+            return box if found else None
+        *rows, energy = found[1]
+        middle = arb_mat(rows).mid()
+        try:
+            left = (middle * middle.transpose()).inv().mid() * middle
+            form = left * arb_mat(rows).transpose()
+            multipliers = form.solve(left * arb_mat([[x] for x in energy])).entries()
+        except ZeroDivisionError:
+            return None
+        more = [x + arb(0, 1) * (growth * x.rad() + (abs(x) + 1) / 2**100) for x in multipliers]
+        return [*box, *more] if all(x > 0 for x in multipliers[: len(self.active)]) else None
+
+    def equations(self, unknowns: list[arb]) -> Any:
+        """Return the residual of the KKT equations and their Jacobian."""
+        found = self.rows_at(unknowns)
+        if found is None:
+            return None
+        values, slopes, bends = found
+        weights = [*(-x for x in unknowns[len(self.places) :]), arb(1)]
+        residual = [dot(weights, column) for column in zip(*slopes, strict=True)]
+        bent = [
+            [dot(weights, entry) for entry in zip(*b, strict=True)]
+            for b in zip(*bends, strict=True)
+        ]
+        rows = slopes[:-1]
+        above = [[*b, *(-row[i] for row in rows)] for i, b in enumerate(bent)]
+        return [*residual, *values[:-1]], [*above, *([*row, *[ZERO] * len(rows)] for row in rows)]
+
+    def negative(self) -> int | None:
+        """Return the negative eigenvalues on the tangent space: each row adds one of each sign."""
+        n, (_, jacobian) = len(self.places), self.equations(self.unknowns)
+        units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(jacobian))]
+        # a symmetric matrix of the same inertia, whose eigenvalues are not multiple by structure
+        signed = [
+            (u if i < n else -u, row)
+            for i, (u, row) in enumerate(zip(units, jacobian, strict=True))
+        ]
+        form = [[u * w * x for w, x in zip(units, row, strict=True)] for u, row in signed]
+        try:
+            found = [x.real for x in acb_mat(arb_mat(form)).eig()] if form else []
+        except ValueError:
+            return None
+        decided = all(x < 0 or x > 0 for x in found)
+        return sum(x < 0 for x in found) - len(self.rows) + 1 if decided else None
+
+    def descends(self) -> None:
+        """Check that ``v = -C (z - z*)`` descends at a locus, and that nothing else is read."""
+        read = {self.p.nodes[a][1][0] for a in self.p.needs[-1] if self.p.nodes[a][0] == "var"}
+        fine = not self.p.k and {i for i in read if i in self.p.free} <= set(self.places)
+        whole = arb_mat(self.equations(hull(self.lower, self.upper))[1])
+        form = whole.transpose() * (whole.mid() + whole.mid().transpose())
+        need(fine and definite((form + form.transpose()).tolist()), f"{self.name}: no descent")
+
+    def same(self, other: "Face") -> bool | None:
+        """Whether two regions have one point: whether this one's lies in the other region."""
+        if self.active != other.active:
+            return False
+        ends = zip(self.places, other.lower, other.upper, strict=True)
+        places = ((self.point[i], a, b, self.p.periods[i]) for i, a, b in ends)
+        known = [(x + turn(x, a, b, period), a, b) for x, a, b, period in places]
+        inside = all(a <= x <= b for x, a, b in known)
+        return True if inside else False if any(x < a or x > b for x, a, b in known) else None

@@ -1,0 +1,120 @@
+"""Problem of a file, and its functions with generalised derivatives on boxes."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from flint import arb, ctx
+
+from .balls import BITS, NAN, ZERO, hull, need, number, sides
+from .operations import SLOPES, VALUES, chain, ordered, unite
+
+FORMAT = ["polycorner-stationary-list", 1]
+
+
+class Problem:
+    """The problem of a file: a program of the functions, the branches of the set, the domain."""
+
+    def __init__(self, data: dict[str, Any]) -> None:
+        ctx.prec = BITS
+        need(data["format"] == FORMAT, f"the format is {data['format']}, not {FORMAT}")
+        self.n, self.m, self.k = (len(data["coordinates"]), data["inequalities"], data["equations"])
+        need(self.m >= 0 and self.k >= 0, "numbers of functions")
+        self.nodes: list[tuple[str, list[Any]]] = []
+        self.known: dict[int, arb] = {}
+        self.positive: set[int] = set()
+        for op, *args in data["nodes"]:
+            self.add(op, args)
+        self.outputs: list[int] = data["outputs"]
+        need(len(self.outputs) == self.m + self.k + 1, "there is one output for each function")
+        self.needs = [self.needed(output) for output in self.outputs]
+        self.branches = {frozenset(branch) for branch in data["branches"]}
+        need(all(0 <= i < self.m for branch in self.branches for i in branch), "branches")
+        self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
+        self.anywhere = hull(self.lower, self.upper)
+        self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]
+        self.free = [i for i in range(self.n) if self.widths[i] > 0]
+        need(data["fixed"] == [i for i in range(self.n) if i not in self.free], "fixed coordinates")
+        self.periods = [number(p) if p else None for p in data["periods"]]
+
+    def add(self, op: str, args: list[Any]) -> None:
+        place = len(self.nodes)
+        if op == "const":
+            self.known[place] = number(args[0])
+        else:
+            need(op in {"var", *VALUES}, f"the operation {op}")
+            bound = self.n if op == "var" else place
+            need(all(type(a) is int and 0 <= a < bound for a in args), f"{op} of {args}")
+        if op == "mul" and args[0] == args[1]:
+            op, args = "square", args[:1]
+        sums = op in {"add", "mul", "div"} and self.positive.issuperset(args)
+        if sums or op in {"square", "abs", "exp"} or (op == "const" and self.known[place] >= 0):
+            self.positive.add(place)  # nowhere negative, whatever a ball says
+        self.nodes.append((op, args))
+
+    def needed(self, output: int) -> list[int]:
+        """Return the nodes on whose derivatives those of an output depend, in order."""
+        seen: set[int] = set()
+        waiting = [output]
+        while waiting:
+            op, args = self.nodes[a := waiting.pop()]
+            if a not in seen and op != "const":
+                seen.add(a)
+                waiting += [] if op == "var" else args[1:] if op == "select" else args
+        return sorted(seen)
+
+    def values(self, box: Sequence[arb]) -> list[Any]:
+        v: list[Any] = []
+        for place, (op, args) in enumerate(self.nodes):
+            if op in {"const", "var"}:
+                v.append(box[args[0]] if op == "var" else self.known[place])
+            elif op == "sqrt" and not v[args[0]] > 0:
+                root = ZERO.union(v[args[0]].abs_upper().sqrt())
+                v.append(root if args[0] in self.positive else NAN)
+            else:
+                v.append(VALUES[op](*[v[a] for a in args]))
+        return v
+
+    def forms(self, v: list[Any], row: int, memo: dict[int, Any], order: int = 1) -> Any:
+        """Return generalised gradient and Hessian of a function; None where there may be none."""
+        for a in self.needs[row]:
+            if a in memo:
+                continue
+            op, args = self.nodes[a]
+            parts = [memo.get(b, ({}, {})) for b in args]
+            if op == "var":
+                memo[a] = {args[0]: arb(1)}, {}
+            elif op in {"select", "min", "max"}:
+                first = v[args[0]] if op == "select" else ordered(*[v[b] for b in args])
+                (x, y), hulls = parts[-2:], op != "select" and order == 1 and None not in parts
+                if first is None:
+                    memo[a] = (unite(x[0], y[0]), {}) if hulls else None
+                else:
+                    memo[a] = x if first == (op != "max") else y
+            else:
+                slopes = SLOPES[op](*[v[b] for b in args])
+                memo[a] = None if None in parts else chain(slopes, parts, order)
+        return memo.get(self.outputs[row], ({}, {}))
+
+    def signs(self, v: list[Any]) -> list[int]:
+        """Return the signs of inequalities and equations, 0 where they are not decided."""
+        rows = (v[output] for output in self.outputs[:-1])
+        return [1 if x > 0 else -1 if x < 0 else 0 for x in rows]
+
+    def sign(self, v: list[Any], row: int, memo: Any, lo: list[float], hi: list[float]) -> int:
+        """Return the sign of a function that is monotone in all coordinates, from two corners."""
+        found = self.forms(v, row, memo)
+        slopes = [found[0].get(i, ZERO) if found else NAN for i in range(self.n)]
+        if all(x >= 0 or x <= 0 for x in slopes):
+            for s, (a, b) in ((1, (lo, hi)), (-1, (hi, lo))):
+                corner = [arb(y if x >= 0 else z) for x, y, z in zip(slopes, a, b, strict=True)]
+                if s * self.values(corner)[self.outputs[row]] > 0:
+                    return s
+        return 0
+
+    def open_sets(self, signs: list[int], zeros: frozenset[int] = frozenset()) -> list[Any]:
+        """Return the functions that have to hold in each branch and may vanish; least sets only."""
+        if any(signs[self.m :]):
+            return []
+        below, above = ({i for i in range(self.m) if signs[i] == s} - zeros for s in (-1, 1))
+        sets = {branch - above for branch in self.branches if not branch & below}
+        return [u for u in sets if not any(smaller < u for smaller in sets)]

@@ -1,0 +1,85 @@
+"""Proof in a file: why each of its boxes is closed."""
+
+from typing import Any
+
+from flint import arb, arb_mat
+
+from .balls import NAN, ZERO, dot, hull, moved
+from .faces import Face
+from .problem import Problem
+from .symmetries import Symmetry
+
+PIECES = 4000  # into which a box is bisected at most
+
+
+class Proof:
+    """The problem of a file, with regions, loci and symmetries."""
+
+    def __init__(self, data: dict[str, Any]) -> None:
+        self.p = p = Problem(data)
+        self.regions = [Face(p, r, p.free, r["active"]) for r in data["regions"]]
+        self.loci = [Face(p, r, r["z"], None) for r in data["loci"]]
+        self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
+
+    def closed(self, lower: list[float], upper: list[float], hints: list[Any]) -> bool:
+        """Whether a box is closed rightly, or every piece of a bisection of it."""
+        ways = [[arb(x) for x in h] for h in hints]
+        ways = [h for h in ways if all(h[i] == 0 or self.p.widths[i] for i in range(self.p.n))]
+        waiting = [(lower, upper)]
+        for _ in range(PIECES):
+            lo, hi = waiting.pop()
+            if not self.shown(lo, hi, ways):
+                shares = [(hi[i] - lo[i]) / self.p.widths[i] for i in self.p.free]
+                axis = self.p.free[shares.index(max(shares))] if shares else 0
+                middle = 0.5 * (lo[axis] + hi[axis])
+                if not lo[axis] < middle < hi[axis]:
+                    return False
+                waiting += [(lo, moved(hi, axis, middle)), (moved(lo, axis, middle), hi)]
+            if not waiting:
+                return True
+        return False
+
+    def shown(self, lo: list[float], hi: list[float], ways: list[list[arb]]) -> bool:
+        """Whether a box is closed rightly."""
+        if any(g.carries(lo, hi) for g in self.symmetries):
+            return True
+        v, memo = self.p.values(hull(lo, hi)), dict[int, Any]()
+        signs, turned = self.p.signs(v), list[Any]()
+        regions, loci = ([f for f in all_ if f.holds(lo, hi)] for all_ in (self.regions, self.loci))
+
+        def grows(row: int, w: list[arb]) -> arb:
+            found = self.p.forms(v, row, memo)
+            return dot([*found[0].values()], [w[i] for i in found[0]]) if found else NAN
+
+        def leads(u: frozenset[int], w: list[arb]) -> bool:
+            return all(grows(i, w) > 0 for i in u)
+
+        def left(u: frozenset[int]) -> bool:
+            if any(u <= region.active for region in regions):
+                return True
+            turned[:] = turned or self.tangents(v, memo, ways)
+            if any(grows(-1, w) < 0 and leads(u, w) for w in turned):
+                return True
+            along = (w for w in ways if loci and all(w[i] == 0 for i in loci[0].places))
+            return bool(loci) and (not u or any(leads(u, w) for w in along))
+
+        if all(map(left, self.p.open_sets(signs))):
+            return True
+        closer = [s or self.p.sign(v, row, memo, lo, hi) for row, s in enumerate(signs)]
+        return closer != signs and all(map(left, self.p.open_sets(closer)))
+
+    def tangents(self, v: list[Any], memo: dict[int, Any], ways: list[list[arb]]) -> list[Any]:
+        """Return ``w + C y`` with ``dh (w + C y) = 0``, for all elements of the enclosed ``dh``."""
+        found = [self.p.forms(v, row, memo) for row in range(self.p.m, self.p.m + self.p.k)]
+        if None in found or not found:
+            return [] if found else ways
+        rows = arb_mat([[g.get(i, ZERO) for i in self.p.free] for g, _ in found])
+        across, changed = rows.mid().transpose(), []
+        for w in ways:
+            try:
+                y = (rows * across).solve(-rows * arb_mat([[w[i]] for i in self.p.free]))
+            except ZeroDivisionError:
+                return []
+            change = dict(zip(self.p.free, (across * y).entries(), strict=True))
+            changed.append([x + change.get(i, ZERO) for i, x in enumerate(w)])
+        return changed
