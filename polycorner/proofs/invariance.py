@@ -48,14 +48,19 @@ class Generator:
     components: tuple[SmoothFunction, ...]
 
     @cached_property
-    def _formulas(self) -> Formulas:
+    def formulas(self) -> Formulas:
+        """The components as formulas."""
         return Formulas(self.components, self.manifold)
+
+    def bounds(self, q: "Sequence[Ball]") -> "list[Ball]":
+        """Return enclosures of the components on a box, infinite where they are not bounded."""
+        return self.formulas.values(Box(q[: self.manifold.size]), range(len(self.components)))
 
     def at(self, q: "Sequence[Ball]") -> "list[Ball] | Undecided":
         """Return enclosures of the components on a box, or why smoothness is undecided."""
         rows = range(len(self.components))
         box = Box(q[: self.manifold.size])
-        forms = self._formulas.smooth(box, rows)
+        forms = self.formulas.smooth(box, rows)
         return forms if isinstance(forms, Undecided) else list(forms.evaluate(box, 0)[0])
 
     def __str__(self) -> str:

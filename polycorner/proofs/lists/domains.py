@@ -7,11 +7,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner import checks
 from polycorner.spaces.arguments import reals
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
+
+ROUNDING = 1e-12  # of boxes that are carried around circles, in scale units
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,30 @@ class Domain(Value):
     def units(self) -> Array:
         """The scales of the coordinates, 0 for those that are fixed, ``(n,)``."""
         return np.where(self.lower < self.upper, self.manifold.scale_array, 0.0)
+
+    def misses(self, lower: Array, upper: Array, places: Sequence[int]) -> bool:
+        """Whether a box in some coordinates lies outside, circles that are whole apart."""
+        at = list(places)
+        whole = (self.upper - self.lower >= self.manifold.periods)[at]
+        away = (upper < self.lower[at]) | (lower > self.upper[at])
+        return bool((away & ~whole).any())
+
+    def within(
+        self, lower: Array, upper: Array, left: Array, right: Array, places: Sequence[int]
+    ) -> NDArray[np.bool_]:
+        """Whether a box lies in boxes ``left``, ``right`` ``(..., k)`` in some coordinates.
+
+        It is carried around circles to where it is nearest to them, and widened by what that
+        rounds.
+        """
+        at = list(places)
+        periods = np.array(self.manifold.periods)[at]
+        circles = np.where(np.isfinite(periods), periods, 1.0)
+        apart = 0.5 * (left + right) - 0.5 * (lower + upper)
+        turn = np.where(np.isfinite(periods), np.round(apart / circles) * circles, 0.0)
+        slack = ROUNDING * self.manifold.scale_array[at]
+        inside = (lower + turn - slack >= left) & (upper + turn + slack <= right)
+        return np.asarray(inside.all(axis=-1))
 
     def sides(self) -> dict[str, tuple[float, float]]:
         """Return the sides by name."""

@@ -1,27 +1,25 @@
 """The search for all stationary points, its symmetries, and what is made of the regions found."""
 
 from collections.abc import Sequence
-from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner import checks
-from polycorner.intervals.balls import between, precision
-from polycorner.intervals.enclosures import SmoothForms
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.proofs.invariance import annihilated, generators, translations
-from polycorner.proofs.lists.acceptance import BITS, Region
+from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, OUT, ROUNDING, Known, full, membership
+from polycorner.proofs.lists.members import OPEN, Known, full, settled
+from polycorner.proofs.lists.quotients import unreached
+from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Boxes, Search
 from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
-from polycorner.spaces.manifold import Array, Manifold
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -149,46 +147,24 @@ def _motions(
 
 def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:
     """Raise ValueError unless continuous symmetries carry every point to the fixed values."""
-    fixed = search.domain.fixed
-    if not fixed:
-        return
-    formulas, manifold = search.faces.formulas, search.domain.manifold
-    forms = SmoothForms(formulas.graph, formulas.outputs, formulas.dimension, formulas.inputs)
-    with precision(BITS):
-        bases = translations(forms)
-        declared = generators(manifold, symmetry.fields if symmetry else ())
-        fields = [f for f in declared if all(annihilated(forms, f))]
-        fields += generators(manifold, bases)
-        sides = zip(search.domain.lower.tolist(), search.domain.upper.tolist(), strict=True)
-        hull = [between(a, b) for a, b in sides]
-        rows = [list(f.at(hull)) for f in fields]  # type: ignore[arg-type]
-        moved = [
-            [float(row[i].mid()) if row[i].rad() == 0 else np.nan for i in fixed] for row in rows
-        ]
-    for choice in _square(moved, len(fixed)):
-        if abs(np.linalg.det(choice)) > 1e-9:
-            return
-    names = ", ".join(manifold.names[i] for i in fixed)
-    checks.refuse(
-        "box", f"an interval for {names}, or a continuous symmetry that moves it", "one value"
-    )
-
-
-def _square(rows: list[list[float]], count: int) -> list[Array]:
-    usable = [row for row in rows if np.isfinite(row).all()]
-    return [np.array(chosen) for chosen in combinations(usable, count)]
+    fields = symmetry.fields if symmetry else ()
+    left = unreached(search.faces.formulas, search.domain, fields)
+    if left:
+        names = ", ".join(search.domain.manifold.names[i] for i in left)
+        checks.refuse(
+            "box", f"an interval for {names}, or a continuous symmetry that moves it", "one value"
+        )
 
 
 def listed(search: Search) -> StationaryList:
     """Return what a search found."""
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
-    known = Known(search)
-    orbits = 0
-    for region in search.regions:
-        place = OUT if known.has(region) else membership(search, region)
-        if place == OUT:
-            continue
+    known, orbits, members = Known(search), 0, settled(search)
+    for k, place in members:
+        region = search.regions[k]
+        if known.has(region):
+            continue  # an image of one before
         known.add(region)
         if place == OPEN:
             open_points.append(_point(search, region, orbits))
@@ -209,7 +185,7 @@ def listed(search: Search) -> StationaryList:
         _undecided(search),
         tuple(open_points),
         search.tally,
-        search,
+        record(search, members),
     )
 
 
@@ -241,12 +217,15 @@ def _images(search: Search, region: Region) -> list[Region]:
 
 def _loci(search: Search) -> list[Locus]:
     """Return the loci that were found and their images, each once."""
-    manifold, z = search.domain.manifold, list(search.reads)
+    domain, z = search.domain, search.reads
     found: list[Locus] = []
     for place in search.loci:
         for g in (None, *search.motions):
             image = place if g is None else _locus_image(search, place, g)
-            if not any(_same_locus(manifold, z, image, other) for other in found):
+            sharp = image.sharp_lower, image.sharp_upper
+            if not domain.misses(*sharp, z) and not any(
+                domain.within(*sharp, other.lower, other.upper, z) for other in found
+            ):
                 found.append(image)
     return found
 
@@ -258,19 +237,6 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
         sides[0][z], sides[1][z] = lower, upper
         ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
     return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
-
-
-def _same_locus(manifold: Manifold, z: list[int], one: Locus, other: Locus) -> bool:
-    """Whether a locus lies in the box of another one, where there is only one."""
-    periods = np.array(manifold.periods)[z]
-    apart = 0.5 * (other.lower + other.upper - one.sharp_lower - one.sharp_upper)
-    circles = np.where(np.isfinite(periods), periods, 1.0)
-    turn = np.where(np.isfinite(periods), np.round(apart / circles) * circles, 0.0)
-    slack = ROUNDING * manifold.scale_array[z]
-    inside = (one.sharp_lower + turn - slack >= other.lower) & (
-        one.sharp_upper + turn + slack <= other.upper
-    )
-    return bool(inside.all())
 
 
 def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ period.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -137,7 +138,7 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
         shift = g.halves[k] * _exact_half(d.manifold.periods[k])
         moved[symbol] = g.signs[k] * symbols[g.order[k]] + shift
     names = {}
-    before = {f: _normal(_bound(f)) for f in problem.functions}
+    before = _normal_forms(problem)
     after = {f: _normal(_bound(f).subs(moved, simultaneous=True)) for f in problem.functions}
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
         return None
@@ -154,6 +155,11 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     if {frozenset(names[i] for i in piece) for piece in pieces} != pieces:
         return None
     return tuple(names[i] for i in range(len(d.functions)))
+
+
+@lru_cache(maxsize=8)
+def _normal_forms(problem: Problem) -> "dict[SmoothFunction, sympy.Expr]":
+    return {f: _normal(_bound(f)) for f in problem.functions}
 
 
 def _exact_half(period: float) -> "sympy.Expr":

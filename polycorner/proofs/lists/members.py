@@ -1,16 +1,14 @@
-"""Which regions of a search carry points of the list, each point once."""
+"""Members of a list: the regions of a search whose points are stationary, each point once."""
 
 import numpy as np
 
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.acceptance import BITS, Region
-from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.search import Search
 from polycorner.spaces.manifold import Array
 
 IN, OUT, OPEN = "in", "out", "open"
-ROUNDING = 1e-12  # of enclosures that are carried around circles, in scale units
 
 
 class Known:
@@ -19,7 +17,6 @@ class Known:
     def __init__(self, search: Search) -> None:
         self.search, self.boxes = search, dict[frozenset[int], list[tuple[Array, Array]]]()
         self.free = list(search.domain.free)
-        self.periods = np.array(search.domain.manifold.periods)[self.free]
 
     def add(self, region: Region) -> None:
         """Add a region."""
@@ -33,12 +30,19 @@ class Known:
             return False
         sides = np.array(known)
         lower, upper = region.sharp_lower[: len(self.free)], region.sharp_upper[: len(self.free)]
-        apart = sides.mean(axis=1) - 0.5 * (lower + upper)
-        circles = np.where(np.isfinite(self.periods), self.periods, 1.0)
-        turn = np.where(np.isfinite(self.periods), np.round(apart / circles) * circles, 0.0)
-        slack = ROUNDING * self.search.problem.scales[self.free]
-        inside = (lower + turn - slack >= sides[:, 0]) & (upper + turn + slack <= sides[:, 1])
-        return bool(inside.all(axis=1).any())
+        domain = self.search.domain
+        return bool(domain.within(lower, upper, sides[:, 0], sides[:, 1], self.free).any())
+
+
+def settled(search: Search) -> list[tuple[int, str]]:
+    """Return the regions whose points are in the list or may be (``IN``, ``OPEN``), each once."""
+    known, found = Known(search), list[tuple[int, str]]()
+    for k, region in enumerate(search.regions):
+        place = OUT if known.has(region) else membership(search, region)
+        if place != OUT:
+            known.add(region)
+            found.append((k, place))
+    return found
 
 
 def full(search: Search, region: Region) -> tuple[Array, Array]:
@@ -68,7 +72,7 @@ def membership(search: Search, region: Region) -> str:
     held[list(region.active)] = True
     below &= ~held
     above &= ~held
-    if _outside(search.domain, lower, upper):
+    if search.domain.misses(lower, upper, range(len(lower))):
         return OUT
     possible = [c for c in search.conj if not (below & c).any()]
     if not possible:
@@ -78,10 +82,3 @@ def membership(search: Search, region: Region) -> str:
     if any(sure and less for sure, less in zip(decided, fewer, strict=True)):
         return OUT
     return IN if any(decided) and not any(fewer) else OPEN
-
-
-def _outside(found: Domain, lower: Array, upper: Array) -> bool:
-    periods = np.array(found.manifold.periods)
-    whole = found.upper - found.lower >= periods
-    away = (upper < found.lower) | (lower > found.upper)
-    return bool((away & ~whole).any())

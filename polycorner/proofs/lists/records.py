@@ -11,7 +11,7 @@ A file is a zip archive of
     The subdivision, each node before its halves: the axis of a split, -1 for a closed and -2 for an
     open box (8-bit integers); where boxes are split (doubles).
 ``counts.bin``, ``directions.bin``
-    How many directions belong to each closed box (8 bits), and these (single precision).
+    How many directions belong to each closed box (16 bits), and these (single precision).
 
 Numbers are little-endian.  Derivatives are not stored.
 """
@@ -22,36 +22,94 @@ import math
 import os
 import zipfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.atomic import write_atomically
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import arguments, pattern
+from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import needed
+from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import IN, OUT, Known, membership
+from polycorner.proofs.lists.members import IN, OPEN
 from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.tree import OPEN as OPEN_BOX
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 FORMAT = ("polycorner-stationary-list", 1)
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
-def save(path: str | os.PathLike[str], search: Search) -> Path:
-    """Save the list that a search found, and its proof; return the path.
+@dataclass(frozen=True, eq=False)
+class Record(Value):
+    """What is known of a list and its proof when the search has ended.
+
+    Attributes
+    ----------
+    problem : Problem
+    domain : Domain
+    branches : tuple of tuple of int
+        The set as a union of intersections.
+    motions : tuple of Motion
+    weights : (n,) array
+    regions : tuple of Region
+    loci : tuple of Locus
+    listed, open_points : tuple of int
+        Regions whose points are in the list, and those whose points may be.  Of points that are
+        images of each other, those that the search met.
+    codes, positions, counts, directions : arrays
+        The subdivision; see :meth:`~polycorner.proofs.lists.tree.Tree.preorder`.
+    """
+
+    problem: Problem
+    domain: Domain
+    branches: tuple[tuple[int, ...], ...]
+    motions: tuple[Motion, ...]
+    weights: Array
+    regions: tuple[Region, ...]
+    loci: tuple[Locus, ...]
+    listed: tuple[int, ...]
+    open_points: tuple[int, ...]
+    codes: NDArray[np.int8]
+    positions: Array
+    counts: NDArray[np.uint16]
+    directions: NDArray[np.float32]
+
+
+def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
+    """Return the record of a search and the members of its list."""
+    return Record(
+        search.problem,
+        search.domain,
+        tuple(tuple(np.flatnonzero(branch).tolist()) for branch in search.conj),
+        search.motions,
+        search.weights,
+        tuple(search.regions),
+        tuple(search.loci),
+        tuple(k for k, place in members if place == IN),
+        tuple(k for k, place in members if place == OPEN),
+        *search.tree.preorder(),
+    )
+
+
+def save(path: str | os.PathLike[str], record: Record) -> Path:
+    """Save a list and its proof; return the path.
 
     Parameters
     ----------
     path : path
         Ends in ``.zip``.
-    search : Search
-        Of points that are images of each other, those that it met are listed.
+    record : Record
 
     Raises
     ------
@@ -60,13 +118,12 @@ def save(path: str | os.PathLike[str], search: Search) -> Path:
     OSError
         If the file could not be written.
     """
-    codes, positions, counts, directions = search.tree.preorder()
     parts = {
-        "problem.json": json.dumps(described(search), indent=1).encode(),
-        "tree.bin": codes.astype("<i1").tobytes(),
-        "positions.bin": positions.astype("<f8").tobytes(),
-        "counts.bin": counts.astype("<u1").tobytes(),
-        "directions.bin": directions.astype("<f4").tobytes(),
+        "problem.json": json.dumps(described(record), indent=1).encode(),
+        "tree.bin": record.codes.astype("<i1").tobytes(),
+        "positions.bin": record.positions.astype("<f8").tobytes(),
+        "counts.bin": record.counts.astype("<u2").tobytes(),
+        "directions.bin": record.directions.astype("<f4").tobytes(),
     }
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -75,13 +132,12 @@ def save(path: str | os.PathLike[str], search: Search) -> Path:
     return write_atomically(path, memory.getvalue(), suffix=".zip")
 
 
-def described(search: Search) -> dict[str, Any]:
+def described(record: Record) -> dict[str, Any]:
     """Return a problem, its regions, loci and symmetries, and the list, as plain data."""
-    listed, open_points = members(search)
-    problem, domain = search.problem, search.domain
-    manifold, formulas = problem.polyhedron.manifold, search.faces.formulas
+    problem, domain = record.problem, record.domain
+    manifold = problem.polyhedron.manifold
+    formulas = Formulas(problem.functions, manifold)
     nodes, outputs = program(formulas.graph, formulas.outputs)
-    regions = [_region(region) for region in search.regions]
     return {
         "format": list(FORMAT),
         "coordinates": list(manifold.names),
@@ -89,30 +145,19 @@ def described(search: Search) -> dict[str, Any]:
         "functions": list(formulas.names),
         "inequalities": problem.inequalities,
         "equations": problem.rows - 1 - problem.inequalities,
-        "branches": [np.flatnonzero(branch).tolist() for branch in search.conj],
+        "branches": [list(branch) for branch in record.branches],
         "nodes": nodes,
         "outputs": outputs,
         "domain": {"lower": _hex(domain.lower), "upper": _hex(domain.upper)},
         "fixed": list(domain.fixed),
-        "symmetries": [_motion(g) for g in search.motions],
-        "weights": _hex(search.weights),
-        "regions": regions,
-        "loci": [_locus(place) for place in search.loci],
-        "points": [{"region": k, "index": search.regions[k].index} for k in listed],
-        "open_points": open_points,
-        "open": _open(search),
+        "symmetries": [_motion(g) for g in record.motions],
+        "weights": _hex(record.weights),
+        "regions": [_region(region) for region in record.regions],
+        "loci": [_locus(place) for place in record.loci],
+        "points": [{"region": k, "index": record.regions[k].index} for k in record.listed],
+        "open_points": list(record.open_points),
+        "open": int((record.codes == OPEN_BOX).sum()),
     }
-
-
-def members(search: Search) -> tuple[list[int], list[int]]:
-    """Return the regions whose point is in the list, each once, and those that may be."""
-    known, listed, undecided = Known(search), list[int](), list[int]()
-    for k, region in enumerate(search.regions):
-        place = OUT if known.has(region) else membership(search, region)
-        if place != OUT:
-            known.add(region)
-            (listed if place == IN else undecided).append(k)
-    return listed, undecided
 
 
 def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list[int]]:
@@ -154,11 +199,6 @@ def period(value: float) -> str | None:
     if turns and float(turns) * math.pi == value:
         return f"{turns} pi"
     return str(Fraction(value))
-
-
-def _open(search: Search) -> int:
-    """Return how many boxes are open: undecided ones and those that still wait."""
-    return len(search.waiting) + sum(map(len, search.undecided))
 
 
 def _hex(values: Array) -> list[str]:

@@ -118,6 +118,7 @@ class Search:
         lower, upper = self.domain.lower[None].copy(), self.domain.upper[None].copy()
         start = np.zeros(1, dtype=np.int64)
         self._treated: Boxes | None = None
+        self._sides: tuple[Array, Array, Mask] | None = None  # of the regions, and active functions
         self.waiting = Boxes(lower, upper, start, start)
 
     def run(self, most: int, seconds: float, report: Callable[["Search"], None]) -> None:
@@ -182,13 +183,15 @@ class Search:
 
     def _covered(self, boxes: Boxes, where: NDArray[np.intp], masks: Mask) -> Mask:
         """Whether items lie in regions whose only stationary point is known."""
-        if not self.regions:
-            return np.zeros(len(where), dtype=np.bool_)
-        sides = [np.array([getattr(r, end) for r in self.regions]) for end in ("lower", "upper")]
-        active = np.zeros((len(self.regions), masks.shape[1]), dtype=np.bool_)
-        for k, region in enumerate(self.regions):
-            active[k, list(region.active)] = True
-        found: Mask = covered(boxes.lower, boxes.upper, where, masks, *sides, active)
+        count, m = len(self.regions), masks.shape[1]
+        if self._sides is None or len(self._sides[0]) < count:
+            active = np.zeros((count, m), dtype=np.bool_)
+            for k, region in enumerate(self.regions):
+                active[k, list(region.active)] = True
+            lower, upper = ([getattr(r, end) for r in self.regions] for end in ("lower", "upper"))
+            n = boxes.lower.shape[1]
+            self._sides = np.reshape(lower, (count, n)), np.reshape(upper, (count, n)), active
+        found: Mask = covered(boxes.lower, boxes.upper, where, masks, *self._sides)
         return found
 
     def _on_loci(

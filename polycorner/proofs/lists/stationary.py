@@ -9,14 +9,16 @@ import numpy as np
 
 from polycorner.minimisation import Certificate, certify
 from polycorner.minimisation.problem import Problem
-from polycorner.printing import Printed, Sheet, Table, facts, number
+from polycorner.printing import Printed, Sheet, Table, facts, number, units
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.records import Record, save
 from polycorner.proofs.lists.search import Search, Tally
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 if TYPE_CHECKING:
+    import os
     from pathlib import Path
 
 Bounds = tuple[float, float]
@@ -107,8 +109,8 @@ class StationaryList(Printed, Value):
         KKT points of faces for which it is not decided whether they lie in the polyhedron.
     tally : Tally
         Numbers of boxes.
-    search : Search
-        The run, for :meth:`save`.
+    record : Record
+        The proof, for :meth:`save`.
     """
 
     problem: Problem
@@ -118,7 +120,7 @@ class StationaryList(Printed, Value):
     undecided: Array
     open_points: tuple[StationaryPoint, ...]
     tally: Tally
-    search: Search
+    record: Record
 
     @property
     def complete(self) -> bool:
@@ -182,22 +184,47 @@ class StationaryList(Printed, Value):
             )
             for k, p in enumerate(self.points)
         )
-        table = Table(head, rows, tuple(range(len(names) + 3)))
-        counts = facts(
-            [
-                ("boxes", str(self.tally.boxes)),
-                ("minima", str(len(self.minima))),
-                ("loci", str(len(self.loci))),
-                ("undecided volume", f"{self.undecided_volume:.1e}"),
-            ]
+        counts = [
+            ("boxes", str(self.tally.boxes)),
+            ("minima", str(len(self.minima))),
+            ("loci", str(len(self.loci))),
+            ("undecided volume", f"{self.undecided_volume:.1e}"),
+        ]
+        numbers = tuple(range(len(names) + 3))
+        tables = [Table(head, rows, numbers)] if rows else []
+        if self.loci:
+            tables.append(self._locus_table())
+        unit = units(self.problem.polyhedron.manifold.periods)
+        return Sheet("Stationary points", (self.statement, facts(counts), *tables, unit))
+
+    def _locus_table(self) -> Table:
+        """Return the loci: the coordinates that are given, and a point on each."""
+        names = self.problem.polyhedron.manifold.names
+        given = [name for name in names if name in self.loci[0].lower]
+        rows = tuple(
+            (
+                *(number(0.5 * (place.lower[name] + place.upper[name])) for name in given),
+                str(place.index),
+                "none found" if place.sample is None else ", ".join(map(number, place.sample)),
+            )
+            for place in self.loci
         )
-        return Sheet("Stationary points", (self.statement, counts, *([table] if rows else [])))
+        head = (*given, "index", f"a point ({', '.join(names)})")
+        return Table(head, rows, tuple(range(len(given) + 1)), "Loci")
 
-    def save(self, path: "str | Path") -> None:
-        """Write the proof to a file that an independent checker verifies; see ``docs``."""
-        from polycorner.proofs.lists.records import save
+    def save(self, path: "str | os.PathLike[str]") -> "Path":
+        """Save the list and its proof, for an independent checker; return the path.
 
-        save(path, self.search)
+        See :mod:`polycorner.proofs.lists.checker`.
+
+        Raises
+        ------
+        ValueError
+            If the name does not end in ``.zip``.
+        OSError
+            If the file could not be written.
+        """
+        return save(path, self.record)
 
 
 def locus_of(search: Search, place: Locus, rng: np.random.Generator) -> StationaryLocus:

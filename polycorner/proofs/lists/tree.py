@@ -41,7 +41,7 @@ class Tree:
         self.count += 2 * len(nodes)
         return first
 
-    def preorder(self) -> tuple[NDArray[np.int8], Array, NDArray[np.uint8], NDArray[np.float32]]:
+    def preorder(self) -> tuple[NDArray[np.int8], Array, NDArray[np.uint16], NDArray[np.float32]]:
         """Return the tree with each node before its halves.
 
         Returns
@@ -73,7 +73,7 @@ class Tree:
         return (
             ordered,
             where[order][ordered >= 0],
-            counts[ordered == CLOSED].astype(np.uint8),
+            counts[ordered == CLOSED].astype(np.uint16),
             joined[by_rank],
         )
 

@@ -51,8 +51,9 @@ def test_the_subdivision_is_a_tree_whose_open_leaves_are_the_undecided_boxes(par
     splits, closed, opened = (codes >= 0).sum(), (codes == -1).sum(), (codes == -2).sum()
     assert splits + 1 == closed + opened
     assert len(parts["positions.bin"]) == 8 * splits
-    assert len(parts["counts.bin"]) == closed
-    assert len(parts["directions.bin"]) == 8 * sum(parts["counts.bin"])
+    counts = np.frombuffer(parts["counts.bin"], "<u2")
+    assert len(counts) == closed
+    assert len(parts["directions.bin"]) == 8 * counts.sum()
     assert opened == len(found.undecided) == json.loads(parts["problem.json"])["open"]
 
 

@@ -1,6 +1,8 @@
 """Complete lists of stationary points, against problems whose lists are known."""
 
 import math
+import pickle
+import zipfile
 
 import numpy as np
 import pytest
@@ -182,6 +184,49 @@ def test_fixed_coordinates_are_a_quotient_by_a_translation():
     assert sorted_points(found) == [[0.0, -1.0], [0.0, 3.0]]
     with pytest.raises(ValueError, match="box"):
         stationary_points(d, (v - u - 3) ** 2 + u**2, box={"u": 0.0, "v": (-9, 9)})
+
+
+def test_a_field_whose_orbits_miss_the_section_is_no_quotient():
+    """Along (1 - x^2, 2 x y) nothing changes, but no orbit from |x| > 1 meets x = 0."""
+    invariant = Y * (1 - X**2)
+    d = Polyhedron(PLANE, {"all": 9 + invariant})
+    field = Symmetry(fields=[{"x": 1 - X**2, "y": 2 * X * Y}])
+    with pytest.raises(ValueError, match="box: expected an interval for x"):
+        stationary_points(d, (invariant - 3) ** 2, box=[0.0, (-9, 9)], symmetry=field)
+
+
+def test_rigid_motions_of_the_plane_are_factored_out_one_after_the_other():
+    """The rotation moves the first point as well, until this is fixed by translations."""
+    plane = Manifold(("a", "b", "t", "u", "v"), (math.inf, math.inf, math.tau) + (math.inf,) * 2)
+    a, b, t, u, v = plane.symbols
+    along = sympy.cos(t) * (u - a) + sympy.sin(t) * (v - b)
+    across = sympy.cos(t) * (v - b) - sympy.sin(t) * (u - a)
+    d = Polyhedron(plane, {"away": along**2 + across**2 - 1})
+    energy = (along - 3) ** 2 + (across + sympy.Rational(1, 2)) ** 2
+    moving = Symmetry(fields=[{"a": 1, "u": 1}, {"b": 1, "v": 1}])
+    turning = Symmetry(fields=[{"a": -b, "b": a, "t": 1, "u": -v, "v": u}])
+    box = {"a": 0.0, "b": 0.0, "t": 0.0, "u": (-5, 5), "v": (-5, 5)}
+    found = stationary_points(d, energy, box=box, symmetry=turning)
+    assert found.complete
+    assert [3.0, -0.5] in [p.point[3:].round(9).tolist() for p in found.minima]
+    with pytest.raises(ValueError, match="box: expected an interval for t"):
+        stationary_points(d, energy, box=box, symmetry=moving)
+
+
+def test_lists_are_values(himmelblau, tmp_path):
+    again = pickle.loads(pickle.dumps(himmelblau))
+    assert sorted_points(again) == sorted_points(himmelblau)
+    files = [found.save(tmp_path / f"{k}.zip") for k, found in enumerate((himmelblau, again))]
+    assert len({zipfile.ZipFile(file).read("problem.json") for file in files}) == 1
+    assert not himmelblau.points[0].lower.flags.writeable
+
+
+def test_loci_outside_the_box_are_not_listed():
+    strip = Polyhedron(PLANE, {"right": X - 1, "left": 3 - X})
+    found = stationary_points(strip, (Y**2 - 4) ** 2, box=[(-4, 4), (-1, 3)])
+    assert found.complete
+    assert sorted(round(p.lower["y"], 6) for p in found.loci) == [0.0, 2.0]
+    assert "a point (x, y)" in str(found)
 
 
 def test_loci_along_coordinates_that_the_energy_does_not_read():

@@ -20,7 +20,7 @@ CHUNK = 500  # leaves that a worker checks at a time
 
 
 def contents(path: str) -> tuple[dict[str, Any], list[Any]]:
-    kinds, parts = {"tree": "b", "positions": "d", "counts": "B", "directions": "f"}, []
+    kinds, parts = {"tree": "b", "positions": "d", "counts": "H", "directions": "f"}, []
     with zipfile.ZipFile(path) as archive:
         for name, kind in kinds.items():
             parts.append(array(kind, archive.read(f"{name}.bin")))
