@@ -1,23 +1,26 @@
 """The search for all stationary points, its symmetries, and what is made of the regions found."""
 
+import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner import checks
+from polycorner.interrupts import first_interrupt
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, Known, full, settled
+from polycorner.proofs.lists.members import OPEN, Listed, full, settled
 from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
-from polycorner.proofs.lists.search import Boxes, Search
+from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
 from polycorner.spaces.manifold import Array
 
@@ -37,6 +40,7 @@ def stationary_points(
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
+    workers: int = 1,
     progress: Progress = silent,
 ) -> StationaryList:
     """Find all stationary points of an energy on a polyhedron in a box, with proof.
@@ -65,6 +69,8 @@ def stationary_points(
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
         Where the search ends at the latest; boxes that wait then are undecided.
+    workers : int, optional
+        Threads that examine boxes at a time.  The result is the same for every number.
     progress : callable, optional
         Called with the number of boxes treated, None, and what waits in words.
 
@@ -93,6 +99,7 @@ def stationary_points(
     """
     search = prepared(polyhedron, energy, box, symmetry, resolution)
     checks.whole("max_boxes", max_boxes, least=1)
+    checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
@@ -101,10 +108,9 @@ def stationary_points(
         note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
         progress(float(s.tally.boxes), None, note)
 
-    try:
-        search.run(max_boxes, max_seconds, report)
-    except KeyboardInterrupt:
-        search.recover()
+    stop = threading.Event()
+    with first_interrupt(stop.set):
+        search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
     return listed(search)
 
 
@@ -160,7 +166,7 @@ def listed(search: Search) -> StationaryList:
     """Return what a search found."""
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
-    known, orbits, members = Known(search), 0, settled(search)
+    known, orbits, members = Listed(search), 0, settled(search)
     for k, place in members:
         region = search.regions[k]
         if known.has(region):
