@@ -22,9 +22,12 @@ from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
+from polycorner.proofs.lists.stores import Store
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
+    import os
+
     from polycorner.minimisation.problem import Energy
 
 RESOLUTION = 1e-6
@@ -41,6 +44,7 @@ def stationary_points(
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
     workers: int = 1,
+    store: "str | os.PathLike[str] | None" = None,
     progress: Progress = silent,
 ) -> StationaryList:
     """Find all stationary points of an energy on a polyhedron in a box, with proof.
@@ -68,9 +72,14 @@ def stationary_points(
     resolution : float, optional
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
-        Where the search ends at the latest; boxes that wait then are undecided.
+        Where the search ends at the latest; boxes that wait then are undecided.  Boxes of earlier
+        calls with the same store count, seconds do not.
     workers : int, optional
         Threads that examine boxes at a time.  The result is the same for every number.
+    store : path, optional
+        A folder in which the search is saved every five seconds, at the end of a round, and at its
+        end.  The same call goes on where it stood, with the result of a search that was never
+        interrupted.
     progress : callable, optional
         Called with the number of boxes treated, None, and what waits in words.
 
@@ -83,7 +92,10 @@ def stationary_points(
     ------
     TypeError, ValueError
         For arguments of a wrong kind, sides that are no intervals, coordinates that are fixed
-        without a symmetry, and elements that are not shown to be symmetries.
+        without a symmetry, elements that are not shown to be symmetries, and a store of another
+        search.
+    OSError
+        If the store cannot be written, which is tried at the start.
 
     Examples
     --------
@@ -104,13 +116,23 @@ def stationary_points(
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
 
+    kept = None if store is None else Store(store, search)
+
     def report(s: Search) -> None:
+        if kept:
+            kept.save_by_the_clock()
         note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
         progress(float(s.tally.boxes), None, note)
 
     stop = threading.Event()
-    with first_interrupt(stop.set):
-        search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
+    try:
+        with first_interrupt(stop.set):
+            search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
+        if kept:
+            kept.save()
+    finally:
+        if kept:
+            kept.close()
     return listed(search)
 
 

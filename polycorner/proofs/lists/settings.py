@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.intervals.enclosures import Formulas
 from polycorner.minimisation.problem import Problem
@@ -58,6 +60,11 @@ class Setting:
         self.conj = conjunctions(self.problem.polyhedron)
         self.reads = read_coordinates(formulas, free)
         self.weights = weights(self.domain)
+
+    @property
+    def branches(self) -> tuple[tuple[int, ...], ...]:
+        """The set as a union of intersections: the functions of each."""
+        return tuple(tuple(np.flatnonzero(branch).tolist()) for branch in self.conj)
 
     @property
     def equations(self) -> int:
