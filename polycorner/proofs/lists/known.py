@@ -9,6 +9,8 @@ from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.loci import Locus
 from polycorner.spaces.manifold import Array
 
+SAME = 1e-9  # distance in scale units below which points are the same
+AGAIN = 1 / 64  # of the widest region that was tried in vain: a smaller one is worth trying
 FIRST = 64  # rows that a growing array has room for
 
 
@@ -56,6 +58,31 @@ class Sides:
         rows = self._rows.get(active)
         found = rows.array if rows else np.zeros((0, 2 * self.width))
         return found[:, : self.width], found[:, self.width :]
+
+
+class Tried:
+    """Points about which regions were tried in vain, by active functions, and the widest reach."""
+
+    def __init__(self, scales: Array) -> None:
+        self.scales = scales
+        self._rows: dict[tuple[int, ...], Rows] = {}
+
+    def add(self, active: tuple[int, ...], q: Array, widest: float) -> None:
+        """Add a point."""
+        rows = self._rows.setdefault(active, Rows(len(q) + 1))
+        rows.add(np.append(q, widest))
+
+    def has(self, active: tuple[int, ...], q: Array, widest: float) -> bool:
+        """Whether regions of about this size were tried at this point before."""
+        if active not in self._rows:
+            return False
+        found = self._rows[active].array
+        near = (abs(found[:, :-1] - q) <= SAME * self.scales).all(axis=1)
+        return bool((near & (found[:, -1] * AGAIN < widest) & (widest <= found[:, -1])).any())
+
+    def items(self) -> list[tuple[tuple[int, ...], list[list[float]]]]:
+        """Return the points with their reach, ``n + 1`` numbers each, by active functions."""
+        return [(active, rows.array.tolist()) for active, rows in self._rows.items()]
 
 
 class Known:
