@@ -100,24 +100,28 @@ class BoxFunctions:
         """Return what :meth:`gradients` does, and bounds of second derivatives ``(B, m, n, n)``."""
         return self._evaluate(lo, hi, 2)
 
-    def mean_value_gradients(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
+    def mean_value_gradients(
+        self, lo: ArrayLike, hi: ArrayLike, *, hessians: bool = False
+    ) -> tuple[Array, ...]:
         """Return bounds of first derivatives ``(B, m, n)``, with those of their mean value form.
 
         By second derivatives on the box, and by the gradients in its middle; the bounds of a
-        derivative that may not be continuous on the box are those of :meth:`gradients`.
+        derivative that may not be continuous on the box are those of :meth:`gradients`.  With
+        ``hessians`` the bounds of second derivatives ``(B, m, n, n)`` follow.
         """
         low, high = self._boxes(lo, hi)
         kernel, entries = self._mean_value
-        count, n = len(entries), self.dimension
-        widths = (count, count, count * n, count * n)
-        parts = tuple([np.zeros((len(low), width)) for width in widths])
+        count, n, m = len(entries), self.dimension, len(self.functions)
+        parts = tuple(
+            [np.zeros((len(low), count, *shape)) for shape in ((), (n,)) for _ in range(2)]
+        )
         kernel.fill(low, high, parts)
         sides = []
-        for part in parts[:2]:
-            side = np.zeros((len(low), len(self.functions) * n))
+        for part in parts if hessians else parts[:2]:
+            side = np.zeros((len(low), m * n, *part.shape[2:]))
             side[:, entries] = part
-            sides.append(side.reshape(len(low), len(self.functions), n))
-        return sides[0], sides[1]
+            sides.append(side.reshape(len(low), m, n, *part.shape[2:]))
+        return tuple(sides)
 
     def continuous(self, lo: ArrayLike, hi: ArrayLike) -> NDArray[np.bool_]:
         """Return ``(B, m)`` whether a function is bounded and continuous on a box, for certain.

@@ -24,7 +24,7 @@ WIDER = 64.0  # sides of the largest region that is tried, over those of the box
 EVERY = 2  # bisections of every coordinate between two attempts at a box
 LOCUS = (-1,)  # in place of the functions of a face
 COARSE = 1e-7  # distance in scale units below which only one of several candidates is tried
-MANY = 16  # candidates for which it is worth compiling second derivatives
+MANY = 48  # candidates for which it is worth compiling second derivatives
 
 
 @dataclass

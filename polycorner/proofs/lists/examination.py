@@ -16,8 +16,6 @@ from polycorner.proofs.lists.known import Known
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
 
-MANY = 256  # open items for which it is worth compiling second derivatives
-
 
 @dataclass
 class Rest:
@@ -82,8 +80,8 @@ class Examined:
         return np.flatnonzero(~self.done[self.rest.items])
 
 
-def examine(setting: Setting, known: Known, boxes: Boxes) -> Examined:
-    """Close what can be closed in some boxes."""
+def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examined:
+    """Close what can be closed in some boxes; ``sharp``: by second derivatives, too."""
     gone = np.zeros(len(boxes), dtype=np.bool_)
     if setting.motions:
         gone = dropped(boxes.lower, boxes.upper, setting.motions, setting.weights, setting.domain)
@@ -97,7 +95,7 @@ def examine(setting: Setting, known: Known, boxes: Boxes) -> Examined:
     units = setting.domain.units
     found, v, weights = directions(g_lo, g_hi, where, masks, k, units, -1.0)
     left = np.flatnonzero(~found)
-    if left.size >= MANY:
+    if sharp and left.size:
         which = np.unique(where[left])
         g_lo[which], g_hi[which] = setting.functions.mean_value_gradients(
             boxes.lower[which], boxes.upper[which]

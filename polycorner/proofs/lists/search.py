@@ -34,6 +34,7 @@ from polycorner.proofs.lists.tree import Tree
 CHUNKS = 8  # that a round consists of
 CHUNK = 4096  # boxes in a chunk, at most
 LEAST = 256  # boxes in a chunk, if there are as many
+SHARP = 20_000  # boxes after which it is worth compiling second derivatives
 NUMBERS = 1 << 20  # bounds of derivatives in a chunk, at most
 
 
@@ -115,14 +116,14 @@ class Search(Setting):
     def _compile(self) -> None:
         """Compile or load what threads would each compile by themselves."""
         first = self.waiting.part(slice(0, 1))
-        examine(self, self.known, first)
+        examine(self, self.known, False, first)
         for count in (1, MANY):
             self.problem.evaluate(np.repeat(first.middles, count, axis=0), 2)
 
     def round(self, mapped: Mapped = map) -> None:
         """Treat the last boxes that wait; ``mapped`` is like ``map``."""
-        chunks = self._chunks()
-        found = list(mapped(partial(examine, self, self.known), chunks))
+        chunks, sharp = self._chunks(), self.tally.boxes >= SHARP
+        found = list(mapped(partial(examine, self, self.known, sharp), chunks))
         regions, loci = len(self.regions), len(self.loci)
         self.attempts.at(found, mapped)
         if len(self.regions) > regions or len(self.loci) > loci:
