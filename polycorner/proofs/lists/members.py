@@ -65,9 +65,10 @@ def membership(search: Search, region: Region) -> str:
         values = search.faces.formulas.values(Box(hull), range(m))
         below = np.array([bool(v < ball(0)) for v in values])
         above = np.array([bool(v > ball(0)) for v in values])
-    # where a root may be zero, compiled intervals know that what is under it is not negative
+    # Balls give up square roots that may reach 0, as of the distance of centres that coincide.
     low, high = search.functions.values(lower[None], upper[None])
-    below, above = below | (high[0, :m] < 0), above | (low[0, :m] > 0)
+    below |= high[0, :m] < 0
+    above |= low[0, :m] > 0
     held = np.zeros(m, dtype=np.bool_)
     held[list(region.active)] = True
     below &= ~held
