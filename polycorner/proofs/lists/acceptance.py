@@ -13,8 +13,8 @@ For a branch whose open functions in a part of ``X`` are a subset of ``A`` this 
 candidate, and none if the subset is proper.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,7 @@ SHARPENINGS = 6
 WIDENINGS = 3  # of a box towards the shape of its image
 MOST_WIDENING = 64.0
 GROWTH = 1.25
+LOOSENESS = 0.01  # of enclosures of points that parameters move, relative to their width
 SLACK = 16  # last binary digits of a multiplier that its enclosure covers at least
 WIDEST = 2.0  # reach of the widest box that is tried, in scale units
 
@@ -88,12 +89,15 @@ class Faces:
     free : tuple of int
         Positions of the coordinates that are free.
     scales : (n,) array
+    held : mapping from int to (float, float)
+        The sides of parameters; boxes contain them.
     """
 
     formulas: Formulas
     inequalities: int
     free: tuple[int, ...]
     scales: Array
+    held: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
     def rows(self, active: Sequence[int]) -> tuple[int, ...]:
         """Return the rows of a face: active inequalities, equations, energy."""
@@ -121,6 +125,8 @@ class Faces:
         radii[list(self.free)] = reach * self.scales[list(self.free)]
         for _ in range(WIDENINGS):
             lower, upper = q - radii, q + radii
+            for i, side in self.held.items():
+                lower[i], upper[i] = side
             found = self._shown(lower, upper, rows, count)
             if found is None or isinstance(found, Region):
                 return found
@@ -157,6 +163,8 @@ class Faces:
         sharp = self._sharpened(forms, box, image)
         index = self._index(start, len(rows) - 1)
         ends = np.array([outward(x) for x in sharp])
+        if self.held:  # so that others, who stop elsewhere, arrive within
+            ends += LOOSENESS * (ends[:, 1:] - ends[:, :1]) * np.array([-1.0, 1.0])
         return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
 
     def _at_centre(

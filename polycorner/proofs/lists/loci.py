@@ -12,7 +12,9 @@ descends, and for a large ``K`` it leads into the set: the point is not stationa
 the energy has no derivative.  The stationary points in the box are therefore those with ``z = z*``.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -66,17 +68,26 @@ def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ..
     return tuple(i for i in free if i in read)
 
 
-def locus(problem: Problem, formulas: Formulas, z: tuple[int, ...], q: Array) -> Locus | None:
-    """Return the widest locus tried about a stationary point near ``q``, or None."""
+def locus(
+    problem: Problem,
+    formulas: Formulas,
+    z: tuple[int, ...],
+    q: Array,
+    held: Mapping[int, tuple[float, float]] = MappingProxyType({}),
+) -> Locus | None:
+    """Return the widest locus tried about a stationary point near ``q``, or None.
+
+    It is one for all values of the parameters, with their sides ``held``.
+    """
     found = newton(problem, q, [], z) if not problem.polyhedron.equations else None
     if found is None:
         return None
     with precision(BITS):
         for power in range(QUARTERINGS):
             radii = problem.scales[list(z)] * WIDEST / 4**power
-            shown = _shown(formulas, z, found[0], radii)
+            shown = _shown(formulas, z, found[0], radii, held)
             if shown is not None:
-                sharp = _shown(formulas, z, found[0], problem.scales[list(z)] * SHARP)
+                sharp = _shown(formulas, z, found[0], problem.scales[list(z)] * SHARP, held)
                 return replace(
                     shown,
                     sharp_lower=(sharp or shown).sharp_lower,
@@ -85,10 +96,18 @@ def locus(problem: Problem, formulas: Formulas, z: tuple[int, ...], q: Array) ->
     return None
 
 
-def _shown(formulas: Formulas, z: tuple[int, ...], q: Array, radii: Array) -> Locus | None:
+def _shown(
+    formulas: Formulas,
+    z: tuple[int, ...],
+    q: Array,
+    radii: Array,
+    held: Mapping[int, tuple[float, float]],
+) -> Locus | None:
     places = list(z)
     lower, upper = q[places] - radii, q[places] + radii
     hull = [ball(x) for x in q.tolist()]
+    for i, side in held.items():
+        hull[i] = between(*side)
     for i, a, b in zip(places, lower.tolist(), upper.tolist(), strict=True):
         hull[i] = between(a, b)
     row = len(formulas.names) - 1

@@ -150,6 +150,7 @@ def described(record: Record) -> dict[str, Any]:
         "outputs": outputs,
         "domain": {"lower": _hex(domain.lower), "upper": _hex(domain.upper)},
         "fixed": list(domain.fixed),
+        "parameters": list(domain.parameters),
         "symmetries": [_motion(g) for g in record.motions],
         "weights": _hex(record.weights),
         "regions": [_region(region) for region in record.regions],

@@ -110,7 +110,8 @@ class Search:
         self.functions = BoxFunctions(self.problem.functions, manifold)
         formulas = Formulas(self.problem.functions, manifold)
         free = self.domain.free
-        self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales)
+        held = self.domain.held
+        self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales, held)
         self.conj = conjunctions(self.problem.polyhedron)
         self.reads = read_coordinates(formulas, free)
         self.weights = weights(self.domain)
@@ -190,7 +191,9 @@ class Search:
                 active[k, list(region.active)] = True
             lower, upper = ([getattr(r, end) for r in self.regions] for end in ("lower", "upper"))
             n = boxes.lower.shape[1]
-            self._sides = np.reshape(lower, (count, n)), np.reshape(upper, (count, n)), active
+            sides = np.reshape([lower, upper], (2, count, n))
+            sides[:, :, list(self.domain.parameters)] = 0.0  # of no account: all boxes have them
+            self._sides = sides[0], sides[1], active
         found: Mask = covered(boxes.lower, boxes.upper, where, masks, *self._sides)
         return found
 
@@ -252,7 +255,7 @@ class Search:
 
     def _try(self, q: Array, active: list[int], widest: float) -> None:
         if not active and self.reads != self.domain.free:
-            place = locus(self.problem, self.faces.formulas, self.reads, q)
+            place = locus(self.problem, self.faces.formulas, self.reads, q, self.domain.held)
             if place is not None and not self._known_locus(place):
                 self.loci.append(place)
         found = newton(self.problem, q, active, self.domain.free)
