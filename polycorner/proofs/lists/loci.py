@@ -27,10 +27,8 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box, needed
-from polycorner.minimisation.problem import Problem
 from polycorner.proofs.definite import pivots
 from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inertia, krawczyk, outward
-from polycorner.proofs.lists.candidates import newton
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -69,25 +67,22 @@ def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ..
 
 
 def locus(
-    problem: Problem,
     formulas: Formulas,
     z: tuple[int, ...],
     q: Array,
+    scales: Array,
     held: Mapping[int, tuple[float, float]] = MappingProxyType({}),
 ) -> Locus | None:
-    """Return the widest locus tried about a stationary point near ``q``, or None.
+    """Return the widest locus tried about ``q``, where the energy's derivative nearly vanishes.
 
     It is one for all values of the parameters, with their sides ``held``.
     """
-    found = newton(problem, q, [], z) if not problem.polyhedron.equations else None
-    if found is None:
-        return None
+    units = scales[list(z)]
     with precision(BITS):
         for power in range(QUARTERINGS):
-            radii = problem.scales[list(z)] * WIDEST / 4**power
-            shown = _shown(formulas, z, found[0], radii, held)
+            shown = _shown(formulas, z, q, units * WIDEST / 4**power, held)
             if shown is not None:
-                sharp = _shown(formulas, z, found[0], problem.scales[list(z)] * SHARP, held)
+                sharp = _shown(formulas, z, q, units * SHARP, held)
                 return replace(
                     shown,
                     sharp_lower=(sharp or shown).sharp_lower,
