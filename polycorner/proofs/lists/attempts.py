@@ -116,7 +116,7 @@ class Attempts:
         for q in points[found]:
             if self.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue
-            place = locus(setting.faces.formulas, z, q, setting.problem.scales)
+            place = locus(setting.faces.formulas, z, q, setting.problem.scales, setting.domain.held)
             if place is None:
                 self.failed.add(LOCUS, q, WIDEST)
             elif not self.known.has_locus(place):

@@ -92,21 +92,26 @@ class Known:
     ----------
     dimension, inequalities : int
         ``n`` and ``m``.
+    parameters : tuple of int
+        Positions of parameters, which have the same sides in all boxes and regions.
     """
 
-    def __init__(self, dimension: int, inequalities: int) -> None:
+    def __init__(self, dimension: int, inequalities: int, parameters: tuple[int, ...] = ()) -> None:
         self.regions: list[Region] = []
         self.loci: list[Locus] = []
         self._sides = Sides(dimension)
         self._all = Rows(2 * dimension + inequalities)
         self._dimension = dimension
+        self._parameters = list(parameters)
 
     def add(self, region: Region) -> None:
         """Add a region."""
         self.regions.append(region)
         self._sides.add(frozenset(region.active), region.lower, region.upper)
         row = np.zeros(self._all.width)
-        row[: 2 * self._dimension] = np.concatenate([region.lower, region.upper])
+        sides = np.array([region.lower, region.upper])
+        sides[:, self._parameters] = 0.0  # of no account
+        row[: 2 * self._dimension] = sides.ravel()
         row[[2 * self._dimension + i for i in region.active]] = 1.0
         self._all.add(row)
 

@@ -97,6 +97,8 @@ class Screen:
         """Return radii of the images of boxes about some points, and whether these pass."""
         reach = np.zeros((len(which), self.q.shape[1]))
         reach[:, self.free] = radii
+        for i, (low, high) in self.setting.domain.held.items():
+            reach[:, i] = 0.5 * (high - low)
         q, n, k = self.q[which], len(self.free), len(self.active)
         (g, g_rad), (h, h_rad) = self._bounds(q - reach, q + reach)
         fine = np.isfinite(g_rad).all(axis=(1, 2)) & np.isfinite(h_rad).all(axis=(1, 2, 3))

@@ -75,7 +75,9 @@ class Search(Setting):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.known = Known(self.problem.dimension, self.problem.inequalities)
+        self.known = Known(
+            self.problem.dimension, self.problem.inequalities, self.domain.parameters
+        )
         self.attempts = Attempts(self, self.known)
         lower, upper = self.domain.lower[None].copy(), self.domain.upper[None].copy()
         start = np.zeros(1, dtype=np.int64)

@@ -56,7 +56,8 @@ class Setting:
         self.functions = BoxFunctions(self.problem.functions, manifold)
         formulas = Formulas(self.problem.functions, manifold)
         free = self.domain.free
-        self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales)
+        held = self.domain.held
+        self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales, held)
         self.conj = conjunctions(self.problem.polyhedron)
         self.reads = read_coordinates(formulas, free)
         self.weights = weights(self.domain)
