@@ -43,10 +43,14 @@ class Starts:
 
 @dataclass
 class Attempts:
-    """Attempts, what they found, and which were in vain."""
+    """Attempts, what they found, and which were in vain.
+
+    ``sharp``: whether second derivatives are compiled already.
+    """
 
     setting: Setting
     known: Known
+    sharp: bool = False
     failed: Tried = field(init=False)
 
     def __post_init__(self) -> None:
@@ -142,7 +146,7 @@ class Attempts:
                 fresh.append(i)
         points, widest = points[fresh], widest[fresh]
         guesses: Array | None = None
-        if len(fresh) >= MANY:
+        if len(fresh) >= (1 if self.sharp else MANY):
             guesses = Screen(self.setting, active, points).radii(widest)
         for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
             guess = None if guesses is None else guesses[i]
