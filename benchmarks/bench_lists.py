@@ -34,7 +34,7 @@ from polycorner.intervals.enclosures import Formulas, SmoothForms
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import stationary_points
 
-ROUNDS, FEW, BITS, WORKERS, EPSILON = 5, 300, 53, 2, 1e-6
+ROUNDS, FEW, BITS, WORKERS, EPSILON = 3, 300, 53, 2, 1e-6
 WIDTH = 1e-2  # of the domain: sides of the boxes that balls enclose on
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
