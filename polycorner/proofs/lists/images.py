@@ -140,7 +140,7 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
         moved[symbol] = g.signs[k] * symbols[g.order[k]] + shift
     names = {}
     before = _normal_forms(problem)
-    after = {f: _normal(_bound(f).subs(moved, simultaneous=True)) for f in problem.functions}
+    after = {f: _normal(_bound(f).xreplace(moved)) for f in problem.functions}
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
         return None
     for h in d.equations:
