@@ -44,6 +44,7 @@ def stationary_points(
     box: Any,
     symmetry: Symmetry | None = None,
     parameters: "Mapping[str, Interval] | None" = None,
+    minima_only: bool = False,
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
@@ -77,6 +78,9 @@ def stationary_points(
         Intervals of parameters of the functions, by name.  What is proved then holds for each of
         their values: one stationary point in each listed box, and no others.  Wide intervals leave
         boxes undecided; divide them.
+    minima_only : bool, optional
+        Whether to list local minima only.  Boxes near saddles are then closed by negative
+        curvature (:mod:`~polycorner.proofs.lists.curvature`), which takes fewer of them.
     resolution : float, optional
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
@@ -117,7 +121,9 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(polyhedron, energy, box, symmetry, resolution, parameters)
+    search = prepared(
+        polyhedron, energy, box, symmetry, resolution, parameters, minima_only=minima_only
+    )
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
@@ -151,6 +157,8 @@ def prepared(
     symmetry: Symmetry | None,
     resolution: float,
     parameters: "Mapping[str, Interval] | None" = None,
+    *,
+    minima_only: bool = False,
 ) -> Search:
     """Return a search that has not begun, after checking its arguments."""
     problem = pose(polyhedron, energy)
@@ -162,7 +170,8 @@ def prepared(
     if sides:
         problem, found, symmetry = with_parameters(problem, found, symmetry, sides)
     motions, maps = _motions(problem, found, symmetry)
-    search = Search(problem, found, resolution, motions, maps)
+    checks.instance("minima_only", minima_only, bool)
+    search = Search(problem, found, resolution, motions, maps, minima_only)
     _check_fixed(search, symmetry)
     return search
 
@@ -221,6 +230,8 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         orbits += 1
     rng = np.random.default_rng(0)
     loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    if search.minima_only:
+        loci = tuple(place for place in loci if place.is_minimum)
     n, names = problem.dimension, search.domain.manifold.names
     return StationaryList(
         problem,
@@ -232,6 +243,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         tuple(open_points),
         search.tally,
         record(search, members),
+        search.minima_only,
     )
 
 

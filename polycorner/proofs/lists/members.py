@@ -36,6 +36,8 @@ def settled(search: Search) -> list[tuple[int, str]]:
     known, found = Listed(search), list[tuple[int, str]]()
     for k, region in enumerate(search.regions):
         place = OUT if known.has(region) else membership(search, region)
+        if search.minima_only and region.index != 0:
+            place = OPEN if place == IN and region.index is None else OUT
         if place != OUT:
             known.add(region)
             found.append((k, place))
