@@ -175,8 +175,7 @@ def listed(search: Search) -> StationaryList:
                 known.add(image)
                 points.append(_point(search, image, orbits))
         orbits += 1
-    rng = np.random.default_rng(0)
-    loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    loci = tuple(locus_of(search, place) for place in _loci(search))
     return StationaryList(
         search.problem,
         search.domain,
@@ -236,7 +235,8 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
         sides = search.domain.lower.copy(), search.domain.upper.copy()
         sides[0][z], sides[1][z] = lower, upper
         ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
-    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
+    sample = None if place.sample is None else g(place.sample, search.domain.manifold)
+    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
 
 
 def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:

@@ -66,8 +66,8 @@ def membership(search: Search, region: Region) -> str:
     with precision(BITS):
         hull = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
         values = search.faces.formulas.values(Box(hull), range(m))
-        below = np.array([bool(v < ball(0)) for v in values])
-        above = np.array([bool(v > ball(0)) for v in values])
+        below = np.array([bool(v < ball(0)) for v in values], dtype=np.bool_)
+        above = np.array([bool(v > ball(0)) for v in values], dtype=np.bool_)
     held = np.zeros(m, dtype=np.bool_)
     held[list(region.active)] = True
     below &= ~held

@@ -216,7 +216,8 @@ def _region(region: Region) -> dict[str, Any]:
 
 
 def _locus(place: Locus) -> dict[str, Any]:
-    return {"z": list(place.z), "index": place.index, **_sides(place)}
+    sample = None if place.sample is None else _hex(place.sample)
+    return {"z": list(place.z), "index": place.index, "sample": sample, **_sides(place)}
 
 
 def _motion(g: Motion) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from polycorner.proofs.lists.candidates import active_set, newton
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.images import Motion, dropped, weights
-from polycorner.proofs.lists.loci import Locus, locus, read_coordinates
+from polycorner.proofs.lists.loci import Locus, locus, met, read_coordinates
 from polycorner.proofs.lists.tree import Tree
 from polycorner.spaces.manifold import Array
 
@@ -101,6 +101,7 @@ class Search:
     maps: tuple[tuple[int, ...], ...] = ()
     regions: list[Region] = field(default_factory=list)
     loci: list[Locus] = field(default_factory=list)
+    missed: list[Locus] = field(default_factory=list)
     tally: Tally = field(default_factory=Tally)
     tree: Tree = field(default_factory=Tree)
     undecided: list[Boxes] = field(default_factory=list)
@@ -254,7 +255,8 @@ class Search:
         if not active and self.reads != self.domain.free:
             place = locus(self.problem, self.faces.formulas, self.reads, q)
             if place is not None and not self._known_locus(place):
-                self.loci.append(place)
+                shown = met(place, self.functions, self.conj, self.domain)
+                (self.missed if shown is None else self.loci).append(shown or place)
         found = newton(self.problem, q, active, self.domain.free)
         if found is None:
             return
@@ -272,7 +274,7 @@ class Search:
     def _known_locus(self, place: Locus) -> bool:
         return any(
             (place.sharp_lower >= other.lower).all() and (place.sharp_upper <= other.upper).all()
-            for other in self.loci
+            for other in (*self.loci, *self.missed)
         )
 
     def _known(self, q: Array, active: list[int]) -> bool:

@@ -3,9 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from polycorner.minimisation import Certificate, certify
 from polycorner.minimisation.problem import Problem
@@ -75,7 +73,8 @@ class StationaryLocus(Value):
     index : int
         Negative eigenvalues of the second derivative by these coordinates.
     sample : (n,) array or None
-        A point of the set on it, which shows that it is not empty; None where none was found.
+        A point of the set on it, which shows that it is not empty; None where none was found.  It
+        is then not decided whether the set has points on it.
     """
 
     lower: Mapping[str, float]
@@ -100,7 +99,8 @@ class StationaryList(Printed, Value):
     domain : Domain
         The box.
     points : tuple of StationaryPoint
-        Isolated ones, by orbit.
+        Isolated ones, by orbit.  A point whose enclosure meets a side of the box is listed, whether
+        it lies in the box or beside it.
     loci : tuple of StationaryLocus
         Connected sets of them along coordinates that the energy does not depend on.
     undecided : (k, 2, n) array
@@ -125,7 +125,8 @@ class StationaryList(Printed, Value):
     @property
     def complete(self) -> bool:
         """Whether it is proved that these are all stationary points in the box."""
-        return not len(self.undecided) and not self.open_points
+        found = all(place.sample is not None for place in self.loci)
+        return not len(self.undecided) and not self.open_points and found
 
     @property
     def minima(self) -> tuple[StationaryPoint, ...]:
@@ -160,11 +161,14 @@ class StationaryList(Printed, Value):
         count, n = len(self.points), self.problem.dimension
         where = f"in the box ({n} coordinates)"
         loci = f" and {len(self.loci)} loci" if self.loci else ""
+        sides = sum(not self.domain.holds(p.lower, p.upper) for p in self.points)
+        on_sides = f"; {sides} of them on a side of it, or beside by rounding" if sides else ""
         if self.complete:
-            return (
-                f"Proved: the energy has exactly {count} isolated stationary points{loci} {where}."
-            )
+            shown = f"exactly {count} isolated stationary points{loci} {where}{on_sides}"
+            return f"Proved: the energy has {shown}."
+        empty = sum(place.sample is None for place in self.loci)
         rest = f"{len(self.undecided)} boxes and {len(self.open_points)} points are undecided"
+        rest += f", and whether {empty} loci are empty" if empty else ""
         return f"Not complete: {count} stationary points{loci} are shown {where}; {rest}."
 
     def __repr__(self) -> str:
@@ -227,27 +231,12 @@ class StationaryList(Printed, Value):
         return save(path, self.record)
 
 
-def locus_of(search: Search, place: Locus, rng: np.random.Generator) -> StationaryLocus:
-    """Return a locus with a sample of it that lies in the set, if one is found."""
-    names = search.domain.manifold.names
-    keys = [names[i] for i in place.z]
+def locus_of(search: Search, place: Locus) -> StationaryLocus:
+    """Return a locus by the names of its coordinates."""
+    keys = [search.domain.manifold.names[i] for i in place.z]
     return StationaryLocus(
         dict(zip(keys, place.sharp_lower.tolist(), strict=True)),
         dict(zip(keys, place.sharp_upper.tolist(), strict=True)),
         place.index,
-        _sample(search, place, rng),
+        place.sample,
     )
-
-
-SAMPLES = 4096
-
-
-def _sample(search: Search, place: Locus, rng: np.random.Generator) -> Array | None:
-    domain, z = search.domain, list(place.z)
-    lower = rng.uniform(domain.lower, domain.upper, (SAMPLES, len(domain.lower)))
-    upper = lower.copy()
-    lower[:, z], upper[:, z] = place.sharp_lower, place.sharp_upper
-    low = search.functions.values(lower, upper)[0][:, : search.problem.inequalities]
-    missed = np.any((low <= 0)[:, None, :] & search.conj, axis=2)
-    found: Any = np.flatnonzero(~np.all(missed, axis=1))
-    return 0.5 * (lower[found[0]] + upper[found[0]]) if found.size else None

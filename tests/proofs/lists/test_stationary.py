@@ -229,6 +229,31 @@ def test_loci_outside_the_box_are_not_listed():
     assert "a point (x, y)" in str(found)
 
 
+@pytest.mark.parametrize("reach", [0.25, 1e-9, 0, -1e-9, -0.25])
+def test_loci_off_the_set_are_not_listed(reach):
+    """The half-plane and the disc leave x <= 2 + reach, and the energy is stationary at x = 2."""
+    end = sympy.Rational(2) + sympy.Rational(reach)
+    d = Polyhedron(PLANE, {"left": 3 - X - Y, "disc": 9 - (X + 3 - end) ** 2 - Y**2})
+    found = stationary_points(d, (X - 2) ** 2, box=SIDES, resolution=1e-3)
+    assert found.complete or abs(reach) < 1e-6
+    assert len(found.loci) == (reach >= 0)
+    if reach > 0:
+        assert d.contains(found.loci[0].sample)
+    if reach == 0:
+        assert found.loci[0].sample is None
+        assert not found.complete
+    if reach == -0.25:
+        assert [p.active for p in found] == [("disc",)]
+
+
+def test_a_set_without_inequalities_is_searched():
+    circle = Polyhedron(PLANE, [], {"circle": 1 - X**2 - Y**2})
+    found = stationary_points(circle, X, box=SIDES)
+    assert found.complete
+    assert sorted_points(found) == [[-1.0, 0.0], [1.0, 0.0]]
+    assert sorted(p.index for p in found) == [0, 1]
+
+
 def test_loci_along_coordinates_that_the_energy_does_not_read():
     d = Polyhedron(PLANE, {"right": X - 1, "left": 3 - X, "low": 2 - Y, "high": Y + 2})
     found = stationary_points(d, Y**2, box=SIDES)
