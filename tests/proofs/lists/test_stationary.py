@@ -175,6 +175,27 @@ def test_circles_need_no_sides_and_have_no_seam():
     assert sum((-1) ** p.index for p in found) == 0  # the Euler characteristic of the torus
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_images_on_circles_hold_the_points(turned):
+    """The points are multiples of pi/4 from a rational angle, which no double is."""
+    tube = Manifold(("z", "t"), (math.inf, math.tau))
+    z, t = tube.symbols
+    for phase in (0, -3, sympy.Rational(-22, 7)):
+        energy = sympy.cos(4 * (t - phase)) + (z**2 - 1) ** 2
+        element = Element((lambda q: q + [0, np.pi]) if turned else (lambda q: q * [-1, 1]), {})
+        found = stationary_points(
+            Polyhedron(tube, {"all": 3 + sympy.cos(4 * t)}), energy, box={"z": (-2, 2)},
+            symmetry=Symmetry(elements=[element]),
+        )  # fmt: skip
+        assert found.complete
+        assert len(found) == 24
+        for p in found:
+            low, high = (sympy.Rational(end[1]) for end in (p.lower, p.upper))
+            step = sympy.pi / 4
+            turns = round(float(((low + high) / 2 - phase) / step))
+            assert low <= sympy.N(phase + turns * step, 60) <= high
+
+
 def test_fixed_coordinates_are_a_quotient_by_a_translation():
     line = Manifold.euclidean("u v")
     u, v = line.symbols
