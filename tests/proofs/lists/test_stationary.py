@@ -175,6 +175,14 @@ def test_circles_need_no_sides_and_have_no_seam():
     assert sum((-1) ** p.index for p in found) == 0  # the Euler characteristic of the torus
 
 
+def half_turned(q):
+    return q + np.array([0, np.pi])
+
+
+def mirrored(q):
+    return q * [-1, 1]
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_images_on_circles_hold_the_points(turned):
     """The points are multiples of pi/4 from a rational angle, which no double is."""
@@ -182,7 +190,7 @@ def test_images_on_circles_hold_the_points(turned):
     z, t = tube.symbols
     for phase in (0, -3, sympy.Rational(-22, 7)):
         energy = sympy.cos(4 * (t - phase)) + (z**2 - 1) ** 2
-        element = Element((lambda q: q + [0, np.pi]) if turned else (lambda q: q * [-1, 1]), {})
+        element = Element(half_turned if turned else mirrored, {})
         found = stationary_points(
             Polyhedron(tube, {"all": 3 + sympy.cos(4 * t)}), energy, box={"z": (-2, 2)},
             symmetry=Symmetry(elements=[element]),
