@@ -104,7 +104,8 @@ class StationaryList(Printed, Value):
     loci : tuple of StationaryLocus
         Connected sets of them along coordinates that the energy does not depend on.
     undecided : (k, 2, n) array
-        Boxes, by lower and upper ends, outside of which there is no other stationary point.
+        Boxes, by lower and upper ends, outside of which there is no other stationary point; where
+        symmetries are declared, none outside of these boxes and their images.
     open_points : tuple of StationaryPoint
         KKT points of faces for which it is not decided whether they lie in the polyhedron.
     tally : Tally

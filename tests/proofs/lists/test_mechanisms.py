@@ -9,9 +9,10 @@ import pytest
 import sympy as sp
 
 from benchmarks.trials.planar import Energy, PlanarProblem, disc, line
-from polycorner import Manifold, Polyhedron
+from polycorner import Manifold, Polyhedron, skeleton, stratum_at
 from polycorner.models import Pinball
 from polycorner.models.disks.disks import TorusDisks
+from polycorner.polyhedra import LocalType
 from polycorner.proofs import stationary_points
 
 # ---------------------------------------------------------------------------- a ladder in a corner
@@ -135,6 +136,22 @@ def test_all_places_of_rest_on_a_pinball_table(board, lean):
     theirs = sorted((*np.round(np.array(p.point, dtype=float), 6), p.index) for p in expected)
     np.testing.assert_allclose(mine, theirs, atol=2e-6)
     assert len(found) > 8
+
+
+def test_places_of_rest_and_tips_add_up_to_the_euler_characteristic():
+    """At the tip of an obstacle nothing rests, but what is lower is connected through it."""
+    board = Pinball()
+    d, (x, y) = board.polyhedron, board.manifold.symbols
+    found = stationary_points(d, y + x / 50, box=[(-0.1, 6.1), (-0.1, 8.1)])
+    # every obstacle that is free all around is met from its highest corner or from its top
+    atlas = skeleton(d, [(a, b + radius) for a, b, radius in board.pins])
+    tips = 0
+    for corner in atlas.corners:
+        if stratum_at(d, corner.point).local_type is LocalType.UNION:
+            rows = d.gradients(corner.point)[[d.names.index(name) for name in corner.active]]
+            # both sides of the obstacle go down from its corner
+            tips += bool((np.linalg.solve(rows.T, [1 / 50, 1]) > 0).all())
+    assert sum((-1) ** p.index for p in found) - tips == atlas.euler_characteristic == 1 - 8
 
 
 def test_a_table_that_does_not_lean_has_a_floor_of_them():
