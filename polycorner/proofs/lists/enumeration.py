@@ -228,8 +228,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
                 known.add(image)
                 points.append(_point(search, image, orbits))
         orbits += 1
-    rng = np.random.default_rng(0)
-    loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    loci = tuple(locus_of(search, place) for place in _loci(search))
     if search.minima_only:
         loci = tuple(place for place in loci if place.is_minimum)
     n, names = problem.dimension, search.domain.manifold.names
@@ -262,13 +261,15 @@ def _images(search: Search, region: Region) -> list[Region]:
         inverse = {image: i for i, image in enumerate(p)}
         lower, upper = _moved(g, *full(search, region), manifold)
         wide = _moved(g, region.lower, region.upper, manifold)
-        turn = manifold.wrap(0.5 * (lower + upper)) - 0.5 * (lower + upper)
+        turn = _turn(0.5 * (lower + upper), manifold)
         active = tuple(inverse[i] for i in region.active)
         sharp = [
-            np.concatenate([(side + turn)[free], rest[n:]])
-            for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
+            np.concatenate([side[free], rest[n:]])
+            for side, rest in zip(
+                _shifted(lower, upper, turn), (region.sharp_lower, region.sharp_upper), strict=True
+            )
         ]
-        sides = wide[0] + turn, wide[1] + turn
+        sides = _shifted(*wide, turn)
         found.append(Region(*sides, active, sharp[0], sharp[1], region.index))
     return found
 
@@ -294,16 +295,30 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
         sides = search.domain.lower.copy(), search.domain.upper.copy()
         sides[0][z], sides[1][z] = lower, upper
         ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
-    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
+    sample = None if place.sample is None else g(place.sample, search.domain.manifold)
+    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
 
 
 def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:
     ends = g.signs * np.array([lower, upper])[:, list(g.order)]
-    shifted = np.sort(ends, axis=0) + g.shifts(manifold)
-    some = np.array(g.halves) != 0
+    lower, upper = np.sort(ends, axis=0)
+    return _shifted(lower, upper, g.shifts(manifold))
+
+
+def _turn(q: Array, manifold: Any) -> Array:
+    """Return the multiples of periods that bring a point into the principal intervals."""
+    periods = np.array(manifold.periods)
+    whole = np.where(np.isfinite(periods), periods, 1.0)
+    return np.asarray(np.round((manifold.wrap(q) - q) / whole) * whole)
+
+
+def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
+    """Return a box moved by the multiples of half periods that a shift rounds, outward."""
+    slack = np.where(shift != 0, np.spacing(abs(shift)), 0.0)
+    below, above = lower + shift - slack, upper + shift + slack
     return (
-        np.where(some, np.nextafter(shifted[0], -np.inf), shifted[0]),
-        np.where(some, np.nextafter(shifted[1], np.inf), shifted[1]),
+        np.where(shift != 0, np.nextafter(below, -np.inf), lower),
+        np.where(shift != 0, np.nextafter(above, np.inf), upper),
     )
 
 

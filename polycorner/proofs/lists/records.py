@@ -230,7 +230,8 @@ def region_data(region: Region) -> dict[str, Any]:
 
 def locus_data(place: Locus) -> dict[str, Any]:
     """Return a locus as plain data."""
-    return {"z": list(place.z), "index": place.index, **_sides(place)}
+    sample = None if place.sample is None else _hex(place.sample)
+    return {"z": list(place.z), "index": place.index, "sample": sample, **_sides(place)}
 
 
 def region_from(data: dict[str, Any]) -> Region:
@@ -242,7 +243,8 @@ def region_from(data: dict[str, Any]) -> Region:
 def locus_from(data: dict[str, Any]) -> Locus:
     """Return the locus that some data describe."""
     lower, upper, low, high = (_numbers(data[name]) for name in SIDES)
-    return Locus(tuple(data["z"]), lower, upper, low, high, data["index"])
+    sample = None if data["sample"] is None else _numbers(data["sample"])
+    return Locus(tuple(data["z"]), lower, upper, low, high, data["index"], sample)
 
 
 def _numbers(texts: Sequence[str]) -> Array:

@@ -96,7 +96,9 @@ def check(path: str, sample: int | None, jobs: int) -> str:
     kind = "local minima" if proof.p.minima_only else "stationary points"
     said = [f"{len(data['points'])} {kind}"]
     said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
-    said += [f"{sum(not f.outside for f in proof.loci)} loci"] if proof.loci else []
+    for met, what in ((True, "loci"), (False, "loci that may be empty")):
+        some = [f for f in proof.loci if f.met == met]
+        said += [f"{sum(not f.outside for f in some)} {what}"] if some else []
     said += [f"{total} leaves" if count == total else f"ONLY A SAMPLE of {count} of {total} leaves"]
     said += [f"complete outside {opened} open boxes" if opened else "no open box"]
     said += (
