@@ -26,6 +26,7 @@ from examples import (
     ex16_dyad_climbs,
     ex17_turning,
     ex18_packing,
+    ex19_all_equilibria,
 )
 from polycorner.polyhedra import LocalType
 
@@ -91,6 +92,19 @@ def test_packing():
     jammed = ex18_packing.main(128)
     assert jammed.is_isostatic
     assert jammed.residuals.worst < 1e-12
+
+
+def test_all_equilibria(tmp_path):
+    table, ladder = ex19_all_equilibria.main()
+    assert table.complete
+    assert ladder.complete
+    assert {p.index for p in table} == {0, 1}
+    assert sorted(p.index for p in ladder) == [0, 0, 0, 0, 1, 1, 1, 1]
+    for draw, found in (
+        (ex19_all_equilibria.draw_table, table),
+        (ex19_all_equilibria.draw_ladder, ladder),
+    ):
+        assert draw(found, tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_pinball():

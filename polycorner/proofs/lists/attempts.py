@@ -12,7 +12,7 @@ from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.candidates import active_sets, newton
 from polycorner.proofs.lists.examination import Examined
 from polycorner.proofs.lists.known import Known, Tried
-from polycorner.proofs.lists.loci import locus
+from polycorner.proofs.lists.loci import locus, met
 from polycorner.proofs.lists.screening import Screen
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
@@ -124,7 +124,8 @@ class Attempts:
             if place is None:
                 self.failed.add(LOCUS, q, WIDEST)
             elif not self.known.has_locus(place):
-                self.known.loci.append(place)
+                shown = met(place, setting.functions, setting.conj, setting.domain)
+                (self.known.missed if shown is None else self.known.loci).append(shown or place)
 
     def _candidates(self, starts: Starts) -> Array:
         """Return KKT points near some points, ``(B, n)``, NaN where there is none."""

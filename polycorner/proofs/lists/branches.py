@@ -8,6 +8,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 
 Mask = NDArray[np.bool_]
 MOST_BRANCHES = 4096
+MANY = 16  # branches from which on boxes are treated one by one
 
 
 def conjunctions(polyhedron: Polyhedron) -> Mask:
@@ -53,12 +54,32 @@ def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]
         return inside, ~above[inside] & conj[0]
     alive: Mask = ~np.any(below[:, None, :] & conj, axis=2)  # (B, c)
     open_: Mask = conj & ~above[:, None, :]  # (B, c, m)
+    kept = (_least_of_many if len(conj) > MANY else _least)(alive, open_)
+    boxes, branches = np.nonzero(kept)
+    return boxes, open_[boxes, branches]
+
+
+def _least(alive: Mask, open_: Mask) -> Mask:
+    """Return which branches contain no other one, the first of equal ones, ``(B, c)``."""
+    count = alive.shape[1]
     kept: Mask = alive.copy()
-    for i in range(len(conj)):
-        for j in range(len(conj)):
+    for i in range(count):
+        for j in range(count):
             if i != j:  # branch i is dropped if j is within it, the later one if they are equal
                 within: Mask = ~np.any(open_[:, j] & ~open_[:, i], axis=1)
                 equal: Mask = within & ~np.any(open_[:, i] & ~open_[:, j], axis=1)
                 kept[:, i] &= ~(alive[:, j] & within & ((j < i) | ~equal))
-    boxes, branches = np.nonzero(kept)
-    return boxes, open_[boxes, branches]
+    return kept
+
+
+def _least_of_many(alive: Mask, open_: Mask) -> Mask:
+    """Return the same, from sets of functions as the bits of whole numbers."""
+    kept: Mask = np.zeros_like(alive)
+    packed = np.packbits(open_, axis=2)
+    for box, branches in enumerate(alive):
+        first: dict[int, int] = {}
+        for c in np.flatnonzero(branches).tolist():
+            first.setdefault(int.from_bytes(packed[box, c].tobytes(), "big"), c)
+        for bits, c in first.items():
+            kept[box, c] = not any(other & ~bits == 0 for other in first if other != bits)
+    return kept

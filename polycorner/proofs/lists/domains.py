@@ -65,6 +65,11 @@ class Domain(Value):
         away = (upper < self.lower[at]) | (lower > self.upper[at])
         return bool((away & ~whole).any())
 
+    def holds(self, lower: Array, upper: Array) -> bool:
+        """Whether a box in all coordinates lies inside, circles that are whole apart."""
+        whole = self.upper - self.lower >= self.manifold.periods
+        return bool(((lower >= self.lower) & (upper <= self.upper) | whole).all())
+
     def within(
         self, lower: Array, upper: Array, left: Array, right: Array, places: Sequence[int]
     ) -> NDArray[np.bool_]:

@@ -44,6 +44,7 @@ def stationary_points(
     box: Any,
     symmetry: Symmetry | None = None,
     parameters: "Mapping[str, Interval] | None" = None,
+    minima_only: bool = False,
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
@@ -77,6 +78,9 @@ def stationary_points(
         Intervals of parameters of the functions, by name.  What is proved then holds for each of
         their values: one stationary point in each listed box, and no others.  Wide intervals leave
         boxes undecided; divide them.
+    minima_only : bool, optional
+        Whether to list local minima only.  Boxes near saddles are then closed by negative
+        curvature (:mod:`~polycorner.proofs.lists.curvature`), which takes fewer of them.
     resolution : float, optional
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
@@ -117,7 +121,9 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(polyhedron, energy, box, symmetry, resolution, parameters)
+    search = prepared(
+        polyhedron, energy, box, symmetry, resolution, parameters, minima_only=minima_only
+    )
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
@@ -151,6 +157,8 @@ def prepared(
     symmetry: Symmetry | None,
     resolution: float,
     parameters: "Mapping[str, Interval] | None" = None,
+    *,
+    minima_only: bool = False,
 ) -> Search:
     """Return a search that has not begun, after checking its arguments."""
     problem = pose(polyhedron, energy)
@@ -162,7 +170,8 @@ def prepared(
     if sides:
         problem, found, symmetry = with_parameters(problem, found, symmetry, sides)
     motions, maps = _motions(problem, found, symmetry)
-    search = Search(problem, found, resolution, motions, maps)
+    checks.instance("minima_only", minima_only, bool)
+    search = Search(problem, found, resolution, motions, maps, minima_only)
     _check_fixed(search, symmetry)
     return search
 
@@ -219,8 +228,9 @@ def listed(search: Search, problem: Problem) -> StationaryList:
                 known.add(image)
                 points.append(_point(search, image, orbits))
         orbits += 1
-    rng = np.random.default_rng(0)
-    loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    loci = tuple(locus_of(search, place) for place in _loci(search))
+    if search.minima_only:
+        loci = tuple(place for place in loci if place.is_minimum)
     n, names = problem.dimension, search.domain.manifold.names
     return StationaryList(
         problem,
@@ -232,6 +242,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         tuple(open_points),
         search.tally,
         record(search, members),
+        search.minima_only,
     )
 
 
@@ -250,13 +261,15 @@ def _images(search: Search, region: Region) -> list[Region]:
         inverse = {image: i for i, image in enumerate(p)}
         lower, upper = _moved(g, *full(search, region), manifold)
         wide = _moved(g, region.lower, region.upper, manifold)
-        turn = manifold.wrap(0.5 * (lower + upper)) - 0.5 * (lower + upper)
+        turn = _turn(0.5 * (lower + upper), manifold)
         active = tuple(inverse[i] for i in region.active)
         sharp = [
-            np.concatenate([(side + turn)[free], rest[n:]])
-            for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
+            np.concatenate([side[free], rest[n:]])
+            for side, rest in zip(
+                _shifted(lower, upper, turn), (region.sharp_lower, region.sharp_upper), strict=True
+            )
         ]
-        sides = wide[0] + turn, wide[1] + turn
+        sides = _shifted(*wide, turn)
         found.append(Region(*sides, active, sharp[0], sharp[1], region.index))
     return found
 
@@ -282,16 +295,30 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
         sides = search.domain.lower.copy(), search.domain.upper.copy()
         sides[0][z], sides[1][z] = lower, upper
         ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
-    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
+    sample = None if place.sample is None else g(place.sample, search.domain.manifold)
+    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
 
 
 def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:
     ends = g.signs * np.array([lower, upper])[:, list(g.order)]
-    shifted = np.sort(ends, axis=0) + g.shifts(manifold)
-    some = np.array(g.halves) != 0
+    lower, upper = np.sort(ends, axis=0)
+    return _shifted(lower, upper, g.shifts(manifold))
+
+
+def _turn(q: Array, manifold: Any) -> Array:
+    """Return the multiples of periods that bring a point into the principal intervals."""
+    periods = np.array(manifold.periods)
+    whole = np.where(np.isfinite(periods), periods, 1.0)
+    return np.asarray(np.round((manifold.wrap(q) - q) / whole) * whole)
+
+
+def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
+    """Return a box moved by the multiples of half periods that a shift rounds, outward."""
+    slack = np.where(shift != 0, np.spacing(abs(shift)), 0.0)
+    below, above = lower + shift - slack, upper + shift + slack
     return (
-        np.where(some, np.nextafter(shifted[0], -np.inf), shifted[0]),
-        np.where(some, np.nextafter(shifted[1], np.inf), shifted[1]),
+        np.where(shift != 0, np.nextafter(below, -np.inf), lower),
+        np.where(shift != 0, np.nextafter(above, np.inf), upper),
     )
 
 

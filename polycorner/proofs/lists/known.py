@@ -99,6 +99,7 @@ class Known:
     def __init__(self, dimension: int, inequalities: int, parameters: tuple[int, ...] = ()) -> None:
         self.regions: list[Region] = []
         self.loci: list[Locus] = []
+        self.missed: list[Locus] = []  # loci without a point of the set
         self._sides = Sides(dimension)
         self._all = Rows(2 * dimension + inequalities)
         self._dimension = dimension
@@ -124,12 +125,13 @@ class Known:
         """Whether a locus lies in the box of a known one."""
         return any(
             (place.sharp_lower >= other.lower).all() and (place.sharp_upper <= other.upper).all()
-            for other in self.loci
+            for other in (*self.loci, *self.missed)
         )
 
     def has_value(self, z: Array) -> bool:
         """Whether values of the coordinates that the energy reads lie in the box of a locus."""
-        return any((z >= p.lower).all() and (z <= p.upper).all() for p in self.loci)
+        known = (*self.loci, *self.missed)
+        return any((z >= p.lower).all() and (z <= p.upper).all() for p in known)
 
     def sides(self, since: int = 0) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return lower and upper ends ``(R, n)`` and active functions ``(R, m)`` of regions.

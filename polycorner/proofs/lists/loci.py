@@ -10,6 +10,9 @@ Now let ``u`` be a vector along ``y`` in which all functions that may vanish in 
 ``z`` of the box lie in ``X``.  At a point of the set with ``z != z*`` the direction ``(v, K u)``
 descends, and for a large ``K`` it leads into the set: the point is not stationary.  At ``z = z*``
 the energy has no derivative.  The stationary points in the box are therefore those with ``z = z*``.
+
+There may be none, as the set may have no point with ``z = z*``: the domain is bisected along ``y``,
+with ``z`` in its enclosure, until one box lies in the set, or all lie outside.
 """
 
 from collections.abc import Mapping
@@ -25,14 +28,18 @@ from polycorner.intervals.balls import (
     middle_inverse,
     precision,
 )
+from polycorner.intervals.boxes import BoxFunctions
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box, needed
 from polycorner.proofs.definite import pivots
 from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inertia, krawczyk, outward
+from polycorner.proofs.lists.branches import Mask
+from polycorner.proofs.lists.domains import Domain
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 SHARP = 1e-9  # reach in scale units of the box whose image is the enclosure of a locus
+MOST_PIECES = 4096  # boxes in which a point of the set is looked for, at a time and in all
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +56,9 @@ class Locus(Value):
         Enclosure of ``z*``.
     index : int
         Negative eigenvalues of the second derivative.
+    sample : (n,) array or None
+        A point with ``z`` in the enclosure; with ``z = z*`` instead it is in the set.  None
+        where none was found.
     """
 
     z: tuple[int, ...]
@@ -57,6 +67,7 @@ class Locus(Value):
     sharp_lower: Array
     sharp_upper: Array
     index: int
+    sample: Array | None = None
 
 
 def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ...]:
@@ -131,3 +142,36 @@ def _shown(
         return None
     ends = np.array([outward(x) for x in image])
     return Locus(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])
+
+
+def met(place: Locus, functions: BoxFunctions, conj: Mask, domain: Domain) -> Locus | None:
+    """Return the locus with a sample, if one is found; None if it is shown to miss the set."""
+    z = list(place.z)
+    along = np.setdiff1d(domain.free, z)
+    lower, upper = domain.lower[None].copy(), domain.upper[None].copy()
+    lower[:, z], upper[:, z] = place.sharp_lower, place.sharp_upper
+    treated = 0
+    while len(lower):
+        treated += len(lower)
+        if treated > MOST_PIECES:
+            return place
+        middle = 0.5 * (lower + upper)
+        low, high = middle.copy(), middle.copy()
+        low[:, z], high[:, z] = place.sharp_lower, place.sharp_upper
+        for i, (least, most) in domain.held.items():
+            low[:, i], high[:, i] = least, most
+        bounds = functions.values(low, high)[0][:, : conj.shape[1]]
+        missed: Mask = np.any((bounds <= 0)[:, None, :] & conj, axis=2)
+        inside = np.flatnonzero(~np.all(missed, axis=1))
+        if inside.size:
+            return replace(place, sample=middle[inside[0]])
+        bounds = functions.values(lower, upper)[1][:, : conj.shape[1]]
+        missed = np.any((bounds < 0)[:, None, :] & conj, axis=2)
+        left = ~np.all(missed, axis=1)
+        lower, upper, middle = lower[left], upper[left], middle[left]
+        each = np.arange(len(lower))
+        axis = along[((upper - lower) / domain.manifold.scale_array)[:, along].argmax(axis=1)]
+        first, second = upper.copy(), lower.copy()
+        first[each, axis] = second[each, axis] = middle[each, axis]
+        lower, upper = np.concatenate([lower, second]), np.concatenate([first, upper])
+    return None

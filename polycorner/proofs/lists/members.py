@@ -36,6 +36,8 @@ def settled(search: Search) -> list[tuple[int, str]]:
     known, found = Listed(search), list[tuple[int, str]]()
     for k, region in enumerate(search.regions):
         place = OUT if known.has(region) else membership(search, region)
+        if search.minima_only and region.index != 0:
+            place = OPEN if place == IN and region.index is None else OUT
         if place != OUT:
             known.add(region)
             found.append((k, place))
@@ -63,8 +65,8 @@ def membership(search: Search, region: Region) -> str:
     with precision(BITS):
         hull = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
         values = search.faces.formulas.values(Box(hull), range(m))
-        below = np.array([bool(v < ball(0)) for v in values])
-        above = np.array([bool(v > ball(0)) for v in values])
+        below = np.array([bool(v < ball(0)) for v in values], dtype=np.bool_)
+        above = np.array([bool(v > ball(0)) for v in values], dtype=np.bool_)
     # Balls give up square roots that may reach 0, as of the distance of centres that coincide.
     low, high = search.functions.values(lower[None], upper[None])
     below |= high[0, :m] < 0

@@ -70,6 +70,8 @@ class Record(Value):
         images of each other, those that the search met.
     codes, positions, counts, directions : arrays
         The subdivision; see :meth:`~polycorner.proofs.lists.tree.Tree.preorder`.
+    minima_only : bool
+        Whether the list is one of local minima.
     """
 
     problem: Problem
@@ -85,6 +87,7 @@ class Record(Value):
     positions: Array
     counts: NDArray[np.uint16]
     directions: NDArray[np.float32]
+    minima_only: bool = False
 
 
 def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
@@ -100,6 +103,7 @@ def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
         tuple(k for k, place in members if place == IN),
         tuple(k for k, place in members if place == OPEN),
         *search.tree.preorder(),
+        search.minima_only,
     )
 
 
@@ -164,6 +168,7 @@ def posed(record: "Record | Search") -> dict[str, Any]:
         "domain": {"lower": _hex(domain.lower), "upper": _hex(domain.upper)},
         "fixed": list(domain.fixed),
         "parameters": list(domain.parameters),
+        "minima_only": record.minima_only,
         "symmetries": [_motion(g) for g in record.motions],
         "weights": _hex(record.weights),
     }
@@ -225,7 +230,8 @@ def region_data(region: Region) -> dict[str, Any]:
 
 def locus_data(place: Locus) -> dict[str, Any]:
     """Return a locus as plain data."""
-    return {"z": list(place.z), "index": place.index, **_sides(place)}
+    sample = None if place.sample is None else _hex(place.sample)
+    return {"z": list(place.z), "index": place.index, "sample": sample, **_sides(place)}
 
 
 def region_from(data: dict[str, Any]) -> Region:
@@ -237,7 +243,8 @@ def region_from(data: dict[str, Any]) -> Region:
 def locus_from(data: dict[str, Any]) -> Locus:
     """Return the locus that some data describe."""
     lower, upper, low, high = (_numbers(data[name]) for name in SIDES)
-    return Locus(tuple(data["z"]), lower, upper, low, high, data["index"])
+    sample = None if data["sample"] is None else _numbers(data["sample"])
+    return Locus(tuple(data["z"]), lower, upper, low, high, data["index"], sample)
 
 
 def _numbers(texts: Sequence[str]) -> Array:

@@ -29,6 +29,8 @@ class Setting:
         Symmetries.
     maps : tuple of tuple of int
         Where they take inequalities.
+    minima_only : bool
+        Whether only local minima are searched.
     functions : BoxFunctions
         Inequalities, equations, energy.
     faces : Faces
@@ -45,6 +47,7 @@ class Setting:
     resolution: float
     motions: tuple[Motion, ...] = ()
     maps: tuple[tuple[int, ...], ...] = ()
+    minima_only: bool = False
     functions: BoxFunctions = field(init=False)
     faces: Faces = field(init=False)
     conj: Mask = field(init=False)

@@ -3,9 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from polycorner.minimisation import Certificate, certify
 from polycorner.minimisation.problem import Problem
@@ -76,7 +74,8 @@ class StationaryLocus(Value):
     index : int
         Negative eigenvalues of the second derivative by these coordinates.
     sample : (n,) array or None
-        A point of the set on it, which shows that it is not empty; None where none was found.
+        A point of the set on it, which shows that it is not empty; None where none was found.  It
+        is then not decided whether the set has points on it.
     """
 
     lower: Mapping[str, float]
@@ -104,17 +103,21 @@ class StationaryList(Printed, Value):
         Intervals of parameters, or empty.  The list is one for each of their values: what is
         enclosed is the point at all values, as a function of them.
     points : tuple of StationaryPoint
-        Isolated ones, by orbit.
+        Isolated ones, by orbit.  A point whose enclosure meets a side of the box is listed, whether
+        it lies in the box or beside it.
     loci : tuple of StationaryLocus
         Connected sets of them along coordinates that the energy does not depend on.
     undecided : (k, 2, n) array
-        Boxes, by lower and upper ends, outside of which there is no other stationary point.
+        Boxes, by lower and upper ends, outside of which there is no other stationary point; where
+        symmetries are declared, none outside of these boxes and their images.
     open_points : tuple of StationaryPoint
         KKT points of faces for which it is not decided whether they lie in the polyhedron.
     tally : Tally
         Numbers of boxes.
     record : Record
         The proof, for :meth:`save`.
+    minima_only : bool
+        Whether only local minima are listed.
     """
 
     problem: Problem
@@ -126,11 +129,13 @@ class StationaryList(Printed, Value):
     open_points: tuple[StationaryPoint, ...]
     tally: Tally
     record: Record
+    minima_only: bool = False
 
     @property
     def complete(self) -> bool:
         """Whether it is proved that these are all stationary points in the box."""
-        return not len(self.undecided) and not self.open_points
+        found = all(place.sample is not None for place in self.loci)
+        return not len(self.undecided) and not self.open_points and found
 
     @property
     def minima(self) -> tuple[StationaryPoint, ...]:
@@ -172,16 +177,20 @@ class StationaryList(Printed, Value):
     def statement(self) -> str:
         """What is proved, in a sentence."""
         count, n = len(self.points), self.problem.dimension
+        kind = "strict local minima" if self.minima_only else "stationary points"
+        loci = f" and {len(self.loci)} loci" if self.loci else ""
         where = f"in the box ({n} coordinates)"
         if self.parameters:
             where += f" for all {shown_box(self.parameters)}"
-        loci = f" and {len(self.loci)} loci" if self.loci else ""
+        sides = sum(not self.domain.holds(p.lower, p.upper) for p in self.points)
+        on_sides = f"; {sides} of them on a side of it, or beside by rounding" if sides else ""
         if self.complete:
-            return (
-                f"Proved: the energy has exactly {count} isolated stationary points{loci} {where}."
-            )
+            shown = f"exactly {count} isolated {kind}{loci} {where}{on_sides}"
+            return f"Proved: the energy has {shown}."
+        empty = sum(place.sample is None for place in self.loci)
         rest = f"{len(self.undecided)} boxes and {len(self.open_points)} points are undecided"
-        return f"Not complete: {count} stationary points{loci} are shown {where}; {rest}."
+        rest += f", and whether {empty} loci are empty" if empty else ""
+        return f"Not complete: {count} {kind}{loci} are shown {where}; {rest}."
 
     def __repr__(self) -> str:
         """Return the statement."""
@@ -244,28 +253,13 @@ class StationaryList(Printed, Value):
         return save(path, self.record)
 
 
-def locus_of(search: Search, place: Locus, rng: np.random.Generator) -> StationaryLocus:
-    """Return a locus with a sample of it that lies in the set, if one is found."""
-    names = search.domain.manifold.names
-    keys = [names[i] for i in place.z]
+def locus_of(search: Search, place: Locus) -> StationaryLocus:
+    """Return a locus by the names of its coordinates."""
+    keys = [search.domain.manifold.names[i] for i in place.z]
+    n = len(search.domain.lower) - len(search.domain.parameters)
     return StationaryLocus(
         dict(zip(keys, place.sharp_lower.tolist(), strict=True)),
         dict(zip(keys, place.sharp_upper.tolist(), strict=True)),
         place.index,
-        _sample(search, place, rng),
+        None if place.sample is None else place.sample[:n],
     )
-
-
-SAMPLES = 4096
-
-
-def _sample(search: Search, place: Locus, rng: np.random.Generator) -> Array | None:
-    domain, z = search.domain, list(place.z)
-    lower = rng.uniform(domain.lower, domain.upper, (SAMPLES, len(domain.lower)))
-    upper = lower.copy()
-    lower[:, z], upper[:, z] = place.sharp_lower, place.sharp_upper
-    low = search.functions.values(lower, upper)[0][:, : search.problem.inequalities]
-    missed = np.any((low <= 0)[:, None, :] & search.conj, axis=2)
-    found: Any = np.flatnonzero(~np.all(missed, axis=1))
-    some = slice(0, len(domain.lower) - len(domain.parameters))
-    return 0.5 * (lower[found[0], some] + upper[found[0], some]) if found.size else None

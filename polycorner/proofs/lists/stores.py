@@ -181,6 +181,7 @@ class Store:
         for data in root["regions"]:
             search.known.add(region_from(data))
         search.known.loci += map(locus_from, root["loci"])
+        search.known.missed += map(locus_from, root["missed"])
         for active, tried in root["failed"]:
             for *q, widest in tried:
                 search.attempts.failed.add(tuple(active), np.array(q), widest)
@@ -219,6 +220,7 @@ def _progress(search: Search) -> dict[str, Any]:
         "tally": asdict(search.tally),
         "regions": [region_data(region) for region in search.regions],
         "loci": [locus_data(place) for place in search.loci],
+        "missed": [locus_data(place) for place in search.known.missed],
         "failed": search.attempts.failed.items(),
     }
 

@@ -174,6 +174,13 @@ def test_a_file_that_is_not_there_is_no_malformed_one(tmp_path, verdict):
     assert "cannot be read" in line
 
 
+def test_loci_without_a_sample_may_be_empty(proofs, verdict, tmp_path):
+    file = File(proofs("strip"))
+    file.data["loci"][0]["sample"] = None
+    file.write(tmp_path / "empty.zip")
+    assert "1 loci that may be empty" in verdict(tmp_path / "empty.zip")[1]
+
+
 def test_a_sample_is_called_a_sample(proofs, verdict):
     fine, line = verdict(proofs("camel"), "--sample", "20")
     assert fine
@@ -433,6 +440,10 @@ def locus_elsewhere(f):
     f.data["loci"][0].update(sharp_lower=[(0.25).hex()], sharp_upper=[(0.5).hex()])
 
 
+def locus_off_the_set(f):
+    f.data["loci"][0]["sample"][1] = (2.0).hex()
+
+
 @pytest.mark.parametrize(
     ("name", "corrupt"),
     [
@@ -448,6 +459,7 @@ def locus_elsewhere(f):
         ("strip", no_locus),
         ("strip", locus_in_another_coordinate),
         ("strip", locus_elsewhere),
+        ("strip", locus_off_the_set),
         ("strip", turned_direction),
         ("ridge", turned_direction),
         ("section", turned_direction),
@@ -534,6 +546,7 @@ def stated(nodes, outputs, **more):
     empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed", "parameters")}
     data = {"format": problem.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
     data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
+    data["minima_only"] = False
     return Proof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
 
 
@@ -545,7 +558,7 @@ def test_a_locus_of_an_energy_that_selects_by_another_coordinate_is_refused(leve
     nodes += [["sub", 0, 2], ["sub", 0, 3], ["mul", 5, 5], ["mul", 6, 6], ["lt", 1, 4]]
     nodes += [["select", 9, 7, 8]]
     point = [(0.75).hex()]
-    locus = {"z": [0], "index": 0, "lower": [(0.5).hex()], "upper": [(1.0).hex()]}
+    locus = {"z": [0], "index": 0, "sample": None, "lower": [(0.5).hex()], "upper": [(1.0).hex()]}
     locus |= {"sharp_lower": point, "sharp_upper": point}
     if level == "-1":  # which no point of the domain is below
         assert stated(nodes, [10], loci=[locus]).loci[0].index == 0

@@ -179,6 +179,35 @@ def test_circles_need_no_sides_and_have_no_seam():
     assert sum((-1) ** p.index for p in found) == 0  # the Euler characteristic of the torus
 
 
+def half_turned(q):
+    return q + np.array([0, np.pi])
+
+
+def mirrored(q):
+    return q * [-1, 1]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_images_on_circles_hold_the_points(turned):
+    """The points are multiples of pi/4 from a rational angle, which no double is."""
+    tube = Manifold(("z", "t"), (math.inf, math.tau))
+    z, t = tube.symbols
+    for phase in (0, -3, sympy.Rational(-22, 7)):
+        energy = sympy.cos(4 * (t - phase)) + (z**2 - 1) ** 2
+        element = Element(half_turned if turned else mirrored, {})
+        found = stationary_points(
+            Polyhedron(tube, {"all": 3 + sympy.cos(4 * t)}), energy, box={"z": (-2, 2)},
+            symmetry=Symmetry(elements=[element]),
+        )  # fmt: skip
+        assert found.complete
+        assert len(found) == 24
+        for p in found:
+            low, high = (sympy.Rational(end[1]) for end in (p.lower, p.upper))
+            step = sympy.pi / 4
+            turns = round(float(((low + high) / 2 - phase) / step))
+            assert low <= sympy.N(phase + turns * step, 60) <= high
+
+
 def test_fixed_coordinates_are_a_quotient_by_a_translation():
     line = Manifold.euclidean("u v")
     u, v = line.symbols
@@ -247,6 +276,31 @@ def test_loci_outside_the_box_are_not_listed():
     assert found.complete
     assert sorted(round(p.lower["y"], 6) for p in found.loci) == [0.0, 2.0]
     assert "a point (x, y)" in str(found)
+
+
+@pytest.mark.parametrize("reach", [0.25, 1e-9, 0, -1e-9, -0.25])
+def test_loci_off_the_set_are_not_listed(reach):
+    """The half-plane and the disc leave x <= 2 + reach, and the energy is stationary at x = 2."""
+    end = sympy.Rational(2) + sympy.Rational(reach)
+    d = Polyhedron(PLANE, {"left": 3 - X - Y, "disc": 9 - (X + 3 - end) ** 2 - Y**2})
+    found = stationary_points(d, (X - 2) ** 2, box=SIDES, resolution=1e-3)
+    assert found.complete or abs(reach) < 1e-6
+    assert len(found.loci) == (reach >= 0)
+    if reach > 0:
+        assert d.contains(found.loci[0].sample)
+    if reach == 0:
+        assert found.loci[0].sample is None
+        assert not found.complete
+    if reach == -0.25:
+        assert [p.active for p in found] == [("disc",)]
+
+
+def test_a_set_without_inequalities_is_searched():
+    circle = Polyhedron(PLANE, [], {"circle": 1 - X**2 - Y**2})
+    found = stationary_points(circle, X, box=SIDES)
+    assert found.complete
+    assert sorted_points(found) == [[-1.0, 0.0], [1.0, 0.0]]
+    assert sorted(p.index for p in found) == [0, 1]
 
 
 def test_loci_along_coordinates_that_the_energy_does_not_read():

@@ -4,8 +4,10 @@ from typing import Any
 
 from flint import acb_mat, arb, arb_mat
 
-from .balls import ZERO, definite, dot, hull, need, sides, turn, zero
+from .balls import ZERO, definite, dot, hull, moved, need, sides, turn, zero
 from .problem import Problem
+
+HALVINGS = 6  # of a region, in whose parts multipliers are enclosed
 
 
 class Face:
@@ -38,13 +40,15 @@ class Face:
         need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
         self.point = self.at(self.unknowns)
         whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
-        some = [(x, p.lower[i], p.upper[i]) for i, x in enumerate(self.point) if not whole[i]]
-        self.outside = any(x < a or x > b for x, a, b in some)
+        stated = zip(places, *sharp, strict=False)  # what meets the domain is listed
+        self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
         branches = p.open_sets(p.signs(p.values(self.point)), self.active)
         self.stationary = branches == [self.active]
         self.absent = not branches or any(u < self.active for u in branches)
         if active is None:
             self.descends()
+            self.met = record["sample"] is not None
+            need(not self.met or self.meets(record), f"{self.name}: the sample is not in the set")
 
     def at(self, unknowns: list[arb], middle: bool = False) -> list[arb]:
         """Return all coordinates; others may be anywhere in the domain, or are in its middle."""
@@ -69,20 +73,39 @@ class Face:
 
     def start(self, growth: int) -> list[arb] | None:
         """Return the box, and more than an enclosure of the multipliers at all of its points."""
-        box = hull(self.lower, self.upper)
-        found = self.rows_at(box)
-        if not found or len(self.rows) == 1:
-            return box if found else None
-        *rows, energy = found[1]
+        multipliers = self.multipliers(self.lower, self.upper, HALVINGS)
+        if multipliers is None:
+            return None
+        more = [x + arb(0, 1) * (growth * x.rad() + (abs(x) + 1) / 2**100) for x in multipliers]
+        return [*hull(self.lower, self.upper), *more]
+
+    def multipliers(self, lower: list[float], upper: list[float], halvings: int) -> Any:
+        """Enclose the multipliers in a box, bisected where needed; None if any may be negative."""
+        found = self.rows_at(hull(lower, upper))
+        if found and len(self.rows) == 1:
+            return []
+        shown = self.solved(found[1]) if found else None
+        if shown or not halvings:
+            return shown
+        widths = [b - a for a, b in zip(lower, upper, strict=True)]
+        shares = [w / self.p.widths[i] for w, i in zip(widths, self.places, strict=True)]
+        axis = shares.index(max(shares))
+        middle = 0.5 * (lower[axis] + upper[axis])
+        first = self.multipliers(lower, moved(upper, axis, middle), halvings - 1)
+        second = first and self.multipliers(moved(lower, axis, middle), upper, halvings - 1)
+        return second and [x.union(y) for x, y in zip(first, second, strict=True)]
+
+    def solved(self, slopes: list[list[arb]]) -> list[arb] | None:
+        """Enclose the solutions of ``sum lam_i g_i = dE``; None if some may not be positive."""
+        *rows, energy = slopes
         middle = arb_mat(rows).mid()
         try:
             left = (middle * middle.transpose()).inv().mid() * middle
             form = left * arb_mat(rows).transpose()
-            multipliers = form.solve(left * arb_mat([[x] for x in energy])).entries()
+            found = form.solve(left * arb_mat([[x] for x in energy])).entries()
         except ZeroDivisionError:
             return None
-        more = [x + arb(0, 1) * (growth * x.rad() + (abs(x) + 1) / 2**100) for x in multipliers]
-        return [*box, *more] if all(x > 0 for x in multipliers[: len(self.active)]) else None
+        return found if all(x > 0 for x in found[: len(self.active)]) else None
 
     def equations(self, unknowns: list[arb], middle: bool = False) -> Any:
         """Return the residual of the KKT equations and their Jacobian."""
@@ -128,6 +151,14 @@ class Face:
         whole = arb_mat(self.equations(hull(self.lower, self.upper))[1])
         form = whole.transpose() * (whole.mid() + whole.mid().transpose())
         need(fine and definite((form + form.transpose()).tolist()), f"{self.name}: no descent")
+
+    def meets(self, record: dict[str, Any]) -> bool:
+        """Whether the sample, with the coordinates of the locus instead, is in the set."""
+        sample = sides(record, ("sample", "sample"), self.p.n)[0]
+        moved = set(self.p.free) - set(self.places)
+        q = [arb(x) if i in moved else self.point[i] for i, x in enumerate(sample)]
+        signs = self.p.signs(self.p.values(q))
+        return any(all(signs[i] > 0 for i in branch) for branch in self.p.branches)
 
     def same(self, other: "Face") -> bool | None:
         """Whether two regions have one point: whether this one's lies in the other region."""

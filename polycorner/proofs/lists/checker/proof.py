@@ -60,6 +60,8 @@ class Proof:
             turned[:] = turned or self.tangents(v, memo, ways)
             if any(grows(-1, w) < 0 and leads(u, w) for w in turned):
                 return True
+            if self.p.minima_only and any(self.bends_down(u, v, w) for w in ways):
+                return True
             along = (w for w in ways if loci and all(w[i] == 0 for i in loci[0].places))
             return bool(loci) and (not u or any(leads(u, w) for w in along))
 
@@ -67,6 +69,37 @@ class Proof:
             return True
         closer = [s or self.p.sign(v, row, memo, lo, hi) for row, s in enumerate(signs)]
         return closer != signs and all(map(left, self.p.open_sets(closer)))
+
+    def bends_down(self, u: frozenset[int], v: list[Any], w: list[arb]) -> bool:
+        """Whether no point of a box is a local minimum: a tangent vector has negative curvature.
+
+        With ``L`` near the pseudoinverse of the gradients' transpose, multipliers solve
+        ``(L G^T) lam = L dE``, and ``d = w + L^T y`` is tangent for ``(G L^T) y = -G w``.
+        """
+        p, memo = self.p, dict[int, Any]()
+        found = [p.forms(v, row, memo, 2) for row in (*sorted(u), *range(p.m, p.m + p.k + 1))]
+        if None in found:
+            return False
+        *rows, energy = [[g.get(i, ZERO) for i in p.free] for g, _ in found]
+        d, lam = [w[i] for i in p.free], list[arb]()
+        if rows:
+            gradients, middle = arb_mat(rows), arb_mat(rows).mid()
+            try:
+                left = (middle * middle.transpose()).inv().mid() * middle
+                form = left * gradients.transpose()
+                lam = form.solve(left * arb_mat([[x] for x in energy])).entries()
+                across = arb_mat([[x] for x in d])
+                y = form.transpose().solve(-gradients * across)
+            except ZeroDivisionError:
+                return False
+            d = (across + left.transpose() * y).entries()
+        weights = [*(-x for x in lam), arb(1)]
+        bent = [
+            dot(weights, [h.get((i, j), ZERO) for _, h in found]) * d[a] * d[b]
+            for a, i in enumerate(p.free)
+            for b, j in enumerate(p.free)
+        ]
+        return all(x > 0 for x in lam[: len(u)]) and sum(bent, ZERO) < 0
 
     def tangents(self, v: list[Any], memo: dict[int, Any], ways: list[list[arb]]) -> list[Any]:
         """Return ``w + C y`` with ``dh (w + C y) = 0``, for all elements of the enclosed ``dh``."""

@@ -59,6 +59,7 @@ def check_list(proof: Proof, data: dict[str, Any]) -> None:
         need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
     for k, face in enumerate(proof.regions):
         known = face.outside or face.absent or k in data["open_points"]
+        known |= proof.p.minima_only and bool(face.index)
         need(known or any(face.same(f) for f in claimed), f"{face.name}: is not listed")
 
 
@@ -92,9 +93,12 @@ def check(path: str, sample: int | None, jobs: int) -> str:
             done += sum(map(len, wave))
             line = f"{done} of {count} leaves, {time.monotonic() - started:.0f} s"
             print(line, file=sys.stderr)
-    said = [f"{len(data['points'])} stationary points"]
+    kind = "local minima" if proof.p.minima_only else "stationary points"
+    said = [f"{len(data['points'])} {kind}"]
     said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
-    said += [f"{sum(not f.outside for f in proof.loci)} loci"] if proof.loci else []
+    for met, what in ((True, "loci"), (False, "loci that may be empty")):
+        some = [f for f in proof.loci if f.met == met]
+        said += [f"{sum(not f.outside for f in some)} {what}"] if some else []
     said += [f"{total} leaves" if count == total else f"ONLY A SAMPLE of {count} of {total} leaves"]
     said += [f"complete outside {opened} open boxes" if opened else "no open box"]
     said += (
