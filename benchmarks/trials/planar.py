@@ -252,8 +252,9 @@ class PlanarProblem:
             if any(not (sign(q[0] - p[0]) or sign(q[1] - p[1])) for p, _, _ in found):
                 continue
             signs = [sign(f.at(q)) for f in self.curves]
-            zeros = frozenset(i for i, s in enumerate(signs) if not s)
-            inside = [b for b in self.branches if all(signs[i] >= 0 for i in b)]
+            least = [b for b in self.branches if not any(other < b for other in self.branches)]
+            zeros = frozenset(i for i in frozenset().union(*least) if not signs[i])
+            inside = [b for b in least if all(signs[i] >= 0 for i in b)]
             if inside and all(self.rests(q, sorted(b & zeros)) for b in inside):
                 found.append(Place(q, zeros, self.index(q, zeros, inside)))
         return found
