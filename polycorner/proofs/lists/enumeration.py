@@ -1,7 +1,7 @@
 """The search for all stationary points, its symmetries, and what is made of the regions found."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, Known, full, settled
+from polycorner.proofs.lists.members import OPEN, Known, full, images, moved, settled
 from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Boxes, Search
@@ -24,6 +24,7 @@ from polycorner.spaces.manifold import Array
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
+S = TypeVar("S", bound=Search)
 RESOLUTION = 1e-6
 MOST_BOXES = 10_000_000
 
@@ -91,7 +92,7 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(polyhedron, energy, box, symmetry, resolution)
+    search = prepared(polyhedron, energy, box, symmetry, resolution, Search)
     checks.whole("max_boxes", max_boxes, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if not callable(progress):
@@ -109,16 +110,21 @@ def stationary_points(
 
 
 def prepared(
-    polyhedron: Polyhedron, energy: "Energy", box: Any, symmetry: Symmetry | None, resolution: float
-) -> Search:
-    """Return a search that has not begun, after checking its arguments."""
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    box: Any,
+    symmetry: Symmetry | None,
+    resolution: float,
+    kind: type[S],
+) -> S:
+    """Return a search of a kind that has not begun, after checking its arguments."""
     problem = pose(polyhedron, energy)
     found = domain(polyhedron.manifold, box)
     checks.real("resolution", resolution, above=0)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
     motions, maps = _motions(problem, found, symmetry)
-    search = Search(problem, found, resolution, motions, maps)
+    search = kind(problem, found, resolution, motions=motions, maps=maps)
     _check_fixed(search, symmetry)
     return search
 
@@ -170,7 +176,7 @@ def listed(search: Search) -> StationaryList:
             open_points.append(_point(search, region, orbits))
             continue
         points.append(_point(search, region, orbits))
-        for image in _images(search, region):
+        for image in images(search, region):
             if not known.has(image):
                 known.add(image)
                 points.append(_point(search, image, orbits))
@@ -182,37 +188,19 @@ def listed(search: Search) -> StationaryList:
         search.domain,
         tuple(points),
         loci,
-        _undecided(search),
+        undecided(search),
         tuple(open_points),
         search.tally,
         record(search, members),
     )
 
 
-def _undecided(search: Search) -> Array:
+def undecided(search: Search) -> Array:
+    """Return the boxes that are left or wait, ``(k, 2, n)``."""
     parts: list[Boxes] = [*search.undecided, search.waiting]
     lower = np.concatenate([p.lower for p in parts])
     upper = np.concatenate([p.upper for p in parts])
     return np.stack([lower, upper], axis=1)
-
-
-def _images(search: Search, region: Region) -> list[Region]:
-    """Return the region carried along by all symmetries."""
-    found, manifold = [], search.domain.manifold
-    free, n = list(search.domain.free), len(search.domain.free)
-    for g, p in zip(search.motions, search.maps, strict=True):
-        inverse = {image: i for i, image in enumerate(p)}
-        lower, upper = _moved(g, *full(search, region), manifold)
-        wide = _moved(g, region.lower, region.upper, manifold)
-        turn = manifold.wrap(0.5 * (lower + upper)) - 0.5 * (lower + upper)
-        active = tuple(inverse[i] for i in region.active)
-        sharp = [
-            np.concatenate([(side + turn)[free], rest[n:]])
-            for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
-        ]
-        sides = wide[0] + turn, wide[1] + turn
-        found.append(Region(*sides, active, sharp[0], sharp[1], region.index))
-    return found
 
 
 def _loci(search: Search) -> list[Locus]:
@@ -235,18 +223,8 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
     for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
         sides = search.domain.lower.copy(), search.domain.upper.copy()
         sides[0][z], sides[1][z] = lower, upper
-        ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
+        ends += [side[z] for side in moved(g, *sides, search.domain.manifold)]
     return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
-
-
-def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:
-    ends = g.signs * np.array([lower, upper])[:, list(g.order)]
-    shifted = np.sort(ends, axis=0) + g.shifts(manifold)
-    some = np.array(g.halves) != 0
-    return (
-        np.where(some, np.nextafter(shifted[0], -np.inf), shifted[0]),
-        np.where(some, np.nextafter(shifted[1], np.inf), shifted[1]),
-    )
 
 
 def _point(search: Search, region: Region, orbit: int) -> StationaryPoint:

@@ -5,8 +5,9 @@ import numpy as np
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.acceptance import BITS, Region
+from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.search import Search
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 
 IN, OUT, OPEN = "in", "out", "open"
 
@@ -82,3 +83,36 @@ def membership(search: Search, region: Region) -> str:
     if any(sure and less for sure, less in zip(decided, fewer, strict=True)):
         return OUT
     return IN if any(decided) and not any(fewer) else OPEN
+
+
+def images(search: Search, region: Region) -> list[Region]:
+    """Return a region carried along by all symmetries of a search."""
+    pairs = zip(search.motions, search.maps, strict=True)
+    return [image(search, region, g, p) for g, p in pairs]
+
+
+def image(search: Search, region: Region, g: Motion, p: tuple[int, ...]) -> Region:
+    """Return a region carried along by a symmetry, which takes inequalities to ``p``."""
+    manifold = search.domain.manifold
+    free, n = list(search.domain.free), len(search.domain.free)
+    inverse = {there: i for i, there in enumerate(p)}
+    lower, upper = moved(g, *full(search, region), manifold)
+    wide = moved(g, region.lower, region.upper, manifold)
+    turn = manifold.wrap(0.5 * (lower + upper)) - 0.5 * (lower + upper)
+    active = tuple(inverse[i] for i in region.active)
+    sharp = [
+        np.concatenate([(side + turn)[free], rest[n:]])
+        for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
+    ]
+    return Region(wide[0] + turn, wide[1] + turn, active, sharp[0], sharp[1], region.index)
+
+
+def moved(g: Motion, lower: Array, upper: Array, manifold: Manifold) -> tuple[Array, Array]:
+    """Return the sides of a box's image, shifts rounded outwards."""
+    ends = g.signs * np.array([lower, upper])[:, list(g.order)]
+    shifted = np.sort(ends, axis=0) + g.shifts(manifold)
+    some = np.array(g.halves) != 0
+    return (
+        np.where(some, np.nextafter(shifted[0], -np.inf), shifted[0]),
+        np.where(some, np.nextafter(shifted[1], np.inf), shifted[1]),
+    )

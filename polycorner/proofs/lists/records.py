@@ -118,8 +118,13 @@ def save(path: str | os.PathLike[str], record: Record) -> Path:
     OSError
         If the file could not be written.
     """
+    return written(path, record, described(record))
+
+
+def written(path: str | os.PathLike[str], record: Record, data: dict[str, Any]) -> Path:
+    """Save what is described with the subdivision of a record; see :func:`save`."""
     parts = {
-        "problem.json": json.dumps(described(record), indent=1).encode(),
+        "problem.json": json.dumps(data, indent=1).encode(),
         "tree.bin": record.codes.astype("<i1").tobytes(),
         "positions.bin": record.positions.astype("<f8").tobytes(),
         "counts.bin": record.counts.astype("<u2").tobytes(),

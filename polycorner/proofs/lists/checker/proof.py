@@ -4,7 +4,7 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import NAN, ZERO, dot, hull, moved
+from .balls import NAN, ZERO, dot, hull, moved, need
 from .faces import Face
 from .problem import Problem
 from .symmetries import Symmetry
@@ -14,6 +14,9 @@ PIECES = 4000  # into which a box is bisected at most
 
 class Proof:
     """The problem of a file, with regions, loci and symmetries."""
+
+    kind = "stationary points"
+    tested = 0  # properties at points that are tested, but not shown
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = Problem(data)
@@ -83,3 +86,16 @@ class Proof:
             change = dict(zip(self.p.free, (across * y).entries(), strict=True))
             changed.append([x + change.get(i, ZERO) for i, x in enumerate(w)])
         return changed
+
+    def check_list(self, data: dict[str, Any]) -> None:
+        """Check that all regions with stationary points are listed, each point once."""
+        claimed = [self.regions[point["region"]] for point in data["points"]]
+        for k, face in enumerate(claimed):
+            need(face.stationary and not face.outside, f"{face.name}: is no stationary point")
+            need(
+                face.index == data["points"][k]["index"], f"{face.name}: the index is {face.index}"
+            )
+            need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
+        for k, face in enumerate(self.regions):
+            known = face.outside or face.absent or k in data["open_points"]
+            need(known or any(face.same(f) for f in claimed), f"{face.name}: is not listed")
