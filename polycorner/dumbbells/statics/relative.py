@@ -1,22 +1,44 @@
-"""Relative placements of two dumbbells in the plane, for complete lists of places of rest.
+"""Relative placements of two dumbbells, in the plane and in the drum, for complete lists.
 
-Rigid motions of the plane preserve the polyhedron ``D`` of a pair, translations along the axis the
-energy as well.  Along a translation across it, the energy of stationary points has no derivative
-either, as it leads from ``D`` into ``D`` both ways: the lateral positions of the two dumbbells
-add up to zero.  All stationary points of the pair are therefore, up to translations along the axis,
-those of the energy on the placements
+Motions of the whole pair preserve the polyhedron ``D``: translations of the plane, or rolling and
+shifting in the drum.  Shifts along the axis preserve the energy as well.  When the pair rolls by
+``s`` the energy is ``-K d cos(s - s0)`` up to a constant, with the distance ``d`` of the centre of
+mass from the axis of the drum: at a local minimum ``s = s0``, the centre of mass is straight below
+the axis.  The local minima of the pair are those of
 
-    A: (-x, -y/2, alpha),   B: (x, y/2, beta)
+    E = 2 (rho^2 - d^2)
 
-in four coordinates, and local minima are the same.  Dumbbells whose centres are more than
-``l + 2 r`` apart do not touch; there the energy is stationary only at ``x = 0`` and headings that
-are multiples of a right angle, for all ``y``.  What remains is compact.
+on its placements up to rolling and shifts, which have four coordinates: A at azimuth ``-x`` and B
+at ``x``, at ``-y/2`` and ``y/2`` along the axis, with headings ``alpha`` and ``beta``.  In the
+plane, the limit of large drums, ``x`` is a length, the centre of mass lies on the lowest line, and
+``E`` is half the sum of squared lateral positions of the four balls.
 
-The rods overlap where their axes cross: where no ball of one dumbbell overlaps the rod of the
-other, each end is at least ``r + t > 2 t`` from the other axis, which is thus nearer than ``2 t``
-only if the axes cross.  They do not cross if and only if their centres are at least ``l`` apart, or
-both ends of one lie on one side of the line through the other: closed conditions that are smooth,
-also for parallel rods, where the distance of the rods is not.
+Dumbbells whose centres are more than ``l + 2 r`` apart do not touch.  Each of them is then a local
+minimum by itself only on the lowest line and along it: ``x = 0`` and the headings are multiples of
+half a turn, for all ``y``.  What remains is compact.
+
+**Rods.**  Let every end of a rod be at least ``p = r + t`` from the axis of the other one, and let
+``e`` be vertical at the mean azimuth.  Then the axes are nearer than ``2 t`` if and only if they
+cross, seen along ``e``:
+
+*   Where they cross or touch, the two points that are seen as one lie between the cylinders on
+    which the balls and the middles of the longest chords are.  One is at most
+    ``h = l^2 / (8 sqrt(rho^2 - l^2/4 - w^2))`` above the other, at a distance ``w`` from the mean
+    azimuth's vertical plane.  It is required that ``h < 2 t``.
+*   If they are nearer than ``2 t``, they are so at interior points ``P`` and ``Q``, because
+    ``p > 2 t``, and ``PQ``, of length ``d``, is orthogonal to both.  They are not parallel, or they
+    were as near at an end.  Let ``g`` be their angle, with directions such that ``cos g >= 0``.  On
+    each side of ``PQ`` let ``k`` be the shorter arm to an end.  The foot of its end lies within the
+    other rod, thus ``d^2 + k^2 sin(g)^2 >= p^2``: all four arms are at least ``a / sin g`` with
+    ``a = sqrt(p^2 - 4 t^2)``, and ``sin g >= 2 a / l``.  Both axes are orthogonal to ``e`` up to
+    ``|sin x|``, so that ``e`` and ``PQ`` make an angle ``f`` with
+    ``sin f <= 2 |sin x| / sin g <= l |sin x| / a``.  Seen along ``e``, the lines cross at most
+    ``d tan f / sin g`` from ``P`` and ``Q``, which is within the rods if ``2 t tan f < a``, as is
+    required.
+
+In the plane ``h = 0`` and ``f = 0``.  Axes do not cross where both ends of one are on one side of
+the line through the other, or the centres are ``l`` apart: closed conditions that are smooth, also
+for parallel rods, where the distance of the rods is not.
 """
 
 import math
@@ -27,6 +49,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf
@@ -44,35 +67,67 @@ MARGIN = 1.05  # sides of the box over the reach of contacts
 
 @dataclass(frozen=True)
 class RelativePlacements(Value):
-    """Two equal dumbbells in the plane, modulo translations; see the module.
+    """Two equal dumbbells up to rolling and shifts; see the module.
 
     Parameters
     ----------
-    length, ball_radius, rod_radius : float
-        ``l``, ``r`` and ``t`` in mm, as of :class:`~polycorner.dumbbells.pair.DumbbellPair`.
+    pair : DumbbellPair
+        The dumbbells, in the plane or in a drum.  The weight of the rods moves no minimum.
 
     Raises
     ------
     TypeError, ValueError
-        As for a pair.
+        If that is no pair, or its rods are so thin that one can lie across the other in the drum.
     """
 
-    length: float
-    ball_radius: float
-    rod_radius: float
+    pair: DumbbellPair
 
     def __post_init__(self) -> None:
-        pair = DumbbellPair(self.length, self.ball_radius, self.rod_radius)
-        for name in ("length", "ball_radius", "rod_radius"):
-            object.__setattr__(self, name, getattr(pair, name))
+        checks.instance("pair", self.pair, DumbbellPair)
+        if not self._rods_cross_seen_from_above():
+            expected = "rods too thick to lie across each other in the drum"
+            checks.refuse("pair", expected, self.pair)
+
+    @property
+    def reach(self) -> float:
+        """Bound of ``|x|`` of placements in contact, with a margin; in mm or rad."""
+        apart = MARGIN * (self.pair.length + 2 * self.pair.ball_radius) / 2
+        if self.pair.is_plane:
+            return apart
+        return math.asin(min(1.0, apart / self._least_depth))
+
+    @property
+    def _least_depth(self) -> float:
+        """Least distance of a dumbbell's centre from the axis of the drum, in mm."""
+        return math.sqrt(self.pair.centre_radius**2 - self.pair.length**2 / 4)
+
+    def _rods_cross_seen_from_above(self) -> bool:
+        """Whether the two requirements of the module hold."""
+        if self.pair.is_plane:
+            return True
+        rho, t = self.pair.centre_radius, self.pair.rod_radius
+        seen = self.reach + math.asin(self.pair.length / (2 * rho))
+        if seen >= math.pi / 2:
+            return False
+        below = self._least_depth**2 - (rho * math.sin(seen)) ** 2
+        if below <= 0 or self.pair.length**2 / (8 * math.sqrt(below)) >= 2 * t:
+            return False
+        a = math.sqrt((self.pair.ball_radius + t) ** 2 - 4 * t**2)
+        sine = self.pair.length * math.sin(self.reach) / a
+        return sine < 1 and 2 * t * math.tan(math.asin(sine)) < a
 
     @cached_property
     def manifold(self) -> Manifold:
-        """Coordinates ``x`` and ``y`` in mm, ``alpha`` and ``beta`` in rad."""
-        r, turn = self.ball_radius, 2 * self.ball_radius / self.length
+        """Coordinates ``x`` in mm, or in rad in the drum, ``y`` in mm, headings in rad."""
+        r, turn, plane = (
+            self.pair.ball_radius,
+            2 * self.pair.ball_radius / self.pair.length,
+            self.pair.is_plane,
+        )
+        scales = (r if plane else r / self.pair.centre_radius, r, turn, turn)
+        units = ("mm" if plane else "rad", "mm", "rad", "rad")
         periods = (math.inf, math.inf, math.tau, math.tau)
-        units = ("mm", "mm", "rad", "rad")
-        return Manifold(("x", "y", "alpha", "beta"), periods, (r, r, turn, turn), units)
+        return Manifold(("x", "y", "alpha", "beta"), periods, scales, units)
 
     @cached_property
     def polyhedron(self) -> Polyhedron:
@@ -94,19 +149,24 @@ class RelativePlacements(Value):
 
     @cached_property
     def energy(self) -> SmoothFunction:
-        """Half the sum of squared lateral positions of the balls, in mm^2."""
+        """``2 (rho^2 - d^2)``, half the sum of squared lateral positions in the plane, in mm^2."""
         import sympy
 
         x, _, alpha, beta = self.manifold.symbols
-        half = sympy.Rational(self.length) / 2
-        lateral = half**2 * (sympy.sin(alpha) ** 2 + sympy.sin(beta) ** 2)
-        return SmoothFunction("trough", 2 * x**2 + lateral, self.manifold, unit="mm^2")
+        if self.pair.is_plane:
+            half = sympy.Rational(self.pair.length) / 2
+            formula = 2 * x**2 + half**2 * (sympy.sin(alpha) ** 2 + sympy.sin(beta) ** 2)
+        else:
+            rho = sympy.Rational(self.pair.centre_radius)
+            (s, c), (u, d) = self._half_chord(alpha), self._half_chord(beta)
+            formula = rho**2 * (1 - c * d + (s**2 + u**2) / 2 + 2 * c * d * sympy.sin(x) ** 2)
+        return SmoothFunction("trough", formula, self.manifold, unit="mm^2")
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:
         """Sides of a box that contains all placements in contact; headings are unrestricted."""
-        reach = MARGIN * (self.length + 2 * self.ball_radius)
-        return {"x": (-reach / 2, reach / 2), "y": (-reach, reach)}
+        apart = MARGIN * (self.pair.length + 2 * self.pair.ball_radius)
+        return {"x": (-self.reach, self.reach), "y": (-apart, apart)}
 
     @cached_property
     def symmetry(self) -> Symmetry:
@@ -115,7 +175,7 @@ class RelativePlacements(Value):
         return Symmetry(elements=tuple(Element(apply, {}) for apply in maps))
 
     def placement(self, q: ArrayLike) -> Array:
-        """Return the placement ``(..., 6)`` of the pair in the plane."""
+        """Return the placement ``(..., 6)`` of the pair."""
         x, y, alpha, beta = np.moveaxis(self.manifold.points(q), -1, 0)
         return np.stack([-x, -y / 2, alpha, x, y / 2, beta], axis=-1)
 
@@ -123,13 +183,10 @@ class RelativePlacements(Value):
         """Return the gaps, and the functions whose signs say that the rods do not cross."""
         import sympy
 
-        x, y, alpha, beta = self.manifold.symbols
-        sizes = (self.length, self.ball_radius, self.rod_radius)
+        sizes = (self.pair.length, self.pair.ball_radius, self.pair.rod_radius)
         length, r, t = (sympy.Rational(size) for size in sizes)
         half = length / 2
-        heading = {"A": alpha, "B": beta}
-        centre = {"A": (-x, -y / 2, sympy.S.Zero), "B": (x, y / 2, sympy.S.Zero)}
-        axis = {k: (sympy.sin(h), sympy.cos(h), sympy.S.Zero) for k, h in heading.items()}
+        centre, axis = self._axes()
         ends = {
             f"{k}{i}": tuple(c + side * half * u for c, u in zip(centre[k], axis[k], strict=True))
             for k in "AB"
@@ -139,7 +196,8 @@ class RelativePlacements(Value):
         for a in ("A1", "A2"):
             for b in ("B1", "B2"):
                 gaps[a + b] = distances.norm(distances.minus(ends[a], ends[b])) - 2 * r
-        ways: dict[str, Any] = {"apart": 4 * x**2 + y**2 - length**2}
+        apart = distances.minus(centre["B"], centre["A"])
+        ways: dict[str, Any] = {"apart": apart[0] ** 2 + apart[1] ** 2 - length**2}
         for end, point in ends.items():
             rod = "B" if end[0] == "A" else "A"
             w, u = distances.minus(point, centre[rod]), axis[rod]
@@ -150,6 +208,32 @@ class RelativePlacements(Value):
             side = w[0] * u[1] - w[1] * u[0]
             ways[f"left{end}"], ways[f"right{end}"] = side, -side
         return gaps, ways
+
+    def _axes(self) -> "tuple[dict[str, Any], dict[str, Any]]":
+        """Return centres and unit axes: across, along, and up at the mean azimuth."""
+        import sympy
+
+        x, y, alpha, beta = self.manifold.symbols
+        centre, axis = {}, {}
+        for k, sign, heading in (("A", -1, alpha), ("B", 1, beta)):
+            across, along = sympy.sin(heading), sympy.cos(heading)
+            if self.pair.is_plane:
+                centre[k] = (sign * x, sign * y / 2, sympy.S.Zero)
+                axis[k] = (across, along, sympy.S.Zero)
+            else:
+                depth = sympy.Rational(self.pair.centre_radius) * self._half_chord(heading)[1]
+                sine, cosine = sign * sympy.sin(x), sympy.cos(x)
+                centre[k] = (depth * sine, sign * y / 2, -depth * cosine)
+                axis[k] = (across * cosine, along, across * sine)
+        return centre, axis
+
+    def _half_chord(self, heading: "sympy.Expr") -> "tuple[sympy.Expr, sympy.Expr]":
+        """Return sine and cosine of half the angle that a dumbbell's balls subtend."""
+        import sympy
+
+        rho = sympy.Rational(self.pair.centre_radius)
+        sine = sympy.Rational(self.pair.length) / (2 * rho) * sympy.sin(heading)
+        return sine, sympy.sqrt(1 - sine**2)
 
 
 def _turn_a(q: Array) -> Array:

@@ -69,6 +69,10 @@ def membership(search: Search, region: Region) -> str:
         values = search.faces.formulas.values(Box(hull), range(m))
         below = np.array([bool(v < ball(0)) for v in values])
         above = np.array([bool(v > ball(0)) for v in values])
+    # Balls give up square roots that may reach 0, as of the distance of centres that coincide.
+    low, high = search.functions.values(lower[None], upper[None])
+    below |= high[0, :m] < 0
+    above |= low[0, :m] > 0
     held = np.zeros(m, dtype=np.bool_)
     held[list(region.active)] = True
     below &= ~held

@@ -5,49 +5,71 @@ import math
 import numpy as np
 import pytest
 
+from polycorner import certify, minimise
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
 from polycorner.proofs import stationary_points
 
 SIZES = (16.0, 3.0, 1.5)
 
 
-@pytest.fixture(scope="module")
-def model():
-    return RelativePlacements(*SIZES)
+@pytest.fixture(scope="module", params=[math.inf, 125.0], ids=["plane", "drum"])
+def model(request):
+    return RelativePlacements(DumbbellPair(*SIZES, request.param))
 
 
-def test_gaps_and_energy_are_those_of_the_pair(model):
-    pair, rng = DumbbellPair(*SIZES), np.random.default_rng(1)
-    sides = np.array([[-12, 12], [-24, 24], [-4, 4], [-4, 4]])
-    q = rng.uniform(sides[:, 0], sides[:, 1], (2000, 4))
-    placed = model.placement(q)
+def placements(model, widest, count=20_000):
+    """Return random placements in the box whose distance along the axis is at most ``widest``."""
+    sides = np.array([model.box["x"], (-widest, widest), (-4, 4), (-4, 4)])
+    return np.random.default_rng(1).uniform(sides[:, 0], sides[:, 1], (count, 4))
+
+
+def test_gaps_are_those_of_the_pair(model):
+    q = placements(model, 24, 2000)
+    theirs = model.pair.polyhedron.values(model.placement(q)).T
     ours = dict(zip(model.polyhedron.names, model.polyhedron.values(q).T, strict=True))
-    theirs = dict(zip(pair.polyhedron.names, pair.polyhedron.values(placed).T, strict=True))
-    for name in set(theirs) - {"ab"}:
-        assert np.allclose(ours[name], theirs[name], atol=1e-12)
-    assert np.allclose(model.energy.value(q), pair.energy.value(placed), atol=1e-10)
+    for name, values in zip(model.pair.polyhedron.names, theirs, strict=True):
+        if name != "ab":
+            assert np.allclose(ours[name], values, atol=1e-11)
+
+
+def test_energy_is_least_over_rolling_and_grows_with_the_height(model):
+    """In the drum it is a function of the least height; in the plane translations are rolling."""
+    q = placements(model, 24, 300)
+    rolling = np.linspace(-0.4, 0.4, 4001) * (model.pair.ball_radius if model.pair.is_plane else 1)
+    placed = model.placement(q)[:, None, :] + rolling[:, None] * np.array([1.0, 0, 0, 1.0, 0, 0])
+    least = model.pair.energy.value(placed.reshape(-1, 6)).reshape(len(q), -1).min(axis=1)
+    if not model.pair.is_plane:
+        rho = model.pair.centre_radius
+        deep = (4 * model.pair.drum_radius - least) / 4  # of the centre of mass under the axis
+        least = 2 * (rho**2 - deep**2)
+    assert np.allclose(model.energy.value(q), least, rtol=1e-5, atol=1e-4)
 
 
 def test_rods_do_not_overlap_where_their_axes_do_not_cross(model):
     """Membership agrees with the pair's, whose rods are kept 2 t apart by their distance."""
-    pair, rng = DumbbellPair(*SIZES), np.random.default_rng(1)
-    sides = np.array([[-9, 9], [-18, 18], [-4, 4], [-4, 4]])
-    q = rng.uniform(sides[:, 0], sides[:, 1], (20_000, 4))
+    q = placements(model, 18)
     inside = np.asarray(model.polyhedron.contains(q))
-    assert np.array_equal(inside, np.asarray(pair.polyhedron.contains(model.placement(q))))
+    assert np.array_equal(inside, np.asarray(model.pair.polyhedron.contains(model.placement(q))))
     assert 0.1 < inside.mean() < 0.9
 
 
 def test_parallel_rods_are_decided(model):
     """At the nested corner, where the formula of the distance of the rods changes."""
-    assert model.polyhedron.contains([-1.5, 12.0, 0.2, 0.2]) == DumbbellPair(
-        *SIZES
-    ).polyhedron.contains(model.placement([-1.5, 12.0, 0.2, 0.2]))
+    pair = model.pair
+    q = [-1.5 / (1 if pair.is_plane else pair.centre_radius), 12.0, 0.2, 0.2]
+    assert model.polyhedron.contains(q) == pair.polyhedron.contains(model.placement(q))
+
+
+def test_rods_that_can_lie_across_each_other_are_refused():
+    """Crossed in the drum, the middles of rods hang 0.02 mm apart at most."""
+    with pytest.raises(ValueError, match="pair: expected rods too thick to lie across"):
+        RelativePlacements(DumbbellPair(12.5, 3.0, 0.05, 125.0))
+    assert RelativePlacements(DumbbellPair(12.5, 3.0, 0.05)).pair.is_plane
 
 
 @pytest.mark.slow
 def test_the_nested_corners_and_the_line_are_all_local_minima(model):
-    """The paper's claim on local minima in the plane, proved for its sizes."""
+    """The paper's claim on local minima, proved for its sizes in the plane and in the drum."""
     found = stationary_points(
         model.polyhedron, model.energy, box=model.box, symmetry=model.symmetry
     )
@@ -55,12 +77,19 @@ def test_the_nested_corners_and_the_line_are_all_local_minima(model):
     corners = [("A2B1", "A2b", "aB1"), ("A2B2", "A2b", "aB2"), ("A1B1", "A1b", "aB1")]
     assert {p.active for p in found.minima} == {*corners, ("A1B2", "A1b", "aB2")}
     assert len({p.orbit for p in found.minima}) == 1
-    heading, along, across = DumbbellPair(*SIZES).plane_corner()
+    assert len(found.minima) == 16  # two hands, either ball of each may be the first, and exchange
+    assert {model.pair.chirality(model.placement(p.point)) for p in found.minima} == {"L", "R"}
     for p in found.minima:
-        assert math.isclose(abs(math.remainder(p.point[2], math.pi)), heading, abs_tol=1e-9)
-        apart = math.hypot(2 * p.point[0], p.point[1])
-        assert math.isclose(apart, math.hypot(along, across), abs_tol=1e-8)
+        placed = model.placement(p.point)
+        rest = minimise(model.pair.polyhedron, model.pair.energy, placed)
+        assert certify(model.pair.polyhedron, model.pair.energy, rest.point).is_minimum
+        assert model.pair.manifold.distance(rest.point, placed) < 1e-7
+    if model.pair.is_plane:
+        heading = model.pair.plane_corner()[0]
+        for p in found.minima:
+            assert math.isclose(abs(math.remainder(p.point[2], math.pi)), heading, abs_tol=1e-9)
     lines = [place for place in found.loci if place.is_minimum]
+    assert len(lines) == 4
     for place in lines:
         for name in ("alpha", "beta"):
             assert abs(math.remainder(place.lower[name], math.pi)) < 1e-6

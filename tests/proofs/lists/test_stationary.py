@@ -11,8 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polycorner import AnyOf, Manifold, Polyhedron, Symmetry
+from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.symmetry import Element
 from polycorner.proofs import stationary_points
+from polycorner.proofs.lists.domains import domain
+from polycorner.proofs.lists.members import OUT, membership
+from polycorner.proofs.lists.search import Search
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
@@ -219,6 +223,22 @@ def test_lists_are_values(himmelblau, tmp_path):
     files = [found.save(tmp_path / f"{k}.zip") for k, found in enumerate((himmelblau, again))]
     assert len({zipfile.ZipFile(file).read("problem.json") for file in files}) == 1
     assert not himmelblau.points[0].lower.flags.writeable
+
+
+def test_a_place_is_left_out_where_a_distance_is_zero():
+    """The energy is stationary at the centre, which is outside; no root is analytic there."""
+    across, along = sympy.sin(X) - sympy.sin(1) / 3, Y - sympy.sqrt(3) / 3
+    d = Polyhedron(PLANE, {"away": sympy.sqrt(across**2 + along**2) - sympy.Rational(1, 4)})
+    energy, centre = across**2 + 2 * along**2, [math.asin(math.sin(1) / 3), math.sqrt(3) / 3]
+    box = [(-1.5, 1.5), (-4, 4)]
+    search = Search(pose(d, energy), domain(PLANE, box), 1e-6)
+    region = search.faces.region(np.array(centre), [])
+    assert region is not None
+    assert membership(search, region) == OUT
+    found = stationary_points(d, energy, box=box)
+    assert found.complete
+    at = np.array([[math.sin(p.point[0]) - math.sin(1) / 3, p.point[1] - centre[1]] for p in found])
+    assert np.allclose(np.sort(4 * at, axis=0), np.sort([[-1, 0], [0, -1], [0, 1], [1, 0]], axis=0))
 
 
 def test_loci_outside_the_box_are_not_listed():
