@@ -43,9 +43,12 @@ if TYPE_CHECKING:
 BITS = 128
 QUARTERINGS = 10
 SHARPENINGS = 6
+SMALL = 2.0**-30  # of the radii of a box of unknowns: those of a small one about the solution
+TIGHT = 70  # binary digits of a solution after which it is sharp enough
 WIDENINGS = 3  # of a box towards the shape of its image
 MOST_WIDENING = 64.0
 GROWTH = 1.25
+GUESSED = (1.0, 0.7, 0.4)  # shares of a guessed box that are tried, as balls are the wider bounds
 SLACK = 16  # last binary digits of a multiplier that its enclosure covers at least
 WIDEST = 2.0  # reach of the widest box that is tried, in scale units
 
@@ -99,13 +102,20 @@ class Faces:
         """Return the rows of a face: active inequalities, equations, energy."""
         return (*active, *range(self.inequalities, len(self.formulas.names)))
 
-    def region(self, q: Array, active: Sequence[int], widest: float = 1.0) -> Region | None:
+    def region(
+        self, q: Array, active: Sequence[int], widest: float = 1.0, guess: Array | None = None
+    ) -> Region | None:
         """Return the widest box tried about ``q`` in which one solution is shown, or None.
 
-        Boxes reach ``widest`` scale units from ``q``, a quarter of it, and so on.
+        Boxes reach ``widest`` scale units from ``q``, a quarter of it, and so on; before these,
+        shares of one with the radii ``guess`` are tried.
         """
         rows = self.rows(active)
         with precision(BITS):
+            for reach in [share * guess for share in GUESSED] if guess is not None else ():
+                shown = self._shown(q - reach, q + reach, rows, len(active))
+                if isinstance(shown, Region):
+                    return shown
             for power in range(QUARTERINGS):
                 found = self._within(q, rows, len(active), min(widest, WIDEST) / 4**power)
                 if found is not None:
@@ -151,10 +161,10 @@ class Faces:
         if inverse is None:
             return None
         image = krawczyk(residual, jacobian, inverse, unknowns, centre)
-        if not all(x.contains_interior(y) for x, y in zip(unknowns, image, strict=True)):
+        if not _inside(image, unknowns):
             reach = [(y - c).abs_upper() for y, c in zip(image[:n], centre, strict=False)]
             return np.array([float(x) for x in reach])
-        sharp = self._sharpened(forms, box, image)
+        sharp = self._sharpened(forms, box, unknowns, image)
         index = self._index(start, len(rows) - 1)
         ends = np.array([outward(x) for x in sharp])
         return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
@@ -190,22 +200,55 @@ class Faces:
         ]
         return [*slope, *values[: len(rows)]], jacobian
 
-    def _sharpened(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball]":
-        """Apply the operator to its image again; return the intersections."""
-        n = len(self.free)
+    def _sharpened(
+        self, forms: SmoothForms, box: Box, unknowns: "list[Ball]", image: "list[Ball]"
+    ) -> "list[Ball]":
+        """Return a narrow enclosure of the only solution in a box of unknowns, from its image.
+
+        Where the operator shows that a small box about the middle contains a solution, it is this
+        one.  Then the operator is applied to its image again.
+        """
+        small = self._small(forms, box, unknowns)
+        shown = small and self._image(forms, box, small)
+        if small and shown and _inside(shown, small) and _inside(small, unknowns):
+            image = shown
         for _ in range(SHARPENINGS):
-            hull = list(box.hull)
-            for i, x in zip(self.free, unknowns[:n], strict=True):
-                hull[i] = x
-            _, gradients, hessians = forms.evaluate(Box(hull), 2)
-            residual, start, centre = self._at_centre(forms, box, unknowns)
-            _, jacobian = self._equations([], gradients, hessians, unknowns)
-            inverse = middle_inverse(start)
-            if inverse is None:
+            pairs = zip(image, unknowns, strict=True)
+            if all(y.rad() <= x.abs_upper() * ball(2) ** (-TIGHT) for y, x in pairs):
                 break
-            image = krawczyk(residual, jacobian, inverse, unknowns, centre)
-            unknowns = [narrower(x, y) for x, y in zip(unknowns, image, strict=True)]
-        return unknowns
+            again = self._image(forms, box, image)
+            if again is None:
+                break
+            image = [narrower(x, y) for x, y in zip(image, again, strict=True)]
+        return image
+
+    def _small(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball] | None":
+        """Return a small box about the middle and the multipliers there."""
+        n = len(self.free)
+        point = list(box.hull)
+        for i in self.free:
+            point[i] = point[i].mid()
+        _, gradients = forms.evaluate(Box(point), 1)
+        multipliers = enclosed_multipliers([[g[i] for i in self.free] for g in gradients])
+        if multipliers is None:
+            return None
+        middle = [*(point[i] for i in self.free), *multipliers]
+        reach = [x.rad() for x in unknowns[:n]] + [abs(lam) for lam in multipliers]
+        pairs = zip(middle, reach, strict=True)
+        return [x.mid() + ball(0, SMALL * r + x.rad()) for x, r in pairs]
+
+    def _image(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball] | None":
+        """Return the image of unknowns under Krawczyk's operator."""
+        hull = list(box.hull)
+        for i, x in zip(self.free, unknowns, strict=False):
+            hull[i] = x
+        _, gradients, hessians = forms.evaluate(Box(hull), 2)
+        residual, start, centre = self._at_centre(forms, box, unknowns)
+        _, jacobian = self._equations([], gradients, hessians, unknowns)
+        inverse = middle_inverse(start)
+        if inverse is None:
+            return None
+        return krawczyk(residual, jacobian, inverse, unknowns, centre)
 
     def _index(self, jacobian: "list[list[Ball]]", rows: int) -> int | None:
         """Return the number of negative eigenvalues on the tangent space, from the inertia.
@@ -218,6 +261,10 @@ class Faces:
         symmetric = [[(x if i < n else -x) for x in row] for i, row in enumerate(jacobian)]
         signs = inertia(symmetric)
         return None if signs is None else signs[0] - rows
+
+
+def _inside(inner: "list[Ball]", outer: "list[Ball]") -> bool:
+    return all(x.contains_interior(y) for x, y in zip(outer, inner, strict=True))
 
 
 def krawczyk(

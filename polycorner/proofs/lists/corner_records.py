@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from polycorner.proofs.lists import records
 from polycorner.proofs.lists.corner_points import Candidate
 from polycorner.proofs.lists.corner_search import CornerSearch
@@ -46,7 +44,7 @@ def corner_record(search: CornerSearch, found: Sequence[Candidate]) -> CornerRec
     record = Record(
         search.problem,
         search.domain,
-        tuple(tuple(np.flatnonzero(branch).tolist()) for branch in search.conj),
+        search.branches,
         search.motions,
         search.weights,
         tuple(search.regions),

@@ -6,47 +6,89 @@ bisected.  Corners become known by Newton's method where the gradients of enough
 independent on a box, and by the search for a singular one in small boxes where they are not.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.attempts import Mapped
+from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.dependence import Enclosures, Places, Truths
+from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.levels import Levels, Rows, levels
-from polycorner.proofs.lists.search import Boxes, Search
+from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tips import Tip, tips
 from polycorner.proofs.lists.vertices import Vertices
 from polycorner.spaces.manifold import Array
 
-ATTEMPTS, RARE = 64, 8  # candidates that are tried in one batch, regular and singular ones
+ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
 WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 SMALL = 0.05  # side in scale units of boxes in which singular corners are sought
 NEWTON = 12
 STRAY = 4.0  # sides of a box that a vertex may be away from its middle
 
 
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Boxes, and which of them are left.
+
+    Attributes
+    ----------
+    images : (I,) array of int
+        Numbers in the tree of boxes that a symmetry carries to others; they are left out below.
+    boxes : Boxes
+    outside, left : (B,) arrays of bool
+        Whether they miss the set, and whether there may be other corners in them.
+    regular : list of (tuple of int, array of int)
+        Sets of functions that may have a common zero in some boxes, where they are independent.
+    singular : list of (int, list of int)
+        Boxes in which no such set is, and the functions that may vanish there.
+    """
+
+    images: NDArray[np.int64]
+    boxes: Boxes
+    outside: Truths
+    left: Truths
+    regular: list[tuple[Rows, Places]]
+    singular: list[tuple[int, list[int]]]
+
+
 @dataclass
 class CornerSearch(Search):
     """One run: what is to be treated, and the regions in which one corner may be."""
-
-    regions: list[Region] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.vertices = Vertices(
             self.faces.formulas,
             self.problem.inequalities,
-            len(self.problem.polyhedron.equations),
+            self.equations,
             self.domain.free,
             self.problem.scales,
         )
 
-    def step(self, boxes: Boxes) -> Boxes:
-        """Treat some boxes; return the halves of those that are left."""
-        boxes = self._without_images(boxes)
-        m, k = self.problem.inequalities, self.vertices.equations
+    def _compile(self) -> None:
+        self._examined(self.waiting.part(slice(0, 1)))
+
+    def round(self, mapped: Mapped = map) -> None:
+        """Treat the last boxes that wait; ``mapped`` is like ``map``."""
+        chunks = self._chunks()
+        found: list[Chunk] = list(mapped(self._examined, chunks))
+        for chunk in found:
+            self._attempt(chunk)
+        taken = sum(map(len, chunks))
+        before = self.waiting.part(slice(None, len(self.waiting) - taken))
+        self.waiting = joined([before, *map(self._closed, found)])
+
+    def _examined(self, boxes: Boxes) -> Chunk:
+        """Return what is shown of some boxes; nothing is changed."""
+        gone = np.zeros(len(boxes), dtype=np.bool_)
+        if self.motions:
+            gone = dropped(boxes.lower, boxes.upper, self.motions, self.weights, self.domain)
+        images, boxes = boxes.nodes[gone], boxes.part(~gone)
+        m, k = self.problem.inequalities, self.equations
         v_lo, v_hi, *gradients = self.functions.gradients(boxes.lower, boxes.upper, mean_value=True)
         meets: Mask = np.all((v_lo[:, m : m + k] <= 0) & (v_hi[:, m : m + k] >= 0), axis=1)
         where, branches = items(self.conj, v_hi[:, :m] < 0, v_lo[:, :m] > 0)
@@ -59,51 +101,70 @@ class CornerSearch(Search):
         part = boxes.part(at)
         sides = gradients[0][at], gradients[1][at]
         found = Enclosures.of(self.functions, part.lower, part.upper, sides, self.domain.free)
-        known = _Known(self.regions, part, self.domain.lower < self.domain.upper)
-        result = levels(found, masks[at], k, known.zero, known.critical)
+        around = _Around(self.regions, part, self.domain.lower < self.domain.upper)
+        result = levels(found, masks[at], k, around.zero, around.critical)
         left = np.zeros(len(boxes), dtype=np.bool_)
         left[at[result.left]] = True
-        since = boxes.since.copy()
-        since[at] = self._seek(part, masks[at], found, result)
-        self.tally.outside += int((~inside).sum())
-        self.tally.covered += int((inside & ~left).sum())
-        nothing = np.zeros((0, boxes.lower.shape[1]))
-        self.tree.close(boxes.nodes[~left], boxes.nodes[:0], nothing)
-        return self._halves(Boxes(boxes.lower, boxes.upper, boxes.nodes, since).part(left))
+        regular = self._regular(found, result)
+        rest = result.left.copy()
+        for _, places in regular:
+            rest[places] = False
+        singular = [
+            (int(at[i]), np.flatnonzero(masks[at[i]]).tolist()) for i in np.flatnonzero(rest)
+        ]
+        located = [(rows, at[places]) for rows, places in regular]
+        return Chunk(images, boxes, ~inside, left, located, singular)
 
-    def _seek(
-        self, boxes: Boxes, masks: Mask, found: Enclosures, result: Levels
-    ) -> NDArray[np.int64]:
-        """Try to find corners in boxes that are left; return the bisections since an attempt."""
-        m, k = self.problem.inequalities, self.vertices.equations
-        since = boxes.since.copy()
+    def _regular(self, found: Enclosures, result: Levels) -> list[tuple[Rows, Places]]:
+        """Return the largest sets and the boxes in which their gradients are independent."""
+        chosen = []
+        for rows, at in result.largest:
+            independent = found.independent(at, self.vertices.rows(rows))
+            if independent.any():
+                chosen.append((rows, at[independent]))
+        return chosen
+
+    def _attempt(self, chunk: Chunk) -> None:
+        """Try to find corners in boxes that are left."""
+        boxes = chunk.boxes
         widths = (boxes.upper - boxes.lower) / self.problem.scales
         sizes = widths[:, list(self.domain.free)].max(axis=1, initial=0.0)
-        middles = 0.5 * (boxes.lower + boxes.upper)
-        rest, tried = result.left.copy(), 0
-        for rows, at in result.largest:
-            regular = found.independent(at, (*rows, *range(m, m + k)))
-            for box in at[regular]:
-                rest[box] = False
+        tried = 0
+        for rows, at in chunk.regular:
+            for box in at:
                 if tried < ATTEMPTS:
-                    tried += self._vertex(middles[box], rows, sizes[box])
+                    tried += self._vertex(boxes.middles[box], rows, sizes[box])
         every = len(self.domain.free)
-        for box in np.flatnonzero(rest & (sizes < SMALL) & (since >= every))[:RARE]:
-            since[box] = 0
-            open_ = np.flatnonzero(masks[box]).tolist()
-            for tip in tips(self.vertices, middles[box], open_, 2 * sizes[box]):
-                if not self._known(0.5 * (tip.lower + tip.upper), list(tip.active)):
-                    self.regions.append(tip)
-        return since
+        ripe = [
+            (box, open_)
+            for box, open_ in chunk.singular
+            if sizes[box] < SMALL and boxes.since[box] >= every
+        ]
+        for box, open_ in ripe[:RARE]:
+            boxes.since[box] = 0
+            for tip in tips(self.vertices, boxes.middles[box], open_, 2 * sizes[box]):
+                if not self.known.has(0.5 * (tip.lower + tip.upper), frozenset(tip.active)):
+                    self.known.add(tip)
+
+    def _closed(self, chunk: Chunk) -> Boxes:
+        """Record which boxes are closed; return the halves of the others."""
+        boxes, left = chunk.boxes, chunk.left
+        nothing = np.zeros((0, boxes.lower.shape[1]))
+        self.tally.images += len(chunk.images)
+        self.tally.outside += int(chunk.outside.sum())
+        self.tally.covered += int((~chunk.outside & ~left).sum())
+        for nodes in (chunk.images, boxes.nodes[~left]):
+            self.tree.close(nodes, boxes.nodes[:0], nothing)
+        return self._halves(boxes.part(left))
 
     def _vertex(self, q: Array, rows: Rows, size: float) -> bool:
         """Seek the common zero of functions near a point; return whether a region was tried."""
         point = self._newton(q, rows, STRAY * size)
-        if point is None or self._known(point, list(rows)):
+        if point is None or self.known.has(point, frozenset(rows)):
             return False
         region = self.vertices.region(point, rows, WIDER * size)
         if region is not None:
-            self.regions.append(region)
+            self.known.add(region)
         return True
 
     def _newton(self, q: Array, rows: Rows, reach: float) -> Array | None:
@@ -125,7 +186,7 @@ class CornerSearch(Search):
         return q
 
 
-class _Known:
+class _Around:
     """Regions around boxes, with questions about sets of functions."""
 
     def __init__(self, regions: list[Region], boxes: Boxes, free: Truths) -> None:

@@ -1,10 +1,12 @@
 """The search for all corners of a polyhedron in a box, with proof."""
 
+import threading
 from typing import Any
 
 import numpy as np
 
 from polycorner import checks
+from polycorner.interrupts import first_interrupt
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
@@ -26,6 +28,7 @@ def corners(
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
+    workers: int = 1,
     progress: Progress = silent,
 ) -> CornerList:
     """Find all corners of a polyhedron in a box, with proof.
@@ -46,7 +49,7 @@ def corners(
     ----------
     polyhedron : Polyhedron
         The set ``D``; and/or trees and equations are allowed.
-    box, symmetry, resolution, max_boxes, max_seconds, progress
+    box, symmetry, resolution, max_boxes, max_seconds, workers, progress
         As for :func:`stationary_points`.  With coordinates fixed, corners are points isolated
         modulo the continuous symmetry.
 
@@ -76,6 +79,7 @@ def corners(
     nothing = sympy.Integer(0)
     search = prepared(polyhedron, nothing, box, symmetry, resolution, CornerSearch)
     checks.whole("max_boxes", max_boxes, least=1)
+    checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
@@ -84,10 +88,9 @@ def corners(
         note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
         progress(float(s.tally.boxes), None, note)
 
-    try:
-        search.run(max_boxes, max_seconds, report)
-    except KeyboardInterrupt:
-        search.recover()
+    stop = threading.Event()
+    with first_interrupt(stop.set):
+        search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
     return listed(search)
 
 

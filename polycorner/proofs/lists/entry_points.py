@@ -9,8 +9,8 @@ from polycorner.formulas.cache import sources_digest
 from polycorner.proofs.lists.directions import one
 
 
-def _entry_points(sources: str) -> tuple[Any, ...]:
-    @njit(cache=True)
+def _direction_search(sources: str) -> Any:
+    @njit(cache=True, nogil=True)
     def directions(low, high, boxes, masks, equations, scales, energy_sign):
         """Find a direction for each item: a box, and the inequalities of a branch.
 
@@ -58,7 +58,11 @@ def _entry_points(sources: str) -> tuple[Any, ...]:
             weights[item, m] = w[count]
         return found, v, weights
 
-    @njit(cache=True)
+    return directions
+
+
+def _box_tests(sources: str) -> tuple[Any, ...]:
+    @njit(cache=True, nogil=True)
     def covered(lower, upper, boxes, masks, left, right, active):
         """Whether each item lies inside one of some regions and asks for none but its functions.
 
@@ -88,7 +92,49 @@ def _entry_points(sources: str) -> tuple[Any, ...]:
                     break
         return found
 
-    return directions, covered
+    @njit(cache=True, nogil=True)
+    def carried(lower, upper, orders, signs, shifts, slopes, weights, periods, least, most, margin):
+        """Whether a motion carries each box into a domain and increases ``w . q`` on all of it.
+
+        Parameters
+        ----------
+        lower, upper : (B, n) arrays
+        orders, signs, shifts : (G, n) arrays
+            The motions ``q -> signs * q[order] + shifts``.
+        slopes : (G, n) array
+            Gradients of the change of ``w . q``.
+        weights : (n,) array
+            ``w``.
+        periods, least, most : (n,) arrays
+            Periods of the coordinates, infinite for lines; the sides of the domain.
+        margin : float
+            By how much ``w . q`` has to increase.
+        """
+        _ = sources
+        gone = np.zeros(len(lower), np.bool_)
+        for box in range(len(lower)):
+            for g in range(len(orders)):
+                inside, growth = True, 0.0
+                for j in range(weights.size):
+                    a = signs[g, j] * lower[box, orders[g, j]]
+                    b = signs[g, j] * upper[box, orders[g, j]]
+                    turn = shifts[g, j]
+                    if periods[j] < np.inf:
+                        turn -= periods[j] * np.rint((0.5 * (a + b) + turn) / periods[j])
+                    if not (least[j] <= min(a, b) + turn and max(a, b) + turn <= most[j]):
+                        inside = False
+                        break
+                    slope = slopes[g, j]
+                    growth += slope * (lower[box, j] if slope > 0.0 else upper[box, j])
+                    growth += turn * weights[j]
+                if inside and growth > margin:
+                    gone[box] = True
+                    break
+        return gone
+
+    return covered, carried
 
 
-directions, covered = _entry_points(sources_digest(__package__))
+SOURCES = sources_digest(__package__)
+directions = _direction_search(SOURCES)
+covered, carried = _box_tests(SOURCES)

@@ -1,27 +1,33 @@
 """The search for all stationary points, its symmetries, and what is made of the regions found."""
 
+import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from polycorner import checks
+from polycorner.interrupts import first_interrupt
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, Known, full, images, moved, settled
+from polycorner.proofs.lists.members import OPEN, Listed, full, images, moved, settled
 from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
-from polycorner.proofs.lists.search import Boxes, Search
+from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
+from polycorner.proofs.lists.stores import Store
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
+    import os
+
     from polycorner.minimisation.problem import Energy
 
 S = TypeVar("S", bound=Search)
@@ -38,6 +44,8 @@ def stationary_points(
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
+    workers: int = 1,
+    store: "str | os.PathLike[str] | None" = None,
     progress: Progress = silent,
 ) -> StationaryList:
     """Find all stationary points of an energy on a polyhedron in a box, with proof.
@@ -65,7 +73,14 @@ def stationary_points(
     resolution : float, optional
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
-        Where the search ends at the latest; boxes that wait then are undecided.
+        Where the search ends at the latest; boxes that wait then are undecided.  Boxes of earlier
+        calls with the same store count, seconds do not.
+    workers : int, optional
+        Threads that examine boxes at a time.  The result is the same for every number.
+    store : path, optional
+        A folder in which the search is saved every five seconds, at the end of a round, and at its
+        end.  The same call goes on where it stood, with the result of a search that was never
+        interrupted.
     progress : callable, optional
         Called with the number of boxes treated, None, and what waits in words.
 
@@ -78,7 +93,10 @@ def stationary_points(
     ------
     TypeError, ValueError
         For arguments of a wrong kind, sides that are no intervals, coordinates that are fixed
-        without a symmetry, and elements that are not shown to be symmetries.
+        without a symmetry, elements that are not shown to be symmetries, and a store of another
+        search.
+    OSError
+        If the store cannot be written, which is tried at the start.
 
     Examples
     --------
@@ -94,18 +112,28 @@ def stationary_points(
     """
     search = prepared(polyhedron, energy, box, symmetry, resolution, Search)
     checks.whole("max_boxes", max_boxes, least=1)
+    checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
 
+    kept = None if store is None else Store(store, search)
+
     def report(s: Search) -> None:
+        if kept:
+            kept.save_by_the_clock()
         note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
         progress(float(s.tally.boxes), None, note)
 
+    stop = threading.Event()
     try:
-        search.run(max_boxes, max_seconds, report)
-    except KeyboardInterrupt:
-        search.recover()
+        with first_interrupt(stop.set):
+            search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
+        if kept:
+            kept.save()
+    finally:
+        if kept:
+            kept.close()
     return listed(search)
 
 
@@ -166,7 +194,7 @@ def listed(search: Search) -> StationaryList:
     """Return what a search found."""
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
-    known, orbits, members = Known(search), 0, settled(search)
+    known, orbits, members = Listed(search), 0, settled(search)
     for k, place in members:
         region = search.regions[k]
         if known.has(region):

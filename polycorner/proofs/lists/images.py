@@ -19,6 +19,7 @@ from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.entry_points import carried
 from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
@@ -195,24 +196,25 @@ def dropped(
 ) -> NDArray[np.bool_]:
     """Return which boxes ``(B, n)`` a symmetry carries to others, see the module."""
     manifold = domain.manifold
-    gone = np.zeros(len(lower), dtype=np.bool_)
     half = np.array(manifold.periods) / 2
-    for g in motions:
-        order, signs = list(g.order), np.array(g.signs)
-        a, b = signs * lower[:, order], signs * upper[:, order]
-        low, high = np.minimum(a, b) + g.shifts(manifold), np.maximum(a, b) + g.shifts(manifold)
-        middle = 0.5 * (low + high)
-        turn = manifold.wrap(middle) - middle
-        low, high = low + turn, high + turn
-        least, most = np.maximum(domain.lower, -half), np.minimum(domain.upper, half)
-        inside = ((low >= least) & (high <= most)).all(axis=1)
-        # w . (g q) - w . q = (w' - w) . q + w . (shift + turn), with w' the weights carried back
-        back = np.zeros_like(weights)
-        back[order] = weights * signs
-        slope = back - weights
-        growth = (np.where(slope > 0, lower, upper) * slope).sum(axis=1)
-        gone |= inside & (growth + (g.shifts(manifold) + turn) @ weights > MARGIN)
-    return gone
+    orders = np.array([g.order for g in motions])
+    signs = np.array([g.signs for g in motions], dtype=np.float64)
+    back = np.zeros(signs.shape)  # w . (g q) = back . q + w . shifts
+    np.put_along_axis(back, orders, weights * signs, axis=1)
+    found: NDArray[np.bool_] = carried(
+        lower,
+        upper,
+        orders,
+        signs,
+        np.array([g.shifts(manifold) for g in motions]),
+        back - weights,
+        weights,
+        np.array(manifold.periods),
+        np.maximum(domain.lower, -half),
+        np.minimum(domain.upper, half),
+        MARGIN,
+    )
+    return found
 
 
 def weights(domain: Domain) -> Array:

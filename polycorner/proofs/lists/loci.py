@@ -25,10 +25,8 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box, needed
-from polycorner.minimisation.problem import Problem
 from polycorner.proofs.definite import pivots
 from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inertia, krawczyk, outward
-from polycorner.proofs.lists.candidates import newton
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -66,17 +64,14 @@ def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ..
     return tuple(i for i in free if i in read)
 
 
-def locus(problem: Problem, formulas: Formulas, z: tuple[int, ...], q: Array) -> Locus | None:
-    """Return the widest locus tried about a stationary point near ``q``, or None."""
-    found = newton(problem, q, [], z) if not problem.polyhedron.equations else None
-    if found is None:
-        return None
+def locus(formulas: Formulas, z: tuple[int, ...], q: Array, scales: Array) -> Locus | None:
+    """Return the widest locus tried about ``q``, where the energy's derivative nearly vanishes."""
+    units = scales[list(z)]
     with precision(BITS):
         for power in range(QUARTERINGS):
-            radii = problem.scales[list(z)] * WIDEST / 4**power
-            shown = _shown(formulas, z, found[0], radii)
+            shown = _shown(formulas, z, q, units * WIDEST / 4**power)
             if shown is not None:
-                sharp = _shown(formulas, z, found[0], problem.scales[list(z)] * SHARP)
+                sharp = _shown(formulas, z, q, units * SHARP)
                 return replace(
                     shown,
                     sharp_lower=(sharp or shown).sharp_lower,

@@ -6,38 +6,35 @@ from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.acceptance import BITS, Region
 from polycorner.proofs.lists.images import Motion
+from polycorner.proofs.lists.known import Sides
 from polycorner.proofs.lists.search import Search
 from polycorner.spaces.manifold import Array, Manifold
 
 IN, OUT, OPEN = "in", "out", "open"
 
 
-class Known:
+class Listed:
     """Regions by their active sets, with the question whether a point is the one of a region."""
 
     def __init__(self, search: Search) -> None:
-        self.search, self.boxes = search, dict[frozenset[int], list[tuple[Array, Array]]]()
-        self.free = list(search.domain.free)
+        self.search, self.free = search, list(search.domain.free)
+        self.boxes = Sides(len(self.free))
 
     def add(self, region: Region) -> None:
         """Add a region."""
-        sides = region.lower[self.free], region.upper[self.free]
-        self.boxes.setdefault(frozenset(region.active), []).append(sides)
+        self.boxes.add(frozenset(region.active), region.lower[self.free], region.upper[self.free])
 
     def has(self, region: Region) -> bool:
         """Whether the point of a region lies in a known one, where there is only one."""
-        known = self.boxes.get(frozenset(region.active))
-        if not known:
-            return False
-        sides = np.array(known)
+        sides = self.boxes.of(frozenset(region.active))
         lower, upper = region.sharp_lower[: len(self.free)], region.sharp_upper[: len(self.free)]
         domain = self.search.domain
-        return bool(domain.within(lower, upper, sides[:, 0], sides[:, 1], self.free).any())
+        return bool(domain.within(lower, upper, *sides, self.free).any())
 
 
 def settled(search: Search) -> list[tuple[int, str]]:
     """Return the regions whose points are in the list or may be (``IN``, ``OPEN``), each once."""
-    known, found = Known(search), list[tuple[int, str]]()
+    known, found = Listed(search), list[tuple[int, str]]()
     for k, region in enumerate(search.regions):
         place = OUT if known.has(region) else membership(search, region)
         if place != OUT:

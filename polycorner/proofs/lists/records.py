@@ -47,6 +47,7 @@ from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 FORMAT = ("polycorner-stationary-list", 1)
+SIDES = ("lower", "upper", "sharp_lower", "sharp_upper")
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
@@ -91,7 +92,7 @@ def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
     return Record(
         search.problem,
         search.domain,
-        tuple(tuple(np.flatnonzero(branch).tolist()) for branch in search.conj),
+        search.branches,
         search.motions,
         search.weights,
         tuple(search.regions),
@@ -139,12 +140,24 @@ def written(path: str | os.PathLike[str], record: Record, data: dict[str, Any]) 
 
 def described(record: Record) -> dict[str, Any]:
     """Return a problem, its regions, loci and symmetries, and the list, as plain data."""
+    return {
+        "format": list(FORMAT),
+        **posed(record),
+        "regions": [region_data(region) for region in record.regions],
+        "loci": [locus_data(place) for place in record.loci],
+        "points": [{"region": k, "index": record.regions[k].index} for k in record.listed],
+        "open_points": list(record.open_points),
+        "open": int((record.codes == OPEN_BOX).sum()),
+    }
+
+
+def posed(record: "Record | Search") -> dict[str, Any]:
+    """Return a problem with its domain and symmetries as plain data."""
     problem, domain = record.problem, record.domain
     manifold = problem.polyhedron.manifold
     formulas = Formulas(problem.functions, manifold)
     nodes, outputs = program(formulas.graph, formulas.outputs)
     return {
-        "format": list(FORMAT),
         "coordinates": list(manifold.names),
         "periods": [period(p) for p in manifold.periods],
         "functions": list(formulas.names),
@@ -157,11 +170,6 @@ def described(record: Record) -> dict[str, Any]:
         "fixed": list(domain.fixed),
         "symmetries": [_motion(g) for g in record.motions],
         "weights": _hex(record.weights),
-        "regions": [_region(region) for region in record.regions],
-        "loci": [_locus(place) for place in record.loci],
-        "points": [{"region": k, "index": record.regions[k].index} for k in record.listed],
-        "open_points": list(record.open_points),
-        "open": int((record.codes == OPEN_BOX).sum()),
     }
 
 
@@ -211,17 +219,33 @@ def _hex(values: Array) -> list[str]:
 
 
 def _sides(box: Region | Locus) -> dict[str, list[str]]:
-    return {
-        name: _hex(getattr(box, name)) for name in ("lower", "upper", "sharp_lower", "sharp_upper")
-    }
+    return {name: _hex(getattr(box, name)) for name in SIDES}
 
 
-def _region(region: Region) -> dict[str, Any]:
+def region_data(region: Region) -> dict[str, Any]:
+    """Return a region as plain data."""
     return {"active": list(region.active), "index": region.index, **_sides(region)}
 
 
-def _locus(place: Locus) -> dict[str, Any]:
+def locus_data(place: Locus) -> dict[str, Any]:
+    """Return a locus as plain data."""
     return {"z": list(place.z), "index": place.index, **_sides(place)}
+
+
+def region_from(data: dict[str, Any]) -> Region:
+    """Return the region that some data describe."""
+    lower, upper, low, high = (_numbers(data[name]) for name in SIDES)
+    return Region(lower, upper, tuple(data["active"]), low, high, data["index"])
+
+
+def locus_from(data: dict[str, Any]) -> Locus:
+    """Return the locus that some data describe."""
+    lower, upper, low, high = (_numbers(data[name]) for name in SIDES)
+    return Locus(tuple(data["z"]), lower, upper, low, high, data["index"])
+
+
+def _numbers(texts: Sequence[str]) -> Array:
+    return np.array([float.fromhex(text) for text in texts])
 
 
 def _motion(g: Motion) -> dict[str, Any]:

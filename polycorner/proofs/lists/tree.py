@@ -3,7 +3,9 @@
 Nodes are numbered as they are made, the two halves of a box one after the other.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,8 @@ from numpy.typing import NDArray
 from polycorner.spaces.manifold import Array
 
 CLOSED, OPEN = -1, -2
+SPLIT = ("nodes", "axes", "positions", "first")  # columns of the records of splits
+DIRECTED = ("owners", "vectors")  # columns of the directions of closed boxes
 
 
 @dataclass
@@ -40,6 +44,35 @@ class Tree:
         self._split.append((nodes, axes.astype(np.int8), positions, first))
         self.count += 2 * len(nodes)
         return first
+
+    @property
+    def marks(self) -> tuple[int, int]:
+        """How many records of splits and of closed boxes there are."""
+        return len(self._split), len(self._closed)
+
+    def records(self, marks: tuple[int, int] = (0, 0)) -> dict[str, NDArray[Any]]:
+        """Return what was recorded since some marks, as arrays by name; see :meth:`extend`."""
+        splits, closed = self._split[marks[0] :], self._closed[marks[1] :]
+        directions = self._directions[marks[1] :]
+        found: dict[str, NDArray[Any]] = {"count": np.array(self.count)}
+        if splits:
+            columns = [np.concatenate(column) for column in zip(*splits, strict=True)]
+            found |= dict(zip(SPLIT, columns, strict=True))
+        if closed:
+            columns = [np.concatenate(column) for column in zip(*directions, strict=True)]
+            found |= {"closed": np.concatenate(closed), **dict(zip(DIRECTED, columns, strict=True))}
+        return found
+
+    def extend(self, records: Mapping[str, NDArray[Any]]) -> None:
+        """Add what another tree recorded after this one was like it."""
+        self.count = int(records["count"])
+        if SPLIT[0] in records:
+            nodes, axes, positions, first = (records[name] for name in SPLIT)
+            self._split.append((nodes, axes, positions, first))
+        if "closed" in records:
+            owners, vectors = (records[name] for name in DIRECTED)
+            self._closed.append(records["closed"])
+            self._directions.append((owners, vectors))
 
     def preorder(self) -> tuple[NDArray[np.int8], Array, NDArray[np.uint16], NDArray[np.float32]]:
         """Return the tree with each node before its halves.

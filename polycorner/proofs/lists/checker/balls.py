@@ -6,7 +6,7 @@ from typing import Any
 
 from flint import arb, arb_mat, fmpq
 
-BITS, STEPS = 128, 10
+BITS, STEPS = 128, 60
 ZERO, NAN = arb(0), arb("nan")
 
 
@@ -84,5 +84,8 @@ def zero(equations: Callable[..., Any], unknowns: list[arb]) -> list[arb] | None
         pairs = list(zip(unknowns, image, strict=True))
         if not shown and not all(x.contains_interior(y) for x, y in pairs):
             return None
+        done = shown and not any(y.rad() < x.rad() for x, y in pairs)
         shown, unknowns = True, [y if y.rad() < x.rad() else x for x, y in pairs]
+        if done:
+            break
     return unknowns

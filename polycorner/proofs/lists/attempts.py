@@ -1,0 +1,168 @@
+"""Attempts to find the stationary points near items that are left."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.proofs.lists.acceptance import WIDEST
+from polycorner.proofs.lists.branches import Mask
+from polycorner.proofs.lists.candidates import active_sets, newton
+from polycorner.proofs.lists.examination import Examined
+from polycorner.proofs.lists.known import Known
+from polycorner.proofs.lists.loci import locus
+from polycorner.proofs.lists.screening import Screen
+from polycorner.proofs.lists.settings import Setting
+from polycorner.spaces.manifold import Array
+
+Mapped: TypeAlias = Callable[..., Iterable[Any]]
+
+ATTEMPTS = 1024  # candidates that are tried in one round
+WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
+EVERY = 2  # bisections of every coordinate between two attempts at a box
+SAME = 1e-9  # distance in scale units below which candidates are the same
+LOCUS = (-1,)  # in place of the functions of a face
+COARSE = 1e-7  # distance in scale units below which only one of several candidates is tried
+MANY = 16  # candidates for which it is worth compiling second derivatives
+AGAIN = 1 / 64  # of the widest region that was tried in vain: a smaller one is worth trying
+
+
+@dataclass
+class Starts:
+    """Points to start from, the functions that seem active there, and the widest regions to try."""
+
+    q: Array
+    active: Mask
+    widest: Array
+
+    def part(self, keep: NDArray[np.intp]) -> "Starts":
+        """Return some of them."""
+        return Starts(self.q[keep], self.active[keep], self.widest[keep])
+
+
+@dataclass
+class Attempts:
+    """Attempts, what they found, and which were in vain."""
+
+    setting: Setting
+    known: Known
+    failed: dict[tuple[int, ...], list[tuple[Array, float]]] = field(default_factory=dict)
+
+    def at(self, examined: Sequence[Examined], mapped: Mapped = map) -> None:
+        """Try boxes in which no candidate was tried for some bisections, longest ago first.
+
+        ``mapped`` applies a function to each of some arguments, like ``map``.
+        """
+        parts, chosen = [], []
+        for e in examined:
+            ripe = self._ripe(e)
+            if ripe.size:
+                parts.append(self._starts(e, ripe))
+                chosen.append((e, e.where[e.rest.items[ripe]]))
+        if not parts:
+            return
+        since = np.concatenate([e.boxes.since[boxes] for e, boxes in chosen])
+        order = np.argsort(-since, kind="stable")[:ATTEMPTS]
+        tried = np.zeros(len(since), dtype=np.bool_)
+        tried[order] = True
+        place = 0
+        for e, boxes in chosen:
+            e.boxes.since[boxes[tried[place : place + len(boxes)]]] = 0
+            place += len(boxes)
+        starts = Starts(
+            np.concatenate([p.q for p in parts]),
+            np.concatenate([p.active for p in parts]),
+            np.concatenate([p.widest for p in parts]),
+        )
+        self.run(starts.part(order), mapped)
+
+    def _ripe(self, e: Examined) -> NDArray[np.intp]:
+        """Return positions in the rest of the items to try, one for a box."""
+        left = e.open_items
+        ripe = left[
+            e.boxes.since[e.where[e.rest.items[left]]] >= EVERY * len(self.setting.domain.free)
+        ]
+        return ripe[np.unique(e.where[e.rest.items[ripe]], return_index=True)[1]]
+
+    def _starts(self, e: Examined, ripe: NDArray[np.intp]) -> Starts:
+        boxes = e.boxes.part(e.where[e.rest.items[ripe]])
+        widths = ((boxes.upper - boxes.lower) / self.setting.problem.scales)[
+            :, self.setting.domain.free
+        ]
+        active = active_sets(e.rest.weights[ripe], e.rest.pulls[ripe])
+        return Starts(boxes.middles, active, WIDER * widths.max(axis=1))
+
+    def run(self, starts: Starts, mapped: Mapped = map) -> None:
+        """Try to find loci and regions from some points."""
+        if self.setting.may_have_loci:
+            self._find_loci(starts.part(np.flatnonzero(~starts.active.any(axis=1))))
+        kinds, which = np.unique(starts.active, axis=0, return_inverse=True)
+        faces = [tuple(np.flatnonzero(active).tolist()) for active in kinds]
+        parts = [starts.part(np.flatnonzero(which.ravel() == k)) for k in range(len(kinds))]
+        for active, part, points in zip(
+            faces, parts, mapped(self._candidates, parts, faces), strict=True
+        ):
+            found = np.isfinite(points).all(axis=1)
+            self._show(points[found], active, part.widest[found])
+
+    def _find_loci(self, starts: Starts) -> None:
+        setting, z = self.setting, self.setting.reads
+        if setting.equations or not len(starts.q):
+            return
+        points, _, found = newton(setting.problem, starts.q, [], z)
+        for q in points[found]:
+            if self.known.has_value(q[list(z)]) or self._in_vain(q, LOCUS, WIDEST):
+                continue
+            place = locus(setting.faces.formulas, z, q, setting.problem.scales)
+            if place is None:
+                self.failed.setdefault(LOCUS, []).append((q, WIDEST))
+            elif not self.known.has_locus(place):
+                self.known.loci.append(place)
+
+    def _candidates(self, starts: Starts, active: tuple[int, ...]) -> Array:
+        """Return KKT points of a face near some points, ``(B, n)``, NaN where there is none."""
+        setting, slack = self.setting, self.setting.domain.units
+        free = setting.domain.free
+        points, lam, found = newton(setting.problem, starts.q, active, free, starts.widest)
+        found &= (lam[:, : len(active)] > 0).all(axis=1)
+        found &= (points >= setting.domain.lower - slack).all(axis=1)
+        found &= (points <= setting.domain.upper + slack).all(axis=1)
+        return np.where(found[:, None], points, np.nan)
+
+    def _show(self, points: Array, active: tuple[int, ...], widest: Array) -> None:
+        """Try regions about approximate KKT points of a face, each once."""
+        fresh, grid = list[int](), set[bytes]()
+        for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
+            place = np.rint(q / (COARSE * self.setting.problem.scales)).tobytes()
+            if place not in grid and self._is_new(q, active, size):
+                grid.add(place)
+                fresh.append(i)
+        points, widest = points[fresh], widest[fresh]
+        guesses: Array | None = None
+        if len(fresh) >= MANY:
+            guesses = Screen(self.setting, active, points).radii(widest)
+        for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
+            guess = None if guesses is None else guesses[i]
+            if not self._is_new(q, active, size):
+                continue
+            if guess is not None and np.isnan(guess).any():
+                region = None
+            else:
+                region = self.setting.faces.region(q, active, size, guess)
+            if region is None:
+                self.failed.setdefault(active, []).append((q, size))
+            else:
+                self.known.add(region)
+
+    def _is_new(self, q: Array, active: tuple[int, ...], widest: float) -> bool:
+        return not self.known.has(q, frozenset(active)) and not self._in_vain(q, active, widest)
+
+    def _in_vain(self, q: Array, active: tuple[int, ...], widest: float) -> bool:
+        """Whether regions of about this size were tried at a point before."""
+        close = SAME * self.setting.problem.scales
+        return any(
+            AGAIN * size < widest <= size and (abs(q - point) <= close).all()
+            for point, size in self.failed.get(active, ())
+        )

@@ -1,0 +1,112 @@
+"""What a search knows at some time: regions with one stationary point, and loci."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.loci import Locus
+from polycorner.spaces.manifold import Array
+
+FIRST = 64  # rows that a growing array has room for
+
+
+@dataclass
+class Rows:
+    """An array that grows by rows, ``(R, width)``."""
+
+    width: int
+    _array: Array = field(init=False)
+    _count: int = 0
+
+    def __post_init__(self) -> None:
+        self._array = np.zeros((FIRST, self.width))
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, row: Array) -> None:
+        """Add a row."""
+        if self._count == len(self._array):
+            self._array = np.concatenate([self._array, np.zeros_like(self._array)])
+        self._array[self._count] = row
+        self._count += 1
+
+    @property
+    def array(self) -> Array:
+        """The rows so far, which later ones do not change."""
+        return self._array[: self._count]
+
+
+class Sides:
+    """Boxes by the active functions of their regions, looked up by points."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self._rows: dict[frozenset[int], Rows] = {}
+
+    def add(self, active: frozenset[int], lower: Array, upper: Array) -> None:
+        """Add a box."""
+        rows = self._rows.setdefault(active, Rows(2 * self.width))
+        rows.add(np.concatenate([lower, upper]))
+
+    def of(self, active: frozenset[int]) -> tuple[Array, Array]:
+        """Return the lower and the upper ends of all boxes with some active functions."""
+        rows = self._rows.get(active)
+        found = rows.array if rows else np.zeros((0, 2 * self.width))
+        return found[:, : self.width], found[:, self.width :]
+
+
+class Known:
+    """Regions and loci, in the order in which they were found.
+
+    Parameters
+    ----------
+    dimension, inequalities : int
+        ``n`` and ``m``.
+    """
+
+    def __init__(self, dimension: int, inequalities: int) -> None:
+        self.regions: list[Region] = []
+        self.loci: list[Locus] = []
+        self._sides = Sides(dimension)
+        self._all = Rows(2 * dimension + inequalities)
+        self._dimension = dimension
+
+    def add(self, region: Region) -> None:
+        """Add a region."""
+        self.regions.append(region)
+        self._sides.add(frozenset(region.active), region.lower, region.upper)
+        row = np.zeros(self._all.width)
+        row[: 2 * self._dimension] = np.concatenate([region.lower, region.upper])
+        row[[2 * self._dimension + i for i in region.active]] = 1.0
+        self._all.add(row)
+
+    def has(self, q: Array, active: frozenset[int]) -> bool:
+        """Whether a point lies in a region with the given active functions."""
+        lower, upper = self._sides.of(active)
+        return bool(((q >= lower) & (q <= upper)).all(axis=1).any())
+
+    def has_locus(self, place: Locus) -> bool:
+        """Whether a locus lies in the box of a known one."""
+        return any(
+            (place.sharp_lower >= other.lower).all() and (place.sharp_upper <= other.upper).all()
+            for other in self.loci
+        )
+
+    def has_value(self, z: Array) -> bool:
+        """Whether values of the coordinates that the energy reads lie in the box of a locus."""
+        return any((z >= p.lower).all() and (z <= p.upper).all() for p in self.loci)
+
+    def sides(self, since: int = 0) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return lower and upper ends ``(R, n)`` and active functions ``(R, m)`` of regions.
+
+        Of all but the first ``since``.
+        """
+        found, n = self._all.array[since:], self._dimension
+        return (
+            np.ascontiguousarray(found[:, :n]),
+            np.ascontiguousarray(found[:, n : 2 * n]),
+            found[:, 2 * n :] > 0,
+        )

@@ -1,0 +1,245 @@
+"""Stores: searches on disk, which go on where they stood after an interruption of any kind.
+
+A store is a folder with
+
+``search.json``
+    the problem, what is known (regions, loci, what was tried in vain) and the names and digests of
+    the other files; it is replaced as a whole, and files that it does not name do not count;
+``tree-K.npz``
+    what was added to the subdivision between two times of saving;
+``boxes-K.npz``
+    the boxes that wait and those that are undecided, at the last time.
+
+Between two rounds this is all that the search depends on, so that one that goes on from a store
+finds what it would have found without the interruption.
+"""
+
+import io
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+
+from polycorner import __version__, checks
+from polycorner.atomic import write_atomically
+from polycorner.formulas.cache import sources_digest
+from polycorner.proofs.lists.boxes import Boxes, joined
+from polycorner.proofs.lists.records import (
+    locus_data,
+    locus_from,
+    posed,
+    region_data,
+    region_from,
+)
+from polycorner.proofs.lists.search import Search, Tally
+
+FORMAT = ["polycorner-search-of-stationary-points", 1]
+ROOT = "search.json"
+EVERY = 5.0  # s between two times of saving
+SHARE = 0.05  # of the time at most that saving takes
+BOXES = ("lower", "upper", "nodes", "since")
+
+
+class Store:
+    """A search on disk.
+
+    Parameters
+    ----------
+    path : path
+        The folder; it is created if it does not exist.
+    search : Search
+        One that has not begun; what the store holds is put into it.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the folder holds something else, another search or a damaged store, or is in use.
+    OSError
+        If it cannot be written.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], search: Search) -> None:
+        if not isinstance(path, str | os.PathLike):
+            checks.refuse("store", "the path of a folder", path, TypeError)
+        self.path, self.search = Path(path), search
+        self._files: dict[str, str] = {}  # digests by name
+        self._marks, self._count, self._took, self._saved = (0, 0), 0, 0.0, time.monotonic()
+        self._stated = json.loads(json.dumps(_stated(search)))
+        found = self._found()
+        with _writing(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = FileLock(f"{self.path}.lock", thread_local=False)
+            try:
+                self._lock.acquire(blocking=False)
+            except Timeout:
+                msg = f"store: expected one that nothing else is writing; {self.path} is in use"
+                raise ValueError(msg) from None
+        try:
+            found = self._found()
+            if found is not None:
+                self._restore(found)
+            self.save()
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def save_by_the_clock(self) -> None:
+        """Save the search if the last time is long enough ago."""
+        if time.monotonic() - self._saved >= max(EVERY, self._took / SHARE):
+            self.save()
+
+    def save(self) -> None:
+        """Save the search as it is between two rounds."""
+        start, search, before = time.monotonic(), self.search, set(self._files)
+        waiting = _arrays(search.waiting, "waiting") | _arrays(
+            joined([search.waiting.part(slice(0)), *search.undecided]), "undecided"
+        )
+        pieces = [name for name in self._files if name.startswith("tree")]
+        files = {name: self._files[name] for name in pieces}
+        with _writing(self.path):
+            if search.tree.marks != self._marks or not pieces:
+                records = search.tree.records(self._marks)
+                files |= self._written(f"tree-{self._count}.npz", records)
+            files |= self._written(f"boxes-{self._count}.npz", waiting)
+            content = self._stated | _progress(search) | {"files": files}
+            text = json.dumps(content)
+            root = json.dumps({"sha256": _digest(text.encode()), "search": text})
+            write_atomically(self.path / ROOT, root)
+            for name in before - set(files):
+                (self.path / name).unlink(missing_ok=True)
+        self._files, self._marks, self._count = files, search.tree.marks, self._count + 1
+        self._saved = time.monotonic()
+        self._took = self._saved - start
+
+    def close(self) -> None:
+        """Release the store."""
+        self._lock.release()
+
+    def _written(self, name: str, arrays: Mapping[str, NDArray[Any]]) -> dict[str, str]:
+        memory = io.BytesIO()
+        np.savez(memory, **arrays)  # type: ignore[arg-type] # its option comes first by name
+        write_atomically(self.path / name, memory.getvalue())
+        return {name: _digest(memory.getvalue())}
+
+    def _found(self) -> dict[str, Any] | None:
+        """Return what the folder holds of this search, or None for nothing."""
+        if self.path.exists() and not self.path.is_dir():
+            msg = f"store: expected a folder; {self.path} is a file"
+            raise ValueError(msg)
+        if not (self.path / ROOT).exists():
+            if self.path.is_dir() and any(self.path.iterdir()):
+                kinds = "a new or empty folder, or the store of a search"
+                msg = f"store: expected {kinds}; {self.path} is neither"
+                raise ValueError(msg)
+            return None
+        root = self._parsed((self.path / ROOT).read_bytes())
+        for name, words in DIFFERENCES.items():
+            if root.get(name) != self._stated[name]:
+                msg = f"store: expected a search {words}; {self.path} holds another one"
+                raise ValueError(msg)
+        return root
+
+    def _parsed(self, content: bytes) -> dict[str, Any]:
+        try:
+            outer = json.loads(content)
+            if outer["sha256"] == _digest(outer["search"].encode()):
+                return dict(json.loads(outer["search"]))
+        except (ValueError, LookupError, TypeError, AttributeError):
+            pass
+        raise self._damaged(ROOT)
+
+    def _damaged(self, name: str) -> ValueError:
+        msg = f"store: expected files as they were written; {self.path / name} was changed"
+        return ValueError(msg)
+
+    def _restore(self, root: dict[str, Any]) -> None:
+        """Put what was saved into the search."""
+        search = self.search
+        for name, digest in root["files"].items():
+            try:
+                content = (self.path / name).read_bytes()
+            except FileNotFoundError:
+                content = b""
+            if _digest(content) != digest:
+                raise self._damaged(name)
+            arrays = np.load(io.BytesIO(content))
+            if name.startswith("tree"):
+                search.tree.extend(arrays)
+            else:
+                search.waiting = _boxes(arrays, "waiting")
+                search.undecided = [_boxes(arrays, "undecided")]
+        search.tally = Tally(**root["tally"])
+        for data in root["regions"]:
+            search.known.add(region_from(data))
+        search.known.loci += map(locus_from, root["loci"])
+        for active, tried in root["failed"]:
+            search.attempts.failed[tuple(active)] = [(np.array(q), size) for q, size in tried]
+        self._files, self._marks = dict(root["files"]), search.tree.marks
+        self._count = 1 + max(int(name.split("-")[1].split(".")[0]) for name in self._files)
+
+
+# What has to be the same, in words.
+DIFFERENCES = {
+    "format": "of this format",
+    "library": "by this version of the library",
+    "functions": "for these functions",
+    "problem": "for this problem",
+    "domain": "in this box",
+    "symmetries": "with these symmetries",
+    "resolution": "of this resolution",
+}
+
+
+def _stated(search: Search) -> dict[str, Any]:
+    """Return what a search is about."""
+    problem = posed(search)
+    parts = ("functions", "domain", "symmetries")
+    return {
+        "format": FORMAT,
+        "library": [__version__, sources_digest(__package__)],
+        **{name: problem.pop(name) for name in parts},
+        "problem": problem,
+        "resolution": search.resolution,
+    }
+
+
+def _progress(search: Search) -> dict[str, Any]:
+    """Return what is known; numbers are written with all their digits."""
+    failed = search.attempts.failed.items()
+    return {
+        "tally": asdict(search.tally),
+        "regions": [region_data(region) for region in search.regions],
+        "loci": [locus_data(place) for place in search.loci],
+        "failed": [[k, [[q.tolist(), size] for q, size in tried]] for k, tried in failed],
+    }
+
+
+def _arrays(boxes: Boxes, prefix: str) -> dict[str, NDArray[Any]]:
+    return {f"{prefix}_{name}": getattr(boxes, name) for name in BOXES}
+
+
+def _boxes(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Boxes:
+    lower, upper, nodes, since = (arrays[f"{prefix}_{name}"] for name in BOXES)
+    return Boxes(lower, upper, nodes, since)
+
+
+def _digest(content: bytes) -> str:
+    return sha256(content).hexdigest()
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        msg = f"store: expected a folder that can be written; {path}: {error.strerror or error}"
+        raise OSError(error.errno, msg) from error
