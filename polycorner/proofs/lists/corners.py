@@ -14,7 +14,7 @@ from polycorner.proofs.lists.corner_lists import CornerList, CornerPoint
 from polycorner.proofs.lists.corner_points import Candidate, candidates, with_images
 from polycorner.proofs.lists.corner_records import corner_record
 from polycorner.proofs.lists.corner_search import CornerSearch
-from polycorner.proofs.lists.enumeration import MOST_BOXES, RESOLUTION, prepared, undecided
+from polycorner.proofs.lists.enumeration import MOST_BOXES, RESOLUTION, begun, undecided
 from polycorner.proofs.lists.members import full
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tips import Tip
@@ -77,7 +77,7 @@ def corners(
 
     checks.instance("polyhedron", polyhedron, Polyhedron)
     nothing = sympy.Integer(0)
-    search = prepared(polyhedron, nothing, box, symmetry, resolution, CornerSearch)
+    search = begun(CornerSearch, polyhedron, nothing, box, symmetry, resolution)
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)

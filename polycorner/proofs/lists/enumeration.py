@@ -110,7 +110,7 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(polyhedron, energy, box, symmetry, resolution, Search)
+    search = prepared(polyhedron, energy, box, symmetry, resolution)
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
@@ -138,14 +138,21 @@ def stationary_points(
 
 
 def prepared(
+    polyhedron: Polyhedron, energy: "Energy", box: Any, symmetry: Symmetry | None, resolution: float
+) -> Search:
+    """Return a search that has not begun, after checking its arguments."""
+    return begun(Search, polyhedron, energy, box, symmetry, resolution)
+
+
+def begun(
+    kind: type[S],
     polyhedron: Polyhedron,
     energy: "Energy",
     box: Any,
     symmetry: Symmetry | None,
     resolution: float,
-    kind: type[S],
 ) -> S:
-    """Return a search of a kind that has not begun, after checking its arguments."""
+    """Return a search of some kind, after checking its arguments."""
     problem = pose(polyhedron, energy)
     found = domain(polyhedron.manifold, box)
     checks.real("resolution", resolution, above=0)

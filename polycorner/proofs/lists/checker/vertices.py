@@ -41,16 +41,16 @@ class Vertex:
             unknowns = zero(self.equations, box) or []
             need(unknowns or not p.free, f"{self.name}: no single common zero is shown")
         slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in unknowns]
-        sharp = hull(*sides(record, ("sharp_lower", "sharp_upper"), len(p.free)))
-        near = [x + y for x, y in zip(sharp, slack, strict=True)]
+        sharp = sides(record, ("sharp_lower", "sharp_upper"), len(p.free))
+        near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
         inside = all(x.contains(y) for x, y in zip(near, unknowns, strict=True))
         need(inside, f"{self.name}: the common zero is elsewhere")
         self.point = self.at(unknowns)
         ends = zip(self.lower, self.upper, self.point, strict=True)
         need(all(a <= x <= b for i, (a, b, x) in enumerate(ends) if i in p.free), self.name)
         whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
-        some = [(x, p.lower[i], p.upper[i]) for i, x in enumerate(self.point) if not whole[i]]
-        self.outside = any(x < a or x > b for x, a, b in some)
+        stated = zip(p.free, *sharp, strict=True)  # what meets the domain is listed
+        self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
         v = p.values(self.point)
         signs = p.signs(v)
         self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
