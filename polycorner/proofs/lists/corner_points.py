@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from polycorner.intervals.balls import ball, between, precision
+from polycorner.intervals.balls import ball, precision
 from polycorner.proofs.lists.acceptance import BITS, Region
 from polycorner.proofs.lists.coincidences import OPEN, ZERO, Place, active_at, signs
 from polycorner.proofs.lists.corner_search import CornerSearch
-from polycorner.proofs.lists.members import full, image
+from polycorner.proofs.lists.members import apart, full, image, inside, placed
 from polycorner.proofs.lists.tips import Tip
 
 MOST_OPEN = 6  # functions of unknown sign at a point, all of whose signs are gone through
@@ -85,48 +85,24 @@ def _candidate(search: CornerSearch, number: int, region: Region) -> Candidate |
 
 def _place(search: CornerSearch, region: Region) -> Place:
     """Return the point of a region, enclosed as well as its kind allows."""
-    rows = search.vertices.rows(region.active)
+    if not isinstance(region, Tip):
+        return placed(search, region)
     with precision(BITS):
-        if isinstance(region, Tip):
-            return Place([ball(x) for x in region.exact], region.lower, region.upper, rows)
-        zero = search.vertices.zero(region.lower, region.upper, region.active)
-        lower, upper = full(search, region)
-        sides = zip(lower.tolist(), upper.tolist(), strict=True)
-        point = [between(a, b) for a, b in sides]
-        for i, x in zip(search.domain.free, zero or (), strict=bool(zero)):
-            point[i] = x
+        point, rows = [ball(x) for x in region.exact], search.vertices.rows(region.active)
         return Place(point, region.lower, region.upper, rows)
 
 
 def same(search: CornerSearch, one: Candidate, other: Candidate) -> bool | None:
     """Whether the points of two regions are the same; None where that is not decided."""
-    if _apart(search, one.region, other.region):
+    if apart(search, one.region, other.region):
         return False
     for here, there in ((one, other), (other, one)):
         rows = set(there.region.active)
         if rows - here.zeros - here.unknown:
             return False
-        if rows <= here.zeros and _inside(search, here.region, there.region):
+        if rows <= here.zeros and inside(search, here.region, there.region):
             return True
     return None
-
-
-def _inside(search: CornerSearch, region: Region, other: Region) -> bool:
-    """Whether the point of a region lies in the box of another one."""
-    free = list(search.domain.free)
-    lower, upper = region.sharp_lower[: len(free)], region.sharp_upper[: len(free)]
-    sides = other.lower[free], other.upper[free]
-    return bool(search.domain.within(lower, upper, *sides, free))
-
-
-def _apart(search: CornerSearch, region: Region, other: Region) -> bool:
-    """Whether the enclosures of two points are disjoint."""
-    (low, high), (left, right) = full(search, region), full(search, other)
-    manifold = search.domain.manifold
-    middle = 0.5 * (left + right) - 0.5 * (low + high)
-    turn = middle - manifold.wrap(middle)
-    slack = 1e-12 * manifold.scale_array
-    return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
 
 
 def with_images(

@@ -20,7 +20,6 @@ from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.levels import Levels, Rows, levels
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tips import Tip, tips
-from polycorner.proofs.lists.vertices import Vertices
 from polycorner.spaces.manifold import Array
 
 ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
@@ -58,16 +57,6 @@ class Chunk:
 @dataclass
 class CornerSearch(Search):
     """One run: what is to be treated, and the regions in which one corner may be."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.vertices = Vertices(
-            self.faces.formulas,
-            self.problem.inequalities,
-            self.equations,
-            self.domain.free,
-            self.problem.scales,
-        )
 
     def _compile(self) -> None:
         self._examined(self.waiting.part(slice(0, 1)))

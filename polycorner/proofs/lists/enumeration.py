@@ -12,12 +12,12 @@ from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, Listed, full, images, moved, settled
+from polycorner.proofs.lists.members import OPEN, Listed, Member, full, images, moved, settled
+from polycorner.proofs.lists.multiples import without_multiples
 from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Search
@@ -58,7 +58,8 @@ def stationary_points(
     Parameters
     ----------
     polyhedron : Polyhedron
-        The set ``D``; and/or trees and equations are allowed.
+        The set ``D``; and/or trees and equations are allowed.  Of inequalities that are positive
+        multiples of each other the first stands for all of them.
     energy : SmoothFunction or SymPy expression
         The energy ``E``.
     box : sequence or mapping
@@ -153,8 +154,9 @@ def begun(
     resolution: float,
 ) -> S:
     """Return a search of some kind, after checking its arguments."""
-    problem = pose(polyhedron, energy)
+    checks.instance("polyhedron", polyhedron, Polyhedron)
     found = domain(polyhedron.manifold, box)
+    problem = pose(without_multiples(polyhedron), energy)
     checks.real("resolution", resolution, above=0)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
@@ -202,19 +204,20 @@ def listed(search: Search) -> StationaryList:
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
     known, orbits, members = Listed(search), 0, settled(search)
-    for k, place in members:
-        region = search.regions[k]
-        if known.has(region):
+    for _, member in members:
+        before = known.has(member)
+        if before:
             continue  # an image of one before
-        known.add(region)
-        if place == OPEN:
-            open_points.append(_point(search, region, orbits))
+        known.add(member)
+        if member.place == OPEN or before is None:
+            open_points.append(_point(search, member, orbits))
             continue
-        points.append(_point(search, region, orbits))
-        for image in images(search, region):
-            if not known.has(image):
+        points.append(_point(search, member, orbits))
+        for image in images(search, member):
+            alike = known.has(image)
+            if not alike:
                 known.add(image)
-                points.append(_point(search, image, orbits))
+                (points if alike is False else open_points).append(_point(search, image, orbits))
         orbits += 1
     rng = np.random.default_rng(0)
     loci = tuple(locus_of(search, place, rng) for place in _loci(search))
@@ -262,10 +265,12 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
     return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index)
 
 
-def _point(search: Search, region: Region, orbit: int) -> StationaryPoint:
+def _point(search: Search, member: Member, orbit: int) -> StationaryPoint:
+    region = member.region
     lower, upper = full(search, region)
     n, d = len(search.domain.free), search.problem.polyhedron
+    more = tuple(d.names[i] for i in sorted(member.zeros.difference(region.active)))
     active = tuple(d.names[i] for i in region.active)
     ends = zip(region.sharp_lower[n:].tolist(), region.sharp_upper[n:].tolist(), strict=True)
     multipliers = dict(zip((*active, *d.equation_names), ends, strict=True))
-    return StationaryPoint(lower, upper, active, multipliers, region.index, orbit)
+    return StationaryPoint(lower, upper, active, multipliers, region.index, orbit, more)

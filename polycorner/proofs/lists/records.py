@@ -40,7 +40,7 @@ from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import IN, OPEN
+from polycorner.proofs.lists.members import IN, OPEN, Member
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tree import OPEN as OPEN_BOX
 from polycorner.spaces.manifold import Array
@@ -87,7 +87,7 @@ class Record(Value):
     directions: NDArray[np.float32]
 
 
-def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
+def record(search: Search, members: Sequence[tuple[int, Member]]) -> Record:
     """Return the record of a search and the members of its list."""
     return Record(
         search.problem,
@@ -97,8 +97,8 @@ def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
         search.weights,
         tuple(search.regions),
         tuple(search.loci),
-        tuple(k for k, place in members if place == IN),
-        tuple(k for k, place in members if place == OPEN),
+        tuple(k for k, member in members if member.place == IN),
+        tuple(k for k, member in members if member.place == OPEN),
         *search.tree.preorder(),
     )
 

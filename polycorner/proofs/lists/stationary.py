@@ -41,6 +41,9 @@ class StationaryPoint(Value):
         number is not shown.
     orbit : int
         Number of the orbit of the declared symmetries that it belongs to.
+    redundant : tuple of str
+        Other functions that vanish there; the multipliers are those of one combination without
+        them.
     """
 
     lower: Array
@@ -49,6 +52,7 @@ class StationaryPoint(Value):
     multipliers: Mapping[str, Bounds]
     index: int | None
     orbit: int
+    redundant: tuple[str, ...] = ()
 
     @property
     def point(self) -> Array:

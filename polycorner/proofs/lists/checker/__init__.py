@@ -8,7 +8,8 @@ in ball arithmetic of 128 bits, that
 - in each branch of the set, some stored direction, made tangent to the equations, increases all
   functions that may vanish and decreases the energy, for all elements of their generalised
   gradients ([Clarke] sec. 2.3); or the functions that may vanish are active in a region around the
-  box; or the box is at a locus, and a direction along the other coordinates leads into the set; or
+  box; or one of both is true of each set of as many of them as can be independent; or the box is at
+  a locus, and a direction along the other coordinates leads into the set; or
 - a symmetry carries it into the domain and increases ``w . q``.
 
 Boxes for which this is not shown at once are bisected.  Krawczyk's operator ([Neumaier] sec. 5.1)

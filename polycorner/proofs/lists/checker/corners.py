@@ -72,10 +72,11 @@ class CornerProof(Proof):
             active = sorted(v.matter)
             need(active == data["points"][k]["active"], f"{v.name}: {active} are active")
             need(all(v.same(w) is False for w in claimed[:k]), f"{v.name}: is listed twice")
-        for k, v in enumerate(self.vertices):
+        named = claimed + [self.vertices[k] for k in data["open_points"]]
+        for v in self.vertices:
             absent = not v.inside or not (v.active <= v.matter or v.critical & v.matter)
-            known = v.outside or absent or k in data["open_points"]
-            need(known or any(v.same(w) for w in claimed), f"{v.name}: is not listed")
+            known = v.outside or absent or any(v.same(w) for w in named)
+            need(known, f"{v.name}: is not listed")
 
 
 class Box:

@@ -84,7 +84,7 @@ def check(path: str, sample: int | None, jobs: int) -> str:
             print(line, file=sys.stderr)
     said = [f"{len(data['points'])} {proof.kind}"]
     said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
-    said += [f"{proof.tested} zeros at corners (tested, not proved)"] if proof.tested else []
+    said += [f"{proof.tested} zeros at points (tested, not proved)"] if proof.tested else []
     said += [f"{sum(not f.outside for f in proof.loci)} loci"] if proof.loci else []
     said += [f"{total} leaves" if count == total else f"ONLY A SAMPLE of {count} of {total} leaves"]
     said += [f"complete outside {opened} open boxes" if opened else "no open box"]

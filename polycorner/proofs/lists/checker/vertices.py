@@ -4,20 +4,8 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import ZERO, definite, dot, hull, need, number, sides, turn, zero
+from .balls import ZERO, definite, dot, hull, need, nothing, number, shown, sides, turn, zero
 from .problem import Problem
-
-SMALL = arb(2) ** -80
-
-
-def nothing(x: arb) -> bool:
-    """Whether a number is 0 as far as it is known."""
-    return x.contains(0) and abs(x) < SMALL
-
-
-def exact(x: arb) -> bool:
-    """Whether a number is shown to be 0."""
-    return bool(x == 0)
 
 
 class Vertex:
@@ -54,7 +42,7 @@ class Vertex:
         v = p.values(self.point)
         signs = p.signs(v)
         self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
-        self.tested += sum(not exact(v[p.outputs[i]]) for i in self.zeros - self.active)
+        self.tested += sum(not shown(v[p.outputs[i]]) for i in self.zeros - self.active)
         self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
         sets = p.open_sets(signs, self.zeros)
         self.matter = frozenset().union(*sets)
@@ -115,7 +103,7 @@ class Vertex:
             except ZeroDivisionError:
                 need(False, f"{self.name}: a second derivative may be singular")
         need(all(map(nothing, zeros)), f"{self.name}: a gradient does not vanish")
-        self.tested += sum(not exact(x) for x in zeros)
+        self.tested += sum(not shown(x) for x in zeros)
         return point
 
     def holds(self, lower: list[float], upper: list[float]) -> bool:
