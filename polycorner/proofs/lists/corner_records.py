@@ -4,6 +4,7 @@ They are as those of stationary points (:mod:`~polycorner.proofs.lists.records`)
 format, no loci and no directions.  The energy is the constant 0.  Regions have as many functions as
 there are free coordinates, without multipliers; those of singular corners have the exact point,
 the combination of gradients that vanishes, the weight, and the functions whose gradient vanishes.
+Linear relations between functions are stated with their weights.
 """
 
 import os
@@ -16,6 +17,7 @@ from polycorner.proofs.lists import records
 from polycorner.proofs.lists.corner_points import Candidate
 from polycorner.proofs.lists.corner_search import CornerSearch
 from polycorner.proofs.lists.records import Record
+from polycorner.proofs.lists.relations import Relation
 from polycorner.proofs.lists.tips import Tip
 from polycorner.values import Value
 
@@ -32,10 +34,13 @@ class CornerRecord(Value):
         Problem, regions, subdivision.
     active : tuple of tuple of int
         Functions that are active at the listed corners.
+    relations : tuple of Relation
+        Linear relations between functions.
     """
 
     record: Record
     active: tuple[tuple[int, ...], ...]
+    relations: tuple[Relation, ...]
 
 
 def corner_record(search: CornerSearch, found: Sequence[Candidate]) -> CornerRecord:
@@ -53,7 +58,8 @@ def corner_record(search: CornerSearch, found: Sequence[Candidate]) -> CornerRec
         tuple(one.number for one in found if one.active is None),
         *search.tree.preorder(),
     )
-    return CornerRecord(record, tuple(one.active for one in listed if one.active is not None))
+    active = tuple(one.active for one in listed if one.active is not None)
+    return CornerRecord(record, active, tuple(filter(None, search.relations.values())))
 
 
 def save(path: str | os.PathLike[str], proof: CornerRecord) -> Path:
@@ -63,6 +69,9 @@ def save(path: str | os.PathLike[str], proof: CornerRecord) -> Path:
     data["points"] = [
         {"region": k, "active": list(active)}
         for k, active in zip(proof.record.listed, proof.active, strict=True)
+    ]
+    data["relations"] = [
+        {"rows": list(r.rows), "weights": [str(w) for w in r.weights]} for r in proof.relations
     ]
     for region, entry in zip(proof.record.regions, data["regions"], strict=True):
         if isinstance(region, Tip):

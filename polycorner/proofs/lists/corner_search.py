@@ -6,7 +6,8 @@ bisected.  Corners become known by Newton's method where the gradients of enough
 independent on a box, and by the search for a singular one in small boxes where they are not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.dependence import Enclosures, Places, Truths
 from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.levels import Levels, Rows, levels
+from polycorner.proofs.lists.relations import Relation, relation
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tips import Tip, tips
 from polycorner.spaces.manifold import Array
@@ -26,6 +28,7 @@ ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and sing
 WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 SMALL = 0.05  # side in scale units of boxes in which singular corners are sought
 NEWTON = 12
+MOST_SETS = 200  # of one size that relations are sought in
 STRAY = 4.0  # sides of a box that a vertex may be away from its middle
 
 
@@ -56,7 +59,15 @@ class Chunk:
 
 @dataclass
 class CornerSearch(Search):
-    """One run: what is to be treated, and the regions in which one corner may be."""
+    """One run: what is to be treated, and the regions in which one corner may be.
+
+    Attributes
+    ----------
+    relations : mapping from tuple of int to Relation or None
+        Linear relations between functions, by the sets in which they were sought.
+    """
+
+    relations: dict[Rows, Relation | None] = field(default_factory=dict)
 
     def _compile(self) -> None:
         self._examined(self.waiting.part(slice(0, 1)))
@@ -91,7 +102,8 @@ class CornerSearch(Search):
         sides = gradients[0][at], gradients[1][at]
         found = Enclosures.of(self.functions, part.lower, part.upper, sides, self.domain.free)
         around = _Around(self.regions, part, self.domain.lower < self.domain.upper)
-        result = levels(found, masks[at], k, around.zero, around.critical)
+        related = [frozenset(r.rows) for r in self.relations.values() if r]
+        result = levels(found, masks[at], k, around.zero, around.critical, related)
         left = np.zeros(len(boxes), dtype=np.bool_)
         left[at[result.left]] = True
         regular = self._regular(found, result)
@@ -124,16 +136,23 @@ class CornerSearch(Search):
                 if tried < ATTEMPTS:
                     tried += self._vertex(boxes.middles[box], rows, sizes[box])
         every = len(self.domain.free)
-        ripe = [
-            (box, open_)
-            for box, open_ in chunk.singular
-            if sizes[box] < SMALL and boxes.since[box] >= every
-        ]
-        for box, open_ in ripe[:RARE]:
+        ripe = [(box, rows) for box, rows in chunk.singular if boxes.since[box] >= every]
+        for _, open_ in ripe[:RARE]:
+            self._relate(open_)
+        for box, open_ in [(box, rows) for box, rows in ripe if sizes[box] < SMALL][:RARE]:
             boxes.since[box] = 0
             for tip in tips(self.vertices, boxes.middles[box], open_, 2 * sizes[box]):
                 if not self.known.has(0.5 * (tip.lower + tip.upper), frozenset(tip.active)):
                     self.known.add(tip)
+
+    def _relate(self, open_: list[int]) -> None:
+        """Seek linear relations between functions, in small sets first."""
+        top = len(self.domain.free) - self.equations
+        for size in range(1, top + 1):
+            for rows in islice(combinations(open_, size), MOST_SETS):
+                parts = (self.relations.get(part) for part in combinations(rows, size - 1))
+                if rows not in self.relations and not any(parts):
+                    self.relations[rows] = relation(self.problem, rows)
 
     def _closed(self, chunk: Chunk) -> Boxes:
         """Record which boxes are closed; return the halves of the others."""

@@ -9,15 +9,17 @@ most ``N - k`` elements
 2. has only one, which is known; or
 3. has fewer than ``N - k`` elements, and the gradients of ``T`` and ``h`` are independent on ``X``,
    except at a known point; or
-4. contains a set with one of the first two properties.
+4. contains a set with one of the first two properties; or
+5. contains a function that is a linear combination of others of ``T`` and of ``h``.
 
 Then all corners in ``X`` are known.  ``A(q)`` contains no set as in 1, since it vanishes at ``q``,
-and if it contains one as in 2, ``q`` is the known point.  Otherwise all its subsets of at most
-``N - k`` elements are as in 3, so that it has fewer than ``N - k`` elements itself, and its common
-zeros are a manifold of positive dimension near ``q``, unless ``q`` is the known point.
+and if it contains one as in 2, ``q`` is the known point.  Otherwise leave out functions that are
+combinations of others until there is none: the common zeros are the same.  All subsets of what is
+left, of at most ``N - k`` elements, are as in 3, so that it has fewer than ``N - k`` elements, and
+its common zeros are a manifold of positive dimension near ``q``, unless ``q`` is the known point.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +50,12 @@ class Levels:
 
 
 def levels(
-    found: Enclosures, masks: Mask, equations: int, known: Known, except_at_known: Known
+    found: Enclosures,
+    masks: Mask,
+    equations: int,
+    known: Known,
+    except_at_known: Known,
+    related: Sequence[frozenset[int]] = (),
 ) -> Levels:
     """Return the boxes in which there may be corners that are not known.
 
@@ -62,6 +69,8 @@ def levels(
         ``k``.
     known, except_at_known : callable
         Whether the common zero of a set, or the point where its gradients are dependent, is known.
+    related : sequence of frozenset of int
+        Sets of functions in which one is a combination of others.
     """
     count, m = masks.shape
     top = found.reach.shape[1] - equations
@@ -72,6 +81,8 @@ def levels(
         survivors: dict[Rows, Truths] = {}
         for rows, where in alive.items():
             at = np.flatnonzero(where & ~left)
+            if any(some.issubset(rows) for some in related):
+                continue
             every = (*rows, *range(m, m + equations))
             if not at.size:
                 continue

@@ -1,13 +1,14 @@
 """Proof of a list of corners: why each box has no others."""
 
+import random
 from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import ZERO, hull, need
+from .balls import ZERO, dot, hull, need, nothing, number
 from .problem import Problem
 from .proof import Proof
-from .symmetries import Symmetry
+from .symmetries import POINTS, Symmetry
 from .vertices import Vertex
 
 SHIFT = 2.0**-30
@@ -22,6 +23,7 @@ class CornerProof(Proof):
         self.p = p = Problem(data)
         self.vertices = [Vertex(p, r) for r in data["regions"]]
         self.loci, self.tested = [], sum(vertex.tested for vertex in self.vertices)
+        self.related = [Relation(p, r).rows for r in data["relations"]]
         self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
 
     def shown(self, lo: list[float], hi: list[float], _: list[list[arb]]) -> bool:
@@ -39,7 +41,8 @@ class CornerProof(Proof):
         """Whether all corners in a box are known, from the sets of functions that may vanish.
 
         Each set vanishes nowhere, or at a known point only, or has independent gradients and too
-        few of them to isolate a point; or a smaller set is of the first two kinds.
+        few of them to isolate a point; or a smaller set is of the first two kinds; or a function is
+        a combination of others.
         """
         p = self.p
         some = sorted(frozenset().union(*p.open_sets(signs)))
@@ -52,6 +55,8 @@ class CornerProof(Proof):
         for size in range(top + 1):
             alive = set[tuple[int, ...]]()
             for rows in level:
+                if any(some.issubset(rows) for some in self.related):
+                    continue
                 every = [*rows, *range(p.m, p.m + p.k)]
                 if every and (rows in zeros or box.incompatible(every)):
                     continue
@@ -77,6 +82,25 @@ class CornerProof(Proof):
             absent = not v.inside or not (v.active <= v.matter or v.critical & v.matter)
             known = v.outside or absent or any(v.same(w) for w in named)
             need(known, f"{v.name}: is not listed")
+
+
+class Relation:
+    """A linear relation between inequalities and equations, tested at random points."""
+
+    def __init__(self, p: Problem, record: dict[str, Any]) -> None:
+        name, weights = f"relation {record}", [number(text) for text in record["weights"]]
+        self.rows = frozenset(record["rows"])
+        fine = (
+            self.rows
+            and self.rows <= set(range(p.m))
+            and all(w != 0 for w in weights[: len(record["rows"])])
+        )
+        need(fine and len(weights) == len(record["rows"]) + p.k, name)
+        every, draw = [*record["rows"], *range(p.m, p.m + p.k)], random.Random(1)
+        for _ in range(POINTS):
+            q = [arb(draw.uniform(a, b)) for a, b in zip(p.lower, p.upper, strict=True)]
+            values = [p.values(q)[p.outputs[row]] for row in every]
+            need(nothing(dot(weights, values)), f"{name}: is none")
 
 
 class Box:

@@ -83,6 +83,8 @@ def check(path: str, sample: int | None, jobs: int) -> str:
             line = f"{done} of {count} leaves, {time.monotonic() - started:.0f} s"
             print(line, file=sys.stderr)
     said = [f"{len(data['points'])} {proof.kind}"]
+    related = len(data.get("relations", ()))
+    said += [f"{related} linear relations (tested, not proved)"] if related else []
     said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
     said += [f"{proof.tested} zeros at points (tested, not proved)"] if proof.tested else []
     said += [f"{sum(not f.outside for f in proof.loci)} loci"] if proof.loci else []
