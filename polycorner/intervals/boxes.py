@@ -7,6 +7,7 @@ searches that look at millions of boxes.
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
+from threading import RLock
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,6 +63,7 @@ class BoxFunctions:
         self.rounding = rounding
         self.graph = Graph()
         self._kernels: dict[tuple[int, str], IntervalKernel] = {}
+        self._making = RLock()  # of kernels, for which threads write into the one graph
 
     def values(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
         """Return lower and upper bounds ``(B, m)`` of values on boxes ``lo <= hi`` ``(B, n)``."""
@@ -98,6 +100,29 @@ class BoxFunctions:
         """Return what :meth:`gradients` does, and bounds of second derivatives ``(B, m, n, n)``."""
         return self._evaluate(lo, hi, 2)
 
+    def mean_value_gradients(
+        self, lo: ArrayLike, hi: ArrayLike, *, hessians: bool = False
+    ) -> tuple[Array, ...]:
+        """Return bounds of first derivatives ``(B, m, n)``, with those of their mean value form.
+
+        By second derivatives on the box, and by the gradients in its middle; the bounds of a
+        derivative that may not be continuous on the box are those of :meth:`gradients`.  With
+        ``hessians`` the bounds of second derivatives ``(B, m, n, n)`` follow.
+        """
+        low, high = self._boxes(lo, hi)
+        kernel, entries = self._mean_value
+        count, n, m = len(entries), self.dimension, len(self.functions)
+        parts = tuple(
+            [np.zeros((len(low), count, *shape)) for shape in ((), (n,)) for _ in range(2)]
+        )
+        kernel.fill(low, high, parts)
+        sides = []
+        for part in parts if hessians else parts[:2]:
+            side = np.zeros((len(low), m * n, *part.shape[2:]))
+            side[:, entries] = part
+            sides.append(side.reshape(len(low), m, n, *part.shape[2:]))
+        return tuple(sides)
+
     def continuous(self, lo: ArrayLike, hi: ArrayLike) -> NDArray[np.bool_]:
         """Return ``(B, m)`` whether a function is bounded and continuous on a box, for certain.
 
@@ -127,15 +152,35 @@ class BoxFunctions:
         return low, high
 
     def _kernel(self, order: int, form: str = "natural") -> IntervalKernel:
-        if (order, form) not in self._kernels:
-            known = self.graph, self.dimension, self._levels(order)
-            self._kernels[order, form] = IntervalKernel(*known, form=form, kind=self.rounding)
-        return self._kernels[order, form]
+        with self._making:
+            if (order, form) not in self._kernels:
+                known = self.graph, self.dimension, self._levels(order)
+                self._kernels[order, form] = IntervalKernel(*known, form=form, kind=self.rounding)
+            return self._kernels[order, form]
+
+    @property
+    def _continuity(self) -> IntervalKernel:
+        with self._making:
+            return self._continuity_kernel
 
     @cached_property
-    def _continuity(self) -> IntervalKernel:
+    def _continuity_kernel(self) -> IntervalKernel:
         known = self.graph, self.dimension, self._levels(0)
         return IntervalKernel(*known, continuity=True, kind=self.rounding)
+
+    @property
+    def _mean_value(self) -> tuple[IntervalKernel, list[int]]:
+        with self._making:
+            return self._mean_value_kernel
+
+    @cached_property
+    def _mean_value_kernel(self) -> tuple[IntervalKernel, list[int]]:
+        """The kernel of first derivatives in mean value form, and which are not zero."""
+        _, slopes, bends = self._levels(2)
+        entries, n = [e for e, a in enumerate(slopes) if a is not None], self.dimension
+        levels = [[slopes[e] for e in entries], [a for e in entries for a in bends[e * n :][:n]]]
+        known = self.graph, n, levels
+        return IntervalKernel(*known, form="mean value", kind=self.rounding), entries
 
     def _levels(self, order: int) -> list[list[int | None]]:
         """Return the nodes of values, first and second derivatives, None for structural zeros."""

@@ -161,15 +161,22 @@ class Lifted:
 
 
 @lru_cache(maxsize=256)
-def lifted_family(family: Family, used: frozenset[str]) -> Family:
-    """Return the used functions of a family as functions of its variables and parameters."""
-    if not family.parameters:
+def lifted_family(
+    family: Family, used: frozenset[str], chosen: frozenset[str] | None = None
+) -> Family:
+    """Return the used functions of a family as functions of its variables and parameters.
+
+    With ``chosen``, only these parameters become variables.
+    """
+    lifted = tuple(p for p in family.parameters if chosen is None or p in chosen)
+    if not lifted:
         return family
     names = tuple(name for name in family.names if name in used)
     source = family.key or family.program().digest()
-    key = repr(("parameters are variables", names, source))
-    symbols, held = family.variables + family.parameters, family.stationary
-    return Family(names, symbols, (), family.formulas, key, stationary=held)
+    key = repr(("parameters are variables", names, source, lifted))
+    rest = tuple(p for p in family.parameters if p not in lifted)
+    symbols, held = family.variables + lifted, family.stationary
+    return Family(names, symbols, rest, family.formulas, key, family.unit, stationary=held)
 
 
 def partial_derivatives(function: SmoothFunction, point: Array, rates: Rates) -> Array:

@@ -94,6 +94,8 @@ def test_random_formulas_lie_in_their_enclosures(expression, seed):
     found = BoxFunctions(members, M2, rounding=KINDS[seed % len(KINDS)]).hessians(lo, hi)
     assert not any(np.isnan(bound).any() for bound in found)
     assert missed(members, M2, found, inside(rng, lo, hi)) == []
+    sharper = BoxFunctions(members, M2).mean_value_gradients(lo, hi)
+    assert missed(members, M2, (*found[:2], *sharper), inside(rng, lo, hi)) == []
 
 
 def test_small_boxes_are_enclosed_about_as_tightly_as_in_ball_arithmetic():
@@ -134,6 +136,9 @@ def test_branches_are_enclosed(expression):
         found = F.gradients(lo, hi, **{form: True})
         for _ in range(4):
             assert missed(members, M2, found[:2], inside(rng, lo, hi)) == []
+    sharper = F.mean_value_gradients(lo, hi)
+    for _ in range(4):
+        assert missed(members, M2, (*found[:2], *sharper), inside(rng, lo, hi)) == []
 
 
 def test_continuous_patterns_are_sharp_and_known_to_be_continuous():
@@ -148,6 +153,32 @@ def test_continuous_patterns_are_sharp_and_known_to_be_continuous():
     apart = np.array([[0.5, 4.5]]), np.array([[1.0, 5.0]])
     assert F.continuous(*apart).all()
     assert F.values(*apart)[0][0, 5] == F.values(*apart)[1][0, 5] == 0
+
+
+def test_mean_value_gradients_are_narrow_where_they_are_smooth_and_the_natural_ones_elsewhere():
+    cubic, kink, line = (x - y) ** 3 - 3 * (x - y), sp.Abs(x) * y, sp.Integer(2) + y
+    F = compiled(cubic, kink, line)
+    lo, hi = np.array([[0.9, 0.1], [-1.0, 0.1]]), np.array([[1.1, 0.2], [2.0, 0.2]])
+    *_, low, high = F.gradients(lo, hi)
+    found, above = F.mean_value_gradients(lo, hi)
+    assert (found >= low).all()
+    assert (above <= high).all()
+    # at the middle 3 u^2 - 3 with u = 0.85; on the box |6 u| <= 6, sides are 0.2 and 0.1
+    assert above[0, 0, 0] - found[0, 0, 0] <= 6 * 0.3 + 1e-9
+    assert found[1, 1].tolist() == low[1, 1].tolist()  # the kink is on this box
+    assert above[1, 1].tolist() == high[1, 1].tolist()
+    assert found[:, 2].tolist() == above[:, 2].tolist() == [[0, 1]] * 2
+    assert compiled(sp.Integer(3)).mean_value_gradients(lo, hi)[0].tolist() == [[[0, 0]]] * 2
+
+
+def test_mean_value_gradients_approach_the_range_with_the_square_of_the_width():
+    f, middle, excess = sp.sin(3 * x * y) * x, np.array([[0.4, 0.7]]), []
+    unit = np.stack(np.meshgrid(*[np.linspace(-1, 1, 41)] * 2), axis=-1).reshape(-1, 2)
+    for width in (0.02, 0.01, 0.005):
+        low, high = compiled(f).mean_value_gradients(middle - width, middle + width)
+        slopes = functions(f)[0].gradient(middle + width * unit)
+        excess.append(float((high - low - np.ptp(slopes, axis=0)).max()))
+    assert excess[0] > 3 * excess[1] > 9 * excess[2] > 0
 
 
 def test_gradients_where_no_branch_is_decided_contain_those_of_both_sides():

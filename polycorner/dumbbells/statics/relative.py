@@ -51,6 +51,7 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -133,9 +134,11 @@ class RelativePlacements(Value):
     def polyhedron(self) -> Polyhedron:
         """Four ball-ball and four ball-rod gaps, and five ways for the rods not to cross."""
         gaps, ways = self._formulas()
+        names, values = zip(*self.parameters.items(), strict=True)
+        family = Family.of(gaps | ways, self.manifold.names, names)
         functions = {
-            name: SmoothFunction.quantity(name, formula, self.manifold)
-            for name, formula in (gaps | ways).items()
+            name: SmoothFunction.member(family, name, self.manifold, parameters=values)
+            for name in family.names
         }
         sides = [
             AllOf(functions[f"{sign}{first}"], functions[f"{sign}{second}"])
@@ -147,20 +150,28 @@ class RelativePlacements(Value):
             AllOf(*[functions[name] for name in gaps], AnyOf(functions["apart"], *sides)),
         )
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The sizes in the formulas by name: ``l``, ``r``, ``t``, and ``rho`` in the drum."""
+        sizes = {"l": self.pair.length, "r": self.pair.ball_radius, "t": self.pair.rod_radius}
+        return sizes if self.pair.is_plane else sizes | {"rho": self.pair.centre_radius}
+
     @cached_property
     def energy(self) -> SmoothFunction:
         """``2 (rho^2 - d^2)``, half the sum of squared lateral positions in the plane, in mm^2."""
         import sympy
 
         x, _, alpha, beta = self.manifold.symbols
+        length, rho = sympy.symbols("l rho")
         if self.pair.is_plane:
-            half = sympy.Rational(self.pair.length) / 2
-            formula = 2 * x**2 + half**2 * (sympy.sin(alpha) ** 2 + sympy.sin(beta) ** 2)
+            sines = sympy.sin(alpha) ** 2 + sympy.sin(beta) ** 2
+            formula = 2 * x**2 + length**2 / 4 * sines
         else:
-            rho = sympy.Rational(self.pair.centre_radius)
-            (s, c), (u, d) = self._half_chord(alpha), self._half_chord(beta)
+            (s, c), (u, d) = _half_chord(alpha), _half_chord(beta)
             formula = rho**2 * (1 - c * d + (s**2 + u**2) / 2 + 2 * c * d * sympy.sin(x) ** 2)
-        return SmoothFunction("trough", formula, self.manifold, unit="mm^2")
+        known = {str(symbol) for symbol in formula.free_symbols}
+        sizes = {name: value for name, value in self.parameters.items() if name in known}
+        return SmoothFunction("trough", formula, self.manifold, parameters=sizes, unit="mm^2")
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:
@@ -183,8 +194,7 @@ class RelativePlacements(Value):
         """Return the gaps, and the functions whose signs say that the rods do not cross."""
         import sympy
 
-        sizes = (self.pair.length, self.pair.ball_radius, self.pair.rod_radius)
-        length, r, t = (sympy.Rational(size) for size in sizes)
+        length, r, t = sympy.symbols("l r t")
         half = length / 2
         centre, axis = self._axes()
         ends = {
@@ -221,19 +231,20 @@ class RelativePlacements(Value):
                 centre[k] = (sign * x, sign * y / 2, sympy.S.Zero)
                 axis[k] = (across, along, sympy.S.Zero)
             else:
-                depth = sympy.Rational(self.pair.centre_radius) * self._half_chord(heading)[1]
+                depth = sympy.Symbol("rho") * _half_chord(heading)[1]
                 sine, cosine = sign * sympy.sin(x), sympy.cos(x)
                 centre[k] = (depth * sine, sign * y / 2, -depth * cosine)
                 axis[k] = (across * cosine, along, across * sine)
         return centre, axis
 
-    def _half_chord(self, heading: "sympy.Expr") -> "tuple[sympy.Expr, sympy.Expr]":
-        """Return sine and cosine of half the angle that a dumbbell's balls subtend."""
-        import sympy
 
-        rho = sympy.Rational(self.pair.centre_radius)
-        sine = sympy.Rational(self.pair.length) / (2 * rho) * sympy.sin(heading)
-        return sine, sympy.sqrt(1 - sine**2)
+def _half_chord(heading: "sympy.Expr") -> "tuple[sympy.Expr, sympy.Expr]":
+    """Return sine and cosine of half the angle that a dumbbell's balls subtend."""
+    import sympy
+
+    length, rho = sympy.symbols("l rho")
+    sine = length / (2 * rho) * sympy.sin(heading)
+    return sine, sympy.sqrt(1 - sine**2)
 
 
 def _turn_a(q: Array) -> Array:

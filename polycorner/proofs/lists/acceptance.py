@@ -13,8 +13,8 @@ For a branch whose open functions in a part of ``X`` are a subset of ``A`` this 
 candidate, and none if the subset is proper.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,6 +48,7 @@ TIGHT = 70  # binary digits of a solution after which it is sharp enough
 WIDENINGS = 3  # of a box towards the shape of its image
 MOST_WIDENING = 64.0
 GROWTH = 1.25
+LOOSENESS = 0.01  # of enclosures of points that parameters move, relative to their width
 GUESSED = (1.0, 0.7, 0.4)  # shares of a guessed box that are tried, as balls are the wider bounds
 SLACK = 16  # last binary digits of a multiplier that its enclosure covers at least
 WIDEST = 2.0  # reach of the widest box that is tried, in scale units
@@ -91,12 +92,15 @@ class Faces:
     free : tuple of int
         Positions of the coordinates that are free.
     scales : (n,) array
+    held : mapping from int to (float, float)
+        The sides of parameters; boxes contain them.
     """
 
     formulas: Formulas
     inequalities: int
     free: tuple[int, ...]
     scales: Array
+    held: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
     def rows(self, active: Sequence[int]) -> tuple[int, ...]:
         """Return the rows of a face: active inequalities, equations, energy."""
@@ -113,7 +117,7 @@ class Faces:
         rows = self.rows(active)
         with precision(BITS):
             for reach in [share * guess for share in GUESSED] if guess is not None else ():
-                shown = self._shown(q - reach, q + reach, rows, len(active))
+                shown = self._shown(*self._sides(q, reach), rows, len(active))
                 if isinstance(shown, Region):
                     return shown
             for power in range(QUARTERINGS):
@@ -130,14 +134,20 @@ class Faces:
         radii = np.zeros_like(q)
         radii[list(self.free)] = reach * self.scales[list(self.free)]
         for _ in range(WIDENINGS):
-            lower, upper = q - radii, q + radii
-            found = self._shown(lower, upper, rows, count)
+            found = self._shown(*self._sides(q, radii), rows, count)
             if found is None or isinstance(found, Region):
                 return found
             if (found > MOST_WIDENING * radii[list(self.free)]).any():
                 break
             radii[list(self.free)] = np.maximum(radii[list(self.free)], GROWTH * found)
         return None
+
+    def _sides(self, q: Array, radii: Array) -> tuple[Array, Array]:
+        """Return the ends of a box about ``q``, those of the parameters being given."""
+        lower, upper = q - radii, q + radii
+        for i, side in self.held.items():
+            lower[i], upper[i] = side
+        return lower, upper
 
     def _shown(
         self, lower: Array, upper: Array, rows: tuple[int, ...], count: int
@@ -167,6 +177,8 @@ class Faces:
         sharp = self._sharpened(forms, box, unknowns, image)
         index = self._index(start, len(rows) - 1)
         ends = np.array([outward(x) for x in sharp])
+        if self.held:  # so that others, who stop elsewhere, arrive within
+            ends += LOOSENESS * (ends[:, 1:] - ends[:, :1]) * np.array([-1.0, 1.0])
         return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
 
     def _at_centre(

@@ -11,7 +11,7 @@ from polycorner.proofs.lists.acceptance import WIDEST
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.candidates import active_sets, newton
 from polycorner.proofs.lists.examination import Examined
-from polycorner.proofs.lists.known import Known
+from polycorner.proofs.lists.known import Known, Tried
 from polycorner.proofs.lists.loci import locus
 from polycorner.proofs.lists.screening import Screen
 from polycorner.proofs.lists.settings import Setting
@@ -22,11 +22,9 @@ Mapped: TypeAlias = Callable[..., Iterable[Any]]
 ATTEMPTS = 1024  # candidates that are tried in one round
 WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 EVERY = 2  # bisections of every coordinate between two attempts at a box
-SAME = 1e-9  # distance in scale units below which candidates are the same
 LOCUS = (-1,)  # in place of the functions of a face
 COARSE = 1e-7  # distance in scale units below which only one of several candidates is tried
-MANY = 16  # candidates for which it is worth compiling second derivatives
-AGAIN = 1 / 64  # of the widest region that was tried in vain: a smaller one is worth trying
+MANY = 48  # candidates for which it is worth compiling second derivatives
 
 
 @dataclass
@@ -48,7 +46,10 @@ class Attempts:
 
     setting: Setting
     known: Known
-    failed: dict[tuple[int, ...], list[tuple[Array, float]]] = field(default_factory=dict)
+    failed: Tried = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.failed = Tried(self.setting.problem.scales)
 
     def at(self, examined: Sequence[Examined], mapped: Mapped = map) -> None:
         """Try boxes in which no candidate was tried for some bisections, longest ago first.
@@ -113,11 +114,11 @@ class Attempts:
             return
         points, _, found = newton(setting.problem, starts.q, [], z)
         for q in points[found]:
-            if self.known.has_value(q[list(z)]) or self._in_vain(q, LOCUS, WIDEST):
+            if self.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue
-            place = locus(setting.faces.formulas, z, q, setting.problem.scales)
+            place = locus(setting.faces.formulas, z, q, setting.problem.scales, setting.domain.held)
             if place is None:
-                self.failed.setdefault(LOCUS, []).append((q, WIDEST))
+                self.failed.add(LOCUS, q, WIDEST)
             elif not self.known.has_locus(place):
                 self.known.loci.append(place)
 
@@ -152,17 +153,9 @@ class Attempts:
             else:
                 region = self.setting.faces.region(q, active, size, guess)
             if region is None:
-                self.failed.setdefault(active, []).append((q, size))
+                self.failed.add(active, q, size)
             else:
                 self.known.add(region)
 
     def _is_new(self, q: Array, active: tuple[int, ...], widest: float) -> bool:
-        return not self.known.has(q, frozenset(active)) and not self._in_vain(q, active, widest)
-
-    def _in_vain(self, q: Array, active: tuple[int, ...], widest: float) -> bool:
-        """Whether regions of about this size were tried at a point before."""
-        close = SAME * self.setting.problem.scales
-        return any(
-            AGAIN * size < widest <= size and (abs(q - point) <= close).all()
-            for point, size in self.failed.get(active, ())
-        )
+        return not self.known.has(q, frozenset(active)) and not self.failed.has(active, q, widest)

@@ -8,7 +8,8 @@ these points is stationary.  By Gordan's theorem of the alternative ([Mangasaria
 ``v`` exists for the middles ``a_i`` of the enclosures unless 0 lies in their convex hull; with
 radii ``rho_i`` in the Euclidean norm it exists if and only if the convex hull of ``a_i / rho_i``
 has no point in the unit ball, and the point of the hull nearest to 0 is one.  It is found by the
-algorithm of Mitchell, Dem'yanov and Malozemov [MDM], which ends as soon as it has an answer.
+algorithm of Mitchell, Dem'yanov and Malozemov [MDM], which ends as soon as it has an answer.  If
+there is none in the units of the coordinates, others are tried, along which enclosures are as wide.
 
 The search for ``v`` is ordinary floating-point arithmetic; what is verified is verified with bounds
 of all rounding errors: a sum of ``n`` products is off by at most ``(n + 2) 2^-52`` times the sum of
@@ -24,6 +25,7 @@ compiled = linked()
 MOST_ROUNDS = np.int64(400)
 UNIT = 2.0**-52
 TINY = 2.0**-1000
+LEAST_WIDTH = 1e-4  # of enclosures along a coordinate, relative to the widest
 LEAST_RADIUS = 1e-9  # relative to the gradient: nearer than this 0 counts as in the hull
 
 
@@ -217,8 +219,48 @@ def inverted(a, inverse):
 
 
 @compiled
-def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v, spread, w):
-    """Find and verify a direction for one box and branch; see :func:`directions`."""
+def adapted(low, high, rows, count, scales, units):
+    """Set units in which the enclosures are about as wide along each coordinate.
+
+    A ball in these units then holds little more than the enclosures.  Widths count relative to the
+    length of their gradient.
+    """
+    n, widest = scales.size, 0.0
+    units[:] = 0.0
+    for i in range(count):
+        size = TINY
+        for j in range(n):
+            size += (0.5 * (low[rows[i], j] + high[rows[i], j]) * scales[j]) ** 2
+        for j in range(n):
+            width = 0.5 * (high[rows[i], j] - low[rows[i], j]) * scales[j] / np.sqrt(size)
+            units[j] = max(units[j], width)
+            widest = max(widest, width)
+    for j in range(n):
+        units[j] = scales[j] / (units[j] + LEAST_WIDTH * widest + TINY)
+
+
+@compiled
+def one(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v, spread, w, units):
+    """Find and verify a direction for one box and branch; see :func:`directions`.
+
+    In the units that are given, or else in units that are adapted to the enclosures.
+    """
+    if attempt(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v, spread, w):
+        return True
+    count = np.int64(energy_sign != 0.0)
+    for k in range(mask.size):
+        count += mask[k]
+    if count < 2:
+        return False
+    adapted(low, high, rows, count, scales, units)
+    return attempt(
+        low, high, mask, equations, units, energy_sign, a, rho, rows, basis, v, spread, w
+    )
+
+
+@compiled
+def attempt(low, high, mask, equations, scales, energy_sign, a, rho, rows, basis, v, spread, w):
+    """Find and verify a direction that is nearly as far as possible from failing, in some units."""
     m, n = mask.size, scales.size
     if equations and not orthonormal(low, high, m, scales, basis):
         return False

@@ -26,16 +26,20 @@ class Domain(Value):
     manifold : Manifold
     lower, upper : (n,) arrays
         Its sides; equal for coordinates that are fixed.
+    parameters : tuple of int
+        Positions of parameters: what is shown is shown for each of their values.
     """
 
     manifold: Manifold
     lower: Array
     upper: Array
+    parameters: tuple[int, ...] = ()
 
     @cached_property
     def free(self) -> tuple[int, ...]:
-        """Positions of the coordinates that are not fixed."""
-        return tuple(np.flatnonzero(self.lower < self.upper).tolist())
+        """Positions of the coordinates that are neither fixed nor parameters."""
+        places = np.flatnonzero(self.lower < self.upper).tolist()
+        return tuple(i for i in places if i not in self.parameters)
 
     @cached_property
     def fixed(self) -> tuple[int, ...]:
@@ -44,8 +48,15 @@ class Domain(Value):
 
     @cached_property
     def units(self) -> Array:
-        """The scales of the coordinates, 0 for those that are fixed, ``(n,)``."""
-        return np.where(self.lower < self.upper, self.manifold.scale_array, 0.0)
+        """The scales of the free coordinates, 0 for the others, ``(n,)``."""
+        units = np.zeros(len(self.lower))
+        units[list(self.free)] = self.manifold.scale_array[list(self.free)]
+        return units
+
+    @property
+    def held(self) -> dict[int, tuple[float, float]]:
+        """The sides of the parameters, by position."""
+        return {i: (float(self.lower[i]), float(self.upper[i])) for i in self.parameters}
 
     def misses(self, lower: Array, upper: Array, places: Sequence[int]) -> bool:
         """Whether a box in some coordinates lies outside, circles that are whole apart."""

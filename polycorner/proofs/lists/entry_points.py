@@ -43,12 +43,13 @@ def _direction_search(sources: str) -> Any:
         weights = np.zeros((items, m + 1))
         a, rho, rows = np.zeros((m + 1, n)), np.zeros(m + 1), np.zeros(m + 1, np.int64)
         basis, spread, w = np.zeros((equations, n)), np.zeros(n), np.zeros(m + 1)
+        units = np.zeros(n)
         for item in range(items):
             lo, hi = low[boxes[item]], high[boxes[item]]
             w[:] = 0.0
             found[item] = one(
                 lo, hi, masks[item], equations, scales, energy_sign,
-                a, rho, rows, basis, v[item], spread, w,
+                a, rho, rows, basis, v[item], spread, w, units,
             )  # fmt: skip
             count = 0
             for k in range(m):

@@ -1,7 +1,7 @@
 """The search for all stationary points, its symmetries, and what is made of the regions found."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -12,12 +12,14 @@ from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
+from polycorner.proofs.arguments import check_parameters
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
 from polycorner.proofs.lists.members import OPEN, Listed, Member, full, images, moved, settled
 from polycorner.proofs.lists.multiples import without_multiples
+from polycorner.proofs.lists.parameters import with_parameters
 from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Search
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     import os
 
     from polycorner.minimisation.problem import Energy
+    from polycorner.proofs.parameter_boxes import Interval
 
 S = TypeVar("S", bound=Search)
 RESOLUTION = 1e-6
@@ -41,6 +44,7 @@ def stationary_points(
     *,
     box: Any,
     symmetry: Symmetry | None = None,
+    parameters: "Mapping[str, Interval] | None" = None,
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
@@ -71,6 +75,10 @@ def stationary_points(
         Its ``elements`` (signed permutations of the coordinates with shifts by half periods) have
         to preserve ``D``, ``E`` and the box, which is checked with the formulas; only a
         part of the box that contains a point of each orbit is then searched.
+    parameters : mapping from str to (float, float), optional
+        Intervals of parameters of the functions, by name.  What is proved then holds for each of
+        their values: one stationary point in each listed box, and no others.  Wide intervals leave
+        boxes undecided; divide them.
     resolution : float, optional
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
@@ -111,7 +119,7 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(polyhedron, energy, box, symmetry, resolution)
+    search = prepared(polyhedron, energy, box, symmetry, resolution, parameters)
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
@@ -135,14 +143,19 @@ def stationary_points(
     finally:
         if kept:
             kept.close()
-    return listed(search)
+    return listed(search, pose(polyhedron, energy))
 
 
 def prepared(
-    polyhedron: Polyhedron, energy: "Energy", box: Any, symmetry: Symmetry | None, resolution: float
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    box: Any,
+    symmetry: Symmetry | None,
+    resolution: float,
+    parameters: "Mapping[str, Interval] | None" = None,
 ) -> Search:
     """Return a search that has not begun, after checking its arguments."""
-    return begun(Search, polyhedron, energy, box, symmetry, resolution)
+    return begun(Search, polyhedron, energy, box, symmetry, resolution, parameters)
 
 
 def begun(
@@ -152,14 +165,20 @@ def begun(
     box: Any,
     symmetry: Symmetry | None,
     resolution: float,
+    parameters: "Mapping[str, Interval] | None" = None,
 ) -> S:
     """Return a search of some kind, after checking its arguments."""
-    checks.instance("polyhedron", polyhedron, Polyhedron)
+    problem = pose(polyhedron, energy)
     found = domain(polyhedron.manifold, box)
-    problem = pose(without_multiples(polyhedron), energy)
     checks.real("resolution", resolution, above=0)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
+    sides = check_parameters(problem, parameters)[0]
+    if sides:
+        problem, found, symmetry = with_parameters(problem, found, symmetry, sides)
+    reduced = without_multiples(problem.polyhedron)  # for all values of the parameters
+    if reduced is not problem.polyhedron:
+        problem = pose(reduced, problem.energy)
     motions, maps = _motions(problem, found, symmetry)
     search = kind(problem, found, resolution, motions=motions, maps=maps)
     _check_fixed(search, symmetry)
@@ -199,8 +218,8 @@ def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:
         )
 
 
-def listed(search: Search) -> StationaryList:
-    """Return what a search found."""
+def listed(search: Search, problem: Problem) -> StationaryList:
+    """Return what a search found for a problem, in whose coordinates parameters are left out."""
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
     known, orbits, members = Listed(search), 0, settled(search)
@@ -221,12 +240,14 @@ def listed(search: Search) -> StationaryList:
         orbits += 1
     rng = np.random.default_rng(0)
     loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    n, names = problem.dimension, search.domain.manifold.names
     return StationaryList(
-        search.problem,
-        search.domain,
+        problem,
+        Domain(problem.polyhedron.manifold, search.domain.lower[:n], search.domain.upper[:n]),
+        {names[i]: side for i, side in search.domain.held.items()},
         tuple(points),
         loci,
-        undecided(search),
+        undecided(search)[:, :, :n],
         tuple(open_points),
         search.tally,
         record(search, members),
@@ -273,4 +294,5 @@ def _point(search: Search, member: Member, orbit: int) -> StationaryPoint:
     active = tuple(d.names[i] for i in region.active)
     ends = zip(region.sharp_lower[n:].tolist(), region.sharp_upper[n:].tolist(), strict=True)
     multipliers = dict(zip((*active, *d.equation_names), ends, strict=True))
-    return StationaryPoint(lower, upper, active, multipliers, region.index, orbit, more)
+    some = slice(0, len(lower) - len(search.domain.parameters))
+    return StationaryPoint(lower[some], upper[some], active, multipliers, region.index, orbit, more)

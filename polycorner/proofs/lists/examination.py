@@ -80,8 +80,8 @@ class Examined:
         return np.flatnonzero(~self.done[self.rest.items])
 
 
-def examine(setting: Setting, known: Known, boxes: Boxes) -> Examined:
-    """Close what can be closed in some boxes."""
+def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examined:
+    """Close what can be closed in some boxes; ``sharp``: by second derivatives, too."""
     gone = np.zeros(len(boxes), dtype=np.bool_)
     if setting.motions:
         gone = dropped(boxes.lower, boxes.upper, setting.motions, setting.weights, setting.domain)
@@ -92,7 +92,17 @@ def examine(setting: Setting, known: Known, boxes: Boxes) -> Examined:
     meets = np.all((v_lo[:, m : m + k] <= 0) & (v_hi[:, m : m + k] >= 0), axis=1)
     where, masks = items(setting.conj, v_hi[:, :m] < 0, v_lo[:, :m] > 0)
     where, masks = where[meets[where]], masks[meets[where]]
-    found, v, weights = directions(g_lo, g_hi, where, masks, k, setting.domain.units, -1.0)
+    units = setting.domain.units
+    found, v, weights = directions(g_lo, g_hi, where, masks, k, units, -1.0)
+    left = np.flatnonzero(~found)
+    if sharp and left.size:
+        which = np.unique(where[left])
+        g_lo[which], g_hi[which] = setting.functions.mean_value_gradients(
+            boxes.lower[which], boxes.upper[which]
+        )
+        found[left], v[left], weights[left] = directions(
+            g_lo, g_hi, where[left], masks[left], k, units, -1.0
+        )
     continuous = setting.functions.continuous(boxes.lower, boxes.upper)[where]
     smooth: Mask = np.all(continuous[:, :m] | ~masks, axis=1)
     smooth &= np.all(continuous[:, m:], axis=1)
@@ -102,8 +112,8 @@ def examine(setting: Setting, known: Known, boxes: Boxes) -> Examined:
         steep = 0.5 * (g_lo[where[rest]] + g_hi[where[rest]]) * problem.scales
         pulls = np.linalg.norm(steep[:, [*range(m), -1]], axis=2)
     some = where[rest] if setting.may_have_loci else where[:0]
-    left = Rest(rest, weights[rest], pulls, smooth[rest], g_lo[some], g_hi[some])
-    examined = Examined(images, boxes, where, masks, found.copy(), found, v, left)
+    kept = Rest(rest, weights[rest], pulls, smooth[rest], g_lo[some], g_hi[some])
+    examined = Examined(images, boxes, where, masks, found.copy(), found, v, kept)
     reconsider(setting, known, examined)
     return examined
 

@@ -9,6 +9,8 @@ from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.loci import Locus
 from polycorner.spaces.manifold import Array
 
+SAME = 1e-9  # distance in scale units below which points are the same
+AGAIN = 1 / 64  # of the widest region that was tried in vain: a smaller one is worth trying
 FIRST = 64  # rows that a growing array has room for
 
 
@@ -58,6 +60,31 @@ class Sides:
         return found[:, : self.width], found[:, self.width :]
 
 
+class Tried:
+    """Points about which regions were tried in vain, by active functions, and the widest reach."""
+
+    def __init__(self, scales: Array) -> None:
+        self.scales = scales
+        self._rows: dict[tuple[int, ...], Rows] = {}
+
+    def add(self, active: tuple[int, ...], q: Array, widest: float) -> None:
+        """Add a point."""
+        rows = self._rows.setdefault(active, Rows(len(q) + 1))
+        rows.add(np.append(q, widest))
+
+    def has(self, active: tuple[int, ...], q: Array, widest: float) -> bool:
+        """Whether regions of about this size were tried at this point before."""
+        if active not in self._rows:
+            return False
+        found = self._rows[active].array
+        near = (abs(found[:, :-1] - q) <= SAME * self.scales).all(axis=1)
+        return bool((near & (found[:, -1] * AGAIN < widest) & (widest <= found[:, -1])).any())
+
+    def items(self) -> list[tuple[tuple[int, ...], list[list[float]]]]:
+        """Return the points with their reach, ``n + 1`` numbers each, by active functions."""
+        return [(active, rows.array.tolist()) for active, rows in self._rows.items()]
+
+
 class Known:
     """Regions and loci, in the order in which they were found.
 
@@ -65,21 +92,26 @@ class Known:
     ----------
     dimension, inequalities : int
         ``n`` and ``m``.
+    parameters : tuple of int
+        Positions of parameters, which have the same sides in all boxes and regions.
     """
 
-    def __init__(self, dimension: int, inequalities: int) -> None:
+    def __init__(self, dimension: int, inequalities: int, parameters: tuple[int, ...] = ()) -> None:
         self.regions: list[Region] = []
         self.loci: list[Locus] = []
         self._sides = Sides(dimension)
         self._all = Rows(2 * dimension + inequalities)
         self._dimension = dimension
+        self._parameters = list(parameters)
 
     def add(self, region: Region) -> None:
         """Add a region."""
         self.regions.append(region)
         self._sides.add(frozenset(region.active), region.lower, region.upper)
         row = np.zeros(self._all.width)
-        row[: 2 * self._dimension] = np.concatenate([region.lower, region.upper])
+        sides = np.array([region.lower, region.upper])
+        sides[:, self._parameters] = 0.0  # of no account
+        row[: 2 * self._dimension] = sides.ravel()
         row[[2 * self._dimension + i for i in region.active]] = 1.0
         self._all.add(row)
 

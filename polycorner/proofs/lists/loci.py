@@ -12,7 +12,9 @@ descends, and for a large ``K`` it leads into the set: the point is not stationa
 the energy has no derivative.  The stationary points in the box are therefore those with ``z = z*``.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -64,14 +66,23 @@ def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ..
     return tuple(i for i in free if i in read)
 
 
-def locus(formulas: Formulas, z: tuple[int, ...], q: Array, scales: Array) -> Locus | None:
-    """Return the widest locus tried about ``q``, where the energy's derivative nearly vanishes."""
+def locus(
+    formulas: Formulas,
+    z: tuple[int, ...],
+    q: Array,
+    scales: Array,
+    held: Mapping[int, tuple[float, float]] = MappingProxyType({}),
+) -> Locus | None:
+    """Return the widest locus tried about ``q``, where the energy's derivative nearly vanishes.
+
+    It is one for all values of the parameters, with their sides ``held``.
+    """
     units = scales[list(z)]
     with precision(BITS):
         for power in range(QUARTERINGS):
-            shown = _shown(formulas, z, q, units * WIDEST / 4**power)
+            shown = _shown(formulas, z, q, units * WIDEST / 4**power, held)
             if shown is not None:
-                sharp = _shown(formulas, z, q, units * SHARP)
+                sharp = _shown(formulas, z, q, units * SHARP, held)
                 return replace(
                     shown,
                     sharp_lower=(sharp or shown).sharp_lower,
@@ -80,10 +91,18 @@ def locus(formulas: Formulas, z: tuple[int, ...], q: Array, scales: Array) -> Lo
     return None
 
 
-def _shown(formulas: Formulas, z: tuple[int, ...], q: Array, radii: Array) -> Locus | None:
+def _shown(
+    formulas: Formulas,
+    z: tuple[int, ...],
+    q: Array,
+    radii: Array,
+    held: Mapping[int, tuple[float, float]],
+) -> Locus | None:
     places = list(z)
     lower, upper = q[places] - radii, q[places] + radii
     hull = [ball(x) for x in q.tolist()]
+    for i, side in held.items():
+        hull[i] = between(*side)
     for i, a, b in zip(places, lower.tolist(), upper.tolist(), strict=True):
         hull[i] = between(a, b)
     row = len(formulas.names) - 1

@@ -182,7 +182,7 @@ def judged(search: Search, region: Region) -> Member:
 def placed(search: Search, region: Region) -> Place:
     """Return the point of a region, enclosed as well as its functions allow."""
     rows = search.vertices.rows(region.active)
-    unique = len(rows) == len(search.domain.free)
+    unique = len(rows) == len(search.domain.free) and not search.domain.parameters
     lower, upper = full(search, region)
     with precision(BITS):
         point = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]

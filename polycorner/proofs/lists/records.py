@@ -168,6 +168,7 @@ def posed(record: "Record | Search") -> dict[str, Any]:
         "outputs": outputs,
         "domain": {"lower": _hex(domain.lower), "upper": _hex(domain.upper)},
         "fixed": list(domain.fixed),
+        "parameters": list(domain.parameters),
         "symmetries": [_motion(g) for g in record.motions],
         "weights": _hex(record.weights),
     }

@@ -45,9 +45,13 @@ class Screen:
         problem, m = self.setting.problem, self.setting.problem.inequalities
         self.rows = [*self.active, *range(m, problem.rows - 1), problem.rows - 1]
         self.free = list(self.setting.domain.free)
-        lower, upper = self.q, self.q
-        self.values, gradients, hessians = self._bounds(lower, upper)
-        self.start = gradients[0], hessians[0]
+        values, slopes, bends = problem.evaluate(self.q, 2)
+        free, units = self.free, problem.scales[self.free]
+        self.values = values[:, self.rows[:-1]]
+        self.start = (
+            slopes[:, self.rows][:, :, free] / units,
+            bends[:, self.rows][:, :, free][:, :, :, free] / np.outer(units, units),
+        )
 
     def radii(self, widest: Array) -> Array:
         """Return the radii ``(B, n)`` of the widest boxes that pass, NaN where none does."""
@@ -79,23 +83,24 @@ class Screen:
                 break
         return found
 
-    def _bounds(self, lower: Array, upper: Array) -> tuple[Array, Sides, Sides]:
-        """Return values in the middle, and middles and radii of derivatives of the face's rows."""
-        v_lo, v_hi, *ends = self.setting.functions.hessians(lower, upper)
+    def _bounds(self, lower: Array, upper: Array) -> tuple[Sides, Sides]:
+        """Return middles and radii of derivatives of the face's rows."""
+        ends = self.setting.functions.mean_value_gradients(lower, upper, hessians=True)
         g_lo, g_hi = (side[:, self.rows][:, :, self.free] for side in ends[:2])
         h_lo, h_hi = (side[:, self.rows][:, :, self.free][:, :, :, self.free] for side in ends[2:])
-        values = 0.5 * (v_lo + v_hi)[:, self.rows[:-1]]
         with np.errstate(all="ignore"):
             middles = [0.5 * (low + high) for low, high in ((g_lo, g_hi), (h_lo, h_hi))]
             radii = [0.5 * (high - low) for low, high in ((g_lo, g_hi), (h_lo, h_hi))]
-        return values, (middles[0], radii[0]), (middles[1], radii[1])
+        return (middles[0], radii[0]), (middles[1], radii[1])
 
     def _images(self, which: NDArray[np.intp], radii: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return radii of the images of boxes about some points, and whether these pass."""
         reach = np.zeros((len(which), self.q.shape[1]))
         reach[:, self.free] = radii
+        for i, (low, high) in self.setting.domain.held.items():
+            reach[:, i] = 0.5 * (high - low)
         q, n, k = self.q[which], len(self.free), len(self.active)
-        _, (g, g_rad), (h, h_rad) = self._bounds(q - reach, q + reach)
+        (g, g_rad), (h, h_rad) = self._bounds(q - reach, q + reach)
         fine = np.isfinite(g_rad).all(axis=(1, 2)) & np.isfinite(h_rad).all(axis=(1, 2, 3))
         images, sure = np.full_like(radii, np.nan), np.zeros(len(which), dtype=np.bool_)
         which, g, g_rad, h, h_rad = which[fine], g[fine], g_rad[fine], h[fine], h_rad[fine]

@@ -37,6 +37,7 @@ from polycorner.spaces.manifold import Array
 CHUNKS = 8  # that a round consists of
 CHUNK = 4096  # boxes in a chunk, at most
 LEAST = 256  # boxes in a chunk, if there are as many
+SHARP = 20_000  # boxes after which it is worth compiling second derivatives
 NUMBERS = 1 << 20  # bounds of derivatives in a chunk, at most
 
 
@@ -77,7 +78,9 @@ class Search(Setting):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.known = Known(self.problem.dimension, self.problem.inequalities)
+        self.known = Known(
+            self.problem.dimension, self.problem.inequalities, self.domain.parameters
+        )
         self.attempts = Attempts(self, self.known)
         lower, upper = self.domain.lower[None].copy(), self.domain.upper[None].copy()
         start = np.zeros(1, dtype=np.int64)
@@ -118,14 +121,14 @@ class Search(Setting):
     def _compile(self) -> None:
         """Compile or load what threads would each compile by themselves."""
         first = self.waiting.part(slice(0, 1))
-        examine(self, self.known, first)
+        examine(self, self.known, False, first)
         for count in (1, MANY):
             self.problem.evaluate(np.repeat(first.middles, count, axis=0), 2)
 
     def round(self, mapped: Mapped = map) -> None:
         """Treat the last boxes that wait; ``mapped`` is like ``map``."""
-        chunks = self._chunks()
-        found = list(mapped(partial(examine, self, self.known), chunks))
+        chunks, sharp = self._chunks(), self.tally.boxes >= SHARP
+        found = list(mapped(partial(examine, self, self.known, sharp), chunks))
         regions, loci = len(self.regions), len(self.loci)
         self.attempts.at(found, mapped)
         if len(self.regions) > regions or len(self.loci) > loci:

@@ -59,7 +59,8 @@ class Setting:
         self.functions = BoxFunctions(self.problem.functions, manifold)
         formulas = Formulas(self.problem.functions, manifold)
         free = self.domain.free
-        self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales)
+        held = self.domain.held
+        self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales, held)
         vertices = formulas, self.problem.inequalities, self.equations, free, self.problem.scales
         self.vertices = Vertices(*vertices)
         self.conj = conjunctions(self.problem.polyhedron)

@@ -14,6 +14,7 @@ from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.loci import Locus
 from polycorner.proofs.lists.records import Record, save
 from polycorner.proofs.lists.search import Search, Tally
+from polycorner.proofs.parameter_boxes import Interval, shown_box
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -103,6 +104,9 @@ class StationaryList(Printed, Value):
         Polyhedron and energy.
     domain : Domain
         The box.
+    parameters : mapping from str to (float, float)
+        Intervals of parameters, or empty.  The list is one for each of their values: what is
+        enclosed is the point at all values, as a function of them.
     points : tuple of StationaryPoint
         Isolated ones, by orbit.
     loci : tuple of StationaryLocus
@@ -119,6 +123,7 @@ class StationaryList(Printed, Value):
 
     problem: Problem
     domain: Domain
+    parameters: "Mapping[str, Interval]"
     points: tuple[StationaryPoint, ...]
     loci: tuple[StationaryLocus, ...]
     undecided: Array
@@ -146,7 +151,16 @@ class StationaryList(Printed, Value):
 
     @cached_property
     def certificates(self) -> tuple[Certificate, ...]:
-        """Certificates at the middles of the isolated points."""
+        """Certificates at the middles of the isolated points.
+
+        Raises
+        ------
+        ValueError
+            For a list over intervals of parameters.
+        """
+        if self.parameters:
+            msg = "certificates: expected a list for one value of each parameter; got intervals"
+            raise ValueError(msg)
         d, energy = self.problem.polyhedron, self.problem.energy
         return tuple(certify(d, energy, p.point) for p in self.points)
 
@@ -163,6 +177,8 @@ class StationaryList(Printed, Value):
         """What is proved, in a sentence."""
         count, n = len(self.points), self.problem.dimension
         where = f"in the box ({n} coordinates)"
+        if self.parameters:
+            where += f" for all {shown_box(self.parameters)}"
         loci = f" and {len(self.loci)} loci" if self.loci else ""
         if self.complete:
             return (
@@ -177,12 +193,13 @@ class StationaryList(Printed, Value):
 
     def _sheet(self) -> Sheet:
         names = self.problem.polyhedron.manifold.names
-        head = ("", *names, "energy", "index", "active")
+        energies = () if self.parameters else ("energy",)
+        head = ("", *names, *energies, "index", "active")
         rows = tuple(
             (
                 str(k),
                 *(number(x) for x in p.point),
-                number(float(self.problem.energy.value(p.point))),
+                *(number(float(self.problem.energy.value(p.point))) for _ in energies),
                 "?" if p.index is None else str(p.index),
                 " ".join(p.active) or "none",
             )
@@ -194,7 +211,7 @@ class StationaryList(Printed, Value):
             ("loci", str(len(self.loci))),
             ("undecided volume", f"{self.undecided_volume:.1e}"),
         ]
-        numbers = tuple(range(len(names) + 3))
+        numbers = tuple(range(len(names) + len(energies) + 2))
         tables = [Table(head, rows, numbers)] if rows else []
         if self.loci:
             tables.append(self._locus_table())
@@ -254,4 +271,5 @@ def _sample(search: Search, place: Locus, rng: np.random.Generator) -> Array | N
     low = search.functions.values(lower, upper)[0][:, : search.problem.inequalities]
     missed = np.any((low <= 0)[:, None, :] & search.conj, axis=2)
     found: Any = np.flatnonzero(~np.all(missed, axis=1))
-    return 0.5 * (lower[found[0]] + upper[found[0]]) if found.size else None
+    some = slice(0, len(domain.lower) - len(domain.parameters))
+    return 0.5 * (lower[found[0], some] + upper[found[0], some]) if found.size else None

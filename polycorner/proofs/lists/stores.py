@@ -182,7 +182,8 @@ class Store:
             search.known.add(region_from(data))
         search.known.loci += map(locus_from, root["loci"])
         for active, tried in root["failed"]:
-            search.attempts.failed[tuple(active)] = [(np.array(q), size) for q, size in tried]
+            for *q, widest in tried:
+                search.attempts.failed.add(tuple(active), np.array(q), widest)
         self._files, self._marks = dict(root["files"]), search.tree.marks
         self._count = 1 + max(int(name.split("-")[1].split(".")[0]) for name in self._files)
 
@@ -214,12 +215,11 @@ def _stated(search: Search) -> dict[str, Any]:
 
 def _progress(search: Search) -> dict[str, Any]:
     """Return what is known; numbers are written with all their digits."""
-    failed = search.attempts.failed.items()
     return {
         "tally": asdict(search.tally),
         "regions": [region_data(region) for region in search.regions],
         "loci": [locus_data(place) for place in search.loci],
-        "failed": [[k, [[q.tolist(), size] for q, size in tried]] for k, tried in failed],
+        "failed": search.attempts.failed.items(),
     }
 
 

@@ -518,7 +518,7 @@ def test_derivatives_are_those_of_sympy(formula, monkeypatch):
 def stated(nodes, outputs, **more):
     """Return a problem without inequalities in the unit square, with its proof."""
     sides = {"lower": [(0.0).hex()] * 2, "upper": [(1.0).hex()] * 2}
-    empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed")}
+    empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed", "parameters")}
     data = {"format": problem.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
     data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
     return Proof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})

@@ -52,18 +52,19 @@ class Face:
         if active is None:
             self.descends()
 
-    def at(self, unknowns: list[arb]) -> list[arb]:
-        """Return all coordinates; those that are no unknowns may be anywhere in the domain."""
+    def at(self, unknowns: list[arb], middle: bool = False) -> list[arb]:
+        """Return all coordinates; others may be anywhere in the domain, or are in its middle."""
         known = dict(zip(self.places, unknowns, strict=False))
-        return [known.get(i, x) for i, x in enumerate(self.p.anywhere)]
+        rest = [x.mid() for x in self.p.anywhere] if middle else self.p.anywhere
+        return [known.get(i, x) for i, x in enumerate(rest)]
 
     def holds(self, lower: list[float], upper: list[float]) -> bool:
         ends = zip(self.lower, self.upper, self.places, strict=True)
         return all(a <= lower[i] and upper[i] <= b for a, b, i in ends)
 
-    def rows_at(self, unknowns: list[arb]) -> Any:
+    def rows_at(self, unknowns: list[arb], middle: bool = False) -> Any:
         """Return values of the functions, and gradients and Hessians in the free coordinates."""
-        v, memo = self.p.values(self.at(unknowns)), dict[int, Any]()
+        v, memo = self.p.values(self.at(unknowns, middle)), dict[int, Any]()
         found = [self.p.forms(v, row, memo, 2) for row in self.rows]
         if None in found:
             return None
@@ -89,9 +90,9 @@ class Face:
         more = [x + arb(0, 1) * (growth * x.rad() + (abs(x) + 1) / 2**100) for x in multipliers]
         return [*box, *more] if all(x > 0 for x in multipliers[: len(self.active)]) else None
 
-    def equations(self, unknowns: list[arb]) -> Any:
+    def equations(self, unknowns: list[arb], middle: bool = False) -> Any:
         """Return the residual of the KKT equations and their Jacobian."""
-        found = self.rows_at(unknowns)
+        found = self.rows_at(unknowns, middle)
         if found is None:
             return None
         values, slopes, bends = found
@@ -106,8 +107,12 @@ class Face:
         return [*residual, *values[:-1]], [*above, *([*row, *[ZERO] * len(rows)] for row in rows)]
 
     def negative(self) -> int | None:
-        """Return the negative eigenvalues on the tangent space: each row adds one of each sign."""
-        n, (_, jacobian) = len(self.places), self.equations(self.unknowns)
+        """Return the negative eigenvalues on the tangent space: each row adds one of each sign.
+
+        Krawczyk's operator shows that all Jacobians are regular: they have the inertia of one.
+        """
+        exact = [x.mid() for x in self.unknowns]
+        n, (_, jacobian) = len(self.places), self.equations(exact, middle=True)
         units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(jacobian))]
         # a symmetric matrix of the same inertia, whose eigenvalues are not multiple by structure
         signed = [

@@ -32,8 +32,10 @@ class Problem:
         self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
         self.anywhere = hull(self.lower, self.upper)
         self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]
-        self.free = [i for i in range(self.n) if self.widths[i] > 0]
-        need(data["fixed"] == [i for i in range(self.n) if i not in self.free], "fixed coordinates")
+        moving = [i for i in range(self.n) if self.widths[i] > 0]
+        need(data["fixed"] == [i for i in range(self.n) if i not in moving], "fixed coordinates")
+        need(set(data["parameters"]) <= set(moving), "parameters")
+        self.free = [i for i in moving if i not in data["parameters"]]
         self.periods = [number(p) if p else None for p in data["periods"]]
 
     def add(self, op: str, args: list[Any]) -> None:

@@ -32,7 +32,7 @@ class Proof:
     def closed(self, lower: list[float], upper: list[float], hints: list[Any]) -> bool:
         """Whether a box is closed rightly, or every piece of a bisection of it."""
         ways = [[arb(x) for x in h] for h in hints]
-        ways = [h for h in ways if all(h[i] == 0 or self.p.widths[i] for i in range(self.p.n))]
+        ways = [h for h in ways if all(h[i] == 0 or i in self.p.free for i in range(self.p.n))]
         waiting = [(lower, upper)]
         for _ in range(PIECES):
             lo, hi = waiting.pop()
