@@ -12,7 +12,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from polycorner import AllOf, AnyOf, Manifold, Polyhedron
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import corners, stationary_points
 from polycorner.proofs.lists.checker.__main__ import main
@@ -214,3 +214,29 @@ def test_corrupted_files_are_refused(change, tmp_path, capsys):
     assert main([str(path)]) == 1
     flint.ctx.prec = before
     assert "NOT VERIFIED" in capsys.readouterr().out
+
+
+def line(name, expression, **values):
+    """Return an inequality with parameters."""
+    return SmoothFunction(name, expression, PLANE, parameters=values)
+
+
+def test_functions_that_agree_at_one_value_of_a_parameter_only():
+    """Two walls coincide, or three lines meet, for the values bound and for no others."""
+    a, b = sympy.symbols("a b")
+    walls = [line("first", a - X, a=1.0), line("second", b - X, b=1.0)]
+    frame = [2 - Y, 2 + Y]
+    found = stationary_points(
+        Polyhedron(PLANE, [*walls, *frame]), Y**2 - X, box=SIDES, parameters={"b": (0.5, 0.6)}
+    )
+    assert found.complete
+    (point,) = found
+    assert point.active == ("second",)
+    assert point.lower[0] <= 0.5
+    assert point.upper[0] >= 0.6
+    fan = [line("third", Y + X - a, a=0.0), Y, Y - X]
+    sides = {"a": (-0.1, 0.1)}
+    found = stationary_points(
+        Polyhedron(PLANE, fan), Y + X / 3, box=SIDES, parameters=sides, resolution=0.02
+    )
+    assert not found.complete
