@@ -206,23 +206,37 @@ def image(search: Search, region: Region, g: Motion, p: tuple[int, ...]) -> Regi
     inverse = {there: i for i, there in enumerate(p)}
     lower, upper = moved(g, *full(search, region), manifold)
     wide = moved(g, region.lower, region.upper, manifold)
-    turn = manifold.wrap(0.5 * (lower + upper)) - 0.5 * (lower + upper)
+    turn = _turn(0.5 * (lower + upper), manifold)
     active = tuple(inverse[i] for i in region.active)
+    sides = _shifted(lower, upper, turn)
     sharp = [
-        np.concatenate([(side + turn)[free], rest[n:]])
-        for side, rest in ((lower, region.sharp_lower), (upper, region.sharp_upper))
+        np.concatenate([side[free], rest[n:]])
+        for side, rest in zip(sides, (region.sharp_lower, region.sharp_upper), strict=True)
     ]
-    return Region(wide[0] + turn, wide[1] + turn, active, sharp[0], sharp[1], region.index)
+    return Region(*_shifted(*wide, turn), active, sharp[0], sharp[1], region.index)
 
 
 def moved(g: Motion, lower: Array, upper: Array, manifold: Manifold) -> tuple[Array, Array]:
     """Return the sides of a box's image, shifts rounded outwards."""
     ends = g.signs * np.array([lower, upper])[:, list(g.order)]
-    shifted = np.sort(ends, axis=0) + g.shifts(manifold)
-    some = np.array(g.halves) != 0
+    lower, upper = np.sort(ends, axis=0)
+    return _shifted(lower, upper, g.shifts(manifold))
+
+
+def _turn(q: Array, manifold: Manifold) -> Array:
+    """Return the multiples of periods that bring a point into the principal intervals."""
+    periods = np.array(manifold.periods)
+    whole = np.where(np.isfinite(periods), periods, 1.0)
+    return np.asarray(np.round((manifold.wrap(q) - q) / whole) * whole)
+
+
+def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
+    """Return a box moved by the multiples of half periods that a shift rounds, outward."""
+    slack = np.where(shift != 0, np.spacing(abs(shift)), 0.0)
+    below, above = lower + shift - slack, upper + shift + slack
     return (
-        np.where(some, np.nextafter(shifted[0], -np.inf), shifted[0]),
-        np.where(some, np.nextafter(shifted[1], np.inf), shifted[1]),
+        np.where(shift != 0, np.nextafter(below, -np.inf), lower),
+        np.where(shift != 0, np.nextafter(above, np.inf), upper),
     )
 
 

@@ -38,8 +38,8 @@ class Face:
         need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
         self.point = self.at(self.unknowns)
         whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
-        some = [(x, p.lower[i], p.upper[i]) for i, x in enumerate(self.point) if not whole[i]]
-        self.outside = any(x < a or x > b for x, a, b in some)
+        stated = zip(places, *sharp, strict=False)  # what meets the domain is listed
+        self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
         v = p.values(self.point)
         signs = p.signs(v)
         self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
