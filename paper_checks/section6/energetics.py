@@ -13,7 +13,6 @@ from paper_checks.section6.experiment import (
     BUNCH,
     CORNER,
     EXPERIMENT,
-    SHORTER,
     enclosed,
     height,
     middle,
@@ -34,6 +33,11 @@ from polycorner.proofs import StationaryList, stationary_points
 THIN = DumbbellPair(length=12.5, ball_radius=3, rod_radius=0.05, drum_radius=125)
 THICK = replace(EXPERIMENT, rod_radius=2.95)
 NAMED = frozenset({"G", "delta_R", "delta_L"})
+OTHERS = tuple(
+    replace(EXPERIMENT, length=length, rod_radius=rod)
+    for length in (14, 16, 18)
+    for rod in (1.2, 1.5, 1.8)
+)
 
 
 # ------------------------------------------------------------------------- E2: the nested corners
@@ -81,33 +85,35 @@ def locus_of(pair: DumbbellPair, active: tuple[str, ...], q: np.ndarray) -> str:
 
 @cache
 def everything(pair: DumbbellPair) -> tuple[StationaryList, frozenset[str]]:
-    """Return all places of rest of a pair, with proof, and the names of its local minima."""
+    """Return all local minima of a pair up to rolling and shifts, with proof, and their names."""
     model = RelativePlacements(pair)
     found = stationary_points(
-        model.polyhedron, model.energy, box=model.box, symmetry=model.symmetry
+        model.polyhedron, model.energy, box=model.box, symmetry=model.symmetry, minima_only=True
     )
     corners = [locus_of(pair, p.active, model.placement(p.point)) for p in found.minima]
     lines = [
         all(abs(np.sin(place.lower[name])) < 1e-6 for name in ("alpha", "beta"))
         for place in found.loci
-        if place.is_minimum
     ]
     return found, frozenset([*corners, *("G" if line else "another locus" for line in lines)])
 
 
 def only_loci(
     named: frozenset[str] = NAMED,
-    pairs: tuple[DumbbellPair, ...] = (EXPERIMENT, SHORTER, BUNCH),
+    pairs: tuple[DumbbellPair, ...] = (*OTHERS, BUNCH),
     starts: int = 1000,
 ) -> Finding:
     """List all local minima with proof; then examine rods far thinner than the experiment's."""
     found = {pair: everything(pair) for pair in pairs}
     complete = all(listed.complete for listed, _ in found.values())
     boxes = sum(listed.tally.boxes for listed, _ in found.values())
+    sizes: dict[frozenset[str], list[str]] = {}
+    for p, (_, names) in found.items():
+        size = f"{p.length:g}, {p.ball_radius:g}, {p.rod_radius:g}"
+        sizes.setdefault(names, []).append(size)
     told = "; ".join(
-        f"$\\ell, r, t = {p.length:g}, {p.ball_radius:g}, {p.rod_radius:g}$: "
-        f"{', '.join(sorted(names))}"
-        for p, (_, names) in found.items()
+        f"{', '.join(sorted(names))} for $(\\ell, r, t) = ({'), ('.join(of)})$"
+        for names, of in sizes.items()
     )
     told = (
         f"Branch and bound over {boxes} boxes of relative placements in the drum, in interval "

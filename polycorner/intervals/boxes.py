@@ -128,10 +128,22 @@ class BoxFunctions:
 
         It is if all branches it depends on are decided or are ``Min``, ``Max``, ``Abs`` or a clamp.
         """
+        return self._are_continuous(lo, hi, 0)
+
+    def differentiable(self, lo: ArrayLike, hi: ArrayLike) -> NDArray[np.bool_]:
+        """Return ``(B, m)`` whether first derivatives are bounded and continuous, for certain."""
         low, high = self._boxes(lo, hi)
-        found = np.zeros((len(low), len(self.functions)))
-        self._continuity.fill(low, high, [found])
-        return found > 0
+        found = self._are_continuous(low, high, 1)
+        return np.asarray(found.reshape(len(low), len(self.functions), -1).all(axis=2))
+
+    def _are_continuous(self, lo: ArrayLike, hi: ArrayLike, order: int) -> NDArray[np.bool_]:
+        low, high = self._boxes(lo, hi)
+        kernel, entries = self._continuity[order]
+        found = np.zeros((len(low), len(entries)))
+        kernel.fill(low, high, [found])
+        result = np.ones((len(low), len(self.functions) * self.dimension**order), dtype=np.bool_)
+        result[:, entries] = found > 0
+        return result
 
     def _evaluate(
         self, lo: ArrayLike, hi: ArrayLike, order: int, form: str = "natural"
@@ -159,14 +171,20 @@ class BoxFunctions:
             return self._kernels[order, form]
 
     @property
-    def _continuity(self) -> IntervalKernel:
+    def _continuity(self) -> "list[tuple[IntervalKernel, list[int]]]":
         with self._making:
-            return self._continuity_kernel
+            return self._continuity_kernels
 
     @cached_property
-    def _continuity_kernel(self) -> IntervalKernel:
-        known = self.graph, self.dimension, self._levels(0)
-        return IntervalKernel(*known, continuity=True, kind=self.rounding)
+    def _continuity_kernels(self) -> "list[tuple[IntervalKernel, list[int]]]":
+        """The kernels for values and for first derivatives, and which are not zero."""
+        kernels = []
+        for level in self._levels(1):
+            entries = [e for e, a in enumerate(level) if a is not None]
+            known = self.graph, self.dimension, [[level[e] for e in entries]]
+            kernel = IntervalKernel(*known, continuity=True, kind=self.rounding)
+            kernels.append((kernel, entries))
+        return kernels
 
     @property
     def _mean_value(self) -> tuple[IntervalKernel, list[int]]:

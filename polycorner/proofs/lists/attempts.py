@@ -19,6 +19,7 @@ from polycorner.spaces.manifold import Array
 
 Mapped: TypeAlias = Callable[..., Iterable[Any]]
 
+PARTS = 8  # into which candidates are divided for threads
 ATTEMPTS = 1024  # candidates that are tried in one round
 WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 EVERY = 2  # bisections of every coordinate between two attempts at a box
@@ -42,10 +43,14 @@ class Starts:
 
 @dataclass
 class Attempts:
-    """Attempts, what they found, and which were in vain."""
+    """Attempts, what they found, and which were in vain.
+
+    ``sharp``: whether second derivatives are compiled already.
+    """
 
     setting: Setting
     known: Known
+    sharp: bool = False
     failed: Tried = field(init=False)
 
     def __post_init__(self) -> None:
@@ -99,20 +104,19 @@ class Attempts:
         """Try to find loci and regions from some points."""
         if self.setting.may_have_loci:
             self._find_loci(starts.part(np.flatnonzero(~starts.active.any(axis=1))))
+        parts = [starts.part(part) for part in np.array_split(np.arange(len(starts.q)), PARTS)]
+        found = list(mapped(self._candidates, [part for part in parts if len(part.q)]))
+        points = np.concatenate(found) if found else starts.q
         kinds, which = np.unique(starts.active, axis=0, return_inverse=True)
-        faces = [tuple(np.flatnonzero(active).tolist()) for active in kinds]
-        parts = [starts.part(np.flatnonzero(which.ravel() == k)) for k in range(len(kinds))]
-        for active, part, points in zip(
-            faces, parts, mapped(self._candidates, parts, faces), strict=True
-        ):
-            found = np.isfinite(points).all(axis=1)
-            self._show(points[found], active, part.widest[found])
+        for kind, active in enumerate(kinds):
+            here = (which.ravel() == kind) & np.isfinite(points).all(axis=1)
+            self._show(points[here], tuple(np.flatnonzero(active).tolist()), starts.widest[here])
 
     def _find_loci(self, starts: Starts) -> None:
         setting, z = self.setting, self.setting.reads
         if setting.equations or not len(starts.q):
             return
-        points, _, found = newton(setting.problem, starts.q, [], z)
+        points, found = newton(setting.problem, starts.q, starts.active, z)
         for q in points[found]:
             if self.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue
@@ -122,14 +126,14 @@ class Attempts:
             elif not self.known.has_locus(place):
                 self.known.loci.append(place)
 
-    def _candidates(self, starts: Starts, active: tuple[int, ...]) -> Array:
-        """Return KKT points of a face near some points, ``(B, n)``, NaN where there is none."""
-        setting, slack = self.setting, self.setting.domain.units
-        free = setting.domain.free
-        points, lam, found = newton(setting.problem, starts.q, active, free, starts.widest)
-        found &= (lam[:, : len(active)] > 0).all(axis=1)
-        found &= (points >= setting.domain.lower - slack).all(axis=1)
-        found &= (points <= setting.domain.upper + slack).all(axis=1)
+    def _candidates(self, starts: Starts) -> Array:
+        """Return KKT points near some points, ``(B, n)``, NaN where there is none."""
+        domain, slack = self.setting.domain, self.setting.domain.units
+        points, found = newton(
+            self.setting.problem, starts.q, starts.active, domain.free, starts.widest
+        )
+        found &= (points >= domain.lower - slack).all(axis=1)
+        found &= (points <= domain.upper + slack).all(axis=1)
         return np.where(found[:, None], points, np.nan)
 
     def _show(self, points: Array, active: tuple[int, ...], widest: Array) -> None:
@@ -142,7 +146,7 @@ class Attempts:
                 fresh.append(i)
         points, widest = points[fresh], widest[fresh]
         guesses: Array | None = None
-        if len(fresh) >= MANY:
+        if len(fresh) >= (1 if self.sharp else MANY):
             guesses = Screen(self.setting, active, points).radii(widest)
         for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
             guess = None if guesses is None else guesses[i]

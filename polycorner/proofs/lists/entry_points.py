@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from polycorner.formulas.cache import sources_digest
+from polycorner.proofs.lists.curvature import bent_down
 from polycorner.proofs.lists.directions import one
 
 
@@ -136,6 +137,28 @@ def _box_tests(sources: str) -> tuple[Any, ...]:
     return covered, carried
 
 
+def _curvature_test(sources: str) -> Any:
+    @njit(cache=True, nogil=True)
+    def bent(g_lo, g_hi, h_lo, h_hi, positive, left, start):
+        """Whether negative curvature shows that there is no local minimum, for each box.
+
+        Arguments are those of :func:`~polycorner.proofs.lists.curvature.bent_down`, stacked.
+        """
+        _ = sources
+        count, k, n = left.shape
+        found = np.zeros(count, np.bool_)
+        spread, lam, reach = np.zeros(n), np.zeros(k), np.zeros(k)
+        for box in range(count):
+            found[box] = bent_down(
+                g_lo[box], g_hi[box], h_lo[box], h_hi[box], positive, left[box], start[box],
+                spread, lam, reach,
+            )  # fmt: skip
+        return found
+
+    return bent
+
+
 SOURCES = sources_digest(__package__)
 directions = _direction_search(SOURCES)
 covered, carried = _box_tests(SOURCES)
+bent = _curvature_test(SOURCES)

@@ -45,6 +45,7 @@ def stationary_points(
     box: Any,
     symmetry: Symmetry | None = None,
     parameters: "Mapping[str, Interval] | None" = None,
+    minima_only: bool = False,
     resolution: float = RESOLUTION,
     max_boxes: int = MOST_BOXES,
     max_seconds: float = np.inf,
@@ -79,6 +80,9 @@ def stationary_points(
         Intervals of parameters of the functions, by name.  What is proved then holds for each of
         their values: one stationary point in each listed box, and no others.  Wide intervals leave
         boxes undecided; divide them.
+    minima_only : bool, optional
+        Whether to list local minima only.  Boxes near saddles are then closed by negative
+        curvature (:mod:`~polycorner.proofs.lists.curvature`), which takes fewer of them.
     resolution : float, optional
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
@@ -119,7 +123,9 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(polyhedron, energy, box, symmetry, resolution, parameters)
+    search = prepared(
+        polyhedron, energy, box, symmetry, resolution, parameters, minima_only=minima_only
+    )
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
@@ -153,9 +159,12 @@ def prepared(
     symmetry: Symmetry | None,
     resolution: float,
     parameters: "Mapping[str, Interval] | None" = None,
+    *,
+    minima_only: bool = False,
 ) -> Search:
     """Return a search that has not begun, after checking its arguments."""
-    return begun(Search, polyhedron, energy, box, symmetry, resolution, parameters)
+    arguments = polyhedron, energy, box, symmetry, resolution, parameters
+    return begun(Search, *arguments, minima_only=minima_only)
 
 
 def begun(
@@ -166,6 +175,8 @@ def begun(
     symmetry: Symmetry | None,
     resolution: float,
     parameters: "Mapping[str, Interval] | None" = None,
+    *,
+    minima_only: bool = False,
 ) -> S:
     """Return a search of some kind, after checking its arguments."""
     problem = pose(polyhedron, energy)
@@ -180,7 +191,8 @@ def begun(
     if reduced is not problem.polyhedron:
         problem = pose(reduced, problem.energy)
     motions, maps = _motions(problem, found, symmetry)
-    search = kind(problem, found, resolution, motions=motions, maps=maps)
+    checks.instance("minima_only", minima_only, bool)
+    search = kind(problem, found, resolution, motions=motions, maps=maps, minima_only=minima_only)
     _check_fixed(search, symmetry)
     return search
 
@@ -240,6 +252,8 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         orbits += 1
     rng = np.random.default_rng(0)
     loci = tuple(locus_of(search, place, rng) for place in _loci(search))
+    if search.minima_only:
+        loci = tuple(place for place in loci if place.is_minimum)
     n, names = problem.dimension, search.domain.manifold.names
     return StationaryList(
         problem,
@@ -251,6 +265,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         tuple(open_points),
         search.tally,
         record(search, members),
+        search.minima_only,
     )
 
 

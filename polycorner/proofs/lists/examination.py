@@ -13,6 +13,7 @@ from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.known import Known
+from polycorner.proofs.lists.saddles import without_minima
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
 
@@ -115,6 +116,10 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
     kept = Rest(rest, weights[rest], pulls, smooth[rest], g_lo[some], g_hi[some])
     examined = Examined(images, boxes, where, masks, found.copy(), found, v, kept)
     reconsider(setting, known, examined)
+    if sharp and setting.minima_only:
+        at = examined.rest.items[examined.open_items]
+        saddles, v[at] = without_minima(setting, boxes, where[at], masks[at])
+        examined.done[at[saddles]] = examined.directed[at[saddles]] = True
     return examined
 
 

@@ -112,6 +112,9 @@ def settled(search: Search) -> list[tuple[int, Member]]:
     seen, members = Listed(search), list[tuple[int, Member]]()
     for k, region in enumerate(search.regions):
         member = None if seen.holds(region) else judged(search, region)
+        if member is not None and search.minima_only and region.index != 0:
+            hidden = region.index is None or not member.is_plain  # others may make it a minimum
+            member = replace(member, place=OPEN if hidden and member.place != OUT else OUT)
         if member is not None and member.place != OUT:
             seen.add(member)
             members.append((k, member))

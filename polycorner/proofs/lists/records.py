@@ -70,6 +70,8 @@ class Record(Value):
         images of each other, those that the search met.
     codes, positions, counts, directions : arrays
         The subdivision; see :meth:`~polycorner.proofs.lists.tree.Tree.preorder`.
+    minima_only : bool
+        Whether the list is one of local minima.
     """
 
     problem: Problem
@@ -85,6 +87,7 @@ class Record(Value):
     positions: Array
     counts: NDArray[np.uint16]
     directions: NDArray[np.float32]
+    minima_only: bool = False
 
 
 def record(search: Search, members: Sequence[tuple[int, Member]]) -> Record:
@@ -100,6 +103,7 @@ def record(search: Search, members: Sequence[tuple[int, Member]]) -> Record:
         tuple(k for k, member in members if member.place == IN),
         tuple(k for k, member in members if member.place == OPEN),
         *search.tree.preorder(),
+        search.minima_only,
     )
 
 
@@ -169,6 +173,7 @@ def posed(record: "Record | Search") -> dict[str, Any]:
         "domain": {"lower": _hex(domain.lower), "upper": _hex(domain.upper)},
         "fixed": list(domain.fixed),
         "parameters": list(domain.parameters),
+        "minima_only": record.minima_only,
         "symmetries": [_motion(g) for g in record.motions],
         "weights": _hex(record.weights),
     }

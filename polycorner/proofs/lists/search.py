@@ -128,6 +128,7 @@ class Search(Setting):
     def round(self, mapped: Mapped = map) -> None:
         """Treat the last boxes that wait; ``mapped`` is like ``map``."""
         chunks, sharp = self._chunks(), self.tally.boxes >= SHARP
+        self.attempts.sharp = sharp
         found = list(mapped(partial(examine, self, self.known, sharp), chunks))
         regions, loci = len(self.regions), len(self.loci)
         self.attempts.at(found, mapped)

@@ -30,6 +30,8 @@ class Setting:
         Symmetries.
     maps : tuple of tuple of int
         Where they take inequalities.
+    minima_only : bool
+        Whether only local minima are searched.
     functions : BoxFunctions
         Inequalities, equations, energy.
     faces : Faces
@@ -47,6 +49,7 @@ class Setting:
     resolution: float
     motions: tuple[Motion, ...] = ()
     maps: tuple[tuple[int, ...], ...] = ()
+    minima_only: bool = False
     functions: BoxFunctions = field(init=False)
     faces: Faces = field(init=False)
     vertices: Vertices = field(init=False)

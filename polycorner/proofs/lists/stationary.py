@@ -119,6 +119,8 @@ class StationaryList(Printed, Value):
         Numbers of boxes.
     record : Record
         The proof, for :meth:`save`.
+    minima_only : bool
+        Whether only local minima are listed.
     """
 
     problem: Problem
@@ -130,6 +132,7 @@ class StationaryList(Printed, Value):
     open_points: tuple[StationaryPoint, ...]
     tally: Tally
     record: Record
+    minima_only: bool = False
 
     @property
     def complete(self) -> bool:
@@ -176,16 +179,15 @@ class StationaryList(Printed, Value):
     def statement(self) -> str:
         """What is proved, in a sentence."""
         count, n = len(self.points), self.problem.dimension
+        kind = "strict local minima" if self.minima_only else "stationary points"
+        loci = f" and {len(self.loci)} loci" if self.loci else ""
         where = f"in the box ({n} coordinates)"
         if self.parameters:
             where += f" for all {shown_box(self.parameters)}"
-        loci = f" and {len(self.loci)} loci" if self.loci else ""
         if self.complete:
-            return (
-                f"Proved: the energy has exactly {count} isolated stationary points{loci} {where}."
-            )
+            return f"Proved: the energy has exactly {count} isolated {kind}{loci} {where}."
         rest = f"{len(self.undecided)} boxes and {len(self.open_points)} points are undecided"
-        return f"Not complete: {count} stationary points{loci} are shown {where}; {rest}."
+        return f"Not complete: {count} {kind}{loci} are shown {where}; {rest}."
 
     def __repr__(self) -> str:
         """Return the statement."""

@@ -21,7 +21,7 @@ from polycorner.errors import NonsmoothWarning
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.enclosures import Formulas
 from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.proofs.lists import checker, records
+from polycorner.proofs.lists import checker, records, search
 from polycorner.proofs.lists.checker import balls, problem
 from polycorner.proofs.lists.checker.__main__ import main
 from polycorner.proofs.lists.checker.proof import Proof
@@ -126,6 +126,19 @@ def test_proofs_are_verified(name, proofs, verdict):
     assert "no open box" in line
     if CASES[name][4] is not None:
         assert line.startswith(f"verified: {CASES[name][4]} stationary points")
+
+
+@pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
+@pytest.mark.parametrize("name", CASES)
+def test_proofs_by_second_derivatives_are_verified(name, verdict, monkeypatch, tmp_path):
+    """As in long searches; the checker knows nothing of them, and bisects."""
+    plain = prove(*CASES[name][:4])
+    monkeypatch.setattr(search, "SHARP", 0)
+    found = prove(*CASES[name][:4])
+    assert np.allclose(*(sorted(p.point.tolist() for p in f) for f in (found, plain)))
+    fine, line = verdict(found.save(tmp_path / "list.zip"))
+    assert fine, line
+    assert "no open box" in line
 
 
 def test_it_stands_alone(proofs, tmp_path):
@@ -521,6 +534,7 @@ def stated(nodes, outputs, **more):
     empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed", "parameters")}
     data = {"format": problem.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
     data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
+    data["minima_only"] = False
     return Proof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
 
 

@@ -102,17 +102,21 @@ def test_boxes_that_pass_the_screen_have_one_point_by_ball_arithmetic(lattice):
             assert (region.upper - region.lower > 0.5 * reach).all()
 
 
-def test_newton_treats_points_by_themselves():
-    d = Polyhedron(PLANE, {"low": Y})
+def test_newton_finds_kkt_points_of_the_face_of_each_start():
+    d = Polyhedron(PLANE, {"low": Y, "left": X + 1})
     setting = prepared(d, X**4 - X**2 + Y, [(-2, 2), (-1, 2)], None, 1e-6)
-    starts = np.array([[0.9, 0.4], [0.0, 0.1], [-0.9, 0.2], [6**-0.5, 0.0]])
-    q, lam, found = newton(setting.problem, starts, [0], (0, 1))
-    assert found.tolist() == [True, True, True, False]  # the last one starts where E'' = 0
+    starts = np.array([[0.9, 0.4], [0.0, 0.1], [-0.9, 0.2], [0.4, 0.1], [-0.9, 0.1]])
+    active = np.array([[1, 0]] * 3 + [[0, 0], [1, 1]], dtype=bool)
+    q, found = newton(setting.problem, starts, active, (0, 1))
+    # on both sides no point is at rest (the multiplier of "left" is -2), inside the gradient is
+    # not 0 either
+    assert found.tolist() == [True, True, True, False, False]
     assert np.allclose(q[:3, 0], [0.5**0.5, 0, -(0.5**0.5)])
     assert np.allclose(q[:3, 1], 0)
-    assert np.allclose(lam[:3], 1)
-    _, _, near = newton(setting.problem, starts, [0], (0, 1), [1.0, 1.0, 0.05, 1.0])
-    assert near.tolist() == [True, True, False, False]
+    _, near = newton(setting.problem, starts, active, (0, 1), [1.0, 1.0, 0.05, 1.0, 1.0])
+    assert near.tolist() == [True, True, False, False, False]
+    _, fixed = newton(setting.problem, starts[:1], active[:1], (1,))
+    assert fixed.tolist() == [True]  # along y alone every point of the side is at rest
 
 
 def test_a_root_that_vanishes_at_a_point_outside_decides_that_it_is_outside():

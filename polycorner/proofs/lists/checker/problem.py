@@ -36,6 +36,7 @@ class Problem:
         need(data["fixed"] == [i for i in range(self.n) if i not in moving], "fixed coordinates")
         need(set(data["parameters"]) <= set(moving), "parameters")
         self.free = [i for i in moving if i not in data["parameters"]]
+        self.minima_only: bool = data["minima_only"]
         self.periods = [number(p) if p else None for p in data["periods"]]
 
     def add(self, op: str, args: list[Any]) -> None:

@@ -19,11 +19,12 @@ MOST_SETS = 500  # of functions that are looked at in a box
 class Proof:
     """The problem of a file, with regions, loci and symmetries."""
 
-    kind = "stationary points"
+    kind = "stationary points"  # that are listed
     tested = 0  # properties at points that are tested, but not shown
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = Problem(data)
+        self.kind = "local minima" if p.minima_only else self.kind
         self.regions = [Face(p, r, p.free, r["active"]) for r in data["regions"]]
         self.loci = [Face(p, r, r["z"], None) for r in data["loci"]]
         self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
@@ -71,6 +72,8 @@ class Proof:
         def left(u: frozenset[int]) -> bool:
             if descends(u) or (regions and self.redundant(v, u, descends)):
                 return True
+            if self.p.minima_only and any(self.bends_down(u, v, w) for w in ways):
+                return True
             along = (w for w in ways if loci and all(w[i] == 0 for i in loci[0].places))
             return bool(loci) and (not u or any(leads(u, w) for w in along))
 
@@ -91,6 +94,37 @@ class Proof:
         found = [p.forms(v, row, memo, 2) for row in (*u, *range(p.m, p.m + p.k + 1))]
         fine = None not in found and all(x.is_finite() for f in found for x in f[1].values())
         return fine and all(descends(frozenset(some)) for some in combinations(sorted(u), top))
+
+    def bends_down(self, u: frozenset[int], v: list[Any], w: list[arb]) -> bool:
+        """Whether no point of a box is a local minimum: a tangent vector has negative curvature.
+
+        With ``L`` near the pseudoinverse of the gradients' transpose, multipliers solve
+        ``(L G^T) lam = L dE``, and ``d = w + L^T y`` is tangent for ``(G L^T) y = -G w``.
+        """
+        p, memo = self.p, dict[int, Any]()
+        found = [p.forms(v, row, memo, 2) for row in (*sorted(u), *range(p.m, p.m + p.k + 1))]
+        if None in found:
+            return False
+        *rows, energy = [[g.get(i, ZERO) for i in p.free] for g, _ in found]
+        d, lam = [w[i] for i in p.free], list[arb]()
+        if rows:
+            gradients, middle = arb_mat(rows), arb_mat(rows).mid()
+            try:
+                left = (middle * middle.transpose()).inv().mid() * middle
+                form = left * gradients.transpose()
+                lam = form.solve(left * arb_mat([[x] for x in energy])).entries()
+                across = arb_mat([[x] for x in d])
+                y = form.transpose().solve(-gradients * across)
+            except ZeroDivisionError:
+                return False
+            d = (across + left.transpose() * y).entries()
+        weights = [*(-x for x in lam), arb(1)]
+        bent = [
+            dot(weights, [h.get((i, j), ZERO) for _, h in found]) * d[a] * d[b]
+            for a, i in enumerate(p.free)
+            for b, j in enumerate(p.free)
+        ]
+        return all(x > 0 for x in lam[: len(u)]) and sum(bent, ZERO) < 0
 
     def tangents(self, v: list[Any], memo: dict[int, Any], ways: list[list[arb]]) -> list[Any]:
         """Return ``w + C y`` with ``dh (w + C y) = 0``, for all elements of the enclosed ``dh``."""
@@ -120,4 +154,6 @@ class Proof:
         named = claimed + [self.regions[k] for k in data["open_points"]]
         for face in self.regions:
             known = face.outside or face.absent or any(face.same(f) for f in named)
+            alone = face.zeros == face.active and not face.unknown
+            known |= self.p.minima_only and bool(face.index) and alone
             need(known, f"{face.name}: is not listed")
