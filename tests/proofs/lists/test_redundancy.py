@@ -240,3 +240,23 @@ def test_functions_that_agree_at_one_value_of_a_parameter_only():
         Polyhedron(PLANE, fan), Y + X / 3, box=SIDES, parameters=sides, resolution=0.02
     )
     assert not found.complete
+
+
+def test_a_redundant_contact_can_make_a_minimum_of_a_saddle():
+    """On the line alone the energy falls to both sides; a second one through the point holds it."""
+    d = Polyhedron(PLANE, [Y, Y - X, Y + X])
+    for energy, count in ((Y + X / 3 - X**2, 1), (Y + X / 3 + X**2, 1)):
+        for minima_only in (False, True):
+            found = stationary_points(
+                d, energy, box=[(-0.6, 0.7), (-0.6, 0.7)], minima_only=minima_only
+            )
+            assert found.complete
+            assert [p.point.tolist() for p in found.minima][:1] == [[0, 0]]
+            assert len(found.minima) == count
+    saddle = Y - X**2
+    fan = Polyhedron(PLANE, [Y, Y - X, Y + X])
+    found = stationary_points(
+        fan, saddle, box=[(-0.4, 0.5), (-0.4, 0.5)], minima_only=True, resolution=1e-3
+    )
+    rest = [*found.undecided, *([p.lower, p.upper] for p in (*found.open_points, *found))]
+    assert any(((lower <= 0) & (upper >= 0)).all() for lower, upper in rest)
