@@ -27,12 +27,19 @@ class Known:
     active : frozenset of str or None
         Functions that vanish there; None where they are not all needed.
     index : int or None
-        None at a degenerate point, which is in no box with exactly one nondegenerate point.
+        None at a degenerate point.
+    ways : mapping from frozenset of str to int
+        Where more functions vanish than are needed: sets of them with which the point may be
+        listed, and the index along their face.  No other degenerate point may be listed.
+    alike : mapping from str to str
+        Functions that are positive multiples of others, and the first of these.
     """
 
     point: Vector
     active: frozenset[str] | None = None
     index: int | None = None
+    ways: Mapping[frozenset[str], int] = field(default_factory=dict)
+    alike: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -131,12 +138,14 @@ def _on_a_side(found: StationaryList, p: StationaryPoint) -> bool:
 
 
 def _differences(k: Known, p: StationaryPoint) -> Iterator[str]:
-    if k.index is None:
-        yield f"{_shown(k.point)} is degenerate, but listed with index {p.index}"
-    elif p.index not in {None, k.index}:
-        yield f"{_shown(k.point)} has index {k.index}, not {p.index}"
-    if k.active is not None and set(p.active) != k.active:
-        yield f"at {_shown(k.point)} {sorted(k.active)} vanish, not {p.active}"
+    active, more = (frozenset(k.alike.get(f, f) for f in fs) for fs in (p.active, p.redundant))
+    index = k.ways.get(active) if k.index is None else k.index
+    if index is None:
+        yield f"{_shown(k.point)} is degenerate, but listed with {p.active} and index {p.index}"
+    elif p.index not in {None, index} or (p.redundant and p.index not in {None, 0}):
+        yield f"{_shown(k.point)} has index {index}, not {p.index}"
+    if k.active is not None and active | more != k.active:
+        yield f"at {_shown(k.point)} {sorted(k.active)} vanish, not {p.active}, {p.redundant}"
     if any(p.multipliers[name][1] <= 0 for name in p.active):
         yield f"at {_shown(k.point)} a multiplier is not positive"
 

@@ -106,11 +106,16 @@ def known(
 ) -> tuple[tuple[Known, ...], tuple[Known, ...]]:
     """Return the stationary points in a box and those outside."""
     parts: tuple[list[Known], list[Known]] = [], []
-    for point, active, index in problem.places():
-        inside = all(Q(a) <= x <= Q(b) for x, (a, b) in zip(point, box, strict=True))
-        names = frozenset(f"f{i}" for i in active) if index is not None else None
-        parts[not inside].append(Known(point, names, index))
+    alike = {f"f{i}": f"f{j}" for i, j in enumerate(problem.firsts()) if j != i}
+    for place in problem.places():
+        inside = all(Q(a) <= x <= Q(b) for x, (a, b) in zip(place.point, box, strict=True))
+        ways = {_named(face): index for face, index in place.ways.items()}
+        parts[not inside].append(Known(place.point, _named(place.active), place.index, ways, alike))
     return tuple(parts[0]), tuple(parts[1])
+
+
+def _named(functions: frozenset[int]) -> frozenset[str]:
+    return frozenset(f"f{i}" for i in functions)
 
 
 def _factor(rng: Generator) -> Any:

@@ -6,7 +6,7 @@ stationary if it lies in the set and, in each branch of the set that contains it
 the cone of the gradients of the functions that vanish, or no curve leads from it into the branch.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations
@@ -38,13 +38,19 @@ class Place(NamedTuple):
     point : tuple of Fraction
     active : frozenset of int
         Functions that vanish there.
-    index : int or None
-        Negative eigenvalues along the face; None at a degenerate point.
+    ways : mapping from frozenset of int to int
+        Sets of them with which it is a nondegenerate KKT point, all multipliers being positive,
+        and the negative eigenvalues along their face.
     """
 
     point: Vector
     active: frozenset[int]
-    index: int | None
+    ways: Mapping[frozenset[int], int]
+
+    @property
+    def index(self) -> int | None:
+        """The negative eigenvalues along the face of all of them; None at a degenerate point."""
+        return self.ways.get(self.active)
 
 
 @dataclass(frozen=True)
@@ -245,18 +251,25 @@ class PlanarProblem:
         for f, g in combinations(self.curves, 2):
             yield from meeting(f, g)
 
+    def firsts(self) -> tuple[int, ...]:
+        """Return the first function that each one is a positive multiple of."""
+        rows = [(f.bent, f.a, f.b, f.c) for f in self.curves]
+        return tuple(next(j for j, g in enumerate(rows) if _multiple(f, g)) for f in rows)
+
     def places(self) -> list[Place]:
-        """Return the stationary points, each once."""
+        """Return the stationary points; the first of positive multiples stands for all."""
         found: list[Place] = []
+        first = self.firsts()
+        branches = {frozenset(first[i] for i in b) for b in self.branches}
         for q in self.candidates():
             if any(not (sign(q[0] - p[0]) or sign(q[1] - p[1])) for p, _, _ in found):
                 continue
             signs = [sign(f.at(q)) for f in self.curves]
-            least = [b for b in self.branches if not any(other < b for other in self.branches)]
+            least = [b for b in branches if not any(other < b for other in branches)]
             zeros = frozenset(i for i in frozenset().union(*least) if not signs[i])
             inside = [b for b in least if all(signs[i] >= 0 for i in b)]
             if inside and all(self.rests(q, sorted(b & zeros)) for b in inside):
-                found.append(Place(q, zeros, self.index(q, zeros, inside)))
+                found.append(Place(q, zeros, self.ways(q, zeros.intersection(*inside))))
         return found
 
     def rests(self, q: Vector, active: Sequence[int]) -> bool:
@@ -286,12 +299,14 @@ class PlanarProblem:
         # curvatures over lengths of gradients, squares apart: f = |df| n + bent s^2
         return sign(_signed_square(f.bent) * b + _signed_square(g.bent) * a) < 0
 
-    def index(
-        self, q: Vector, zeros: frozenset[int], inside: Sequence[frozenset[int]]
-    ) -> int | None:
-        """Return the index of a point where all that is needed is strict, otherwise None."""
-        if any(b & zeros != zeros for b in inside) or len(zeros) > 2:
-            return None
+    def ways(self, q: Vector, zeros: frozenset[int]) -> dict[frozenset[int], int]:
+        """Return which functions that vanish make it a nondegenerate KKT point."""
+        sets = (frozenset(c) for count in range(3) for c in combinations(zeros, count))
+        found = ((face, self.index(q, face)) for face in sets)
+        return {face: index for face, index in found if index is not None}
+
+    def index(self, q: Vector, zeros: frozenset[int]) -> int | None:
+        """Return the index along a face where all that is needed is strict, otherwise None."""
         pull, bent = self.energy.derivatives(q)
         rows = [self.curves[i].gradient(q) for i in sorted(zeros)]
         if len(rows) == 2:
@@ -300,11 +315,15 @@ class PlanarProblem:
                 return None
             shares = _cross(pull, rows[1]) / det, _cross(rows[0], pull) / det
             return 0 if min(map(sign, shares)) > 0 else None
+        if not rows and (sign(pull[0]) or sign(pull[1])):
+            return None
         if not rows:
             det = bent[0][0] * bent[1][1] - bent[0][1] ** 2
             trace = bent[0][0] + bent[1][1]
             return {1: 0 if trace > 0 else 2, -1: 1, 0: None}[sign(det)]
         (g,), (k,) = rows, zeros
+        if sign(_cross(g, pull)):
+            return None
         share = _dot(g, pull) / _dot(g, g)
         along = (-g[1], g[0])
         curved = sum(
@@ -313,6 +332,13 @@ class PlanarProblem:
             for j in (0, 1)
         )
         return {1: 0, -1: 1, 0: None}[sign(curved)] if sign(share) > 0 else None
+
+
+def _multiple(a: Sequence[Fraction], b: Sequence[Fraction]) -> bool:
+    """Whether a vector is a positive multiple of another one."""
+    pairs = list(zip(a, b, strict=True))
+    crossed = all(x * v == y * u for x, y in pairs for u, v in pairs)
+    return crossed and sum(x * y for x, y in pairs) > 0
 
 
 def _dot(a: Vector, b: Vector) -> Fraction:

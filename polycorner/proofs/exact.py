@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.programs import Graph, Payload
 from polycorner.formulas.ranges import arguments
-from polycorner.intervals.balls import ball, constant, integer_relation, operations
+from polycorner.intervals.balls import ball, constant, exact, integer_relation, operations
 from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import needed
 from polycorner.proofs import polynomials as algebra
@@ -247,6 +247,33 @@ def recognised(enclosure: Enclosure) -> ExactPoint | None:
         return None
     rows = [values[k + n * r : k + n * (r + 1)] for r in range(k + 1)]
     return found if _stationary(system.gauges, system.anchor, rows, found, n) else None
+
+
+def common_zero(
+    formulas: Formulas, rows: Sequence[int], solution: "Sequence[Ball]"
+) -> ExactPoint | None:
+    """Return a point in a small enclosure at which functions are shown to vanish exactly.
+
+    That the enclosure contains it is tested; if the functions have one common zero in a larger one
+    this is it.
+    """
+    symbols = Symbols()
+    constants = _constants(formulas, symbols)
+    if len(constants) > MOST_CONSTANTS:
+        return None
+    unknowns = [_recognised(x, constants, symbols) for x in solution]
+    known = tuple([p for p in unknowns if p is not None])
+    if len(known) < len(unknowns):
+        return None
+    wide = [x + ball(0, 2.0**-50) for x in solution]
+    if not all(w.contains(symbols.ball(p)) for w, p in zip(wide, known, strict=True)):
+        return None
+    values = evaluate(formulas.graph, [formulas.outputs[row] for row in rows], known, symbols)
+    return None if any(value != {} for value in values) else ExactPoint(known, symbols)
+
+
+def _recognised(x: "Ball", constants: Sequence[Polynomial], symbols: Symbols) -> Polynomial | None:
+    return algebra.number(exact(x)) if x.is_exact() else _combination(x, constants, symbols)
 
 
 def _stationary(

@@ -17,6 +17,10 @@ from polycorner.values import Value
 class Completeness(Enum):
     """Completeness of a skeleton; the value is a sentence."""
 
+    CORNERS_PROVED = (
+        "all corners in the box of a complete list, as proved, and all that they lead to; \
+closed edges and faces that no walk met are not excluded"
+    )
     EXHAUSTED = "all that was met is traced; islands that no walk met are not excluded"
     GAPS = "some edges could not be traced: the notes say which"
     BUDGET = "budget or time was used up: edges or faces are left"

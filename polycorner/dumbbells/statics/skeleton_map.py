@@ -194,7 +194,8 @@ def signature_of(atlas: PairAtlas) -> Signature:
         ordered, unordered = atlas.ordered, atlas.unordered
     except ValueError:
         return Signature(_sizes(single), _sizes(single), _pattern(atlas, single), sound=False)
-    whole = found.complete is Completeness.EXHAUSTED and found.components.get(6) == 1
+    finished = found.complete in (Completeness.EXHAUSTED, Completeness.CORNERS_PROVED)
+    whole = finished and found.components.get(6) == 1
     return Signature(
         labelled=_sizes(single),
         ordered=_sizes(ordered),

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -13,12 +13,12 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.proofs.arguments import check_parameters
-from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, Listed, full, settled
+from polycorner.proofs.lists.members import OPEN, Listed, Member, full, images, moved, settled
+from polycorner.proofs.lists.multiples import without_multiples
 from polycorner.proofs.lists.parameters import with_parameters
 from polycorner.proofs.lists.quotients import unreached
 from polycorner.proofs.lists.records import record
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.proofs.parameter_boxes import Interval
 
+S = TypeVar("S", bound=Search)
 RESOLUTION = 1e-6
 MOST_BOXES = 10_000_000
 
@@ -62,7 +63,8 @@ def stationary_points(
     Parameters
     ----------
     polyhedron : Polyhedron
-        The set ``D``; and/or trees and equations are allowed.
+        The set ``D``; and/or trees and equations are allowed.  Of inequalities that are positive
+        multiples of each other the first stands for all of them.
     energy : SmoothFunction or SymPy expression
         The energy ``E``.
     box : sequence or mapping
@@ -161,6 +163,22 @@ def prepared(
     minima_only: bool = False,
 ) -> Search:
     """Return a search that has not begun, after checking its arguments."""
+    arguments = polyhedron, energy, box, symmetry, resolution, parameters
+    return begun(Search, *arguments, minima_only=minima_only)
+
+
+def begun(
+    kind: type[S],
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    box: Any,
+    symmetry: Symmetry | None,
+    resolution: float,
+    parameters: "Mapping[str, Interval] | None" = None,
+    *,
+    minima_only: bool = False,
+) -> S:
+    """Return a search of some kind, after checking its arguments."""
     problem = pose(polyhedron, energy)
     found = domain(polyhedron.manifold, box)
     checks.real("resolution", resolution, above=0)
@@ -169,9 +187,12 @@ def prepared(
     sides = check_parameters(problem, parameters)[0]
     if sides:
         problem, found, symmetry = with_parameters(problem, found, symmetry, sides)
+    reduced = without_multiples(problem.polyhedron)  # for all values of the parameters
+    if reduced is not problem.polyhedron:
+        problem = pose(reduced, problem.energy)
     motions, maps = _motions(problem, found, symmetry)
     checks.instance("minima_only", minima_only, bool)
-    search = Search(problem, found, resolution, motions, maps, minima_only)
+    search = kind(problem, found, resolution, motions=motions, maps=maps, minima_only=minima_only)
     _check_fixed(search, symmetry)
     return search
 
@@ -214,19 +235,20 @@ def listed(search: Search, problem: Problem) -> StationaryList:
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
     known, orbits, members = Listed(search), 0, settled(search)
-    for k, place in members:
-        region = search.regions[k]
-        if known.has(region):
+    for _, member in members:
+        before = known.has(member)
+        if before:
             continue  # an image of one before
-        known.add(region)
-        if place == OPEN:
-            open_points.append(_point(search, region, orbits))
+        known.add(member)
+        if member.place == OPEN or before is None:
+            open_points.append(_point(search, member, orbits))
             continue
-        points.append(_point(search, region, orbits))
-        for image in _images(search, region):
-            if not known.has(image):
+        points.append(_point(search, member, orbits))
+        for image in images(search, member):
+            alike = known.has(image)
+            if not alike:
                 known.add(image)
-                points.append(_point(search, image, orbits))
+                (points if alike is False else open_points).append(_point(search, image, orbits))
         orbits += 1
     loci = tuple(locus_of(search, place) for place in _loci(search))
     if search.minima_only:
@@ -238,7 +260,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         {names[i]: side for i, side in search.domain.held.items()},
         tuple(points),
         loci,
-        _undecided(search)[:, :, :n],
+        undecided(search)[:, :, :n],
         tuple(open_points),
         search.tally,
         record(search, members),
@@ -246,32 +268,12 @@ def listed(search: Search, problem: Problem) -> StationaryList:
     )
 
 
-def _undecided(search: Search) -> Array:
+def undecided(search: Search) -> Array:
+    """Return the boxes that are left or wait, ``(k, 2, n)``."""
     parts: list[Boxes] = [*search.undecided, search.waiting]
     lower = np.concatenate([p.lower for p in parts])
     upper = np.concatenate([p.upper for p in parts])
     return np.stack([lower, upper], axis=1)
-
-
-def _images(search: Search, region: Region) -> list[Region]:
-    """Return the region carried along by all symmetries."""
-    found, manifold = [], search.domain.manifold
-    free, n = list(search.domain.free), len(search.domain.free)
-    for g, p in zip(search.motions, search.maps, strict=True):
-        inverse = {image: i for i, image in enumerate(p)}
-        lower, upper = _moved(g, *full(search, region), manifold)
-        wide = _moved(g, region.lower, region.upper, manifold)
-        turn = _turn(0.5 * (lower + upper), manifold)
-        active = tuple(inverse[i] for i in region.active)
-        sharp = [
-            np.concatenate([side[free], rest[n:]])
-            for side, rest in zip(
-                _shifted(lower, upper, turn), (region.sharp_lower, region.sharp_upper), strict=True
-            )
-        ]
-        sides = _shifted(*wide, turn)
-        found.append(Region(*sides, active, sharp[0], sharp[1], region.index))
-    return found
 
 
 def _loci(search: Search) -> list[Locus]:
@@ -294,39 +296,19 @@ def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
     for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
         sides = search.domain.lower.copy(), search.domain.upper.copy()
         sides[0][z], sides[1][z] = lower, upper
-        ends += [side[z] for side in _moved(g, *sides, search.domain.manifold)]
+        ends += [side[z] for side in moved(g, *sides, search.domain.manifold)]
     sample = None if place.sample is None else g(place.sample, search.domain.manifold)
     return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
 
 
-def _moved(g: Motion, lower: Array, upper: Array, manifold: Any) -> tuple[Array, Array]:
-    ends = g.signs * np.array([lower, upper])[:, list(g.order)]
-    lower, upper = np.sort(ends, axis=0)
-    return _shifted(lower, upper, g.shifts(manifold))
-
-
-def _turn(q: Array, manifold: Any) -> Array:
-    """Return the multiples of periods that bring a point into the principal intervals."""
-    periods = np.array(manifold.periods)
-    whole = np.where(np.isfinite(periods), periods, 1.0)
-    return np.asarray(np.round((manifold.wrap(q) - q) / whole) * whole)
-
-
-def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
-    """Return a box moved by the multiples of half periods that a shift rounds, outward."""
-    slack = np.where(shift != 0, np.spacing(abs(shift)), 0.0)
-    below, above = lower + shift - slack, upper + shift + slack
-    return (
-        np.where(shift != 0, np.nextafter(below, -np.inf), lower),
-        np.where(shift != 0, np.nextafter(above, np.inf), upper),
-    )
-
-
-def _point(search: Search, region: Region, orbit: int) -> StationaryPoint:
+def _point(search: Search, member: Member, orbit: int) -> StationaryPoint:
+    region = member.region
     lower, upper = full(search, region)
     n, d = len(search.domain.free), search.problem.polyhedron
+    more = tuple(d.names[i] for i in sorted(member.zeros.difference(region.active)))
     active = tuple(d.names[i] for i in region.active)
     ends = zip(region.sharp_lower[n:].tolist(), region.sharp_upper[n:].tolist(), strict=True)
     multipliers = dict(zip((*active, *d.equation_names), ends, strict=True))
     some = slice(0, len(lower) - len(search.domain.parameters))
-    return StationaryPoint(lower[some], upper[some], active, multipliers, region.index, orbit)
+    index = region.index if region.index == 0 or not more else None
+    return StationaryPoint(lower[some], upper[some], active, multipliers, index, orbit, more)

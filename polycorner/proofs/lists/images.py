@@ -158,6 +158,11 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     return tuple(names[i] for i in range(len(d.functions)))
 
 
+def expanded(f: SmoothFunction) -> "sympy.Expr":
+    """Return a function's expression with its parameters, expanded."""
+    return _normal(_bound(f))
+
+
 @lru_cache(maxsize=8)
 def _normal_forms(problem: Problem) -> "dict[SmoothFunction, sympy.Expr]":
     return {f: _normal(_bound(f)) for f in problem.functions}

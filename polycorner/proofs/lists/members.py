@@ -1,15 +1,44 @@
 """Members of a list: the regions of a search whose points are stationary, each point once."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.acceptance import BITS, Region
+from polycorner.proofs.lists.coincidences import ZERO, Place, signs
+from polycorner.proofs.lists.domains import ROUNDING
+from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.known import Sides
 from polycorner.proofs.lists.search import Search
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 
 IN, OUT, OPEN = "in", "out", "open"
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """The point of a region.
+
+    Attributes
+    ----------
+    region : Region
+    zeros, unknown : frozenset of int
+        Inequalities that vanish there, and those that may.
+    place : str
+        Whether it is stationary in the set (``IN``), or not (``OUT``), or that is ``OPEN``.
+    """
+
+    region: Region
+    zeros: frozenset[int]
+    unknown: frozenset[int]
+    place: str
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether no functions vanish there but those of the region."""
+        return not self.unknown and len(self.zeros) == len(self.region.active)
 
 
 class Listed:
@@ -18,29 +47,84 @@ class Listed:
     def __init__(self, search: Search) -> None:
         self.search, self.free = search, list(search.domain.free)
         self.boxes = Sides(len(self.free))
+        self.every, self.special = list[Member](), list[Member]()
 
-    def add(self, region: Region) -> None:
+    def add(self, member: Member) -> None:
         """Add a region."""
+        region = member.region
         self.boxes.add(frozenset(region.active), region.lower[self.free], region.upper[self.free])
+        self.every.append(member)
+        if not member.is_plain:
+            self.special.append(member)
 
-    def has(self, region: Region) -> bool:
-        """Whether the point of a region lies in a known one, where there is only one."""
+    def holds(self, region: Region) -> bool:
+        """Whether the point of a region lies in a known one of the same functions."""
         sides = self.boxes.of(frozenset(region.active))
         lower, upper = region.sharp_lower[: len(self.free)], region.sharp_upper[: len(self.free)]
         domain = self.search.domain
         return bool(domain.within(lower, upper, *sides, self.free).any())
 
+    def has(self, member: Member) -> bool | None:
+        """Whether the point of a region is that of a known one; None where it is not decided."""
+        if self.holds(member.region):
+            return True
+        others = self.special if member.is_plain else self.every
+        found = [same(self.search, member, other) for other in others]
+        return True if True in found else None if None in found else False
 
-def settled(search: Search) -> list[tuple[int, str]]:
-    """Return the regions whose points are in the list or may be (``IN``, ``OPEN``), each once."""
-    known, found = Listed(search), list[tuple[int, str]]()
+
+def same(search: Search, one: Member, other: Member) -> bool | None:
+    """Whether the points of two regions are the same; None where that is not decided.
+
+    Regions of as many functions as are independent have one common zero of these.
+    """
+    top = len(search.domain.free) - search.equations
+    if apart(search, one.region, other.region):
+        return False
+    for here, there in ((one, other), (other, one)):
+        rows = frozenset(there.region.active)
+        if rows - here.zeros - here.unknown:
+            return False
+        if len(rows) >= top and rows <= here.zeros and inside(search, here.region, there.region):
+            return True
+    return None
+
+
+def inside(search: Search, region: Region, other: Region) -> bool:
+    """Whether the point of a region lies in the box of another one."""
+    free = list(search.domain.free)
+    lower, upper = region.sharp_lower[: len(free)], region.sharp_upper[: len(free)]
+    return bool(search.domain.within(lower, upper, other.lower[free], other.upper[free], free))
+
+
+def apart(search: Search, region: Region, other: Region) -> bool:
+    """Whether the enclosures of two points are disjoint."""
+    (low, high), (left, right) = full(search, region), full(search, other)
+    manifold = search.domain.manifold
+    middle = 0.5 * (left + right) - 0.5 * (low + high)
+    turn = middle - manifold.wrap(middle)
+    slack = ROUNDING * manifold.scale_array
+    return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
+
+
+def settled(search: Search) -> list[tuple[int, Member]]:
+    """Return the regions whose points are in the list or may be, each once, with numbers."""
+    seen, members = Listed(search), list[tuple[int, Member]]()
     for k, region in enumerate(search.regions):
-        place = OUT if known.has(region) else membership(search, region)
-        if search.minima_only and region.index != 0:
-            place = OPEN if place == IN and region.index is None else OUT
-        if place != OUT:
-            known.add(region)
-            found.append((k, place))
+        member = None if seen.holds(region) else judged(search, region)
+        if member is not None and search.minima_only and region.index != 0:
+            hidden = region.index is None or not member.is_plain  # others may make it a minimum
+            member = replace(member, place=OPEN if hidden and member.place != OUT else OUT)
+        if member is not None and member.place != OUT:
+            seen.add(member)
+            members.append((k, member))
+    known, found = Listed(search), list[tuple[int, Member]]()
+    for k, member in sorted(members, key=lambda pair: pair[1].place == OPEN):
+        before = known.has(member)
+        if not before:
+            decided = replace(member, place=OPEN) if before is None else member
+            known.add(decided)
+            found.append((k, decided))
     return found
 
 
@@ -53,18 +137,24 @@ def full(search: Search, region: Region) -> tuple[Array, Array]:
 
 
 def membership(search: Search, region: Region) -> str:
-    """Decide whether a region's point is a stationary point of the set in the domain.
+    """Decide whether a region's point is a stationary point of the set in the domain."""
+    return judged(search, region).place
+
+
+def judged(search: Search, region: Region) -> Member:
+    """Return the point of a region, and whether it is a stationary point of the set in the domain.
 
     The signs of the other functions at the point say in which branches of the tree it lies.  As
-    all multipliers are positive, it is not stationary if a branch that contains it asks for fewer
-    than the active functions.  If every branch that may contain it asks for all of them it is
-    stationary, whatever else they ask for; it is in the set if one of them asks for no more.
+    all multipliers are positive, it is stationary in each branch that asks for all of the active
+    functions, whatever else that asks for, and in none that asks for some of them and for no other
+    one that vanishes.
     """
     lower, upper = full(search, region)
     m = search.problem.inequalities
+    formulas = search.faces.formulas
     with precision(BITS):
         hull = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
-        values = search.faces.formulas.values(Box(hull), range(m))
+        values = formulas.values(Box(hull), range(m))
         below = np.array([bool(v < ball(0)) for v in values], dtype=np.bool_)
         above = np.array([bool(v > ball(0)) for v in values], dtype=np.bool_)
     # Balls give up square roots that may reach 0, as of the distance of centres that coincide.
@@ -73,15 +163,90 @@ def membership(search: Search, region: Region) -> str:
     above |= low[0, :m] > 0
     held = np.zeros(m, dtype=np.bool_)
     held[list(region.active)] = True
-    below &= ~held
-    above &= ~held
-    if search.domain.misses(lower, upper, range(len(lower))):
-        return OUT
+    zeros = held.copy()
+    outside = search.domain.misses(lower, upper, range(len(lower)))
+    if not outside and (~below & ~above & ~held).any():
+        found = signs(formulas, placed(search, region), m)
+        zeros |= np.array([sign == ZERO for sign in found])
+    below, above = below & ~zeros, above & ~zeros
+    unknown = ~below & ~above & ~zeros
+    sets = frozenset(np.flatnonzero(zeros).tolist()), frozenset(np.flatnonzero(unknown).tolist())
     possible = [c for c in search.conj if not (below & c).any()]
-    if not possible:
-        return OUT
-    decided = [not (c & ~above & ~held).any() for c in possible]
-    fewer = [bool((held & ~c).any()) for c in possible]
-    if any(sure and less for sure, less in zip(decided, fewer, strict=True)):
-        return OUT
-    return IN if any(decided) and not any(fewer) else OPEN
+    if outside or not possible:
+        return Member(region, *sets, OUT)
+    sure = [not (c & unknown).any() for c in possible]
+    some = [bool((held & ~c).any()) for c in possible]
+    fewer = [less and not (c & zeros & ~held).any() for c, less in zip(possible, some, strict=True)]
+    if any(a and b for a, b in zip(sure, fewer, strict=True)):
+        return Member(region, *sets, OUT)
+    return Member(region, *sets, IN if any(sure) and not any(some) else OPEN)
+
+
+def placed(search: Search, region: Region) -> Place:
+    """Return the point of a region, enclosed as well as its functions allow."""
+    rows = search.vertices.rows(region.active)
+    unique = len(rows) == len(search.domain.free) and not search.domain.parameters
+    lower, upper = full(search, region)
+    with precision(BITS):
+        point = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
+        sides = region.lower, region.upper
+        zero = search.vertices.zero(*sides, region.active) if unique else None
+        for i, x in zip(search.domain.free, zero or (), strict=bool(zero)):
+            point[i] = x
+        return Place(point, *sides, rows, unique)
+
+
+def images(search: Search, member: Member) -> list[Member]:
+    """Return a member carried along by all symmetries of a search."""
+    pairs = zip(search.motions, search.maps, strict=True)
+    return [image_of(search, member, g, p) for g, p in pairs]
+
+
+def image(search: Search, region: Region, g: Motion, p: tuple[int, ...]) -> Region:
+    """Return a region carried along by a symmetry, which takes inequalities to ``p``."""
+    manifold = search.domain.manifold
+    free, n = list(search.domain.free), len(search.domain.free)
+    inverse = {there: i for i, there in enumerate(p)}
+    lower, upper = moved(g, *full(search, region), manifold)
+    wide = moved(g, region.lower, region.upper, manifold)
+    turn = _turn(0.5 * (lower + upper), manifold)
+    active = tuple(inverse[i] for i in region.active)
+    sides = _shifted(lower, upper, turn)
+    sharp = [
+        np.concatenate([side[free], rest[n:]])
+        for side, rest in zip(sides, (region.sharp_lower, region.sharp_upper), strict=True)
+    ]
+    return Region(*_shifted(*wide, turn), active, sharp[0], sharp[1], region.index)
+
+
+def moved(g: Motion, lower: Array, upper: Array, manifold: Manifold) -> tuple[Array, Array]:
+    """Return the sides of a box's image, shifts rounded outwards."""
+    ends = g.signs * np.array([lower, upper])[:, list(g.order)]
+    lower, upper = np.sort(ends, axis=0)
+    return _shifted(lower, upper, g.shifts(manifold))
+
+
+def _turn(q: Array, manifold: Manifold) -> Array:
+    """Return the multiples of periods that bring a point into the principal intervals."""
+    periods = np.array(manifold.periods)
+    whole = np.where(np.isfinite(periods), periods, 1.0)
+    return np.asarray(np.round((manifold.wrap(q) - q) / whole) * whole)
+
+
+def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
+    """Return a box moved by the multiples of half periods that a shift rounds, outward."""
+    slack = np.where(shift != 0, np.spacing(abs(shift)), 0.0)
+    below, above = lower + shift - slack, upper + shift + slack
+    return (
+        np.where(shift != 0, np.nextafter(below, -np.inf), lower),
+        np.where(shift != 0, np.nextafter(above, np.inf), upper),
+    )
+
+
+def image_of(search: Search, member: Member, g: Motion, p: tuple[int, ...]) -> Member:
+    """Return a member carried along by a symmetry, as :func:`image` does a region."""
+    inverse = {there: i for i, there in enumerate(p)}
+    zeros, unknown = (
+        frozenset(inverse[i] for i in rows) for rows in (member.zeros, member.unknown)
+    )
+    return Member(image(search, member.region, g, p), zeros, unknown, member.place)

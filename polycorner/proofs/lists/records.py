@@ -40,7 +40,7 @@ from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import IN, OPEN
+from polycorner.proofs.lists.members import IN, OPEN, Member
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tree import OPEN as OPEN_BOX
 from polycorner.spaces.manifold import Array
@@ -90,7 +90,7 @@ class Record(Value):
     minima_only: bool = False
 
 
-def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
+def record(search: Search, members: Sequence[tuple[int, Member]]) -> Record:
     """Return the record of a search and the members of its list."""
     return Record(
         search.problem,
@@ -100,8 +100,8 @@ def record(search: Search, members: Sequence[tuple[int, str]]) -> Record:
         search.weights,
         tuple(search.regions),
         tuple(search.loci),
-        tuple(k for k, place in members if place == IN),
-        tuple(k for k, place in members if place == OPEN),
+        tuple(k for k, member in members if member.place == IN),
+        tuple(k for k, member in members if member.place == OPEN),
         *search.tree.preorder(),
         search.minima_only,
     )
@@ -123,8 +123,13 @@ def save(path: str | os.PathLike[str], record: Record) -> Path:
     OSError
         If the file could not be written.
     """
+    return written(path, record, described(record))
+
+
+def written(path: str | os.PathLike[str], record: Record, data: dict[str, Any]) -> Path:
+    """Save what is described with the subdivision of a record; see :func:`save`."""
     parts = {
-        "problem.json": json.dumps(described(record), indent=1).encode(),
+        "problem.json": json.dumps(data, indent=1).encode(),
         "tree.bin": record.codes.astype("<i1").tobytes(),
         "positions.bin": record.positions.astype("<f8").tobytes(),
         "counts.bin": record.counts.astype("<u2").tobytes(),

@@ -2,8 +2,8 @@
 
 A box is discarded where no point of the set lies in it, or where each of its branches has a
 direction along which the energy decreases (:mod:`~polycorner.proofs.lists.directions`), or lies in
-a region whose only stationary point is known (:mod:`~polycorner.proofs.lists.acceptance`); all
-others are bisected.
+a region whose only stationary point is known (:mod:`~polycorner.proofs.lists.acceptance`), with
+redundant functions perhaps (:mod:`~polycorner.proofs.lists.redundancy`); all others are bisected.
 
 The search goes in rounds.  In each, some boxes that wait are examined, in chunks that read the same
 state and change nothing, by as many threads as there are; then candidates are tried near what is
@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.formulas.kernels import MANY
 from polycorner.proofs.lists.acceptance import Region
@@ -28,8 +29,10 @@ from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.examination import Examined, examine, reconsider
 from polycorner.proofs.lists.known import Known
 from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.redundancy import close_redundant
 from polycorner.proofs.lists.settings import Setting
 from polycorner.proofs.lists.tree import Tree
+from polycorner.spaces.manifold import Array
 
 CHUNKS = 8  # that a round consists of
 CHUNK = 4096  # boxes in a chunk, at most
@@ -132,9 +135,10 @@ class Search(Setting):
         if len(self.regions) > regions or len(self.loci) > loci:
             for e in found:
                 reconsider(self, self.known, e, regions, loci)
+        more = [close_redundant(self, self.known, e, self.attempts) for e in found]
         taken = sum(map(len, chunks))
         before = self.waiting.part(slice(None, len(self.waiting) - taken))
-        self.waiting = joined([before, *map(self._finish, found)])
+        self.waiting = joined([before, *map(self._finish, found, more)])
 
     def _chunks(self) -> list[Boxes]:
         """Return the last boxes that wait, in chunks of a size that the problem determines."""
@@ -145,8 +149,11 @@ class Search(Setting):
         last = self.waiting.part(slice(len(self.waiting) - count, None))
         return [last.part(slice(i, i + size)) for i in range(0, count, size)]
 
-    def _finish(self, e: Examined) -> Boxes:
-        """Record how boxes are closed; return the halves of those that are left."""
+    def _finish(self, e: Examined, more: tuple[NDArray[np.intp], Array]) -> Boxes:
+        """Record how boxes are closed; return the halves of those that are left.
+
+        ``more`` are boxes and directions beside those of items.
+        """
         boxes, where, count = e.boxes, e.where, len(e.boxes)
         seen, left, by_region = (np.zeros(count, dtype=np.bool_) for _ in range(3))
         seen[where], left[where[~e.done]], by_region[where[e.done & ~e.directed]] = True, True, True
@@ -157,6 +164,8 @@ class Search(Setting):
         used = e.directed & ~left[where]
         self.tree.close(e.images, e.images[:0], e.v[:0])
         self.tree.close(boxes.nodes[~left], boxes.nodes[where[used]], e.v[used])
+        kept = ~left[more[0]]
+        self.tree.close(boxes.nodes[:0], boxes.nodes[more[0][kept]], more[1][kept])
         return self._halves(boxes.part(left))
 
     def _halves(self, boxes: Boxes) -> Boxes:

@@ -12,6 +12,7 @@ from polycorner.proofs.lists.branches import Mask, conjunctions
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion, weights
 from polycorner.proofs.lists.loci import read_coordinates
+from polycorner.proofs.lists.vertices import Vertices
 from polycorner.spaces.manifold import Array
 
 
@@ -34,6 +35,7 @@ class Setting:
     functions : BoxFunctions
         Inequalities, equations, energy.
     faces : Faces
+    vertices : Vertices
     conj : (c, m) array of bool
         The set as a union of intersections.
     reads : tuple of int
@@ -50,6 +52,7 @@ class Setting:
     minima_only: bool = False
     functions: BoxFunctions = field(init=False)
     faces: Faces = field(init=False)
+    vertices: Vertices = field(init=False)
     conj: Mask = field(init=False)
     reads: tuple[int, ...] = field(init=False)
     weights: Array = field(init=False)
@@ -61,6 +64,8 @@ class Setting:
         free = self.domain.free
         held = self.domain.held
         self.faces = Faces(formulas, self.problem.inequalities, free, self.problem.scales, held)
+        vertices = formulas, self.problem.inequalities, self.equations, free, self.problem.scales
+        self.vertices = Vertices(*vertices)
         self.conj = conjunctions(self.problem.polyhedron)
         self.reads = read_coordinates(formulas, free)
         self.weights = weights(self.domain)

@@ -37,9 +37,13 @@ class StationaryPoint(Value):
         Enclosures of the multipliers, those of equations included: ``dE = sum lam_i df_i``.
     index : int or None
         Negative eigenvalues of the Hessian of the Lagrangian along the face; None where their
-        number is not shown.
+        number is not shown, or where it is not 0 and redundant functions may make the point a
+        minimum all the same.
     orbit : int
         Number of the orbit of the declared symmetries that it belongs to.
+    redundant : tuple of str
+        Other functions that vanish there; the multipliers are those of one combination without
+        them.
     """
 
     lower: Array
@@ -48,6 +52,7 @@ class StationaryPoint(Value):
     multipliers: Mapping[str, Bounds]
     index: int | None
     orbit: int
+    redundant: tuple[str, ...] = ()
 
     @property
     def point(self) -> Array:

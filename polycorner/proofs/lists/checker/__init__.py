@@ -1,4 +1,4 @@
-"""Checker of saved lists of stationary points and their proofs; needs python-flint alone.
+"""Checker of saved lists of stationary points or corners and their proofs; python-flint alone.
 
 ``python -m checker FILE [--sample K] [--jobs J]``, run where this folder or a copy of it is,
 differentiates the program in the file itself, walks the subdivision and shows of every closed box,
@@ -8,13 +8,19 @@ in ball arithmetic of 128 bits, that
 - in each branch of the set, some stored direction, made tangent to the equations, increases all
   functions that may vanish and decreases the energy, for all elements of their generalised
   gradients ([Clarke] sec. 2.3); or the functions that may vanish are active in a region around the
-  box; or the box is at a locus, and a direction along the other coordinates leads into the set; or
+  box; or one of both is true of each set of as many of them as can be independent; or the box is at
+  a locus, and a direction along the other coordinates leads into the set; or
 - a symmetry carries it into the domain and increases ``w . q``.
 
 Boxes for which this is not shown at once are bisected.  Krawczyk's operator ([Neumaier] sec. 5.1)
 shows that a region has one KKT point with positive multipliers, and a locus one zero of the
 derivative of the energy in the coordinates that it depends on.  The list must consist of all
 regions whose point is stationary and not outside the domain, with their indices.
+
+In a list of corners each set of functions that may vanish in a box vanishes nowhere there, or at
+the point of a region only, or has independent gradients and too few of them for a corner, or has a
+subset of the first two kinds.  Regions have one common zero of as many functions as there are
+coordinates, by Krawczyk's operator, or one that second order isolates.
 
 What is shown is about the problem that the file states.  That its symmetries preserve this problem
 is tested at random points and not proved.

@@ -19,6 +19,16 @@ def need(condition: object, message: str) -> None:
         raise RefusedError(message)
 
 
+def nothing(x: arb) -> bool:
+    """Whether a number is 0 as far as it is known."""
+    return x.contains(0) and abs(x) < arb(2) ** -80
+
+
+def shown(x: arb) -> bool:
+    """Whether a number is shown to be 0."""
+    return bool(x == 0)
+
+
 def square(x: arb) -> arb:
     return (x.abs_lower() ** 2).union(x.abs_upper() ** 2)
 

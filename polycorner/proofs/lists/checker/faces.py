@@ -4,7 +4,7 @@ from typing import Any
 
 from flint import acb_mat, arb, arb_mat
 
-from .balls import ZERO, definite, dot, hull, moved, need, sides, turn, zero
+from .balls import ZERO, definite, dot, hull, moved, need, nothing, shown, sides, turn, zero
 from .problem import Problem
 
 HALVINGS = 6  # of a region, in whose parts multipliers are enclosed
@@ -42,8 +42,14 @@ class Face:
         whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
         stated = zip(places, *sharp, strict=False)  # what meets the domain is listed
         self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
-        branches = p.open_sets(p.signs(p.values(self.point)), self.active)
-        self.stationary = branches == [self.active]
+        v = p.values(self.point)
+        signs = p.signs(v)
+        self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
+        self.tested = sum(not shown(v[p.outputs[i]]) for i in self.zeros - self.active)
+        self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
+        branches = p.open_sets(signs, self.zeros)
+        sure = any(u <= self.zeros for u in branches)
+        self.stationary = sure and all(self.active <= u for u in branches)
         self.absent = not branches or any(u < self.active for u in branches)
         if active is None:
             self.descends()
@@ -162,10 +168,14 @@ class Face:
 
     def same(self, other: "Face") -> bool | None:
         """Whether two regions have one point: whether this one's lies in the other region."""
-        if self.active != other.active:
-            return False
+        alike, full = self.active == other.active, len(other.rows) > len(self.p.free)
+        for one, two in ((self, other), (other, self)):
+            if not alike and one.active - two.zeros - two.unknown:
+                return False
         ends = zip(self.places, other.lower, other.upper, strict=True)
         places = ((self.point[i], a, b, self.p.periods[i]) for i, a, b in ends)
         known = [(x + turn(x, a, b, period), a, b) for x, a, b, period in places]
         inside = all(a <= x <= b for x, a, b in known)
-        return True if inside else False if any(x < a or x > b for x, a, b in known) else None
+        if any(x < a or x > b for x, a, b in known):
+            return False
+        return True if inside and (alike or (full and other.active <= self.zeros)) else None

@@ -8,7 +8,7 @@ from flint import arb, ctx
 from .balls import BITS, NAN, ZERO, hull, need, number, sides
 from .operations import SLOPES, VALUES, chain, ordered, unite
 
-FORMAT = ["polycorner-stationary-list", 1]
+FORMAT, CORNERS = ["polycorner-stationary-list", 1], ["polycorner-corner-list", 1]
 
 
 class Problem:
@@ -16,7 +16,7 @@ class Problem:
 
     def __init__(self, data: dict[str, Any]) -> None:
         ctx.prec = BITS
-        need(data["format"] == FORMAT, f"the format is {data['format']}, not {FORMAT}")
+        need(data["format"] in (FORMAT, CORNERS), f"the format is {data['format']}, not {FORMAT}")
         self.n, self.m, self.k = (len(data["coordinates"]), data["inequalities"], data["equations"])
         need(self.m >= 0 and self.k >= 0, "numbers of functions")
         self.nodes: list[tuple[str, list[Any]]] = []

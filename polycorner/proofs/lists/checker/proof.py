@@ -1,25 +1,34 @@
 """Proof in a file: why each of its boxes is closed."""
 
+from collections.abc import Callable
+from itertools import combinations
+from math import comb
 from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import NAN, ZERO, dot, hull, moved
+from .balls import NAN, ZERO, dot, hull, moved, need
 from .faces import Face
 from .problem import Problem
 from .symmetries import Symmetry
 
 PIECES = 4000  # into which a box is bisected at most
+MOST_SETS = 500  # of functions that are looked at in a box
 
 
 class Proof:
     """The problem of a file, with regions, loci and symmetries."""
 
+    kind = "stationary points"  # that are listed
+    tested = 0  # properties at points that are tested, but not shown
+
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = Problem(data)
+        self.kind = "local minima" if p.minima_only else self.kind
         self.regions = [Face(p, r, p.free, r["active"]) for r in data["regions"]]
         self.loci = [Face(p, r, r["z"], None) for r in data["loci"]]
         self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
+        self.tested = sum(region.tested for region in self.regions)
 
     def closed(self, lower: list[float], upper: list[float], hints: list[Any]) -> bool:
         """Whether a box is closed rightly, or every piece of a bisection of it."""
@@ -54,11 +63,14 @@ class Proof:
         def leads(u: frozenset[int], w: list[arb]) -> bool:
             return all(grows(i, w) > 0 for i in u)
 
-        def left(u: frozenset[int]) -> bool:
+        def descends(u: frozenset[int]) -> bool:
             if any(u <= region.active for region in regions):
                 return True
             turned[:] = turned or self.tangents(v, memo, ways)
-            if any(grows(-1, w) < 0 and leads(u, w) for w in turned):
+            return any(grows(-1, w) < 0 and leads(u, w) for w in turned)
+
+        def left(u: frozenset[int]) -> bool:
+            if descends(u) or (regions and self.redundant(v, u, descends)):
                 return True
             if self.p.minima_only and any(self.bends_down(u, v, w) for w in ways):
                 return True
@@ -69,6 +81,19 @@ class Proof:
             return True
         closer = [s or self.p.sign(v, row, memo, lo, hi) for row, s in enumerate(signs)]
         return closer != signs and all(map(left, self.p.open_sets(closer)))
+
+    def redundant(self, v: list[Any], u: frozenset[int], descends: Callable[..., bool]) -> bool:
+        """Whether all largest sets of functions that can be independent have directions or regions.
+
+        By Caratheodory's theorem this is enough where all functions are smooth.
+        """
+        p, memo = self.p, dict[int, Any]()
+        top = len(p.free) - p.k
+        if len(u) <= top or comb(len(u), top) > MOST_SETS:
+            return False
+        found = [p.forms(v, row, memo, 2) for row in (*u, *range(p.m, p.m + p.k + 1))]
+        fine = None not in found and all(x.is_finite() for f in found for x in f[1].values())
+        return fine and all(descends(frozenset(some)) for some in combinations(sorted(u), top))
 
     def bends_down(self, u: frozenset[int], v: list[Any], w: list[arb]) -> bool:
         """Whether no point of a box is a local minimum: a tangent vector has negative curvature.
@@ -116,3 +141,19 @@ class Proof:
             change = dict(zip(self.p.free, (across * y).entries(), strict=True))
             changed.append([x + change.get(i, ZERO) for i, x in enumerate(w)])
         return changed
+
+    def check_list(self, data: dict[str, Any]) -> None:
+        """Check that all regions with stationary points are listed, each point once."""
+        claimed = [self.regions[point["region"]] for point in data["points"]]
+        for k, face in enumerate(claimed):
+            need(face.stationary and not face.outside, f"{face.name}: is no stationary point")
+            need(
+                face.index == data["points"][k]["index"], f"{face.name}: the index is {face.index}"
+            )
+            need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
+        named = claimed + [self.regions[k] for k in data["open_points"]]
+        for face in self.regions:
+            known = face.outside or face.absent or any(face.same(f) for f in named)
+            alone = face.zeros == face.active and not face.unknown
+            known |= self.p.minima_only and bool(face.index) and alone
+            need(known, f"{face.name}: is not listed")

@@ -13,7 +13,8 @@ from itertools import islice
 from typing import Any
 
 from .balls import moved, need
-from .problem import Problem
+from .corners import CornerProof
+from .problem import CORNERS, Problem
 from .proof import Proof
 
 CHUNK = 500  # leaves that a worker checks at a time
@@ -50,24 +51,12 @@ def leaves(p: Problem, codes: Any, positions: Any, counts: Any, directions: Any)
     need(closed == len(counts) and rows * p.n == len(directions), "the number of directions")
 
 
-def check_list(proof: Proof, data: dict[str, Any]) -> None:
-    """Check that all regions with stationary points are listed, each point once."""
-    claimed = [proof.regions[point["region"]] for point in data["points"]]
-    for k, face in enumerate(claimed):
-        need(face.stationary and not face.outside, f"{face.name}: is no stationary point")
-        need(face.index == data["points"][k]["index"], f"{face.name}: the index is {face.index}")
-        need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
-    for k, face in enumerate(proof.regions):
-        known = face.outside or face.absent or k in data["open_points"]
-        known |= proof.p.minima_only and bool(face.index)
-        need(known or any(face.same(f) for f in claimed), f"{face.name}: is not listed")
-
-
 WORKER: list[Proof] = []
 
 
 def begin(path: str) -> None:
-    WORKER[:] = [Proof(contents(path)[0])]
+    data = contents(path)[0]
+    WORKER[:] = [(CornerProof if data["format"] == CORNERS else Proof)(data)]
 
 
 def failing(chunk: list[Any]) -> Any:
@@ -79,7 +68,7 @@ def check(path: str, sample: int | None, jobs: int) -> str:
     (data, parts), started, done = contents(path), time.monotonic(), 0
     begin(path)
     proof, (total, opened) = WORKER[0], (parts[0].count(code) for code in (-1, -2))
-    check_list(proof, data)
+    proof.check_list(data)
     need(opened == data["open"], f"{opened} boxes are open, not {data['open']}")
     count = total if sample is None else min(sample, total)
     wanted = range(total) if count == total else set(random.Random(0).sample(range(total), count))
@@ -93,9 +82,11 @@ def check(path: str, sample: int | None, jobs: int) -> str:
             done += sum(map(len, wave))
             line = f"{done} of {count} leaves, {time.monotonic() - started:.0f} s"
             print(line, file=sys.stderr)
-    kind = "local minima" if proof.p.minima_only else "stationary points"
-    said = [f"{len(data['points'])} {kind}"]
+    said = [f"{len(data['points'])} {proof.kind}"]
+    related = len(data.get("relations", ()))
+    said += [f"{related} linear relations (tested, not proved)"] if related else []
     said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
+    said += [f"{proof.tested} zeros at points (tested, not proved)"] if proof.tested else []
     for met, what in ((True, "loci"), (False, "loci that may be empty")):
         some = [f for f in proof.loci if f.met == met]
         said += [f"{sum(not f.outside for f in some)} {what}"] if some else []

@@ -1,0 +1,74 @@
+"""Skeletons whose corners are proved to be all: their corners beside those of a complete list."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.skeletons.elements import Skeleton
+from polycorner.skeletons.parts import Completeness
+from polycorner.skeletons.registry import SAME
+from polycorner.skeletons.search import skeleton
+from polycorner.spaces.manifold import Array
+
+
+def proved_skeleton(
+    polyhedron: Polyhedron,
+    points: Sequence[Array],
+    symmetry: Symmetry,
+    *,
+    complete: bool,
+    starts: Sequence[Any] = (),
+    **options: Any,
+) -> Skeleton:
+    """Return the skeleton found from corners, and whether its corners are proved to be all.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+    points : sequence of (n,) arrays
+        The corners of a list.
+    symmetry : Symmetry
+        Symmetry to divide by.
+    complete : bool
+        Whether the list is complete.
+    starts : sequence of (n,) arrays, optional
+        Points of the set from which the search sets out as well.
+    options
+        Of :func:`polycorner.skeleton`.
+    """
+    rows = [*points, *(np.asarray(q, dtype=float) for q in starts)]
+    size = polyhedron.manifold.size
+    found = skeleton(polyhedron, np.reshape(rows, (-1, size)), symmetry=symmetry, **options)
+    notes = list(_mismatches(found, points, symmetry))
+    if not complete:
+        notes.append("the list of corners is not complete")
+    proved = not notes and found.complete is Completeness.EXHAUSTED
+    return replace(
+        found,
+        complete=Completeness.CORNERS_PROVED if proved else found.complete,
+        notes=(*found.notes, *notes),
+    )
+
+
+def _mismatches(found: Skeleton, points: Sequence[Array], symmetry: Symmetry) -> list[str]:
+    """Return sentences on the corners of one side that are not those of the other."""
+    manifold = found.polyhedron.manifold
+    pairs = [
+        [bool(symmetry.relabellings(manifold, q, corner.point, SAME)) for corner in found.corners]
+        for q in points
+    ]
+    table = np.reshape(np.array(pairs, dtype=bool), (len(points), len(found.corners)))
+    notes = [
+        f"corner {k} of the list is {count} corners of the skeleton"
+        for k, count in enumerate(table.sum(axis=1).tolist())
+        if count != 1
+    ]
+    single = not (symmetry.elements or symmetry.fields)
+    for k, count in enumerate(table.sum(axis=0).tolist()):
+        if count == 0 or (single and count > 1):
+            notes.append(f"corner {k} of the skeleton is {count} corners of the list")
+    return notes

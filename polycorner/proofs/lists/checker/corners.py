@@ -1,0 +1,155 @@
+"""Proof of a list of corners: why each box has no others."""
+
+import random
+from typing import Any
+
+from flint import arb, arb_mat
+
+from .balls import ZERO, dot, hull, need, nothing, number
+from .problem import Problem
+from .proof import Proof
+from .symmetries import POINTS, Symmetry
+from .vertices import Vertex
+
+SHIFT = 2.0**-30
+
+
+class CornerProof(Proof):
+    """The problem of a file, with regions and symmetries."""
+
+    kind = "corners"
+
+    def __init__(self, data: dict[str, Any]) -> None:
+        self.p = p = Problem(data)
+        self.vertices = [Vertex(p, r) for r in data["regions"]]
+        self.loci, self.tested = [], sum(vertex.tested for vertex in self.vertices)
+        self.related = [Relation(p, r).rows for r in data["relations"]]
+        self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
+
+    def shown(self, lo: list[float], hi: list[float], _: list[list[arb]]) -> bool:
+        """Whether a box is closed rightly."""
+        if any(g.carries(lo, hi) for g in self.symmetries):
+            return True
+        box = Box(self.p, lo, hi)
+        signs = self.p.signs(box.v)
+        if self.known(box, signs):
+            return True
+        closer = [s or self.p.sign(box.v, row, box.memo, lo, hi) for row, s in enumerate(signs)]
+        return closer != signs and self.known(box, closer)
+
+    def known(self, box: "Box", signs: list[int]) -> bool:
+        """Whether all corners in a box are known, from the sets of functions that may vanish.
+
+        Each set vanishes nowhere, or at a known point only, or has independent gradients and too
+        few of them to isolate a point; or a smaller set is of the first two kinds; or a function is
+        a combination of others.
+        """
+        p = self.p
+        some = sorted(frozenset().union(*p.open_sets(signs)))
+        if not p.open_sets(signs):
+            return True
+        around = [v for v in self.vertices if v.holds(box.lo, box.hi)]
+        zeros = {tuple(sorted(v.active)) for v in around}
+        criticals = {(i,) for v in around for i in v.critical}
+        top, level = len(p.free) - p.k, {tuple[int, ...]()}
+        for size in range(top + 1):
+            alive = set[tuple[int, ...]]()
+            for rows in level:
+                if any(some.issubset(rows) for some in self.related):
+                    continue
+                every = [*rows, *range(p.m, p.m + p.k)]
+                if every and (rows in zeros or box.incompatible(every)):
+                    continue
+                if size == top or (every and not (rows in criticals or box.independent(every))):
+                    return False
+                alive.add(rows)
+            larger = {(*rows, j) for rows in alive for j in some if not rows or j > rows[-1]}
+            level = {
+                s for s in larger if all((*s[:i], *s[i + 1 :]) in alive for i in range(size + 1))
+            }
+        return bool(top >= 0)
+
+    def check_list(self, data: dict[str, Any]) -> None:
+        """Check that all regions with corners are listed, each corner once."""
+        claimed = [self.vertices[point["region"]] for point in data["points"]]
+        for k, v in enumerate(claimed):
+            need(v.inside and v.active <= v.matter and not v.outside, f"{v.name}: is no corner")
+            active = sorted(v.matter)
+            need(active == data["points"][k]["active"], f"{v.name}: {active} are active")
+            need(all(v.same(w) is False for w in claimed[:k]), f"{v.name}: is listed twice")
+        named = claimed + [self.vertices[k] for k in data["open_points"]]
+        for v in self.vertices:
+            absent = not v.inside or not (v.active <= v.matter or v.critical & v.matter)
+            known = v.outside or absent or any(v.same(w) for w in named)
+            need(known, f"{v.name}: is not listed")
+
+
+class Relation:
+    """A linear relation between inequalities and equations, tested at random points."""
+
+    def __init__(self, p: Problem, record: dict[str, Any]) -> None:
+        name, weights = f"relation {record}", [number(text) for text in record["weights"]]
+        self.rows = frozenset(record["rows"])
+        fine = (
+            self.rows
+            and self.rows <= set(range(p.m))
+            and all(w != 0 for w in weights[: len(record["rows"])])
+        )
+        need(fine and len(weights) == len(record["rows"]) + p.k, name)
+        every, draw = [*record["rows"], *range(p.m, p.m + p.k)], random.Random(1)
+        for _ in range(POINTS):
+            q = [arb(draw.uniform(a, b)) for a, b in zip(p.lower, p.upper, strict=True)]
+            values = [p.values(q)[p.outputs[row]] for row in every]
+            need(nothing(dot(weights, values)), f"{name}: is none")
+
+
+class Box:
+    """Enclosures of functions on a box."""
+
+    def __init__(self, p: Problem, lo: list[float], hi: list[float]) -> None:
+        self.p, self.lo, self.hi = p, lo, hi
+        self.hull, self.memo = hull(lo, hi), dict[int, Any]()
+        self.v = p.values(self.hull)
+        self.middle = [arb(0.5 * (a + b)) for a, b in zip(lo, hi, strict=True)]
+        self.at = p.values(self.middle)
+
+    def gradients(self, rows: list[int]) -> list[list[arb]] | None:
+        found = [self.p.forms(self.v, row, self.memo) for row in rows]
+        if None in found:
+            return None
+        slopes = [[g.get(i, ZERO) for i in self.p.free] for g, _ in found]
+        return slopes if all(x.is_finite() for g in slopes for x in g) else None
+
+    def independent(self, rows: list[int]) -> bool:
+        """Whether the gradients of functions are independent on the whole box."""
+        slopes = self.gradients(rows)
+        if slopes is None or len(rows) > len(self.p.free):
+            return False
+        try:
+            (arb_mat(slopes) * arb_mat(slopes).mid().transpose()).inv()
+        except ZeroDivisionError:
+            return False
+        return True
+
+    def incompatible(self, rows: list[int]) -> bool:
+        """Whether functions do not vanish together, by the mean value form of combinations."""
+        slopes = self.gradients(rows)
+        if slopes is None:
+            return False
+        away = [self.hull[i] - self.middle[i] for i in self.p.free]
+        values = arb_mat([[self.at[self.p.outputs[row]]] for row in rows])
+        moved = [[x * a.abs_upper() for x, a in zip(g, away, strict=True)] for g in slopes]
+        middle = arb_mat(moved).mid()
+        square = (middle * middle.transpose()).tolist()
+        shift = sum((square[i][i] for i in range(len(rows))), ZERO) * SHIFT
+        for i in range(len(rows)):
+            square[i][i] += shift
+        try:
+            inverse = arb_mat(square).mid().inv().mid()
+        except ZeroDivisionError:
+            return False
+        for weights in (inverse, (middle.transpose() * inverse).mid()):
+            sums = weights * values + weights * arb_mat(slopes) * arb_mat([[x] for x in away])
+            if any(x > 0 or x < 0 for x in sums.entries()):
+                return True
+        return False

@@ -1,0 +1,228 @@
+"""Branch and bound for all corners of a polyhedron.
+
+A box is discarded where no point of the set lies in it, and where
+:mod:`~polycorner.proofs.lists.levels` shows that the corners in it are known; all others are
+bisected.  Corners become known by Newton's method where the gradients of enough functions are
+independent on a box, and by the search for a singular one in small boxes where they are not.
+"""
+
+from dataclasses import dataclass, field
+from itertools import combinations, islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.attempts import Mapped
+from polycorner.proofs.lists.boxes import Boxes, joined
+from polycorner.proofs.lists.branches import Mask, items
+from polycorner.proofs.lists.dependence import Enclosures, Places, Truths
+from polycorner.proofs.lists.images import dropped
+from polycorner.proofs.lists.levels import Levels, Rows, levels
+from polycorner.proofs.lists.relations import Relation, relation
+from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.tips import Tip, tips
+from polycorner.spaces.manifold import Array
+
+ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
+WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
+SMALL = 0.05  # side in scale units of boxes in which singular corners are sought
+NEWTON = 12
+MOST_SETS = 200  # of one size that relations are sought in
+STRAY = 4.0  # sides of a box that a vertex may be away from its middle
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Boxes, and which of them are left.
+
+    Attributes
+    ----------
+    images : (I,) array of int
+        Numbers in the tree of boxes that a symmetry carries to others; they are left out below.
+    boxes : Boxes
+    outside, left : (B,) arrays of bool
+        Whether they miss the set, and whether there may be other corners in them.
+    regular : list of (tuple of int, array of int)
+        Sets of functions that may have a common zero in some boxes, where they are independent.
+    singular : list of (int, list of int)
+        Boxes in which no such set is, and the functions that may vanish there.
+    """
+
+    images: NDArray[np.int64]
+    boxes: Boxes
+    outside: Truths
+    left: Truths
+    regular: list[tuple[Rows, Places]]
+    singular: list[tuple[int, list[int]]]
+
+
+@dataclass
+class CornerSearch(Search):
+    """One run: what is to be treated, and the regions in which one corner may be.
+
+    Attributes
+    ----------
+    relations : mapping from tuple of int to Relation or None
+        Linear relations between functions, by the sets in which they were sought.
+    """
+
+    relations: dict[Rows, Relation | None] = field(default_factory=dict)
+
+    def _compile(self) -> None:
+        self._examined(self.waiting.part(slice(0, 1)))
+
+    def round(self, mapped: Mapped = map) -> None:
+        """Treat the last boxes that wait; ``mapped`` is like ``map``."""
+        chunks = self._chunks()
+        found: list[Chunk] = list(mapped(self._examined, chunks))
+        for chunk in found:
+            self._attempt(chunk)
+        taken = sum(map(len, chunks))
+        before = self.waiting.part(slice(None, len(self.waiting) - taken))
+        self.waiting = joined([before, *map(self._closed, found)])
+
+    def _examined(self, boxes: Boxes) -> Chunk:
+        """Return what is shown of some boxes; nothing is changed."""
+        gone = np.zeros(len(boxes), dtype=np.bool_)
+        if self.motions:
+            gone = dropped(boxes.lower, boxes.upper, self.motions, self.weights, self.domain)
+        images, boxes = boxes.nodes[gone], boxes.part(~gone)
+        m, k = self.problem.inequalities, self.equations
+        v_lo, v_hi, *gradients = self.functions.gradients(boxes.lower, boxes.upper, mean_value=True)
+        meets: Mask = np.all((v_lo[:, m : m + k] <= 0) & (v_hi[:, m : m + k] >= 0), axis=1)
+        where, branches = items(self.conj, v_hi[:, :m] < 0, v_lo[:, :m] > 0)
+        inside = np.zeros(len(boxes), dtype=np.bool_)
+        inside[where] = True
+        inside &= meets
+        masks = np.zeros((len(boxes), m), dtype=np.bool_)
+        np.logical_or.at(masks, where, branches)
+        at = np.flatnonzero(inside)
+        part = boxes.part(at)
+        sides = gradients[0][at], gradients[1][at]
+        found = Enclosures.of(self.functions, part.lower, part.upper, sides, self.domain.free)
+        around = _Around(self.regions, part, self.domain.lower < self.domain.upper)
+        related = [frozenset(r.rows) for r in self.relations.values() if r]
+        result = levels(found, masks[at], k, around.zero, around.critical, related)
+        left = np.zeros(len(boxes), dtype=np.bool_)
+        left[at[result.left]] = True
+        regular = self._regular(found, result)
+        rest = result.left.copy()
+        for _, places in regular:
+            rest[places] = False
+        singular = [
+            (int(at[i]), np.flatnonzero(masks[at[i]]).tolist()) for i in np.flatnonzero(rest)
+        ]
+        located = [(rows, at[places]) for rows, places in regular]
+        return Chunk(images, boxes, ~inside, left, located, singular)
+
+    def _regular(self, found: Enclosures, result: Levels) -> list[tuple[Rows, Places]]:
+        """Return the largest sets and the boxes in which their gradients are independent."""
+        chosen = []
+        for rows, at in result.largest:
+            independent = found.independent(at, self.vertices.rows(rows))
+            if independent.any():
+                chosen.append((rows, at[independent]))
+        return chosen
+
+    def _attempt(self, chunk: Chunk) -> None:
+        """Try to find corners in boxes that are left."""
+        boxes = chunk.boxes
+        widths = (boxes.upper - boxes.lower) / self.problem.scales
+        sizes = widths[:, list(self.domain.free)].max(axis=1, initial=0.0)
+        tried = 0
+        for rows, at in chunk.regular:
+            for box in at:
+                if tried < ATTEMPTS:
+                    tried += self._vertex(boxes.middles[box], rows, sizes[box])
+        every = len(self.domain.free)
+        ripe = [(box, rows) for box, rows in chunk.singular if boxes.since[box] >= every]
+        for _, open_ in ripe[:RARE]:
+            self._relate(open_)
+        for box, open_ in [(box, rows) for box, rows in ripe if sizes[box] < SMALL][:RARE]:
+            boxes.since[box] = 0
+            for tip in tips(self.vertices, boxes.middles[box], open_, 2 * sizes[box]):
+                if not self.known.has(0.5 * (tip.lower + tip.upper), frozenset(tip.active)):
+                    self.known.add(tip)
+
+    def _relate(self, open_: list[int]) -> None:
+        """Seek linear relations between functions, in small sets first."""
+        top = len(self.domain.free) - self.equations
+        for size in range(1, top + 1):
+            for rows in islice(combinations(open_, size), MOST_SETS):
+                parts = (self.relations.get(part) for part in combinations(rows, size - 1))
+                if rows not in self.relations and not any(parts):
+                    self.relations[rows] = relation(self.problem, rows)
+
+    def _closed(self, chunk: Chunk) -> Boxes:
+        """Record which boxes are closed; return the halves of the others."""
+        boxes, left = chunk.boxes, chunk.left
+        nothing = np.zeros((0, boxes.lower.shape[1]))
+        self.tally.images += len(chunk.images)
+        self.tally.outside += int(chunk.outside.sum())
+        self.tally.covered += int((~chunk.outside & ~left).sum())
+        for nodes in (chunk.images, boxes.nodes[~left]):
+            self.tree.close(nodes, boxes.nodes[:0], nothing)
+        return self._halves(boxes.part(left))
+
+    def _vertex(self, q: Array, rows: Rows, size: float) -> bool:
+        """Seek the common zero of functions near a point; return whether a region was tried."""
+        point = self._newton(q, rows, STRAY * size)
+        if point is None or self.known.has(point, frozenset(rows)):
+            return False
+        region = self.vertices.region(point, rows, WIDER * size)
+        if region is not None:
+            self.known.add(region)
+        return True
+
+    def _newton(self, q: Array, rows: Rows, reach: float) -> Array | None:
+        """Return a common zero within some scale units of a point, or None."""
+        free, at = list(self.domain.free), list(self.vertices.rows(rows))
+        start, scales = q, self.problem.scales[free]
+        q = q.copy()
+        for _ in range(NEWTON):
+            values, gradients = self.problem.evaluate(q, 1)
+            try:
+                step = np.linalg.solve(gradients[at][:, free], -values[at])
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(step).all():
+                return None
+            q[free] += step * scales
+            if (abs(q - start)[free] > reach * scales).any():
+                return None
+        return q
+
+
+class _Around:
+    """Regions around boxes, with questions about sets of functions."""
+
+    def __init__(self, regions: list[Region], boxes: Boxes, free: Truths) -> None:
+        self.zeros: dict[Rows, Truths] = {}
+        self.criticals: dict[Rows, Truths] = {}
+        for region in regions:
+            within: Truths = (region.lower < boxes.lower) & (boxes.upper < region.upper)
+            inside: Truths = np.all(within | ~free, axis=1)
+            if inside.any():
+                self._add(self.zeros, tuple(sorted(region.active)), inside)
+                for i in region.critical if isinstance(region, Tip) else ():
+                    self._add(self.criticals, (i,), inside)
+
+    @staticmethod
+    def _add(known: dict[Rows, Truths], rows: Rows, inside: Truths) -> None:
+        inside = inside.copy()
+        inside |= known.get(rows, inside)
+        known[rows] = inside
+
+    def zero(self, rows: Rows, at: Places) -> Truths:
+        """Whether the common zero of functions, and the equations, is known in some boxes."""
+        return self._found(self.zeros, rows, at)
+
+    def critical(self, rows: Rows, at: Places) -> Truths:
+        """Whether the point where the gradient of a function vanishes is known in some boxes."""
+        return self._found(self.criticals, rows, at)
+
+    @staticmethod
+    def _found(known: dict[Rows, Truths], rows: Rows, at: Places) -> Truths:
+        found = known.get(rows)
+        return np.zeros(len(at), dtype=np.bool_) if found is None else found[at]

@@ -1,0 +1,264 @@
+"""Singular corners: common zeros with dependent gradients that second order isolates.
+
+Let functions ``f_i`` vanish at a point ``p`` of a box ``X``, with gradients ``G_i`` there, and let
+``sum l_i G_i = 0``.  For ``q`` in ``X`` and ``d = q - p`` Taylor's theorem gives ``H_i`` in the
+enclosure of the second derivatives on ``X`` with ``f_i(q) = G_i d + d' H_i d / 2``, and
+therefore, for every ``w``,
+
+    sum_i (l_i + w G_i d) f_i(q) = d' Q d,
+    Q = sum_i (l_i H_i / 2 + w G_i' G_i + w (G_i d) H_i / 2).
+
+If all matrices in the enclosure of ``Q`` are positive definite, ``p`` is the only common zero in
+``X``.  The gradients being dependent is no property that enclosures could show: ``p`` has rational
+coordinates, at which values and gradients are evaluated exactly, and so are the ``l_i``.
+
+Where a single function has the gradient 0 at ``p`` and a regular second derivative on all of ``X``,
+there is no other such point in ``X`` either.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polycorner.intervals.balls import ball, between, dot, matrix, precision
+from polycorner.intervals.enclosures import SmoothForms, Undecided
+from polycorner.intervals.tapes import Box
+from polycorner.proofs import polynomials as algebra
+from polycorner.proofs.definite import pivots
+from polycorner.proofs.exact import Symbols, evaluate
+from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, Region, outward
+from polycorner.proofs.lists.vertices import Vertices
+from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    from polycorner.intervals.balls import Ball
+
+DENOMINATORS = (1, 12, 1000, 10**6)
+FACTORS = (1.0, 4.0, 16.0, 64.0)  # of the least w that may do, by the sizes of the terms of Q
+MOST_STEPS = 60
+
+Exact = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Tip(Region):
+    """A box in which some functions vanish together at one point only, where they are dependent.
+
+    Attributes
+    ----------
+    exact : tuple of Fraction
+        The point, all coordinates.
+    combination : tuple of Fraction
+        ``l``, for the active functions, then the equations.
+    weight : float
+        ``w``.
+    critical : tuple of int
+        The active functions whose gradient vanishes at this point and at no other one of the box.
+    """
+
+    exact: Exact
+    combination: Exact
+    weight: float
+    critical: tuple[int, ...]
+
+
+def tips(vertices: Vertices, q: Array, open_: Sequence[int], reach: float) -> Iterator[Tip]:
+    """Yield boxes about a singular corner near ``q``, for each set of functions that isolates it.
+
+    Parameters
+    ----------
+    vertices : Vertices
+    q : (n,) array
+    open_ : sequence of int
+        Inequalities that may vanish there.
+    reach : float
+        How far the corner may be, in scale units.
+    """
+    with precision(BITS):
+        near = _approximate(vertices, q, open_)
+        if near is None or (abs(near - q) > reach * vertices.scales).any():
+            return
+        for point in _rational(vertices, near, reach):
+            found = list(_tips_at(vertices, point, open_))
+            yield from found
+            if found:
+                return
+
+
+def _tips_at(vertices: Vertices, point: Exact, open_: Sequence[int]) -> Iterator[Tip]:
+    active, slopes = _vanishing(vertices, point, open_)
+    if active is None:
+        return
+    rest = range(len(active), len(active) + vertices.equations)
+    for size in range(len(vertices.free) - vertices.equations + 1):
+        for places in combinations(range(len(active)), size):
+            chosen = [slopes[i] for i in (*places, *rest)]
+            found = _isolated(vertices, point, [active[i] for i in places], chosen)
+            if found is not None:
+                yield found
+
+
+def _approximate(vertices: Vertices, q: Array, open_: Sequence[int]) -> Array | None:
+    """Return a common zero of functions near ``q`` by the method of Gauss and Newton."""
+    free, rows = list(vertices.free), vertices.rows(open_)
+    q = q.copy()
+    for _ in range(MOST_STEPS):
+        forms = vertices.formulas.smooth(Box([ball(x) for x in q.tolist()]), rows)
+        if isinstance(forms, Undecided):
+            return None
+        values, gradients = forms.evaluate(Box([ball(x) for x in q.tolist()]), 1)
+        slopes = np.array([[float(g[i].mid()) for i in free] for g in gradients])
+        missed = np.array([float(x.mid()) for x in values])
+        if not (np.isfinite(slopes).all() and np.isfinite(missed).all()):
+            return None
+        step = np.linalg.lstsq(slopes * vertices.scales[free], -missed, rcond=1e-9)[0]
+        q[free] += step * vertices.scales[free]
+        if abs(step).max(initial=0.0) < 1e-14:
+            break
+    return q
+
+
+def _rational(vertices: Vertices, near: Array, reach: float) -> Iterator[Exact]:
+    """Yield points with small denominators near one, the smallest first."""
+    fixed = set(range(len(near))) - set(vertices.free)
+    seen = set()
+    for most in DENOMINATORS:
+        numbers = [Fraction(x) for x in near.tolist()]
+        point = tuple(
+            [x if i in fixed else x.limit_denominator(most) for i, x in enumerate(numbers)]
+        )
+        away = abs(np.array([float(x) for x in point]) - near) / vertices.scales
+        if point not in seen and (away <= reach).all():
+            seen.add(point)
+            yield point
+
+
+def _vanishing(
+    vertices: Vertices, point: Exact, open_: Sequence[int]
+) -> tuple[list[int] | None, list[list[Fraction]]]:
+    """Return the functions that vanish exactly at a point, and their gradients, equations last.
+
+    None unless all equations vanish and everything is a rational number.
+    """
+    rows = vertices.rows(open_)
+    forms = vertices.formulas.smooth(Box([ball(x) for x in point]), rows)
+    if isinstance(forms, Undecided):
+        return None, []
+    d = forms.graph.derivative
+    slopes = [d(f, i) for f in forms.outputs for i in vertices.free]
+    inputs = [algebra.number(x) for x in point]
+    found = evaluate(forms.graph, [*forms.outputs, *slopes], inputs, Symbols())
+    numbers = [None if p is None else algebra.constant(p) for p in found]
+    values, n = numbers[: len(rows)], len(vertices.free)
+    if any(value != 0 for value in values[len(open_) :]):
+        return None, []
+    active, gradients = [], []
+    for r, value in enumerate(values):
+        gradient = numbers[len(rows) + n * r : len(rows) + n * (r + 1)]
+        if value == 0:
+            if any(x is None for x in gradient):
+                return None, []
+            gradients.append([Fraction(x) for x in gradient if x is not None])
+            active += [rows[r]] if r < len(open_) else []
+    return active, gradients
+
+
+def _isolated(
+    vertices: Vertices, point: Exact, active: list[int], slopes: list[list[Fraction]]
+) -> Tip | None:
+    """Return the widest box tried in which the point is the only common zero."""
+    import sympy
+
+    if not slopes:
+        return None
+    relations = [
+        tuple([Fraction(int(x.p), int(x.q)) for x in v])
+        for v in sympy.Matrix(
+            [[sympy.Rational(x.numerator, x.denominator) for x in row] for row in slopes]
+        ).T.nullspace()
+    ]
+    chosen = _relations(relations)
+    q = np.array([float(x) for x in point])
+    free = list(vertices.free)
+    for power in range(QUARTERINGS if chosen else 0):
+        radii = np.zeros_like(q)
+        radii[free] = WIDEST / 4**power * vertices.scales[free]
+        lower, upper = q - radii, q + radii
+        sides = zip(lower.tolist(), upper.tolist(), strict=True)
+        box = Box([between(a, b) for a, b in sides])
+        forms = vertices.formulas.smooth(box, vertices.rows(active))
+        if isinstance(forms, Undecided):
+            continue
+        hessians = _hessians(forms, box, vertices.free)
+        away = [box.hull[i] - ball(point[i]) for i in vertices.free]
+        for relation in chosen:
+            for weight in _weights(hessians, slopes, relation):
+                if isolates(hessians, slopes, away, relation, weight):
+                    ends = np.array([outward(ball(point[i])) for i in vertices.free])
+                    critical = [
+                        i
+                        for i, g, h in zip(active, slopes, hessians, strict=False)
+                        if not any(g) and not vertices.equations and _regular(h)
+                    ]
+                    return Tip(
+                        lower, upper, tuple(active), ends[:, 0], ends[:, 1], None,
+                        point, relation, weight, tuple(critical),
+                    )  # fmt: skip
+    return None
+
+
+def _hessians(forms: SmoothForms, box: Box, free: Sequence[int]) -> "list[list[list[Ball]]]":
+    return [[[h[i][j] for j in free] for i in free] for h in forms.evaluate(box, 2)[2]]
+
+
+def _relations(basis: list[Exact]) -> list[Exact]:
+    """Return combinations of relations that may be definite: each, and sums of two."""
+    every = list(basis)
+    for u, v in pairwise(basis):
+        every += [tuple(a + s * b for a, b in zip(u, v, strict=True)) for s in (1, -1)]
+    return [tuple(s * x for x in relation) for relation in every for s in (1, -1)]
+
+
+def _weights(hessians: Any, slopes: list[list[Fraction]], relation: Exact) -> list[float]:
+    """Return values of ``w`` that may do."""
+    middle = np.array([[[float(x.mid()) for x in row] for row in h] for h in hessians])
+    gradients = np.array(slopes, dtype=float)
+    bent = np.linalg.norm(np.tensordot(np.array(relation, dtype=float), middle, 1))
+    steep = np.linalg.norm(gradients.T @ gradients)
+    if not steep > 0:
+        return [0.0]
+    start = float(bent / steep)
+    return [factor * start for factor in FACTORS] if np.isfinite(start) else []
+
+
+def isolates(
+    hessians: Any, slopes: Sequence[Sequence[Fraction]], away: Any, relation: Exact, weight: float
+) -> bool:
+    """Whether ``Q`` is positive definite for all ``d`` in a box and all second derivatives."""
+    n, w = len(away), ball(weight)
+    gradients = [[ball(x) for x in row] for row in slopes]
+    factors = [ball(x) / 2 + w * dot(g, away) / 2 for x, g in zip(relation, gradients, strict=True)]
+    form = [
+        [
+            dot(factors, [h[i][j] for h in hessians])
+            + w * dot([g[i] for g in gradients], [g[j] for g in gradients])
+            for j in range(n)
+        ]
+        for i in range(n)
+    ]
+    symmetric = [[(form[i][j] + form[j][i]) / 2 for j in range(n)] for i in range(n)]
+    found = pivots(symmetric)
+    return len(found) == n and all(x > 0 for x in found)
+
+
+def _regular(rows: "list[list[Ball]]") -> bool:
+    """Whether every matrix in an enclosure is regular."""
+    try:
+        matrix(rows).inv()
+    except ZeroDivisionError:
+        return False
+    return True
