@@ -69,21 +69,31 @@ def relative_curves(
 
 def _cut(atlas: PairAtlas, points: Array, period: float) -> list[Array]:
     """Return the pieces of an edge in one period about zero."""
-    turns = np.round(points[:, 2] / period)
+    turns = _turns(points[:, 2], period)
     cuts = np.flatnonzero(np.diff(turns)) + 1
     pieces = np.split(points, cuts)
     for k, cut in enumerate(cuts.tolist()):
-        if abs(points[cut, 2] - points[cut - 1, 2]) > SAME:
-            end = _on_seam(atlas, points[cut - 1], points[cut], turns[cut - 1 : cut + 1], period)
-            pieces[k] = np.vstack([pieces[k], end])
-            pieces[k + 1] = np.vstack([end, pieces[k + 1]])
+        end = _on_seam(atlas, points[cut - 1], points[cut], turns[cut - 1 : cut + 1], period)
+        pieces[k] = np.vstack([pieces[k], end])
+        pieces[k + 1] = np.vstack([end, pieces[k + 1]])
     starts = np.concatenate([[0], cuts])
-    shifted = [
+    return [
         piece - np.array([0.0, 0.0, period * turns[start]])
         for piece, start in zip(pieces, starts.tolist(), strict=True)
     ]
-    # An edge that begins or ends on the seam leaves a piece without length beyond it.
-    return [piece for piece in shifted if np.ptp(piece, axis=0).max() > SAME]
+
+
+def _turns(heading: Array, period: float) -> Array:
+    """Return whole periods to be taken off; points between two have those of a point beside them.
+
+    Rounding does not cut an edge along which the heading is half a period.
+    """
+    share = heading / period - np.floor(heading / period)
+    clear = np.flatnonzero(abs(share - 0.5) * period > SAME)
+    if not clear.size:
+        return np.floor(heading / period) + 1
+    before = np.searchsorted(clear, np.arange(len(heading)), side="right") - 1
+    return np.asarray(np.round(heading / period)[clear[np.maximum(before, 0)]])
 
 
 def _on_seam(atlas: PairAtlas, one: Array, other: Array, turns: Array, period: float) -> Array:
@@ -123,7 +133,7 @@ def relative_corners(
     letters = []
     for corner in atlas.skeleton.corners:
         point = relative_coordinates(atlas.pair, corner.point, mean_heading=atlas.heading)
-        point[2] -= period * np.round(point[2] / period)
+        point[2] -= period * _turns(point[2:], period)[0]
         for image in _images(atlas, point):
             if all(abs(image - other).max() > 1e-6 for other in points):
                 points.append(image)
