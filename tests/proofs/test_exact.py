@@ -16,9 +16,10 @@ from polycorner.intervals.balls import ball, integer_relation, precision
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import prove
 from polycorner.proofs.definite import positive_on_cone
-from polycorner.proofs.exact import Symbols, evaluate, implied
+from polycorner.proofs.exact import implied
 from polycorner.proofs.hypotheses import CURVED
 from polycorner.proofs.polynomials import number
+from polycorner.proofs.symbols import Symbols, evaluate
 
 M = Manifold.euclidean("x y z")
 x, y, z = M.symbols
@@ -46,6 +47,33 @@ expressions = st.recursive(
     ),
     max_leaves=6,
 )
+
+
+@pytest.mark.parametrize("twelfths", range(-13, 14))
+def test_sines_and_cosines_of_twelfths_of_a_turn_that_are_rational(twelfths):
+    angle = twelfths * sp.pi / 6
+    f, symbols = formulas(sp.sin(x), sp.cos(x)), Symbols()
+    ((pi, _),) = symbols.of("const", "pi").items()
+    at = [{pi: Fraction(twelfths, 6)} if twelfths else {}, {}, {}]
+    for found, truth in zip(
+        evaluate(f.graph, f.outputs, at, symbols), (sp.sin(angle), sp.cos(angle)), strict=True
+    ):
+        if truth.is_rational:
+            assert found == number(Fraction(int(2 * truth), 2))
+        else:
+            assert sp.Abs(sp.Float(symbols.ball(found).str(15, radius=False)) - truth) < 1e-12
+
+
+@pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
+def test_comparisons_are_decided_where_enclosures_decide_them():
+    f, symbols = formulas(sp.Abs(x - sp.pi) + sp.Abs(y - x)), Symbols()
+    at = [number(3), symbols.of("var", 1), {}]
+    assert evaluate(f.graph, f.outputs, at, symbols)[0] != {}
+    symbols.places[1] = ball(4)
+    (found,) = evaluate(f.graph, f.outputs, at, symbols)
+    ((pi, _),) = symbols.of("const", "pi").items()
+    ((moved, _),) = symbols.of("var", 1).items()
+    assert found == {pi: 1, moved: 1, (): -6}
 
 
 @given(expressions, st.tuples(fractions, fractions, fractions))

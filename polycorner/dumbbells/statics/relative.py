@@ -38,7 +38,8 @@ cross, seen along ``e``:
 
 In the plane ``h = 0`` and ``f = 0``.  Axes do not cross where both ends of one are on one side of
 the line through the other, or the centres are ``l`` apart: closed conditions that are smooth, also
-for parallel rods, where the distance of the rods is not.
+for parallel rods, where the distance of the rods is not.  Of two dumbbells that do not overlap one
+of them holds strictly, so that corners are made of contacts alone.
 """
 
 import math
@@ -184,6 +185,20 @@ class RelativePlacements(Value):
         """Half-turns of each dumbbell, their exchange, and the mirror images in both axes."""
         maps = (_turn_a, _turn_b, _exchange, _mirror_across, _mirror_along)
         return Symmetry(elements=tuple(Element(apply, {}) for apply in maps))
+
+    @cached_property
+    def rotations(self) -> Symmetry:
+        """Rotations of the plane about the middle of the centres, which preserve all contacts.
+
+        Raises
+        ------
+        ValueError
+            In a drum.
+        """
+        if not self.pair.is_plane:
+            checks.refuse("pair", "a pair in the plane, where rotations are symmetries", self.pair)
+        x, y = self.manifold.symbols[:2]
+        return Symmetry(fields=({"x": y / 2, "y": -2 * x, "alpha": 1, "beta": 1},))
 
     def placement(self, q: ArrayLike) -> Array:
         """Return the placement ``(..., 6)`` of the pair."""

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -87,15 +87,20 @@ class PairAtlas(Value):
         return counts | ({6: 1} if self.components.get(6) == 1 else {})
 
     def kind(self, corner: Corner) -> str:
-        """Return the paper's letter for a corner with its chirality, as ``Delta_R``.
+        """Return the paper's letter for a corner with its chirality, see :func:`corner_kind`."""
+        return corner_kind(corner.active, corner.chirality)
 
-        ``Delta``: a ball-ball contact and two ball-rod contacts; ``E``: two of either; for other
-        corners the numbers of ball-ball, ball-rod and rod-rod contacts.
-        """
-        lengths = Counter(len(name) for name in corner.active)
-        numbers = (lengths[4], lengths[3], lengths[2])
-        letter = {(1, 2, 0): "Delta", (2, 2, 0): "E"}.get(numbers, "C{}{}{}".format(*numbers))
-        return f"{letter}_{corner.chirality or 'N'}"
+
+def corner_kind(active: Iterable[str], chirality: str | None) -> str:
+    """Return the paper's letter for the contacts at a corner with a chirality, as ``Delta_R``.
+
+    ``Delta``: a ball-ball contact and two ball-rod contacts; ``E``: two of either; for other
+    corners the numbers of ball-ball, ball-rod and rod-rod contacts.
+    """
+    lengths = Counter(len(name) for name in active)
+    numbers = (lengths[4], lengths[3], lengths[2])
+    letter = {(1, 2, 0): "Delta", (2, 2, 0): "E"}.get(numbers, "C{}{}{}".format(*numbers))
+    return f"{letter}_{chirality or 'N'}"
 
 
 def pair_atlas(

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.intervals.balls import between, precision
-from polycorner.intervals.enclosures import Formulas
+from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.exact import common_zero, implied
-from polycorner.proofs.lists.acceptance import BITS
+from polycorner.proofs.exact import MOST_CONSTANTS, ExactPoint, implied, in_ideal, number_in
+from polycorner.proofs.lists.acceptance import BITS, outward
+from polycorner.proofs.lists.vertices import Vertices
+from polycorner.proofs.polynomials import Polynomial
+from polycorner.proofs.symbols import Symbols, constants, evaluate
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from polycorner.proofs.lists.branches import Mask
 
 NEGATIVE, ZERO, POSITIVE, OPEN = -1, 0, 1, 2
+REACH = 2.0**-40  # of the box in which coordinates that are not recognised are sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +52,9 @@ class Place:
     unique: bool = True
 
 
-def signs(formulas: Formulas, place: Place, count: int) -> list[int]:
+def signs(vertices: Vertices, place: Place, count: int) -> list[int]:
     """Return the signs of the first ``count`` functions at a point, ``OPEN`` where not decided."""
+    formulas = vertices.formulas
     with precision(BITS):
         values = formulas.values(Box(place.point), range(count))
         found = [POSITIVE if v > 0 else NEGATIVE if v < 0 else OPEN for v in values]
@@ -59,19 +63,66 @@ def signs(formulas: Formulas, place: Place, count: int) -> list[int]:
                 found[row] = ZERO
         left = [i for i, sign in enumerate(found) if sign == OPEN and values[i].is_finite()]
         if left:
-            exact = common_zero(formulas, place.rows, place.point) if place.unique else None
-            if exact is not None and not all(
-                between(a, b).contains(exact.symbols.ball(x))
-                for a, b, x in zip(
-                    place.lower.tolist(), place.upper.tolist(), exact.unknowns, strict=True
-                )
-            ):
-                exact = None
+            exact = common_zero(vertices, place) if place.unique else None
             for i in left:
                 shown = exact is not None and exact.vanishes(formulas, i)
                 if shown or implied(formulas, place.rows, i):
                     found[i] = ZERO
     return found
+
+
+def common_zero(vertices: Vertices, place: Place) -> ExactPoint | None:
+    """Return the point of a place exactly, or None.
+
+    Some coordinates are recognised as combinations of constants.  Where they have these values
+    some of the functions are polynomials of the others, in symbols, and have one common zero in the
+    other coordinates by Krawczyk's operator; the rest of the functions are combinations of these
+    polynomials.  The point found lies in the box in which the functions have one common zero only:
+    it is the one.
+    """
+    formulas, symbols = vertices.formulas, Symbols()
+    sought = constants(formulas, symbols)
+    pi = symbols.of("const", "pi")
+    sought += [pi] if pi not in sought else []
+    if len(sought) > MOST_CONSTANTS:
+        return None
+    known = [number_in(x, sought, symbols) for x in place.point]
+    wide = [x + ball(0, 2.0**-50) for x in place.point]
+    for i, (w, p) in enumerate(zip(wide, known, strict=True)):
+        if p is None or not w.contains(symbols.ball(p)):
+            known[i] = None
+    left = tuple(i for i, p in enumerate(known) if p is None)
+    if not set(left) <= set(vertices.free):
+        return None
+    hull = [
+        x + ball(0, REACH) if p is None else symbols.ball(p)
+        for x, p in zip(place.point, known, strict=True)
+    ]
+    if not all(map(_within, hull, place.lower.tolist(), place.upper.tolist())):
+        return None
+    symbols.places = {i: hull[i] for i in left}
+    unknowns = [symbols.of("var", i) if p is None else p for i, p in enumerate(known)]
+    outputs = [formulas.outputs[row] for row in place.rows]
+    values = evaluate(formulas.graph, outputs, unknowns, symbols)
+    if any(value is None for value in values):
+        return None
+    chosen, zeros = list[int](), list[Polynomial]()
+    for row, value in zip(place.rows, values, strict=True):
+        if not in_ideal(value, zeros):
+            chosen.append(row)
+            zeros.append(value)
+    if len(chosen) != len(left):
+        return None
+    if left:
+        ends = np.array([outward(x) for x in hull])
+        on = Vertices(formulas, 0, 0, left, vertices.scales)
+        if on.zero(ends[:, 0], ends[:, 1], chosen) is None:
+            return None
+    return ExactPoint(tuple(unknowns), symbols, tuple(zeros))
+
+
+def _within(x: "Ball", lower: float, upper: float) -> bool:
+    return bool(between(lower, upper).contains(x))
 
 
 def active_at(conj: "Mask", found: Sequence[int]) -> tuple[int, ...] | None:

@@ -63,7 +63,7 @@ def _candidate(search: CornerSearch, number: int, region: Region) -> Candidate |
     lower, upper = full(search, region)
     if search.domain.misses(lower, upper, range(len(lower))):
         return None
-    found = signs(search.vertices.formulas, _place(search, region), search.problem.inequalities)
+    found = signs(search.vertices, _place(search, region), search.problem.inequalities)
     unknown = [i for i, sign in enumerate(found) if sign == OPEN]
     zeros = frozenset(i for i, sign in enumerate(found) if sign == ZERO)
     possible: set[Names | None] = set()

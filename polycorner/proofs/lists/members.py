@@ -151,10 +151,9 @@ def judged(search: Search, region: Region) -> Member:
     """
     lower, upper = full(search, region)
     m = search.problem.inequalities
-    formulas = search.faces.formulas
     with precision(BITS):
         hull = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
-        values = formulas.values(Box(hull), range(m))
+        values = search.faces.formulas.values(Box(hull), range(m))
         below = np.array([bool(v < ball(0)) for v in values], dtype=np.bool_)
         above = np.array([bool(v > ball(0)) for v in values], dtype=np.bool_)
     # Balls give up square roots that may reach 0, as of the distance of centres that coincide.
@@ -166,7 +165,7 @@ def judged(search: Search, region: Region) -> Member:
     zeros = held.copy()
     outside = search.domain.misses(lower, upper, range(len(lower)))
     if not outside and (~below & ~above & ~held).any():
-        found = signs(formulas, placed(search, region), m)
+        found = signs(search.vertices, placed(search, region), m)
         zeros |= np.array([sign == ZERO for sign in found])
     below, above = below & ~zeros, above & ~zeros
     unknown = ~below & ~above & ~zeros

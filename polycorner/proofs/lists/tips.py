@@ -29,9 +29,9 @@ from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.definite import pivots
-from polycorner.proofs.exact import Symbols, evaluate
 from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, Region, outward
 from polycorner.proofs.lists.vertices import Vertices
+from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:

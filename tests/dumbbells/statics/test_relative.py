@@ -7,7 +7,8 @@ import pytest
 
 from polycorner import certify, minimise
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
-from polycorner.proofs import stationary_points
+from polycorner.dumbbells.statics.skeleton import corner_kind, pair_atlas
+from polycorner.proofs import corners, stationary_points
 
 SIZES = (16.0, 3.0, 1.5)
 
@@ -95,3 +96,22 @@ def test_the_nested_corners_and_the_line_are_all_local_minima(model):
             assert abs(math.remainder(place.lower[name], math.pi)) < 1e-6
         assert place.lower["x"] <= 0 <= place.upper["x"]
     assert any(place.sample is not None for place in lines)
+
+
+def test_all_corners_in_the_plane_are_those_of_the_search():
+    """Eight of either kind; at those of four contacts, the fourth by algebra."""
+    pair = DumbbellPair(*SIZES)
+    model = RelativePlacements(pair)
+    found = corners(model.polyhedron, box={**model.box, "alpha": 0.0}, symmetry=model.rotations)
+    assert found.complete
+    walked = pair_atlas(pair)
+    kinds = [corner_kind(p.active, pair.chirality(model.placement(p.point))) for p in found]
+    assert sorted(kinds) == sorted(map(walked.kind, walked.skeleton.corners))
+    assert {frozenset(p.active) for p in found} == {
+        frozenset(corner.active) for corner in walked.skeleton.corners
+    }
+
+
+def test_rotations_are_no_symmetries_in_a_drum():
+    with pytest.raises(ValueError, match="pair: expected a pair in the plane"):
+        RelativePlacements(DumbbellPair(*SIZES, 125.0)).rotations  # noqa: B018

@@ -187,7 +187,8 @@ def test_other_statements(check, statement, verdict):
 
 
 def test_an_atlas_without_a_corner_is_noticed(monkeypatch):
-    short = pairs.atlas(DumbbellPair(7, 3, 1.5))
+    pair = DumbbellPair(7, 3, 1.5)
+    short = pairs.atlas(pair)
     monkeypatch.setattr(strata_counts, "atlas", lambda *_: short)
-    assert strata_counts.corners_fall_into().verdict is Verdict.REFUTED
+    assert strata_counts.corners_fall_into(pairs=(pair,)).verdict is Verdict.REFUTED
     assert strata_counts.kinds_are((2, 3, 2)).verdict is Verdict.CORRECTED

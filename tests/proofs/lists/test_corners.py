@@ -248,6 +248,25 @@ def test_the_number_of_workers_changes_nothing(tmp_path):
     assert files[0] == files[1] == files[2]
 
 
+def test_a_fourth_function_through_corners_with_an_irrational_coordinate():
+    """Where ``b`` is 0 or pi, two distances are one; ``y`` is the root of 3/4."""
+    space = Manifold(("x", "y", "b"), periods=(math.inf, math.inf, math.tau))
+    x, y, b = space.symbols
+    s = sympy.sin(b)
+    parts = {
+        "over": sympy.sqrt(x**2 + (y - s) ** 2) - 1,
+        "under": sympy.sqrt(x**2 + (y + s) ** 2) - 1,
+        "wall": x - sympy.Rational(1, 2),
+        "leaning": x - sympy.Rational(1, 2) + s / 3,
+    }
+    found = corners(Polyhedron(space, parts), box=[(0.3, 0.9), (-2, 2.1), None])
+    at = [p for p in found.points if len(p.active) == 4]
+    assert found.complete
+    assert sorted(np.round(abs(p.point), 9).tolist() for p in at) == [
+        [0.5, round(math.sqrt(0.75), 9), round(abs(turn), 9)] for turn in (0, 0, math.pi, math.pi)
+    ]
+
+
 def test_clusters_of_three_spheres():
     """One at the origin, one on the axis, one in the plane: a triangle and its mirror image."""
     d = Polyhedron(
