@@ -68,7 +68,7 @@ def draw_ladder(found: StationaryList, path: Path) -> Path:
     from matplotlib.figure import Figure
 
     from polycorner.pictures import save
-    from polycorner.pictures.style import BODIES
+    from polycorner.pictures.regions import MINIMA
 
     figure = Figure(figsize=(4.5, 4.5), layout="constrained")
     axes = figure.add_subplot(aspect="equal", xticks=[], yticks=[], frame_on=False)
@@ -86,9 +86,9 @@ def draw_ladder(found: StationaryList, path: Path) -> Path:
         along = math.cos(angle), math.sin(angle)
         axes.plot(
             [x - along[0], x + along[0]], [y - along[1], y + along[1]],
-            color=BODIES[not stable], lw=4, solid_capstyle="round",
+            color=MINIMA[not stable], lw=4, solid_capstyle="round",
         )  # fmt: skip
-    for colour, label in zip(BODIES, ("stable", "unstable"), strict=True):
+    for colour, label in zip(MINIMA, ("stable", "unstable"), strict=False):
         axes.plot([], [], color=colour, lw=4, label=label)
     axes.legend(loc="upper right", frameon=False)
     return save(figure, path)
