@@ -124,6 +124,21 @@ def real(
     return number
 
 
+def numbers(argument: str, value: object, expected: str) -> NDArray[np.float64]:
+    """Return an array of numbers, or raise.
+
+    Examples
+    --------
+    >>> numbers("radii", "ab", "at least two positive numbers")
+    Traceback (most recent call last):
+    TypeError: radii: expected at least two positive numbers; got 'ab'
+    """
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        refuse(argument, expected, value, TypeError)
+
+
 def increasing(
     argument: str,
     values: object,

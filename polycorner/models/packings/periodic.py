@@ -39,9 +39,9 @@ class PeriodicPacking(Value):
 
     Raises
     ------
-    ValueError
-        If radii are not positive, or one body is so large that it might touch another in two
-        images.
+    TypeError, ValueError
+        If radii are no numbers or not positive, or one body is so large that it might touch
+        another in two images.
 
     Examples
     --------
@@ -55,9 +55,10 @@ class PeriodicPacking(Value):
     box: float = 1.0
 
     def __post_init__(self) -> None:
-        radii = np.array(self.radii, dtype=np.float64)
+        expected = "at least two positive numbers"
+        radii = checks.numbers("radii", self.radii, expected)
         if radii.ndim != 1 or len(radii) < 2 or not (np.isfinite(radii) & (radii > 0)).all():
-            checks.refuse("radii", "at least two positive numbers", self.radii)
+            checks.refuse("radii", expected, self.radii)
         checks.whole("dimension", self.dimension, least=2, most=3)
         checks.real("box", self.box, above=0)
         object.__setattr__(self, "radii", radii)
@@ -164,9 +165,9 @@ class PeriodicPacking(Value):
         return scaled.jammed(end)
 
     def _centres(self, start: ArrayLike) -> Array:
-        centres = np.array(start, dtype=np.float64)
+        expected = f"finite centres of shape ({self.count}, {self.dimension})"
+        centres = checks.numbers("start", start, f"{expected}, a random generator or a seed")
         if centres.shape != (self.count, self.dimension) or not np.isfinite(centres).all():
-            expected = f"finite centres of shape ({self.count}, {self.dimension})"
             checks.refuse("start", expected, np.shape(start))
         return centres
 

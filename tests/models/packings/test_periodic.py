@@ -141,3 +141,16 @@ def test_a_stopped_chain_says_so():
 def test_wrong_arguments(make, argument):
     with pytest.raises(ValueError, match=argument):
         make()
+
+
+@pytest.mark.parametrize(
+    ("make", "argument"),
+    [
+        (lambda: PeriodicPacking("ab"), "radii"),
+        (lambda: PeriodicPacking.bidisperse(100).jam("abc"), "start"),
+        (lambda: PeriodicPacking.bidisperse(100).jam([[0.0], [0.0, 1.0]]), "start"),
+    ],
+)
+def test_what_is_no_numbers_is_named(make, argument):
+    with pytest.raises(TypeError, match=f"^{argument}: expected "):
+        make()
