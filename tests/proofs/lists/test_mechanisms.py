@@ -1,8 +1,7 @@
-"""All equilibria of small mechanisms, and critical discs on a torus, each counted twice."""
+"""All equilibria of small mechanisms, each counted twice."""
 
 import math
 from fractions import Fraction as Q
-from itertools import product
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import sympy as sp
 from benchmarks.trials.planar import Energy, PlanarProblem, disc, line
 from polycorner import Manifold, Polyhedron, skeleton, stratum_at
 from polycorner.models import Pinball
-from polycorner.models.disks.disks import TorusDisks
 from polycorner.polyhedra import LocalType
 from polycorner.proofs import stationary_points
 
@@ -163,46 +161,3 @@ def test_a_table_that_does_not_lean_has_a_floor_of_them():
     (top,) = found
     np.testing.assert_allclose(top.point, [3, 5], atol=1e-9)
     assert top.index == 1
-
-
-# ------------------------------------------------------------------------- two discs on a torus
-
-
-def two_discs(lattice):
-    """The second disc's centre and the radius; the first one is at the origin.
-
-    Squares of distances are polynomials.  A stressed component goes around the torus, through at
-    most two contacts, so that the radius is at least 1/4.
-    """
-    M = Manifold.euclidean("u v r")
-    u, v, r = M.symbols
-    c = {"square": sp.Integer(0), "hexagonal": sp.Rational(1, 2)}[lattice]
-    gaps = {}
-    for p, q in product((-1, 0, 1), repeat=2):
-        a, b = u + p, v + q
-        gaps[f"1-2({p},{q})"] = sp.expand(a * a + 2 * c * a * b + b * b - 4 * r * r)
-    return Polyhedron(M, gaps), -r, [(-0.26, 0.74), (-0.26, 0.74), (0.2, 0.6)]
-
-
-@pytest.mark.parametrize(("lattice", "count"), [("hexagonal", 5), ("square", 3)])
-def test_critical_configurations_of_two_discs(lattice, count):
-    """The search from random starts finds the kinds; their copies on the torus add up to -1.
-
-    This is the Euler characteristic of the torus without a point.
-    """
-    d, energy, box = two_discs(lattice)
-    found = stationary_points(d, energy, box=box, max_boxes=50_000, resolution=1e-4)
-    kinds = {(round(c.radius, 6), c.index) for c in TorusDisks(2, lattice).critical(0)}
-    listed = {(round(float(p.point[2]), 6), p.index) for p in found}
-    assert listed <= kinds
-    if lattice == "hexagonal":
-        assert found.complete
-    if found.complete:
-        assert listed == kinds
-        assert len(found) == count
-        assert sum((-1) ** p.index for p in found) == -1
-    else:  # four contacts at once, in three coordinates
-        at = [0.5, 0.5, math.sqrt(0.125)]
-        lower, upper = found.undecided[:, 0], found.undecided[:, 1]
-        assert ((lower <= at) & (upper >= at)).all(axis=1).any()
-        assert len(found) == count - 1
