@@ -27,6 +27,7 @@ from examples import (
     ex17_turning,
     ex18_packing,
     ex19_all_equilibria,
+    ex20_rigid_clusters,
 )
 from polycorner.polyhedra import LocalType
 
@@ -105,6 +106,13 @@ def test_all_equilibria(tmp_path):
         (ex19_all_equilibria.draw_ladder, ladder),
     ):
         assert draw(found, tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_rigid_clusters(tmp_path):
+    found = ex20_rigid_clusters.main()
+    assert [graph.size() for graph, _ in found.clusters] == [12, 12]
+    picture = ex20_rigid_clusters.draw(found, tmp_path / "clusters.png")
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_pinball():
