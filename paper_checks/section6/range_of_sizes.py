@@ -1,7 +1,7 @@
 """Claim E7 for all sizes in a range at once: two dumbbells in the plane, all l and t, r = 3 mm.
 
-The range is cut into cells, and these again where that is needed.  In each of them ``G`` and ``delta`` are shown to be all the local
-minima, for every ``l`` and ``t`` of the cell:
+The range is cut into cells, and these again where that is needed.  In each of them ``G`` and
+``delta`` are shown to be all the local minima, for every ``l`` and ``t`` of the cell:
 
 1.  :func:`~polycorner.proofs.stationary_points`, with the cell as its ``parameters``, leaves
     undecided boxes about one of the 16 labelled corners ``delta``, its images being covered by
