@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
-from polycorner.proofs.lists import corner_records
 from polycorner.proofs.lists.atlases import proved_skeleton
-from polycorner.proofs.lists.corner_records import CornerRecord
+from polycorner.proofs.lists.corner_records import CornerRecord, save
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.search import Tally
 from polycorner.skeletons.elements import Skeleton
@@ -154,4 +153,4 @@ class CornerList(Printed, Value):
         OSError
             If the file could not be written.
         """
-        return corner_records.save(path, self.proof)
+        return save(path, self.proof)

@@ -28,12 +28,15 @@ class Member:
         Inequalities that vanish there, and those that may.
     place : str
         Whether it is stationary in the set (``IN``), or not (``OUT``), or that is ``OPEN``.
+    free : bool
+        Whether in some branch that contains it all functions but those of the region are positive.
     """
 
     region: Region
     zeros: frozenset[int]
     unknown: frozenset[int]
     place: str
+    free: bool
 
     @property
     def is_plain(self) -> bool:
@@ -113,7 +116,7 @@ def settled(search: Search) -> list[tuple[int, Member]]:
     for k, region in enumerate(search.regions):
         member = None if seen.holds(region) else judged(search, region)
         if member is not None and search.minima_only and region.index != 0:
-            hidden = region.index is None or not member.is_plain  # others may make it a minimum
+            hidden = region.index is None or not member.free  # others may make it a minimum
             member = replace(member, place=OPEN if hidden and member.place != OUT else OUT)
         if member is not None and member.place != OUT:
             seen.add(member)
@@ -171,14 +174,15 @@ def judged(search: Search, region: Region) -> Member:
     unknown = ~below & ~above & ~zeros
     sets = frozenset(np.flatnonzero(zeros).tolist()), frozenset(np.flatnonzero(unknown).tolist())
     possible = [c for c in search.conj if not (below & c).any()]
+    free = any(not (c & (zeros | unknown) & ~held).any() for c in possible)
     if outside or not possible:
-        return Member(region, *sets, OUT)
+        return Member(region, *sets, OUT, free)
     sure = [not (c & unknown).any() for c in possible]
     some = [bool((held & ~c).any()) for c in possible]
     fewer = [less and not (c & zeros & ~held).any() for c, less in zip(possible, some, strict=True)]
     if any(a and b for a, b in zip(sure, fewer, strict=True)):
-        return Member(region, *sets, OUT)
-    return Member(region, *sets, IN if any(sure) and not any(some) else OPEN)
+        return Member(region, *sets, OUT, free)
+    return Member(region, *sets, IN if any(sure) and not any(some) else OPEN, free)
 
 
 def placed(search: Search, region: Region) -> Place:
@@ -248,4 +252,4 @@ def image_of(search: Search, member: Member, g: Motion, p: tuple[int, ...]) -> M
     zeros, unknown = (
         frozenset(inverse[i] for i in rows) for rows in (member.zeros, member.unknown)
     )
-    return Member(image(search, member.region, g, p), zeros, unknown, member.place)
+    return Member(image(search, member.region, g, p), zeros, unknown, member.place, member.free)

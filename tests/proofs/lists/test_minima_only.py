@@ -168,3 +168,11 @@ def test_a_kink_is_not_taken_for_negative_curvature():
     lower, upper = found.undecided[:, 0], found.undecided[:, 1]
     assert not found.complete
     assert ((lower <= 0) & (0 <= upper)).all(axis=1).any()
+
+
+def test_a_saddle_where_a_function_of_another_branch_vanishes_is_no_minimum(tmp_path):
+    union = Polyhedron(PLANE, [AnyOf(X + Y, 1 - X)])
+    box = [(-0.5, 0.625), (-0.625, 0.5)]
+    found = stationary_points(union, Y**2 - X**2, box=box, minima_only=True)
+    assert (found.complete, len(found), found.open_points) == (True, 0, ())
+    assert check(str(found.save(tmp_path / "saddle.zip")), None, 1).startswith("verified")

@@ -50,6 +50,7 @@ class Face:
         branches = p.open_sets(signs, self.zeros)
         sure = any(u <= self.zeros for u in branches)
         self.stationary = sure and all(self.active <= u for u in branches)
+        self.free = any(u <= self.active for u in branches)  # all others are positive in one
         self.absent = not branches or any(u < self.active for u in branches)
         if active is None:
             self.descends()

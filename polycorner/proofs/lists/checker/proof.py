@@ -154,6 +154,5 @@ class Proof:
         named = claimed + [self.regions[k] for k in data["open_points"]]
         for face in self.regions:
             known = face.outside or face.absent or any(face.same(f) for f in named)
-            alone = face.zeros == face.active and not face.unknown
-            known |= self.p.minima_only and bool(face.index) and alone
+            known |= self.p.minima_only and bool(face.index) and face.free
             need(known, f"{face.name}: is not listed")
