@@ -15,6 +15,7 @@ import pytest
 import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from proof_files import verdict
 
 from polycorner import AnyOf, Manifold, Polyhedron
 from polycorner.errors import NonsmoothWarning
@@ -104,23 +105,8 @@ def proofs(tmp_path_factory):
     return proof
 
 
-@pytest.fixture
-def verdict(capsys):
-    """Return what the checker says of a file: whether it verifies it, and the line it prints."""
-
-    def run(path, *options):
-        before = flint.ctx.prec
-        code = main([str(path), *options])
-        flint.ctx.prec = before
-        line = capsys.readouterr().out.strip()
-        assert line.startswith("verified" if code == 0 else "NOT VERIFIED")
-        return code == 0, line
-
-    return run
-
-
 @pytest.mark.parametrize("name", CASES)
-def test_proofs_are_verified(name, proofs, verdict):
+def test_proofs_are_verified(name, proofs):
     fine, line = verdict(proofs(name))
     assert fine, line
     assert "no open box" in line
@@ -130,7 +116,7 @@ def test_proofs_are_verified(name, proofs, verdict):
 
 @pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
 @pytest.mark.parametrize("name", CASES)
-def test_proofs_by_second_derivatives_are_verified(name, verdict, monkeypatch, tmp_path):
+def test_proofs_by_second_derivatives_are_verified(name, monkeypatch, tmp_path):
     """As in long searches; the checker knows nothing of them, and bisects."""
     plain = prove(*CASES[name][:4])
     monkeypatch.setattr(search, "SHARP", 0)
@@ -168,20 +154,20 @@ def test_options_that_are_no_positive_numbers_are_named(option, number, capsys):
     assert f"argument {option}: invalid positive whole number value" in capsys.readouterr().err
 
 
-def test_a_file_that_is_not_there_is_no_malformed_one(tmp_path, verdict):
+def test_a_file_that_is_not_there_is_no_malformed_one(tmp_path):
     fine, line = verdict(tmp_path / "nothing.zip")
     assert not fine
     assert "cannot be read" in line
 
 
-def test_loci_without_a_sample_may_be_empty(proofs, verdict, tmp_path):
+def test_loci_without_a_sample_may_be_empty(proofs, tmp_path):
     file = File(proofs("strip"))
     file.data["loci"][0]["sample"] = None
     file.write(tmp_path / "empty.zip")
     assert "1 loci that may be empty" in verdict(tmp_path / "empty.zip")[1]
 
 
-def test_a_sample_is_called_a_sample(proofs, verdict):
+def test_a_sample_is_called_a_sample(proofs):
     fine, line = verdict(proofs("camel"), "--sample", "20")
     assert fine
     assert "ONLY A SAMPLE of 20 of" in line
@@ -394,7 +380,7 @@ EVERYWHERE = (
 
 @pytest.mark.parametrize("corrupt", EVERYWHERE, ids=lambda f: f.__name__)
 @pytest.mark.parametrize("name", ["parabola", "arc", "two discs"])
-def test_corrupted_files_are_refused(name, corrupt, proofs, verdict, tmp_path):
+def test_corrupted_files_are_refused(name, corrupt, proofs, tmp_path):
     file = File(proofs(name))
     corrupt(file)
     file.write(tmp_path / "corrupted.zip")
@@ -465,12 +451,12 @@ def locus_off_the_set(f):
         ("section", turned_direction),
     ],
 )
-def test_other_corrupted_files_are_refused(name, corrupt, proofs, verdict, tmp_path):
-    test_corrupted_files_are_refused(name, corrupt, proofs, verdict, tmp_path)
+def test_other_corrupted_files_are_refused(name, corrupt, proofs, tmp_path):
+    test_corrupted_files_are_refused(name, corrupt, proofs, tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", b"not an archive"])
-def test_what_is_no_archive_is_refused(content, verdict, tmp_path):
+def test_what_is_no_archive_is_refused(content, tmp_path):
     (tmp_path / "some.zip").write_bytes(content)
     assert not verdict(tmp_path / "some.zip")[0]
     assert not verdict(tmp_path / "missing.zip")[0]
@@ -478,7 +464,7 @@ def test_what_is_no_archive_is_refused(content, verdict, tmp_path):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 2**32 - 1))
-def test_changed_boxes_cover_what_they_did_or_are_refused(seed, proofs, verdict, tmp_path_factory):
+def test_changed_boxes_cover_what_they_did_or_are_refused(seed, proofs, tmp_path_factory):
     """Moved splits and exchanged directions give another proof, or none; the list is the same."""
     rng = np.random.default_rng(seed)
     file = File(proofs("parabola"))
@@ -496,7 +482,7 @@ def test_changed_boxes_cover_what_they_did_or_are_refused(seed, proofs, verdict,
 
 @pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
 @pytest.mark.parametrize("energy", [sp.Abs(x) + y**2, sp.Max(x, -2 * x) + y**2])
-def test_a_minimum_at_a_kink_on_the_side_of_the_domain_is_not_lost(energy, verdict, tmp_path):
+def test_a_minimum_at_a_kink_on_the_side_of_the_domain_is_not_lost(energy, tmp_path):
     """At ``x = 0`` the derivative on the one side of the kink is not all there is."""
     found = prove(DISC, energy, [(0, 3), (-2, 1)], most=20_000)
     assert not found.complete

@@ -1,24 +1,23 @@
 """Complete lists of corners: against brute force, and with what must stay undecided."""
 
 import itertools
-import json
 import math
 import pickle
+import re
 import zipfile
 from fractions import Fraction
 
-import flint
 import numpy as np
 import pytest
 import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from proof_files import changed, verdict
 
 from polycorner import AnyOf, Manifold, Polyhedron
 from polycorner.models.tutorial import Tutorial
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import corners
-from polycorner.proofs.lists.checker.__main__ import main
 from polycorner.skeletons import Completeness
 
 PLANE = Manifold.euclidean("x y")
@@ -32,28 +31,6 @@ R = sympy.Rational
 
 def points(found):
     return sorted(p.point.round(9).tolist() for p in found)
-
-
-def refused(path, capsys):
-    """Return why the checker refuses a file, or nothing."""
-    before = flint.ctx.prec
-    code = main([str(path)])
-    flint.ctx.prec = before
-    line = capsys.readouterr().out.strip()
-    return "" if code == 0 else line
-
-
-def changed(path, change):
-    """Change what a file says."""
-    with zipfile.ZipFile(path) as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    data = json.loads(parts["problem.json"])
-    change(data)
-    parts["problem.json"] = json.dumps(data).encode()
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in parts.items():
-            archive.writestr(name, content)
-    return path
 
 
 def test_the_tutorial_region_has_seven_corners_and_its_skeleton_has_no_others():
@@ -124,12 +101,12 @@ def test_polygons_have_the_vertices_of_rational_arithmetic(lines):
         ([AnyOf(1 - X**2 - Y**2, 1 - (X - 2) ** 2 - Y**2)], [[1, 0]], 0),  # a union that touches
     ],
 )
-def test_singular_corners_are_isolated_by_second_order(parts, singular, regular, tmp_path, capsys):
+def test_singular_corners_are_isolated_by_second_order(parts, singular, regular, tmp_path):
     found = corners(Polyhedron(PLANE, parts), box=SIDES)
     assert found.complete
     assert np.allclose(points(p for p in found if p.singular), np.array(singular, dtype=float))
     assert sum(not p.singular for p in found) == regular
-    assert not refused(found.save(tmp_path / "corners.zip"), capsys)
+    assert verdict(found.save(tmp_path / "corners.zip"))[0]
 
 
 def test_an_apex_and_the_tip_of_a_pyramid():
@@ -153,17 +130,19 @@ def test_an_apex_and_the_tip_of_a_pyramid():
         ([U, V, U + V], 0),
     ],
 )
-def test_functions_that_are_combinations_of_others(parts, count, tmp_path, capsys):
+def test_functions_that_are_combinations_of_others(parts, count, tmp_path):
     found = corners(Polyhedron(SPACE, parts), box=CUBE)
     assert found.complete
     assert len(found) == count
     path = found.save(tmp_path / "corners.zip")
-    assert not refused(path, capsys)
+    assert verdict(path)[0]
 
     def other_weights(data):
         data["relations"][0]["weights"][0] = "7/5"
 
-    assert "is none" in refused(changed(path, other_weights), capsys)
+    fine, line = verdict(changed(path, other_weights))
+    assert not fine
+    assert "is none" in line
 
 
 @pytest.mark.parametrize(
@@ -390,12 +369,12 @@ def another_branch(data):
         (another_branch, "is no corner|leaf|is not listed|are active"),
     ],
 )
-def test_corrupted_files_are_refused(change, why, tmp_path, capsys):
-    import re
-
+def test_corrupted_files_are_refused(change, why, tmp_path):
     path = corners(CUSP, box=SIDES).save(tmp_path / "corners.zip")
-    assert not refused(path, capsys)
-    assert re.search(why, refused(changed(path, change), capsys))
+    assert verdict(path)[0]
+    fine, line = verdict(changed(path, change))
+    assert not fine
+    assert re.search(why, line)
 
 
 @pytest.mark.parametrize(
