@@ -168,12 +168,12 @@ def parts(cell: Sides) -> list[Sides]:
 
 
 def proved(
-    l: float,  # noqa: E741
-    t: float,
+    length: float,
+    rod: float,
     width: tuple[float, float] = CELL,
     cuts: int = CUTS,
 ) -> dict[str, Any]:
-    """Prove the statement for the cell that begins at ``l`` and ``t``, in mm.
+    """Prove the statement for the cell that begins at ``length`` and ``rod``, in mm.
 
     Where that fails, as something is left undecided far from the corner, the cell is cut in four,
     up to ``cuts`` times.
@@ -184,7 +184,7 @@ def proved(
         ``proved``; ``boxes``, ``boxes_nearby``, of all searches; ``cells``, without those that were
         cut; ``reach`` of the neighbourhoods, in mm or rad.
     """
-    cell = {"l": (l, l + width[0]), "t": (t, t + width[1])}
+    cell = {"l": (length, length + width[0]), "t": (rod, rod + width[1])}
     found = everywhere(cell)
     near = neighbourhood(found.undecided, cell)
     lines = all(
@@ -204,7 +204,11 @@ def proved(
     if numbers["proved"] or not cuts:
         return numbers
     half = width[0] / 2, width[1] / 2
-    pieces = [proved(x, y, half, cuts - 1) for x in (l, l + half[0]) for y in (t, t + half[1])]
+    pieces = [
+        proved(x, y, half, cuts - 1)
+        for x in (length, length + half[0])
+        for y in (rod, rod + half[1])
+    ]
     return {
         "proved": float(all(piece["proved"] for piece in pieces)),
         "boxes": numbers["boxes"] + sum(piece["boxes"] for piece in pieces),
@@ -224,7 +228,7 @@ def main() -> None:
     given = parser.parse_args()
     axes = {
         name: Axis(np.arange(low, high - 1e-9, width).round(9), unit="mm")
-        for name, (low, high), width in (("l", LENGTHS, CELL[0]), ("t", RODS, CELL[1]))
+        for name, (low, high), width in (("length", LENGTHS, CELL[0]), ("rod", RODS, CELL[1]))
     }
     found = sweep(
         proved, axes, executor=given.workers, store=given.store,
