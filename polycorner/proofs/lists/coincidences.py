@@ -15,7 +15,7 @@ import numpy as np
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.exact import MOST_CONSTANTS, ExactPoint, implied, in_ideal, number_in
-from polycorner.proofs.lists.acceptance import BITS, outward
+from polycorner.proofs.lists.operators import BITS, outward
 from polycorner.proofs.lists.vertices import Vertices
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate

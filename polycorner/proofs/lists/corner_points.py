@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from polycorner.intervals.balls import ball, precision
-from polycorner.proofs.lists.acceptance import BITS, Region
+from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.coincidences import OPEN, ZERO, Place, active_at, signs
 from polycorner.proofs.lists.corner_search import CornerSearch
-from polycorner.proofs.lists.members import apart, full, image, inside, placed
+from polycorner.proofs.lists.members import RegionPoint, full, image, placed, same
+from polycorner.proofs.lists.operators import BITS
 from polycorner.proofs.lists.tips import Tip
 
 MOST_OPEN = 6  # functions of unknown sign at a point, all of whose signs are gone through
@@ -22,24 +23,18 @@ Names = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """The point of a region.
+class Candidate(RegionPoint):
+    """A point that may be a corner.
 
     Attributes
     ----------
     number : int
         Of its region in the search.
-    region : Region
-    zeros, unknown : frozenset of int
-        Inequalities that vanish there, and those that may.
     active : tuple of int or None
         Those that vanish and matter; None where that is not decided.
     """
 
     number: int
-    region: Region
-    zeros: frozenset[int]
-    unknown: frozenset[int]
     active: Names | None
 
 
@@ -80,7 +75,7 @@ def _candidate(search: CornerSearch, number: int, region: Region) -> Candidate |
         if possible == {None} and not sole:
             return None
     decided = possible.pop() if len(possible) == 1 and not sole else None
-    return Candidate(number, region, zeros, frozenset(unknown), decided)
+    return Candidate(region, zeros, frozenset(unknown), number, decided)
 
 
 def _place(search: CornerSearch, region: Region) -> Place:
@@ -90,19 +85,6 @@ def _place(search: CornerSearch, region: Region) -> Place:
     with precision(BITS):
         point, rows = [ball(x) for x in region.exact], search.vertices.rows(region.active)
         return Place(point, region.lower, region.upper, rows)
-
-
-def same(search: CornerSearch, one: Candidate, other: Candidate) -> bool | None:
-    """Whether the points of two regions are the same; None where that is not decided."""
-    if apart(search, one.region, other.region):
-        return False
-    for here, there in ((one, other), (other, one)):
-        rows = set(there.region.active)
-        if rows - here.zeros - here.unknown:
-            return False
-        if rows <= here.zeros and inside(search, here.region, there.region):
-            return True
-    return None
 
 
 def with_images(
@@ -122,7 +104,7 @@ def with_images(
             inverse = {there: i for i, there in enumerate(p)}
             region = image(search, one.region, g, p)
             parts = [tuple(sorted(inverse[i] for i in s)) for s in (one.zeros, one.active)]
-            moved = Candidate(one.number, region, frozenset(parts[0]), frozenset(), parts[1])
+            moved = Candidate(region, frozenset(parts[0]), frozenset(), one.number, parts[1])
             alike = [same(search, moved, other) for other in (*listed, *new)]
             if True not in alike:
                 new.append(replace(moved, active=None) if None in alike else moved)

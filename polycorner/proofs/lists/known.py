@@ -1,4 +1,4 @@
-"""What a search knows at some time: regions with one stationary point, and loci."""
+"""Regions with one stationary point and loci: the state of a search."""
 
 from dataclasses import dataclass, field
 

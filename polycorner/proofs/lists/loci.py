@@ -32,9 +32,10 @@ from polycorner.intervals.boxes import BoxFunctions
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box, needed
 from polycorner.proofs.definite import pivots
-from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, inertia, krawczyk, outward
+from polycorner.proofs.lists.acceptance import QUARTERINGS, WIDEST
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.operators import BITS, inertia, krawczyk, outward
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 

@@ -6,11 +6,12 @@ import numpy as np
 
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.acceptance import BITS, Region
+from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
 from polycorner.proofs.lists.domains import ROUNDING
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.known import Sides
+from polycorner.proofs.lists.operators import BITS
 from polycorner.proofs.lists.search import Search
 from polycorner.spaces.manifold import Array, Manifold
 
@@ -18,7 +19,7 @@ IN, OUT, OPEN = "in", "out", "open"
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class RegionPoint:
     """The point of a region.
 
     Attributes
@@ -26,15 +27,25 @@ class Member:
     region : Region
     zeros, unknown : frozenset of int
         Inequalities that vanish there, and those that may.
+    """
+
+    region: Region
+    zeros: frozenset[int]
+    unknown: frozenset[int]
+
+
+@dataclass(frozen=True, eq=False)
+class Member(RegionPoint):
+    """A point that may be stationary.
+
+    Attributes
+    ----------
     place : str
         Whether it is stationary in the set (``IN``), or not (``OUT``), or that is ``OPEN``.
     free : bool
         Whether in some branch that contains it all functions but those of the region are positive.
     """
 
-    region: Region
-    zeros: frozenset[int]
-    unknown: frozenset[int]
     place: str
     free: bool
 
@@ -49,6 +60,7 @@ class Listed:
 
     def __init__(self, search: Search) -> None:
         self.search, self.free = search, list(search.domain.free)
+        self.top = len(self.free) - search.equations
         self.boxes = Sides(len(self.free))
         self.every, self.special = list[Member](), list[Member]()
 
@@ -72,23 +84,23 @@ class Listed:
         if self.holds(member.region):
             return True
         others = self.special if member.is_plain else self.every
-        found = [same(self.search, member, other) for other in others]
+        found = [same(self.search, member, other, self.top) for other in others]
         return True if True in found else None if None in found else False
 
 
-def same(search: Search, one: Member, other: Member) -> bool | None:
+def same(search: Search, one: RegionPoint, other: RegionPoint, least: int = 0) -> bool | None:
     """Whether the points of two regions are the same; None where that is not decided.
 
-    Regions of as many functions as are independent have one common zero of these.
+    Regions of ``least`` functions or more have one common zero of these.
     """
-    top = len(search.domain.free) - search.equations
     if apart(search, one.region, other.region):
         return False
     for here, there in ((one, other), (other, one)):
         rows = frozenset(there.region.active)
         if rows - here.zeros - here.unknown:
             return False
-        if len(rows) >= top and rows <= here.zeros and inside(search, here.region, there.region):
+        known = len(rows) >= least and rows <= here.zeros
+        if known and inside(search, here.region, there.region):
             return True
     return None
 
@@ -137,11 +149,6 @@ def full(search: Search, region: Region) -> tuple[Array, Array]:
     free = list(search.domain.free)
     lower[free], upper[free] = region.sharp_lower[: len(free)], region.sharp_upper[: len(free)]
     return lower, upper
-
-
-def membership(search: Search, region: Region) -> str:
-    """Decide whether a region's point is a stationary point of the set in the domain."""
-    return judged(search, region).place
 
 
 def judged(search: Search, region: Region) -> Member:

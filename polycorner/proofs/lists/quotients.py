@@ -19,8 +19,8 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms
 from polycorner.intervals.tapes import Box, needed
 from polycorner.proofs.invariance import Generator, annihilated, generators, translations
-from polycorner.proofs.lists.acceptance import BITS
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.operators import BITS
 from polycorner.spaces.manifold import Array
 
 INDEPENDENT = 1e-9  # least singular value, over the largest, of rows that count as independent

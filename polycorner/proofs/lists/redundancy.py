@@ -34,13 +34,13 @@ from numpy.typing import NDArray
 from polycorner.intervals.balls import between, precision
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.acceptance import BITS
 from polycorner.proofs.lists.attempts import WIDER, Attempts, Starts
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.candidates import active_sets
 from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.examination import Examined
 from polycorner.proofs.lists.known import Known
+from polycorner.proofs.lists.operators import BITS
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
 

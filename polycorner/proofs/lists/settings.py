@@ -1,4 +1,4 @@
-"""What a search is about: problem, domain and symmetries, and how they are evaluated."""
+"""The unchanging part of a search: problem, domain, symmetries, and their evaluators."""
 
 from dataclasses import dataclass, field
 

@@ -29,7 +29,8 @@ from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.definite import pivots
-from polycorner.proofs.lists.acceptance import BITS, QUARTERINGS, WIDEST, Region, outward
+from polycorner.proofs.lists.acceptance import QUARTERINGS, WIDEST, Region
+from polycorner.proofs.lists.operators import BITS, outward
 from polycorner.proofs.lists.vertices import Vertices
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.spaces.manifold import Array

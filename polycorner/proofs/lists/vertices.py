@@ -14,15 +14,8 @@ import numpy as np
 from polycorner.intervals.balls import between, middle_inverse, narrower, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.acceptance import (
-    BITS,
-    QUARTERINGS,
-    SHARPENINGS,
-    WIDEST,
-    Region,
-    krawczyk,
-    outward,
-)
+from polycorner.proofs.lists.acceptance import QUARTERINGS, SHARPENINGS, WIDEST, Region
+from polycorner.proofs.lists.operators import BITS, krawczyk, outward
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:

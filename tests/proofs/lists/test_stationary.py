@@ -15,7 +15,7 @@ from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.symmetry import Element
 from polycorner.proofs import stationary_points
 from polycorner.proofs.lists.domains import domain
-from polycorner.proofs.lists.members import OUT, membership
+from polycorner.proofs.lists.members import OUT, judged
 from polycorner.proofs.lists.search import Search
 
 PLANE = Manifold.euclidean("x y")
@@ -263,7 +263,7 @@ def test_a_place_is_left_out_where_a_distance_is_zero():
     search = Search(pose(d, energy), domain(PLANE, box), 1e-6)
     region = search.faces.region(np.array(centre), [])
     assert region is not None
-    assert membership(search, region) == OUT
+    assert judged(search, region).place == OUT
     found = stationary_points(d, energy, box=box)
     assert found.complete
     at = np.array([[math.sin(p.point[0]) - math.sin(1) / 3, p.point[1] - centre[1]] for p in found])
