@@ -39,7 +39,7 @@ from polycorner import Manifold, Polyhedron, SmoothFunction
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.proofs import StationaryList, stationary_points
-from polycorner.sweeps import Axis, sweep
+from polycorner.sweeps import Axis, SweepError, sweep
 
 BALL = 3.0
 LENGTHS, RODS = (14.0, 18.0), (1.2, 1.8)
@@ -230,14 +230,21 @@ def main() -> None:
         name: Axis(np.arange(low, high - 1e-9, width).round(9), unit="mm")
         for name, (low, high), width in (("length", LENGTHS, CELL[0]), ("rod", RODS, CELL[1]))
     }
-    found = sweep(
-        proved, axes, executor=given.workers, store=given.store,
-        progress=lambda done, total, note: print(f"{done:g} of {total:g} cells {note}"),
-    )  # fmt: skip
-    shown = found["proved"].values == 1
-    print(f"{shown.sum()} of {shown.size} cells are proved, in {found['cells'].sum():.0f} pieces")
-    print(f"{found['boxes'].sum():.0f} boxes, near the corner {found['boxes_nearby'].sum():.0f}")
-    print(f"{found['seconds'].sum():.0f} s of a processor")
+    try:
+        found = sweep(
+            proved, axes, executor=given.workers, store=given.store,
+            progress=lambda done, total, _: print(f"{done:g} of {total:g} cells", flush=True),
+        )  # fmt: skip
+    except (ValueError, SweepError) as error:
+        parser.error(str(error))
+    numbers = found[["cells", "boxes", "boxes_nearby", "reach", "seconds"]]
+    shown = numbers.where(found["proved"] == 1)
+    count, whole = int((shown["cells"] > 0).sum()), int((shown["cells"] == 1).sum())
+    print(f"{count} of {found['proved'].size} cells are proved, {whole} of them as a whole")
+    print(f"{shown['boxes'].sum():.0f} boxes, near the corner {shown['boxes_nearby'].sum():.0f}")
+    reach = ", ".join(f"{x:.3f}" for x in shown["reach"].max(("length", "rod")).values)
+    print(f"neighbourhoods reach {reach} (U, V in mm; T, W in rad)")
+    print(f"{shown['seconds'].sum():.0f} s of a processor")
 
 
 if __name__ == "__main__":

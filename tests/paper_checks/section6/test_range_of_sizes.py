@@ -91,3 +91,33 @@ def test_a_cell_is_proved():
     found = range_of_sizes.proved(15.9, 1.45, (0.1, 0.05))
     assert found["proved"] == 1
     assert found["reach"].max() < 0.5
+
+
+def some(length, rod):
+    """Return what a search might: the cell at 16 mm is not proved, that at 14 mm is cut."""
+    return {
+        "proved": float(length < 16), "boxes": 100.0, "boxes_nearby": 7.0,
+        "cells": 4.0 if length == 14 else 1.0, "reach": np.full(4, rod / 10),
+    }  # fmt: skip
+
+
+def test_the_command_counts_what_is_proved(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(range_of_sizes, "LENGTHS", (14.0, 17.0))
+    monkeypatch.setattr(range_of_sizes, "CELL", (1.0, 0.6))
+    monkeypatch.setattr(range_of_sizes, "proved", some)
+    monkeypatch.setattr("sys.argv", ["sizes", "--workers", "1", "--store", str(tmp_path / "s")])
+    range_of_sizes.main()
+    said = capsys.readouterr().out.splitlines()
+    assert said[-4:-1] == [
+        "2 of 3 cells are proved, 1 of them as a whole",
+        "200 boxes, near the corner 14",
+        "neighbourhoods reach 0.120, 0.120, 0.120, 0.120 (U, V in mm; T, W in rad)",
+    ]
+
+
+@pytest.mark.parametrize("arguments", [["--workers", "0"], ["--store", __file__]])
+def test_the_command_names_what_is_wrong(arguments, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["sizes", *arguments])
+    with pytest.raises(SystemExit):
+        range_of_sizes.main()
+    assert "expected" in capsys.readouterr().err
