@@ -141,7 +141,6 @@ def sections(rng: Generator) -> Posed:
     a, b = (int(k) for k in rng.integers(1, 4, 2))
     roots = [Q(round(4 * x), 4) for x in distinct(rng, int(rng.integers(1, 4)), Q(1, 2))]
     ends = sorted(distinct(rng, 2))
-    # dyadic coefficients, with which the library sees that the energy does not change
     inner = line(with_roots(roots, Q(either(rng))), roots, [tuple(ends)])
     at = Q(int(rng.integers(-8, 9)), 4)
     combined = (a * X + b * Y) if rng.integers(2) else (b * Y - a * X)

@@ -10,6 +10,7 @@ The polynomials have no fixed set of variables, as differentiation adds nodes
 (:mod:`~polycorner.proofs.polynomials`).
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -87,7 +88,7 @@ def generators(manifold: Manifold, fields: Iterable[Any]) -> list[Generator]:
 
 
 def translations(forms: SmoothForms) -> list[list[Fraction]]:
-    """Return a basis of constant vectors along which the functions are constant.
+    """Return a basis of constant vectors, of whole numbers, along which the functions are constant.
 
     These are the vectors that annihilate every argument of a nonlinear operation, where all of
     these are linear forms with rational coefficients.
@@ -126,7 +127,7 @@ def _factor(graph: Graph, a: int) -> tuple[Fraction, int] | None:
 
 
 def _null_space(rows: list[list[Fraction]], n: int) -> list[list[Fraction]]:
-    """Return a basis of the null space of rational rows."""
+    """Return a basis of the null space of rational rows, in whole numbers."""
     from sympy import QQ
     from sympy.polys.matrices import DomainMatrix
 
@@ -137,7 +138,8 @@ def _null_space(rows: list[list[Fraction]], n: int) -> list[list[Fraction]]:
         vector = [Fraction(int(k == free)) for k in range(n)]
         for pivot, row in zip(pivots, reduced.to_list(), strict=False):
             vector[pivot] = -Fraction(int(row[free].numerator), int(row[free].denominator))
-        basis.append(vector)
+        denominator = math.lcm(*(x.denominator for x in vector))
+        basis.append([denominator * x for x in vector])
     return basis
 
 

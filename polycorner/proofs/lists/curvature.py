@@ -5,13 +5,16 @@ gradients, ``W`` any matrix, and let the derivatives of all functions involved b
 box.  If ``|I - W G^T| < 1`` on the box, in the row and the column norm, then
 
 *   the gradients are independent, and multipliers with ``dE = G^T lam`` are bounded by
-    ``lam = W dE + (I - W G^T) lam``.  If all those of inequalities are positive, every function of
-    ``U`` vanishes at a stationary point;
+    ``lam = W dE + (I - W G^T) lam``;
 *   for each vector ``d_0`` there is ``d = d_0 + W^T y`` with ``G d = 0`` and
     ``|y| <= |G d_0| / (1 - |I - G W^T|)`` in the maximum norm.
 
 If moreover ``d^T (E'' - sum lam_i f_i'') d < 0`` for all of these multipliers and vectors, a
-stationary point in the box is no local minimum of the branch ([NW] thm 12.5), nor of the set.
+stationary point in the box is no local minimum of the branch, nor of the set.  For let ``V`` be the
+functions of ``U`` that vanish there.  The multipliers of the others are 0, and ``d`` is tangent to
+``V``: some curve with this tangent stays in the zeros of ``V``, on which the energy has the
+derivatives 0 and ``d^T (E'' - sum lam_i f_i'') d`` ([NW] thm 12.5), and all others stay positive.
+Nothing is asked of the signs of multipliers, so that those that nearly vanish do no harm.
 
 ``W`` and ``d_0`` are found in floating point; all bounds include rounding errors, as in
 :mod:`~polycorner.proofs.lists.directions`.
@@ -24,17 +27,15 @@ compiled = linked()
 
 
 @compiled
-def bent_down(g_lo, g_hi, h_lo, h_hi, positive, left, start, spread, lam, reach):
+def bent_down(g_lo, g_hi, h_lo, h_hi, left, start, spread, lam, reach):
     """Show that there is no local minimum in a box; see the module.
 
     Parameters
     ----------
     g_lo, g_hi : (k + 1, n) arrays
-        Enclosures of gradients on the box: ``positive`` inequalities, equations, the energy.
+        Enclosures of gradients on the box: inequalities, equations, the energy.
     h_lo, h_hi : (k + 1, n, n) arrays
         Enclosures of second derivatives.
-    positive : int
-        How many of the ``k`` multipliers have to be positive.
     left : (k, n) array
         ``W``.
     start : (n,) array
@@ -69,8 +70,6 @@ def bent_down(g_lo, g_hi, h_lo, h_hi, positive, left, start, spread, lam, reach)
     for i in range(k):
         _, radius = product(g_lo[k], g_hi[k], left[i], slack)
         reach[i] = (radius + reach[i] * largest) * (1.0 + slack)
-        if i < positive and not lam[i] - reach[i] > 0.0:
-            return False
     for j in range(n):
         total = 0.0
         for i in range(k):

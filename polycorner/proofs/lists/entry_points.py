@@ -139,7 +139,7 @@ def _box_tests(sources: str) -> tuple[Any, ...]:
 
 def _curvature_test(sources: str) -> Any:
     @njit(cache=True, nogil=True)
-    def bent(g_lo, g_hi, h_lo, h_hi, positive, left, start):
+    def bent(g_lo, g_hi, h_lo, h_hi, left, start):
         """Whether negative curvature shows that there is no local minimum, for each box.
 
         Arguments are those of :func:`~polycorner.proofs.lists.curvature.bent_down`, stacked.
@@ -150,7 +150,7 @@ def _curvature_test(sources: str) -> Any:
         spread, lam, reach = np.zeros(n), np.zeros(k), np.zeros(k)
         for box in range(count):
             found[box] = bent_down(
-                g_lo[box], g_hi[box], h_lo[box], h_hi[box], positive, left[box], start[box],
+                g_lo[box], g_hi[box], h_lo[box], h_hi[box], left[box], start[box],
                 spread, lam, reach,
             )  # fmt: skip
         return found

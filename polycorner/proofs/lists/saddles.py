@@ -29,13 +29,11 @@ def without_minima(
         at = at[smooth[place[at]][:, rows].all(axis=1)]
         if at.size and len(rows) <= len(setting.domain.free):
             parts = tuple([side[place[at]][:, rows] for side in bounds])
-            found[at], directions[at] = _bent(setting, parts, int(mask.sum()))
+            found[at], directions[at] = _bent(setting, parts)
     return found, directions
 
 
-def _bent(
-    setting: Setting, bounds: tuple[Array, ...], positive: int
-) -> tuple[NDArray[np.bool_], Array]:
+def _bent(setting: Setting, bounds: tuple[Array, ...]) -> tuple[NDArray[np.bool_], Array]:
     """Return the same for items with the same rows, by bounds of their derivatives."""
     free, units = list(setting.domain.free), setting.domain.units[list(setting.domain.free)]
     g_lo, g_hi = (side[:, :, free] for side in bounds[:2])
@@ -54,11 +52,10 @@ def _bent(
     weights = np.concatenate([-lam, np.ones((len(at), 1))], axis=1)
     bent_form = flat.transpose(0, 2, 1) @ np.einsum("bk,bkij->bij", weights, bends) @ flat
     values, vectors = np.linalg.eigh(0.5 * (bent_form + bent_form.transpose(0, 2, 1)))
-    likely = np.flatnonzero((values[:, 0] < 0) & (lam[:, :positive] > 0).all(axis=1))
+    likely = np.flatnonzero(values[:, 0] < 0)
     at, start = at[likely], (vectors[likely, :, 0] * units).astype(np.float32).astype(np.float64)
     found[at] = bent(
         *(np.ascontiguousarray(side[at]) for side in (g_lo, g_hi, h_lo, h_hi)),
-        positive,
         np.ascontiguousarray(left[likely] * units),
         np.ascontiguousarray(start),
     )

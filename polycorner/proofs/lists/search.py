@@ -37,7 +37,7 @@ from polycorner.spaces.manifold import Array
 CHUNKS = 8  # that a round consists of
 CHUNK = 4096  # boxes in a chunk, at most
 LEAST = 256  # boxes in a chunk, if there are as many
-SHARP = 20_000  # boxes after which it is worth compiling second derivatives
+SHARP = 20_000  # boxes after which second derivatives are used, if not before for small boxes
 NUMBERS = 1 << 20  # bounds of derivatives in a chunk, at most
 
 
@@ -127,7 +127,9 @@ class Search(Setting):
 
     def round(self, mapped: Mapped = map) -> None:
         """Treat the last boxes that wait; ``mapped`` is like ``map``."""
-        chunks, sharp = self._chunks(), self.tally.boxes >= SHARP
+        chunks = self._chunks()
+        late = self.tally.boxes >= SHARP or bool(self.undecided)
+        sharp = late or any(self._small(boxes).any() for boxes in chunks)
         self.attempts.sharp = sharp
         found = list(mapped(partial(examine, self, self.known, sharp), chunks))
         regions, loci = len(self.regions), len(self.loci)
@@ -166,13 +168,22 @@ class Search(Setting):
         self.tree.close(boxes.nodes[~left], boxes.nodes[where[used]], e.v[used])
         kept = ~left[more[0]]
         self.tree.close(boxes.nodes[:0], boxes.nodes[more[0][kept]], more[1][kept])
-        return self._halves(boxes.part(left))
+        rest = boxes.part(left)
+        again = self._small(rest) & (not self.attempts.sharp)
+        return self._halves(rest.part(~again)).with_others(rest.part(again))
+
+    def _relative(self, boxes: Boxes) -> Array:
+        """Return the sides of boxes in the units of the domain."""
+        units = np.where(self.domain.units > 0, self.domain.units, np.inf)
+        return (boxes.upper - boxes.lower) / units
+
+    def _small(self, boxes: Boxes) -> NDArray[np.bool_]:
+        """Return which boxes are not divided any more."""
+        small: NDArray[np.bool_] = self._relative(boxes).max(axis=1, initial=0.0) <= self.resolution
+        return small
 
     def _halves(self, boxes: Boxes) -> Boxes:
-        widths = boxes.upper - boxes.lower
-        units = np.where(self.domain.units > 0, self.domain.units, np.inf)
-        relative = widths / units
-        small = relative.max(axis=1, initial=0.0) <= self.resolution
+        small, relative = self._small(boxes), self._relative(boxes)
         if small.any():
             self.undecided.append(boxes.part(small))
             self.tally.undecided += int(small.sum())
