@@ -128,7 +128,7 @@ class Search(Setting):
     def round(self, mapped: Mapped = map) -> None:
         """Treat the last boxes that wait; ``mapped`` is like ``map``."""
         chunks = self._chunks()
-        late = self.tally.boxes >= SHARP or bool(self.undecided)
+        late = self.tally.boxes >= SHARP or self.tally.undecided > 0
         sharp = late or any(self._small(boxes).any() for boxes in chunks)
         self.attempts.sharp = sharp
         found = list(mapped(partial(examine, self, self.known, sharp), chunks))
