@@ -30,15 +30,20 @@ MANY = 48  # candidates for which it is worth compiling second derivatives
 
 @dataclass
 class Starts:
-    """Points to start from, the functions that seem active there, and the widest regions to try."""
+    """Points to start from.
+
+    With the functions that seem active there, the widest regions to try, and whether the energy's
+    derivative may vanish nearby.
+    """
 
     q: Array
     active: Mask
     widest: Array
+    still: Mask
 
     def part(self, keep: NDArray[np.intp]) -> "Starts":
         """Return some of them."""
-        return Starts(self.q[keep], self.active[keep], self.widest[keep])
+        return Starts(self.q[keep], self.active[keep], self.widest[keep], self.still[keep])
 
 
 @dataclass
@@ -81,6 +86,7 @@ class Attempts:
             np.concatenate([p.q for p in parts]),
             np.concatenate([p.active for p in parts]),
             np.concatenate([p.widest for p in parts]),
+            np.concatenate([p.still for p in parts]),
         )
         self.run(starts.part(order), mapped)
 
@@ -98,12 +104,15 @@ class Attempts:
             :, self.setting.domain.free
         ]
         active = active_sets(e.rest.weights[ripe], e.rest.pulls[ripe])
-        return Starts(boxes.middles, active, WIDER * widths.max(axis=1))
+        still = np.zeros(len(ripe), dtype=np.bool_)
+        if self.setting.may_have_loci:
+            still = ((e.rest.low[ripe, -1] <= 0) & (e.rest.high[ripe, -1] >= 0)).all(axis=1)
+        return Starts(boxes.middles, active, WIDER * widths.max(axis=1), still)
 
     def run(self, starts: Starts, mapped: Mapped = map) -> None:
         """Try to find loci and regions from some points."""
         if self.setting.may_have_loci:
-            self._find_loci(starts.part(np.flatnonzero(~starts.active.any(axis=1))))
+            self._find_loci(starts.q[starts.still])
         parts = [starts.part(part) for part in np.array_split(np.arange(len(starts.q)), PARTS)]
         found = list(mapped(self._candidates, [part for part in parts if len(part.q)]))
         points = np.concatenate(found) if found else starts.q
@@ -112,11 +121,12 @@ class Attempts:
             here = (which.ravel() == kind) & np.isfinite(points).all(axis=1)
             self._show(points[here], tuple(np.flatnonzero(active).tolist()), starts.widest[here])
 
-    def _find_loci(self, starts: Starts) -> None:
+    def _find_loci(self, q: Array) -> None:
         setting, z = self.setting, self.setting.reads
-        if setting.equations or not len(starts.q):
+        if setting.equations or not len(q):
             return
-        points, found = newton(setting.problem, starts.q, starts.active, z)
+        inside = np.zeros((len(q), setting.problem.inequalities), dtype=np.bool_)
+        points, found = newton(setting.problem, q, inside, z)
         for q in points[found]:
             if self.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue

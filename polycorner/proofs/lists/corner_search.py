@@ -16,6 +16,7 @@ from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.attempts import Mapped
 from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.branches import Mask, items
+from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.dependence import Enclosures, Places, Truths
 from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.levels import Levels, Rows, levels
@@ -47,6 +48,8 @@ class Chunk:
         Sets of functions that may have a common zero in some boxes, where they are independent.
     singular : list of (int, list of int)
         Boxes in which no such set is, and the functions that may vanish there.
+    inner : (2, B, n) array
+        Narrower sides of the boxes, beyond which no point of the set lies.
     """
 
     images: NDArray[np.int64]
@@ -55,6 +58,7 @@ class Chunk:
     left: Truths
     regular: list[tuple[Rows, Places]]
     singular: list[tuple[int, list[int]]]
+    inner: Array
 
 
 @dataclass
@@ -114,7 +118,13 @@ class CornerSearch(Search):
             (int(at[i]), np.flatnonzero(masks[at[i]]).tolist()) for i in np.flatnonzero(rest)
         ]
         located = [(rows, at[places]) for rows, places in regular]
-        return Chunk(images, boxes, ~inside, left, located, singular)
+        inner = np.stack([boxes.lower, boxes.upper])
+        part, kept = boxes.part(left), np.flatnonzero(left)
+        inner[:, left] = narrowed(
+            part, [side[kept] for side in (v_lo, v_hi, *gradients)],
+            self.functions.continuous(part.lower, part.upper), self.conj, k,
+        )  # fmt: skip
+        return Chunk(images, boxes, ~inside, left, located, singular, inner)
 
     def _regular(self, found: Enclosures, result: Levels) -> list[tuple[Rows, Places]]:
         """Return the largest sets and the boxes in which their gradients are independent."""
@@ -163,7 +173,7 @@ class CornerSearch(Search):
         self.tally.covered += int((~chunk.outside & ~left).sum())
         for nodes in (chunk.images, boxes.nodes[~left]):
             self.tree.close(nodes, boxes.nodes[:0], nothing)
-        return self._halves(boxes.part(left))
+        return self._halves(boxes.part(left), chunk.inner[:, left])
 
     def _vertex(self, q: Array, rows: Rows, size: float) -> bool:
         """Seek the common zero of functions near a point; return whether a region was tried."""

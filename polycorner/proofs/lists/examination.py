@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.branches import Mask, items
+from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.known import Known
@@ -63,6 +64,8 @@ class Examined:
         Those that a direction closes.
     v : (I, n) array
         The directions.
+    inner : (2, B, n) array
+        Narrower sides of the boxes that are open, beyond which no point of the set lies.
     rest : Rest
     """
 
@@ -73,6 +76,7 @@ class Examined:
     done: Mask
     directed: Mask
     v: Array
+    inner: Array
     rest: Rest
 
     @property
@@ -104,9 +108,9 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
         found[left], v[left], weights[left] = directions(
             g_lo, g_hi, where[left], masks[left], k, units, -1.0
         )
-    continuous = setting.functions.continuous(boxes.lower, boxes.upper)[where]
-    smooth: Mask = np.all(continuous[:, :m] | ~masks, axis=1)
-    smooth &= np.all(continuous[:, m:], axis=1)
+    continuous = setting.functions.continuous(boxes.lower, boxes.upper)
+    smooth: Mask = np.all(continuous[where, :m] | ~masks, axis=1)
+    smooth &= np.all(continuous[where, m:], axis=1)
     found &= smooth
     rest = np.flatnonzero(~found)
     with np.errstate(all="ignore"):
@@ -114,12 +118,18 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
         pulls = np.linalg.norm(steep[:, [*range(m), -1]], axis=2)
     some = where[rest] if setting.may_have_loci else where[:0]
     kept = Rest(rest, weights[rest], pulls, smooth[rest], g_lo[some], g_hi[some])
-    examined = Examined(images, boxes, where, masks, found.copy(), found, v, kept)
+    inner = np.stack([boxes.lower, boxes.upper])
+    examined = Examined(images, boxes, where, masks, found.copy(), found, v, inner, kept)
     reconsider(setting, known, examined)
     if sharp and setting.minima_only:
         at = examined.rest.items[examined.open_items]
         saddles, v[at] = without_minima(setting, boxes, where[at], masks[at])
         examined.done[at[saddles]] = examined.directed[at[saddles]] = True
+    left = np.unique(where[~examined.done])
+    examined.inner[:, left] = narrowed(
+        boxes.part(left), [side[left] for side in (v_lo, v_hi, g_lo, g_hi)],
+        continuous[left], setting.conj, k,
+    )  # fmt: skip
     return examined
 
 

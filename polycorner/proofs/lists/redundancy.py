@@ -140,4 +140,4 @@ def _try(setting: Setting, e: Examined, box: int, sets: Mask, attempts: Attempts
     q = np.repeat(e.boxes.middles[[box]], len(sets), axis=0)
     widths = (e.boxes.upper[box] - e.boxes.lower[box]) / setting.problem.scales
     widest = np.full(len(sets), WIDER * widths[list(setting.domain.free)].max())
-    attempts.run(Starts(q, sets, widest))
+    attempts.run(Starts(q, sets, widest, np.zeros(len(q), dtype=np.bool_)))

@@ -3,7 +3,8 @@
 A box is discarded where no point of the set lies in it, or where each of its branches has a
 direction along which the energy decreases (:mod:`~polycorner.proofs.lists.directions`), or lies in
 a region whose only stationary point is known (:mod:`~polycorner.proofs.lists.acceptance`), with
-redundant functions perhaps (:mod:`~polycorner.proofs.lists.redundancy`); all others are bisected.
+redundant functions perhaps (:mod:`~polycorner.proofs.lists.redundancy`); all others are bisected,
+once what lies outside of the set is cut off (:mod:`~polycorner.proofs.lists.contraction`).
 
 The search goes in rounds.  In each, some boxes that wait are examined, in chunks that read the same
 state and change nothing, by as many threads as there are; then candidates are tried near what is
@@ -38,6 +39,7 @@ CHUNKS = 8  # that a round consists of
 CHUNK = 4096  # boxes in a chunk, at most
 LEAST = 256  # boxes in a chunk, if there are as many
 SHARP = 20_000  # boxes after which second derivatives are used, if not before for small boxes
+LEAST_CUT = 0.1  # of a side, that is cut off before a box is bisected
 NUMBERS = 1 << 20  # bounds of derivatives in a chunk, at most
 
 
@@ -170,7 +172,8 @@ class Search(Setting):
         self.tree.close(boxes.nodes[:0], boxes.nodes[more[0][kept]], more[1][kept])
         rest = boxes.part(left)
         again = self._small(rest) & (not self.attempts.sharp)
-        return self._halves(rest.part(~again)).with_others(rest.part(again))
+        halves = self._halves(rest.part(~again), e.inner[:, left][:, ~again])
+        return halves.with_others(rest.part(again))
 
     def _relative(self, boxes: Boxes) -> Array:
         """Return the sides of boxes in the units of the domain."""
@@ -182,14 +185,16 @@ class Search(Setting):
         small: NDArray[np.bool_] = self._relative(boxes).max(axis=1, initial=0.0) <= self.resolution
         return small
 
-    def _halves(self, boxes: Boxes) -> Boxes:
-        small, relative = self._small(boxes), self._relative(boxes)
+    def _halves(self, boxes: Boxes, inner: Array) -> Boxes:
+        """Return the halves of boxes, without what lies beyond narrower sides ``(2, B, n)``."""
+        small = self._small(boxes)
         if small.any():
             self.undecided.append(boxes.part(small))
             self.tally.undecided += int(small.sum())
-            boxes, relative = boxes.part(~small), relative[~small]
+            boxes, inner = boxes.part(~small), inner[:, ~small]
+        boxes = self._cut(boxes, inner)
         self.tally.split += len(boxes)
-        axis = relative.argmax(axis=1)
+        axis = self._relative(boxes).argmax(axis=1)
         each = np.arange(len(boxes))
         middle = boxes.middles[each, axis]
         first, second = boxes.upper.copy(), boxes.lower.copy()
@@ -199,6 +204,22 @@ class Search(Setting):
         return Boxes(boxes.lower, first, nodes, since).with_others(
             Boxes(second, boxes.upper, nodes + 1, since)
         )
+
+    def _cut(self, boxes: Boxes, inner: Array) -> Boxes:
+        """Cut off and close what lies beyond narrower sides, where that is worth a cut."""
+        lower, upper, nodes = boxes.lower.copy(), boxes.upper.copy(), boxes.nodes.copy()
+        nothing = nodes[:0], np.zeros((0, lower.shape[1]))
+        for axis in self.domain.free:
+            for side, (ends, others) in enumerate(((lower, upper), (upper, lower))):
+                place = inner[side][:, axis]
+                share = (place - ends[:, axis]) / (others[:, axis] - ends[:, axis])
+                at = np.flatnonzero((share > LEAST_CUT) & (share < 1))
+                first = self.tree.split(nodes[at], np.full(len(at), axis), place[at])
+                self.tree.close(first + side, *nothing)
+                ends[at, axis], nodes[at] = place[at], first + 1 - side
+                self.tally.split += len(at)
+                self.tally.outside += len(at)
+        return Boxes(lower, upper, nodes, boxes.since)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from typing import Any
 
 from flint import arb, ctx
 
-from .balls import BITS, NAN, ZERO, hull, need, number, sides
+from .balls import BITS, NAN, ZERO, dot, hull, need, number, sides
 from .operations import SLOPES, VALUES, chain, ordered, unite
 
 FORMAT, CORNERS = ["polycorner-stationary-list", 1], ["polycorner-corner-list", 1]
@@ -104,14 +104,21 @@ class Problem:
         return [1 if x > 0 else -1 if x < 0 else 0 for x in rows]
 
     def sign(self, v: list[Any], row: int, memo: Any, lo: list[float], hi: list[float]) -> int:
-        """Return the sign of a function that is monotone in all coordinates, from two corners."""
+        """Return the sign of a function from its values at two corners, by its slopes.
+
+        It grows from one and decreases from the other, but for slopes of the wrong sign.
+        """
         found = self.forms(v, row, memo)
         slopes = [found[0].get(i, ZERO) if found else NAN for i in range(self.n)]
-        if all(x >= 0 or x <= 0 for x in slopes):
-            for s, (a, b) in ((1, (lo, hi)), (-1, (hi, lo))):
-                corner = [arb(y if x >= 0 else z) for x, y, z in zip(slopes, a, b, strict=True)]
-                if s * self.values(corner)[self.outputs[row]] > 0:
-                    return s
+        if not all(x.is_finite() for x in slopes):
+            return 0
+        up = [x.mid() >= 0 for x in slopes]
+        wrong = [max(ZERO, -x.lower() if u else x.upper()) for u, x in zip(up, slopes, strict=True)]
+        lost = dot(wrong, [arb(b) - arb(a) for a, b in zip(lo, hi, strict=True)])
+        for s, (a, b) in ((1, (lo, hi)), (-1, (hi, lo))):
+            corner = [arb(y if u else z) for u, y, z in zip(up, a, b, strict=True)]
+            if s * self.values(corner)[self.outputs[row]] > lost:
+                return s
         return 0
 
     def open_sets(self, signs: list[int], zeros: frozenset[int] = frozenset()) -> list[Any]:

@@ -56,9 +56,12 @@ class Proof:
         signs, turned = self.p.signs(v), list[Any]()
         regions, loci = ([f for f in all_ if f.holds(lo, hi)] for all_ in (self.regions, self.loci))
 
+        near = list[Any]()  # what :meth:`slope` reads, once it is to be sharper
+
         def grows(row: int, w: list[arb]) -> arb:
             found = self.p.forms(v, row, memo)
-            return dot([*found[0].values()], [w[i] for i in found[0]]) if found else NAN
+            natural = dot([*found[0].values()], [w[i] for i in found[0]]) if found else NAN
+            return self.slope(row, w, *near) if near else natural
 
         def leads(u: frozenset[int], w: list[arb]) -> bool:
             return all(grows(i, w) > 0 for i in u)
@@ -80,7 +83,28 @@ class Proof:
         if all(map(left, self.p.open_sets(signs))):
             return True
         closer = [s or self.p.sign(v, row, memo, lo, hi) for row, s in enumerate(signs)]
-        return closer != signs and all(map(left, self.p.open_sets(closer)))
+        if closer != signs and all(map(left, self.p.open_sets(closer))):
+            return True
+        box = hull(lo, hi)
+        middle = [x.mid() for x in box]
+        near[:] = (
+            v,
+            {},
+            self.p.values(middle),
+            {},
+            [x - c for x, c in zip(box, middle, strict=True)],
+        )
+        return bool(ways) and all(map(left, self.p.open_sets(closer)))
+
+    def slope(
+        self, row: int, w: list[arb], v: Any, memo: Any, middle: Any, there: Any, away: list[arb]
+    ) -> arb:
+        """Enclose ``dE w`` or ``df w`` on a box in mean value form, from its middle."""
+        found, at = self.p.forms(v, row, memo, 2), self.p.forms(middle, row, there)
+        if None in (found, at):
+            return NAN
+        bends = (w[i] * h * away[j] for (i, j), h in found[1].items())
+        return dot([*at[0].values()], [w[i] for i in at[0]]) + sum(bends, ZERO)
 
     def redundant(self, v: list[Any], u: frozenset[int], descends: Callable[..., bool]) -> bool:
         """Whether all largest sets of functions that can be independent have directions or regions.
