@@ -121,12 +121,12 @@ class Attempts:
             here = (which.ravel() == kind) & np.isfinite(points).all(axis=1)
             self._show(points[here], tuple(np.flatnonzero(active).tolist()), starts.widest[here])
 
-    def _find_loci(self, q: Array) -> None:
+    def _find_loci(self, starts: Array) -> None:
         setting, z = self.setting, self.setting.reads
-        if setting.equations or not len(q):
+        if setting.equations or not len(starts):
             return
-        inside = np.zeros((len(q), setting.problem.inequalities), dtype=np.bool_)
-        points, found = newton(setting.problem, q, inside, z)
+        inside = np.zeros((len(starts), setting.problem.inequalities), dtype=np.bool_)
+        points, found = newton(setting.problem, starts, inside, z)
         for q in points[found]:
             if self.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue

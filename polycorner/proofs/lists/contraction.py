@@ -1,10 +1,10 @@
 """Narrower sides of boxes, beyond which no point of the set lies.
 
-Let ``f <= F`` and ``df/dq_k >= g > 0`` on a box with the sides ``l_k`` and ``u_k``, and let ``f`` be
-continuous there.  Along the coordinate ``k`` the function grows by at least ``g (u_k - q_k)`` up to
-the side, so that ``f(q) <= F - g (u_k - q_k)``: it is negative where ``q_k < u_k - F / g``.  The other
-side, and negative slopes, are the same in a mirror.  What is cut off is a part of the subdivision
-like any other, whose function is negative on it: nothing else has to be trusted or checked.
+Let ``f`` be continuous on a box, where ``l_k <= q_k <= u_k``, with ``f <= F`` and ``df/dq_k >= g >
+0``.  Along the coordinate ``k`` the function grows by at least ``g (u_k - q_k)`` up to the side, so
+that ``f(q) <= F - g (u_k - q_k)``: it is negative where ``q_k < u_k - F / g``.  The other side, and
+negative slopes, are the same in a mirror.  What is cut off is a part of the subdivision like any
+other, on which a function is negative: nothing else has to be trusted or checked.
 """
 
 from collections.abc import Sequence

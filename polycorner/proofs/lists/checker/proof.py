@@ -103,8 +103,10 @@ class Proof:
         found, at = self.p.forms(v, row, memo, 2), self.p.forms(middle, row, there)
         if None in (found, at):
             return NAN
-        bends = (w[i] * h * away[j] for (i, j), h in found[1].items())
-        return dot([*at[0].values()], [w[i] for i in at[0]]) + sum(bends, ZERO)
+        bent = [ZERO] * self.p.n
+        for (i, j), h in found[1].items():
+            bent[j] += w[i] * h
+        return dot([*at[0].values()], [w[i] for i in at[0]]) + dot(bent, away)
 
     def redundant(self, v: list[Any], u: frozenset[int], descends: Callable[..., bool]) -> bool:
         """Whether all largest sets of functions that can be independent have directions or regions.
