@@ -1,7 +1,7 @@
 """Claim E7 for all sizes in a range at once: two dumbbells in the plane, all l and t, r = 3 mm.
 
-The range is cut into cells, and these again where that is needed.  In each of them ``G`` and
-``delta`` are shown to be all the local minima, for every ``l`` and ``t`` of the cell:
+The range is cut into cells.  In each of them ``G`` and ``delta`` are shown to be all the local
+minima, for every ``l`` and ``t`` of the cell:
 
 1.  :func:`~polycorner.proofs.stationary_points`, with the cell as its ``parameters``, leaves
     undecided boxes about one of the 16 labelled corners ``delta``, its images being covered by
@@ -44,7 +44,6 @@ from polycorner.sweeps import Axis, SweepError, sweep
 BALL = 3.0
 LENGTHS, RODS = (14.0, 18.0), (1.2, 1.8)
 CELL = (0.2, 0.1)  # widths of a cell, in mm
-CUTS = 3  # of a cell into four
 PARTS = 2  # of a cell's sides, near the corner
 RESOLUTION, FINE = 3e-3, 1e-5
 TINY = 1e-9
@@ -167,22 +166,14 @@ def parts(cell: Sides) -> list[Sides]:
     return [{"l": a, "t": b} for a in pairwise(cuts["l"]) for b in pairwise(cuts["t"])]
 
 
-def proved(
-    length: float,
-    rod: float,
-    width: tuple[float, float] = CELL,
-    cuts: int = CUTS,
-) -> dict[str, Any]:
+def proved(length: float, rod: float, width: tuple[float, float] = CELL) -> dict[str, Any]:
     """Prove the statement for the cell that begins at ``length`` and ``rod``, in mm.
-
-    Where that fails, as something is left undecided far from the corner, the cell is cut in four,
-    up to ``cuts`` times.
 
     Returns
     -------
     dict
-        ``proved``; ``boxes``, ``boxes_nearby``, of all searches; ``cells``, without those that were
-        cut; ``reach`` of the neighbourhoods, in mm or rad.
+        ``proved``; ``boxes`` and ``boxes_nearby`` of the two searches; ``reach`` of the
+        neighbourhood, in mm or rad.
     """
     cell = {"l": (length, length + width[0]), "t": (rod, rod + width[1])}
     found = everywhere(cell)
@@ -194,27 +185,11 @@ def proved(
     )
     alone = lines and not len(found) and not found.open_points and only_contacts(near, cell)
     locally = [nearby(near, part) for part in parts(cell)] if alone else []
-    numbers: dict[str, Any] = {
+    return {
         "proved": float(alone and all(map(is_corner, locally))),
         "boxes": float(found.tally.boxes),
         "boxes_nearby": float(sum(part.tally.boxes for part in locally)),
-        "cells": 1.0,
         "reach": abs(near).max(axis=0),
-    }
-    if numbers["proved"] or not cuts:
-        return numbers
-    half = width[0] / 2, width[1] / 2
-    pieces = [
-        proved(x, y, half, cuts - 1)
-        for x in (length, length + half[0])
-        for y in (rod, rod + half[1])
-    ]
-    return {
-        "proved": float(all(piece["proved"] for piece in pieces)),
-        "boxes": numbers["boxes"] + sum(piece["boxes"] for piece in pieces),
-        "boxes_nearby": numbers["boxes_nearby"] + sum(piece["boxes_nearby"] for piece in pieces),
-        "cells": sum(piece["cells"] for piece in pieces),
-        "reach": np.max([piece["reach"] for piece in pieces], axis=0),
     }
 
 
@@ -237,10 +212,8 @@ def main() -> None:
         )  # fmt: skip
     except (ValueError, SweepError) as error:
         parser.error(str(error))
-    numbers = found[["cells", "boxes", "boxes_nearby", "reach", "seconds"]]
-    shown = numbers.where(found["proved"] == 1)
-    count, whole = int((shown["cells"] > 0).sum()), int((shown["cells"] == 1).sum())
-    print(f"{count} of {found['proved'].size} cells are proved, {whole} of them as a whole")
+    shown = found[["boxes", "boxes_nearby", "reach", "seconds"]].where(found["proved"] == 1)
+    print(f"{int(found['proved'].sum())} of {found['proved'].size} cells are proved")
     print(f"{shown['boxes'].sum():.0f} boxes, near the corner {shown['boxes_nearby'].sum():.0f}")
     reach = ", ".join(f"{x:.3f}" for x in shown["reach"].max(("length", "rod")).values)
     print(f"neighbourhoods reach {reach} (U, V in mm; T, W in rad)")
