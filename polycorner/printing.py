@@ -196,7 +196,7 @@ def listed(
     """Return the first of ``count`` rows as a table whose caption says that rows are left out."""
     shown = tuple(islice(rows, MOST))
     left = f" (the first {MOST} of {count})" if count > len(shown) else ""
-    return Table(tuple(head), shown, numbers, f"{caption}{left}")
+    return Table(tuple(head), shown, numbers, f"{caption}{left}".strip())
 
 
 def number(value: float, digits: int = 9) -> str:
@@ -246,16 +246,16 @@ def titled(name: str, period: float) -> str:
 
 
 def coordinates(names: Sequence[str], periods: Sequence[float], point: Sequence[float]) -> Table:
-    """Return a table of the coordinates of a point, angles in radians and in degrees."""
+    """Return a table of the first coordinates of a point, angles in radians and in degrees."""
     units = [angle_unit(period) for period in periods]
     rows = [(name, number(x)) for name, x in zip(names, point, strict=True)]
     if not any(units):
-        return Table(("coordinate", "value"), tuple(rows), (1,))
+        return listed("", ("coordinate", "value"), rows, len(rows), (1,))
     turned = [
         (*row, unit, f"{math.degrees(x):.6f} deg" if unit else "")
         for row, unit, x in zip(rows, units, point, strict=True)
     ]
-    return Table(("coordinate", "value", "unit", "in degrees"), tuple(turned), (1, 3))
+    return listed("", ("coordinate", "value", "unit", "in degrees"), turned, len(turned), (1, 3))
 
 
 def _column(title: str, cells: Sequence[str], *, number: bool) -> list[str]:

@@ -41,6 +41,7 @@ from polycorner.printing import (
     angle_unit,
     coordinates,
     facts,
+    listed,
     names,
     number,
     units,
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from polycorner.polyhedra.polyhedron import Polyhedron
 
 # What an analysis finds where a search has stopped says less than that it has not converged.
+LONGEST = 400  # list of names that is printed
 SHOWN = 100  # coordinates that are shown in one line
 VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALONG_LOCUS})
 
@@ -268,7 +270,7 @@ class Certificate(Value, Printed):
                     (
                         ("verdict", self.verdict.value),
                         ("energy", number(self.energy, 12)),
-                        ("active", ", ".join(self.active) or "none"),
+                        ("active", names(self.active, LONGEST) or "none"),
                         ("signature", "(p, q, r) = ({}, {}, {})".format(*self.signature)),
                         ("infeasibility", f"{residuals.infeasibility:.1e}"),
                         ("stationarity", f"{residuals.stationarity:.1e}"),
@@ -278,9 +280,11 @@ class Certificate(Value, Printed):
                 coordinates(manifold.names, manifold.periods, self.point.tolist()),
                 self._multiplier_table(),
                 "" if self.multipliers_unique else "The multipliers are one choice of several.",
-                Table(
+                listed(
+                    "",
                     ("direction", "entrapment"),
-                    tuple((name, kind.value) for name, kind in self.entrapment.items()),
+                    ((name, kind.value) for name, kind in self.entrapment.items()),
+                    len(self.entrapment),
                 ),
                 units(manifold.periods),
             ),
@@ -292,13 +296,10 @@ class Certificate(Value, Printed):
         rows = [(name, number(value[name], 3), number(x)) for name, x in self.multipliers.items()]
         head = ("active function", "value", "multiplier dE/df")
         if self.multipliers_unique:
-            return Table(head, tuple(rows), (1, 2))
+            return listed("", head, rows, len(rows), (1, 2))
         spans = [(number(low), number(high)) for low, high in self.multiplier_ranges.values()]
-        return Table(
-            (*head, "least", "largest"),
-            tuple((*row, *span) for row, span in zip(rows, spans, strict=True)),
-            (1, 2, 3, 4),
-        )
+        wide = ((*row, *span) for row, span in zip(rows, spans, strict=True))
+        return listed("", (*head, "least", "largest"), wide, len(rows), (1, 2, 3, 4))
 
 
 def certify(

@@ -197,3 +197,15 @@ def test_entrapment_accounts_for_every_dimension(n):
     c = certify(D, sum(symbols) + sum(s**2 for s in symbols), [0.0] * n)
     assert c.entrapment_counts == {"half-V": 1, "half-U": 0, "U": n - 1, "free": 0}
     assert len(c.entrapment) == n
+
+
+def test_certificates_of_many_contacts_are_short_and_say_what_they_leave_out():
+    manifold = Manifold.euclidean([f"x{i}" for i in range(150)])
+    D = Polyhedron(manifold, {f"f{i}": s for i, s in enumerate(manifold.symbols)})
+    c = certify(D, sum(manifold.symbols), np.zeros(150))
+    text = str(c)
+    assert len(text.splitlines()) < 100
+    assert max(map(len, text.splitlines())) < 120
+    assert text.count("(the first 20 of 150)") == 3  # coordinates, multipliers, directions
+    assert "150 functions" in text
+    assert len(c.multipliers) == len(c.entrapment) == 150
