@@ -52,11 +52,10 @@ class Proof:
         """Whether a box is closed rightly."""
         if any(g.carries(lo, hi) for g in self.symmetries):
             return True
-        v, memo = self.p.values(hull(lo, hi)), dict[int, Any]()
+        box, memo = hull(lo, hi), dict[int, Any]()
+        v, near = self.p.values(box), list[Any]()  # near: what a sharper enclosure reads, if any
         signs, turned = self.p.signs(v), list[Any]()
         regions, loci = ([f for f in all_ if f.holds(lo, hi)] for all_ in (self.regions, self.loci))
-
-        near = list[Any]()  # what :meth:`slope` reads, once it is to be sharper
 
         def grows(row: int, w: list[arb]) -> arb:
             found = self.p.forms(v, row, memo)
@@ -85,15 +84,9 @@ class Proof:
         closer = [s or self.p.sign(v, row, memo, lo, hi) for row, s in enumerate(signs)]
         if closer != signs and all(map(left, self.p.open_sets(closer))):
             return True
-        box = hull(lo, hi)
         middle = [x.mid() for x in box]
-        near[:] = (
-            v,
-            {},
-            self.p.values(middle),
-            {},
-            [x - c for x, c in zip(box, middle, strict=True)],
-        )
+        away = [x - c for x, c in zip(box, middle, strict=True)]
+        near[:] = v, {}, self.p.values(middle), {}, away
         return bool(ways) and all(map(left, self.p.open_sets(closer)))
 
     def slope(
