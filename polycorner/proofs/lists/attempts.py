@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.proofs.lists.acceptance import WIDEST, Region
+from polycorner.proofs.lists.acceptance import WIDEST
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.candidates import active_sets, newton
 from polycorner.proofs.lists.examination import Examined
@@ -167,26 +167,10 @@ class Attempts:
                 region = None
             else:
                 region = self.setting.faces.region(q, active, size, guess)
-            if region is None or self._is_open_saddle(region):
+            if region is None:
                 self.failed.add(active, q, size)
             else:
                 self.known.add(region)
-
-    def _is_open_saddle(self, region: Region) -> bool:
-        """Whether other functions may vanish at a saddle for some values of parameters only.
-
-        Where minima alone are sought, negative curvature shows of boxes what stays open of it.
-        """
-        domain, m = self.setting.domain, self.setting.problem.inequalities
-        if not (self.setting.minima_only and domain.parameters and region.index):
-            return False
-        free, (lower, upper) = list(domain.free), (domain.lower.copy(), domain.upper.copy())
-        lower[free], upper[free] = (
-            side[: len(free)] for side in (region.sharp_lower, region.sharp_upper)
-        )
-        low, high = self.setting.functions.values(lower[None], upper[None])
-        signed = (low[0, :m] > 0) | (high[0, :m] < 0)
-        return len(region.active) < int((~signed).sum())
 
     def _is_new(self, q: Array, active: tuple[int, ...], widest: float) -> bool:
         return not self.known.has(q, frozenset(active)) and not self.failed.has(active, q, widest)

@@ -234,7 +234,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
     """Return what a search found for a problem, in whose coordinates parameters are left out."""
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
-    known, orbits, members = Listed(search), 0, settled(search)
+    known, orbits, (members, ways) = Listed(search), 0, settled(search)
     for _, member in members:
         before = known.has(member)
         if before:
@@ -263,7 +263,7 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         undecided(search)[:, :, :n],
         tuple(open_points),
         search.tally,
-        record(search, members),
+        record(search, members, ways),
         search.minima_only,
     )
 

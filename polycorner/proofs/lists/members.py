@@ -7,11 +7,13 @@ import numpy as np
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.acceptance import Region
+from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
 from polycorner.proofs.lists.domains import ROUNDING
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.known import Sides
 from polycorner.proofs.lists.operators import BITS
+from polycorner.proofs.lists.saddles import without_minima
 from polycorner.proofs.lists.search import Search
 from polycorner.spaces.manifold import Array, Manifold
 
@@ -122,14 +124,22 @@ def apart(search: Search, region: Region, other: Region) -> bool:
     return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
 
 
-def settled(search: Search) -> list[tuple[int, Member]]:
-    """Return the regions whose points are in the list or may be, each once, with numbers."""
-    seen, members = Listed(search), list[tuple[int, Member]]()
+def settled(search: Search) -> tuple[list[tuple[int, Member]], dict[int, Array]]:
+    """Return the regions whose points are in the list or may be, each once, with numbers.
+
+    And directions of negative curvature, by the numbers of regions whose points are no minima for
+    their sake.
+    """
+    seen, members, ways = Listed(search), list[tuple[int, Member]](), dict[int, Array]()
     for k, region in enumerate(search.regions):
         member = None if seen.holds(region) else judged(search, region)
         if member is not None and search.minima_only and region.index != 0:
-            hidden = region.index is None or not member.free  # others may make it a minimum
-            member = replace(member, place=OPEN if hidden and member.place != OUT else OUT)
+            plain = region.index is not None and member.free  # no others can make it a minimum
+            way = None if plain or member.place == OUT else _bent(search, member)
+            if way is not None:
+                ways[k] = way
+            shown = plain or way is not None or member.place == OUT
+            member = replace(member, place=OUT if shown else OPEN)
         if member is not None and member.place != OUT:
             seen.add(member)
             members.append((k, member))
@@ -140,7 +150,20 @@ def settled(search: Search) -> list[tuple[int, Member]]:
             decided = replace(member, place=OPEN) if before is None else member
             known.add(decided)
             found.append((k, decided))
-    return found
+    return found, ways
+
+
+def _bent(search: Search, member: Member) -> Array | None:
+    """Return a direction of negative curvature at a point, tangent to all that may vanish there.
+
+    It shows that the point is no minimum of any branch (:mod:`~polycorner.proofs.lists.curvature`).
+    """
+    lower, upper = full(search, member.region)
+    nodes = np.zeros(1, dtype=np.int64)
+    mask = np.zeros((1, search.problem.inequalities), dtype=np.bool_)
+    mask[0, list(member.zeros | member.unknown)] = True
+    found, ways = without_minima(search, Boxes(lower[None], upper[None], nodes, nodes), nodes, mask)
+    return ways[0] if found[0] else None
 
 
 def full(search: Search, region: Region) -> tuple[Array, Array]:

@@ -21,8 +21,8 @@ import json
 import math
 import os
 import zipfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -70,6 +70,8 @@ class Record(Value):
         images of each other, those that the search met.
     codes, positions, counts, directions : arrays
         The subdivision; see :meth:`~polycorner.proofs.lists.tree.Tree.preorder`.
+    ways : mapping from int to (n,) array
+        Directions of negative curvature, by the regions whose points are no minima for their sake.
     minima_only : bool
         Whether the list is one of local minima.
     """
@@ -87,11 +89,14 @@ class Record(Value):
     positions: Array
     counts: NDArray[np.uint16]
     directions: NDArray[np.float32]
+    ways: Mapping[int, Array] = field(default_factory=dict)
     minima_only: bool = False
 
 
-def record(search: Search, members: Sequence[tuple[int, Member]]) -> Record:
-    """Return the record of a search and the members of its list."""
+def record(
+    search: Search, members: Sequence[tuple[int, Member]], ways: Mapping[int, Array]
+) -> Record:
+    """Return the record of a search and the members of its list; see :class:`Record`."""
     return Record(
         search.problem,
         search.domain,
@@ -103,6 +108,7 @@ def record(search: Search, members: Sequence[tuple[int, Member]]) -> Record:
         tuple(k for k, member in members if member.place == IN),
         tuple(k for k, member in members if member.place == OPEN),
         *search.tree.preorder(),
+        ways,
         search.minima_only,
     )
 
@@ -147,7 +153,10 @@ def described(record: Record) -> dict[str, Any]:
     return {
         "format": list(FORMAT),
         **posed(record),
-        "regions": [region_data(region) for region in record.regions],
+        "regions": [
+            region_data(region) | ({"way": _hex(record.ways[k])} if k in record.ways else {})
+            for k, region in enumerate(record.regions)
+        ],
         "loci": [locus_data(place) for place in record.loci],
         "points": [{"region": k, "index": record.regions[k].index} for k in record.listed],
         "open_points": list(record.open_points),

@@ -159,6 +159,24 @@ def test_saddles_whose_multiplier_passes_through_zero(tmp_path):
     assert check(str(found.save(tmp_path / "saddles.zip")), None, 1).startswith("verified: 0 local")
 
 
+@pytest.mark.parametrize("wall", [X + Y / 3, X - X**2])
+def test_a_saddle_on_a_wall_without_force_is_no_minimum(wall, tmp_path):
+    """The saddle of ``x^2 - y^2`` lies on the wall, along which the energy decreases."""
+    d = Polyhedron(PLANE, {"wall": wall})
+    found = stationary_points(d, X**2 - Y**2, box=[(-0.5, 0.5), (-0.5, 0.5)], minima_only=True)
+    assert (found.complete, len(found), found.open_points) == (True, 0, ())
+    path = found.save(tmp_path / "saddle.zip")
+    assert check(str(path), None, 1).startswith("verified: 0 local minima")
+    changed(path, lambda data: data["regions"][0].update(way=["0x0p0", "0x0p0"]))
+    with pytest.raises(RefusedError, match="is not listed"):
+        check(str(path), None, 1)
+    upright = Polyhedron(PLANE, {"wall": wall.subs({X: Y, Y: X}, simultaneous=True)})
+    found = stationary_points(
+        upright, X**2 - Y**2, box=[(-0.5, 0.5), (-0.5, 0.5)], minima_only=True, resolution=1e-3
+    )
+    assert not found.complete  # it descends one way only, along no tangent of the wall
+
+
 def test_a_weakly_active_minimum_is_not_closed():
     """With ``x >= 0`` and ``y >= 0``, where both multipliers vanish, 0 is the minimum."""
     d = Polyhedron(PLANE, {"right": X, "above": Y})

@@ -47,7 +47,7 @@ class Face:
         self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
         self.tested = sum(not shown(v[p.outputs[i]]) for i in self.zeros - self.active)
         self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
-        branches = p.open_sets(signs, self.zeros)
+        self.branches = branches = p.open_sets(signs, self.zeros)
         sure = any(u <= self.zeros for u in branches)
         self.stationary = sure and all(self.active <= u for u in branches)
         self.free = any(u <= self.active for u in branches)  # all others are positive in one

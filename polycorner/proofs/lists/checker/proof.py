@@ -7,7 +7,7 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import NAN, ZERO, dot, hull, moved, need
+from .balls import NAN, ZERO, dot, hull, moved, need, sides
 from .faces import Face
 from .problem import Problem
 from .symmetries import Symmetry
@@ -26,6 +26,9 @@ class Proof:
         self.p = p = Problem(data)
         self.kind = "local minima" if p.minima_only else self.kind
         self.regions = [Face(p, r, p.free, r["active"]) for r in data["regions"]]
+        self.ways = [
+            sides(r, ("way", "way"), p.n)[0] if "way" in r else [] for r in data["regions"]
+        ]
         self.loci = [Face(p, r, r["z"], None) for r in data["loci"]]
         self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
         self.tested = sum(region.tested for region in self.regions)
@@ -145,6 +148,11 @@ class Proof:
         ]
         return sum(bent, ZERO) < 0
 
+    def is_saddle(self, face: Face, way: list[float]) -> bool:
+        """Whether negative curvature along all that may vanish at a point makes it no minimum."""
+        u = frozenset[int]().union(*face.branches)
+        return self.bends_down(u, self.p.values(face.point), [arb(x) for x in way])
+
     def tangents(self, v: list[Any], memo: dict[int, Any], ways: list[list[arb]]) -> list[Any]:
         """Return ``w + C y`` with ``dh (w + C y) = 0``, for all elements of the enclosed ``dh``."""
         found = [self.p.forms(v, row, memo) for row in range(self.p.m, self.p.m + self.p.k)]
@@ -171,7 +179,8 @@ class Proof:
             )
             need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
         named = claimed + [self.regions[k] for k in data["open_points"]]
-        for face in self.regions:
+        for face, way in zip(self.regions, self.ways, strict=True):
             known = face.outside or face.absent or any(face.same(f) for f in named)
             known |= self.p.minima_only and bool(face.index) and face.free
+            known |= self.p.minima_only and bool(way) and self.is_saddle(face, way)
             need(known, f"{face.name}: is not listed")
