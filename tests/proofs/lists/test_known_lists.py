@@ -16,10 +16,10 @@ IDENTITY = ((Q(1), Q(0)), (Q(0), Q(1)))
 HERE = (Q(0), Q(0))
 
 
-def found(posed, most):
+def found(posed, most, *, minima_only=False):
     return stationary_points(
         posed.polyhedron, posed.energy, box=posed.box, symmetry=posed.symmetry,
-        resolution=1e-3, max_boxes=most,
+        resolution=1e-3, max_boxes=most, minima_only=minima_only,
     )  # fmt: skip
 
 
@@ -38,6 +38,25 @@ def judge(posed, most):
 def test_no_false_list_in_a_few_problems_of_every_kind(draw):
     for number in range(EACH):
         judge(known_lists.drawn(draw, np.random.default_rng([SEED, number])), 600)
+
+
+@pytest.mark.parametrize("draw", known_lists.DRAWS, ids=lambda draw: draw.__name__)
+def test_minima_alone_are_those_of_the_whole_list(draw):
+    for number in range(EACH):
+        posed = known_lists.drawn(draw, np.random.default_rng([SEED + 1, number]))
+        if posed.refused:
+            continue
+        every, minima = (found(posed, 600, minima_only=only) for only in (False, True))
+        if every.complete and minima.complete:
+            places = [
+                sorted(np.round(p.point, 6).tolist() for p in some if p.is_minimum)
+                for some in (every, minima)
+            ]
+            assert places[0] == places[1]
+            assert sum(place.is_minimum for place in every.loci) == len(minima.loci)
+        elif minima.complete:
+            assert len(minima) == sum(p.index == 0 for p in posed.points)
+        assert minima.complete or not every.complete
 
 
 @pytest.mark.slow
