@@ -110,7 +110,9 @@ class Attempts:
         return Starts(boxes.middles, active, WIDER * widths.max(axis=1), still)
 
     def run(self, starts: Starts, mapped: Mapped = map) -> None:
-        """Try to find loci and regions from some points."""
+        """Try to find loci and regions from some points, for parameters in their middles."""
+        for i, side in self.setting.domain.held.items():
+            starts.q[:, i] = 0.5 * sum(side)
         if self.setting.may_have_loci:
             self._find_loci(starts.q[starts.still])
         parts = [starts.part(part) for part in np.array_split(np.arange(len(starts.q)), PARTS)]

@@ -206,10 +206,13 @@ class Search(Setting):
         )
 
     def _cut(self, boxes: Boxes, inner: Array) -> Boxes:
-        """Cut off and close what lies beyond narrower sides, where that is worth a cut."""
+        """Cut off and close what lies beyond narrower sides, where that is worth a cut.
+
+        Parameters are cut as well: what is left then are some of their values.
+        """
         lower, upper, nodes = boxes.lower.copy(), boxes.upper.copy(), boxes.nodes.copy()
         nothing = nodes[:0], np.zeros((0, lower.shape[1]))
-        for axis in self.domain.free:
+        for axis in np.flatnonzero(self.domain.lower < self.domain.upper).tolist():
             for side, (ends, others) in enumerate(((lower, upper), (upper, lower))):
                 place = inner[side][:, axis]
                 share = (place - ends[:, axis]) / (others[:, axis] - ends[:, axis])

@@ -6,7 +6,7 @@ import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from polycorner import AnyOf, Manifold, NonsmoothWarning, Polyhedron
+from polycorner import AnyOf, Manifold, NonsmoothWarning, Polyhedron, SmoothFunction
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.proofs import corners, stationary_points
 from polycorner.proofs.lists import search
@@ -162,3 +162,23 @@ def test_the_checker_reads_no_sign_from_slopes_that_are_not_bounded(formula, tmp
     p = Proof(contents(str(proof))[0]).p
     lo, hi = [0.0, 0.0], [1.0, 1.0]
     assert p.sign(p.values(hull(lo, hi)), 0, {}, lo, hi) == 0
+
+
+def test_parameters_are_cut_and_the_list_holds_for_all_of_them(tmp_path, monkeypatch):
+    """Of the box some values of ``a`` leave a part only; the minimum is at ``(a, a^2 - a / 2)``."""
+    a = sympy.Symbol("a")
+    wall = SmoothFunction("wall", X - a, PLANE, parameters={"a": 0.3})
+    energy = SmoothFunction("E", X**2 + (Y - X**2 + a / 2) ** 2, PLANE, parameters={"a": 0.3})
+    problem = {"box": [(-1, 1), (-1, 1)], "parameters": {"a": (0.25, 0.35)}}
+    found = stationary_points(Polyhedron(PLANE, [wall]), energy, **problem)
+    axes = found.record.codes
+    assert (axes == 2).any()  # the parameter comes after the coordinates
+    assert check(str(found.save(tmp_path / "list.zip")), None, 1).startswith("verified")
+    monkeypatch.setattr(search, "LEAST_CUT", 2.0)
+    whole = stationary_points(Polyhedron(PLANE, [wall]), energy, **problem)
+    assert not (whole.record.codes == 2).any()
+    for some in (found, whole):
+        assert some.complete
+        (p,) = some
+        assert (p.lower <= [0.25, 0.25**2 - 0.125]).all()
+        assert (p.upper >= [0.35, 0.35**2 - 0.175]).all()
