@@ -165,6 +165,7 @@ class Printed:
     """Base of results that ``print`` and notebooks show as a sheet."""
 
     def _sheet(self) -> Sheet:
+        """Return what is shown; every result has its own."""
         raise NotImplementedError
 
     @property

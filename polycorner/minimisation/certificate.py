@@ -53,9 +53,9 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
-# What an analysis finds where a search has stopped says less than that it has not converged.
-LONGEST = 400  # list of names that is printed
+LONGEST = 400  # letters of a list of names that is printed
 SHOWN = 100  # coordinates that are shown in one line
+# What an analysis finds where a search has stopped says less than that it has not converged.
 VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALONG_LOCUS})
 
 
