@@ -142,6 +142,7 @@ class Formulas:
         self.outputs = tuple([write(self.graph, f, places) for f in functions])
         self._tapes: dict[tuple[int, ...], Tape] = {}
         self._smooth: dict[Any, SmoothForms] = {}
+        self._branches = Graph()  # of all smooth forms, so that none is differentiated twice
 
     def _tape(self, rows: tuple[int, ...]) -> Tape:
         if rows not in self._tapes:
@@ -229,8 +230,7 @@ class Formulas:
         return ""
 
     def _pruned(self, rows: tuple[int, ...], taken: dict[int, int]) -> "SmoothForms":
-        graph = Graph()
-        placed: dict[int, int] = {}
+        graph, placed = self._branches, dict[int, int]()
         for a in sorted(taken):
             op, args = self.graph.nodes[a]
             direct = taken[a] == a

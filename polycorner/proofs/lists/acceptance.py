@@ -121,8 +121,12 @@ class Faces:
                 shown = self._shown(*self._sides(q, reach), rows, len(active))
                 if isinstance(shown, Region):
                     return shown
-            for power in range(QUARTERINGS):
-                found = self._within(q, rows, len(active), min(widest, WIDEST) / 4**power)
+            reaches = [min(widest, WIDEST) / 4**power for power in range(QUARTERINGS)]
+            narrowest = self._box(*self._sides(q, self._radii(reaches[-1])))
+            if self._multipliers(narrowest, rows, len(active)) is None:
+                return None  # as wider boxes have wider enclosures
+            for reach in reaches:
+                found = self._within(q, rows, len(active), reach)
                 if found is not None:
                     return found
         return None
@@ -132,8 +136,7 @@ class Faces:
 
         Where the image of a box is wider than the box along a coordinate, the next is as wide.
         """
-        radii = np.zeros_like(q)
-        radii[list(self.free)] = reach * self.scales[list(self.free)]
+        radii = self._radii(reach)
         for _ in range(WIDENINGS):
             found = self._shown(*self._sides(q, radii), rows, count)
             if found is None or isinstance(found, Region):
@@ -142,6 +145,12 @@ class Faces:
                 break
             radii[list(self.free)] = np.maximum(radii[list(self.free)], GROWTH * found)
         return None
+
+    def _radii(self, reach: float) -> Array:
+        """Return the radii of a box that reaches ``reach`` scale units from its middle."""
+        radii = np.zeros_like(self.scales)
+        radii[list(self.free)] = reach * self.scales[list(self.free)]
+        return radii
 
     def _sides(self, q: Array, radii: Array) -> tuple[Array, Array]:
         """Return the ends of a box about ``q``, those of the parameters being given."""
@@ -154,16 +163,12 @@ class Faces:
         self, lower: Array, upper: Array, rows: tuple[int, ...], count: int
     ) -> "Region | Array | None":
         """Return the region of a box; the reach of its image if that is too wide; or None."""
-        sides = zip(lower.tolist(), upper.tolist(), strict=True)
-        box = Box([between(a, b) for a, b in sides])
-        forms = self.formulas.smooth(box, rows)
-        if isinstance(forms, Undecided):
+        box = self._box(lower, upper)
+        enclosed = self._multipliers(box, rows, count)
+        if enclosed is None:
             return None
+        forms, multipliers = enclosed
         _, gradients, hessians = forms.evaluate(box, 2)
-        slopes = [[g[i] for i in self.free] for g in gradients]
-        multipliers = enclosed_multipliers(slopes)
-        if multipliers is None or not all(lam > 0 for lam in multipliers[:count]):
-            return None
         n = len(self.free)
         unknowns = [*(box.hull[i] for i in self.free), *(wider(lam) for lam in multipliers)]
         residual, start, centre = self._at_centre(forms, box, unknowns)
@@ -181,6 +186,23 @@ class Faces:
         if self.held:  # so that others, who stop elsewhere, arrive within
             ends += LOOSENESS * (ends[:, 1:] - ends[:, :1]) * np.array([-1.0, 1.0])
         return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
+
+    @staticmethod
+    def _box(lower: Array, upper: Array) -> Box:
+        return Box([between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)])
+
+    def _multipliers(
+        self, box: Box, rows: tuple[int, ...], count: int
+    ) -> "tuple[SmoothForms, list[Ball]] | None":
+        """Return the functions on a box and their multipliers, if these are positive on it."""
+        forms = self.formulas.smooth(box, rows)
+        if isinstance(forms, Undecided):
+            return None
+        _, gradients = forms.evaluate(box, 1)
+        multipliers = enclosed_multipliers([[g[i] for i in self.free] for g in gradients])
+        if multipliers is None or not all(lam > 0 for lam in multipliers[:count]):
+            return None
+        return forms, multipliers
 
     def _at_centre(
         self, forms: SmoothForms, box: Box, unknowns: "list[Ball]"

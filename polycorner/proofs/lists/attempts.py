@@ -1,7 +1,7 @@
 """Attempts to find the stationary points near items that are left."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,7 +19,7 @@ from polycorner.spaces.manifold import Array
 
 Mapped: TypeAlias = Callable[..., Iterable[Any]]
 
-PARTS = 8  # into which candidates are divided for threads
+PART = 512  # starts that Newton's method goes on from at a time, at most
 ATTEMPTS = 1024  # candidates that are tried in one round
 WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 EVERY = 2  # bisections of every coordinate between two attempts at a box
@@ -44,6 +44,16 @@ class Starts:
     def part(self, keep: NDArray[np.intp]) -> "Starts":
         """Return some of them."""
         return Starts(self.q[keep], self.active[keep], self.widest[keep], self.still[keep])
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Starts]") -> "Starts":
+        """Return some starts, one or more, together."""
+        return cls(
+            np.concatenate([p.q for p in parts]),
+            np.concatenate([p.active for p in parts]),
+            np.concatenate([p.widest for p in parts]),
+            np.concatenate([p.still for p in parts]),
+        )
 
 
 @dataclass
@@ -82,13 +92,7 @@ class Attempts:
         for e, boxes in chosen:
             e.boxes.since[boxes[tried[place : place + len(boxes)]]] = 0
             place += len(boxes)
-        starts = Starts(
-            np.concatenate([p.q for p in parts]),
-            np.concatenate([p.active for p in parts]),
-            np.concatenate([p.widest for p in parts]),
-            np.concatenate([p.still for p in parts]),
-        )
-        self.run(starts.part(order), mapped)
+        self.run(Starts.joined(parts).part(order), mapped)
 
     def _ripe(self, e: Examined) -> NDArray[np.intp]:
         """Return positions in the rest of the items to try, one for a box."""
@@ -111,16 +115,19 @@ class Attempts:
 
     def run(self, starts: Starts, mapped: Mapped = map) -> None:
         """Try to find loci and regions from some points, for parameters in their middles."""
+        q = starts.q.copy()
         for i, side in self.setting.domain.held.items():
-            starts.q[:, i] = 0.5 * sum(side)
+            q[:, i] = 0.5 * sum(side)
+        starts = replace(starts, q=q)
         if self.setting.may_have_loci:
             self._find_loci(starts.q[starts.still])
-        parts = [starts.part(part) for part in np.array_split(np.arange(len(starts.q)), PARTS)]
-        found = list(mapped(self._candidates, [part for part in parts if len(part.q)]))
-        points = np.concatenate(found) if found else starts.q
-        kinds, which = np.unique(starts.active, axis=0, return_inverse=True)
-        for kind, active in enumerate(kinds):
-            here = (which.ravel() == kind) & np.isfinite(points).all(axis=1)
+        each = np.array_split(np.arange(len(q)), -(-len(q) // PART))
+        points = np.concatenate(list(mapped(self._candidates, map(starts.part, each))))
+        fine = np.flatnonzero(np.isfinite(points).all(axis=1))
+        kinds, which = np.unique(starts.active[fine], axis=0, return_inverse=True)
+        order = np.argsort(which.ravel(), kind="stable")
+        ends = np.searchsorted(which.ravel()[order], np.arange(1, len(kinds)))
+        for active, here in zip(kinds, np.split(fine[order], ends), strict=False):
             self._show(points[here], tuple(np.flatnonzero(active).tolist()), starts.widest[here])
 
     def _find_loci(self, starts: Array) -> None:

@@ -1,6 +1,7 @@
 """Small linear systems, many at a time, in floating point."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.spaces.manifold import Array
 
@@ -16,21 +17,19 @@ def bordered(bent: Array, rows: Array) -> Array:
 
 def solved(matrix: Array, right: Array) -> Array:
     """Return the solutions ``(B, N)`` of linear systems, NaN for those that are singular."""
-    try:
-        return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0], dtype=np.float64)
-    except np.linalg.LinAlgError:
-        if len(matrix) == 1:
-            return np.full_like(right, np.nan)
-        halves = np.array_split(np.arange(len(matrix)), 2)
-        return np.concatenate([solved(matrix[half], right[half]) for half in halves])
+    fine, found = _regular(matrix), np.full_like(right, np.nan)
+    found[fine] = np.linalg.solve(matrix[fine], right[fine][:, :, None])[:, :, 0]
+    return found
 
 
 def inverted(matrix: Array) -> Array:
     """Return the inverses ``(B, N, N)``, NaN for matrices that are singular."""
-    try:
-        return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        if len(matrix) == 1:
-            return np.full_like(matrix, np.nan)
-        halves = np.array_split(np.arange(len(matrix)), 2)
-        return np.concatenate([inverted(matrix[half]) for half in halves])
+    fine, found = _regular(matrix), np.full_like(matrix, np.nan)
+    found[fine] = np.linalg.inv(matrix[fine])
+    return found
+
+
+def _regular(matrix: Array) -> NDArray[np.bool_]:
+    """Return which matrices are eliminated without a pivot of zero."""
+    regular: NDArray[np.bool_] = np.linalg.slogdet(matrix)[0] != 0
+    return regular

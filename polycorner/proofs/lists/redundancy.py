@@ -25,6 +25,7 @@ combination after all ([Schrijver] secs. 7.3, 7.7).
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations
 from math import comb
 
@@ -34,7 +35,7 @@ from numpy.typing import NDArray
 from polycorner.intervals.balls import between, precision
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.attempts import WIDER, Attempts, Starts
+from polycorner.proofs.lists.attempts import WIDER, Starts
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.candidates import active_sets
 from polycorner.proofs.lists.entry_points import covered, directions
@@ -48,19 +49,28 @@ MOST_SETS = 500  # of one item
 MOST_ITEMS = 64  # of one chunk
 
 
-def close_redundant(
-    setting: Setting, known: Known, e: Examined, attempts: Attempts
-) -> tuple[NDArray[np.intp], Array]:
-    """Close items with redundant functions, or try the faces that are missing for that.
+@dataclass
+class Closing:
+    """What items with redundant functions are closed with, and what is missing.
 
-    Returns
-    -------
+    Attributes
+    ----------
     boxes : (I,) array of int
         Boxes of directions that items are closed with.
     v : (I, n) array
         The directions.
+    starts : list of Starts
+        Where to look for the points of faces that have no direction.
     """
-    owners, vectors = [np.zeros(0, dtype=np.intp)], [e.v[:0]]
+
+    boxes: NDArray[np.intp]
+    v: Array
+    starts: list[Starts]
+
+
+def close_redundant(setting: Setting, known: Known, e: Examined) -> Closing:
+    """Close items with redundant functions, or say which faces are missing for that."""
+    owners, vectors, starts = [np.zeros(0, dtype=np.intp)], [e.v[:0]], []
     for item in _candidates(setting, known, e):
         box = e.where[item]
         if not _smooth(setting, e, item):
@@ -75,8 +85,8 @@ def close_redundant(
             owners.append(np.full(len(v), box))
             vectors.append(v)
         else:
-            _try(setting, e, box, sets[~found], attempts)
-    return np.concatenate(owners), np.concatenate(vectors)
+            starts.append(_starts(setting, e, box, sets[~found]))
+    return Closing(np.concatenate(owners), np.concatenate(vectors), starts)
 
 
 def _candidates(setting: Setting, known: Known, e: Examined) -> Iterator[int]:
@@ -135,9 +145,9 @@ def _directions(setting: Setting, e: Examined, box: int, sets: Mask) -> tuple[Ma
     return found, v
 
 
-def _try(setting: Setting, e: Examined, box: int, sets: Mask, attempts: Attempts) -> None:
-    """Look for the points of faces that have no direction."""
+def _starts(setting: Setting, e: Examined, box: int, sets: Mask) -> Starts:
+    """Return the middle of a box as a start for each set of functions."""
     q = np.repeat(e.boxes.middles[[box]], len(sets), axis=0)
     widths = (e.boxes.upper[box] - e.boxes.lower[box]) / setting.problem.scales
     widest = np.full(len(sets), WIDER * widths[list(setting.domain.free)].max())
-    attempts.run(Starts(q, sets, widest, np.zeros(len(q), dtype=np.bool_)))
+    return Starts(q, sets, widest, np.zeros(len(q), dtype=np.bool_))

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from polycorner.formulas.kernels import MANY
 from polycorner.proofs.lists.acceptance import Region
-from polycorner.proofs.lists.attempts import Attempts, Mapped
+from polycorner.proofs.lists.attempts import Attempts, Mapped, Starts
 from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.examination import Examined, examine, reconsider
 from polycorner.proofs.lists.known import Known
 from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.redundancy import close_redundant
+from polycorner.proofs.lists.redundancy import Closing, close_redundant
 from polycorner.proofs.lists.settings import Setting
 from polycorner.proofs.lists.tree import Tree
 from polycorner.spaces.manifold import Array
@@ -139,7 +139,10 @@ class Search(Setting):
         if len(self.regions) > regions or len(self.loci) > loci:
             for e in found:
                 reconsider(self, self.known, e, regions, loci)
-        more = [close_redundant(self, self.known, e, self.attempts) for e in found]
+        more = [close_redundant(self, self.known, e) for e in found]
+        starts = [start for closing in more for start in closing.starts]
+        if starts:
+            self.attempts.run(Starts.joined(starts), mapped)
         taken = sum(map(len, chunks))
         before = self.waiting.part(slice(None, len(self.waiting) - taken))
         self.waiting = joined([before, *map(self._finish, found, more)])
@@ -153,11 +156,8 @@ class Search(Setting):
         last = self.waiting.part(slice(len(self.waiting) - count, None))
         return [last.part(slice(i, i + size)) for i in range(0, count, size)]
 
-    def _finish(self, e: Examined, more: tuple[NDArray[np.intp], Array]) -> Boxes:
-        """Record how boxes are closed; return the halves of those that are left.
-
-        ``more`` are boxes and directions beside those of items.
-        """
+    def _finish(self, e: Examined, more: Closing) -> Boxes:
+        """Record how boxes are closed; return the halves of those that are left."""
         boxes, where, count = e.boxes, e.where, len(e.boxes)
         seen, left, by_region = (np.zeros(count, dtype=np.bool_) for _ in range(3))
         seen[where], left[where[~e.done]], by_region[where[e.done & ~e.directed]] = True, True, True
@@ -168,8 +168,8 @@ class Search(Setting):
         used = e.directed & ~left[where]
         self.tree.close(e.images, e.images[:0], e.v[:0])
         self.tree.close(boxes.nodes[~left], boxes.nodes[where[used]], e.v[used])
-        kept = ~left[more[0]]
-        self.tree.close(boxes.nodes[:0], boxes.nodes[more[0][kept]], more[1][kept])
+        kept = ~left[more.boxes]
+        self.tree.close(boxes.nodes[:0], boxes.nodes[more.boxes[kept]], more.v[kept])
         rest = boxes.part(left)
         again = self._small(rest) & (not self.attempts.sharp)
         halves = self._halves(rest.part(~again), e.inner[:, left][:, ~again])
