@@ -144,7 +144,7 @@ def settled(search: Search) -> tuple[list[tuple[int, Member]], dict[int, Array]]
             seen.add(member)
             members.append((k, member))
     known, found = Listed(search), list[tuple[int, Member]]()
-    for k, member in sorted(members, key=lambda pair: pair[1].place == OPEN):
+    for k, member in sorted(members, key=_order):
         before = known.has(member)
         if not before:
             decided = replace(member, place=OPEN) if before is None else member
@@ -164,6 +164,12 @@ def _bent(search: Search, member: Member) -> Array | None:
     mask[0, list(member.zeros | member.unknown)] = True
     found, ways = without_minima(search, Boxes(lower[None], upper[None], nodes, nodes), nodes, mask)
     return ways[0] if found[0] else None
+
+
+def _order(pair: tuple[int, Member]) -> tuple[bool, bool]:
+    """Members first, and points that are no minima by the functions of their region alone last."""
+    member = pair[1]
+    return member.place == OPEN, not member.is_plain and member.region.index != 0
 
 
 def full(search: Search, region: Region) -> tuple[Array, Array]:

@@ -41,6 +41,7 @@ from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import Locus
 from polycorner.proofs.lists.members import IN, OPEN, Member
+from polycorner.proofs.lists.pinned import Pinned
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tree import OPEN as OPEN_BOX
 from polycorner.spaces.manifold import Array
@@ -48,6 +49,7 @@ from polycorner.values import Value
 
 FORMAT = ("polycorner-stationary-list", 1)
 SIDES = ("lower", "upper", "sharp_lower", "sharp_upper")
+PINNED = ("into", "steps", "weights")
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
@@ -239,7 +241,11 @@ def _sides(box: Region | Locus) -> dict[str, list[str]]:
 
 def region_data(region: Region) -> dict[str, Any]:
     """Return a region as plain data."""
-    return {"active": list(region.active), "index": region.index, **_sides(region)}
+    found = {"active": list(region.active), "index": region.index, **_sides(region)}
+    if isinstance(region, Pinned):
+        found["corner"] = list(region.corner)
+        found |= {name: _hex(getattr(region, name).ravel()) for name in PINNED}
+    return found
 
 
 def locus_data(place: Locus) -> dict[str, Any]:
@@ -251,7 +257,11 @@ def locus_data(place: Locus) -> dict[str, Any]:
 def region_from(data: dict[str, Any]) -> Region:
     """Return the region that some data describe."""
     lower, upper, low, high = (_numbers(data[name]) for name in SIDES)
-    return Region(lower, upper, tuple(data["active"]), low, high, data["index"])
+    region = lower, upper, tuple(data["active"]), low, high, data["index"]
+    if "corner" not in data:
+        return Region(*region)
+    into, steps, weights = (_numbers(data[name]) for name in PINNED)
+    return Pinned(*region, tuple(data["corner"]), into, steps, weights.reshape(len(steps), -1))
 
 
 def locus_from(data: dict[str, Any]) -> Locus:

@@ -22,6 +22,10 @@ be as few of these as possible.  ``top`` of them or fewer cancel neither where a
 all of them nor in a region, where gradients are independent.  ``top + 1`` of them, of which none
 can be left out, reach every vector with weights that are not negative, so that ``dE`` is such a
 combination after all ([Schrijver] secs. 7.3, 7.7).
+
+Boxes around points that ``A`` holds to first order (:mod:`~polycorner.proofs.lists.pinned`) serve
+as regions, too: no other point is stationary for a combination of functions of ``A``, and these
+increase along one direction, so that none of their gradients cancel.
 """
 
 from collections.abc import Iterator
@@ -70,12 +74,12 @@ class Closing:
 
 def close_redundant(setting: Setting, known: Known, e: Examined) -> Closing:
     """Close items with redundant functions, or say which faces are missing for that."""
-    owners, vectors, starts = [np.zeros(0, dtype=np.intp)], [e.v[:0]], []
+    owners, vectors, missing = [np.zeros(0, dtype=np.intp)], [e.v[:0]], list[Starts]()
     for item in _candidates(setting, known, e):
         box = e.where[item]
         if not _smooth(setting, e, item):
             continue
-        sets = _sets(setting, known, e, item)
+        sets = largest_sets(setting, known, e, item)
         if not len(sets):
             e.done[item] = True
             continue
@@ -85,8 +89,8 @@ def close_redundant(setting: Setting, known: Known, e: Examined) -> Closing:
             owners.append(np.full(len(v), box))
             vectors.append(v)
         else:
-            starts.append(_starts(setting, e, box, sets[~found]))
-    return Closing(np.concatenate(owners), np.concatenate(vectors), starts)
+            missing.append(starts(setting, e, box, sets[~found]))
+    return Closing(np.concatenate(owners), np.concatenate(vectors), missing)
 
 
 def _candidates(setting: Setting, known: Known, e: Examined) -> Iterator[int]:
@@ -119,7 +123,7 @@ def _smooth(setting: Setting, e: Examined, item: int) -> bool:
         return not isinstance(setting.faces.formulas.smooth(box, rows), Undecided)
 
 
-def _sets(setting: Setting, known: Known, e: Examined, item: int) -> Mask:
+def largest_sets(setting: Setting, known: Known, e: Examined, item: int) -> Mask:
     """Return the largest sets of functions that no region around the box has, ``(T, m)``."""
     lower, upper = e.boxes.lower[e.where[item]], e.boxes.upper[e.where[item]]
     left, right, active = known.sides()
@@ -145,7 +149,7 @@ def _directions(setting: Setting, e: Examined, box: int, sets: Mask) -> tuple[Ma
     return found, v
 
 
-def _starts(setting: Setting, e: Examined, box: int, sets: Mask) -> Starts:
+def starts(setting: Setting, e: Examined, box: int, sets: Mask) -> Starts:
     """Return the middle of a box as a start for each set of functions."""
     q = np.repeat(e.boxes.middles[[box]], len(sets), axis=0)
     widths = (e.boxes.upper[box] - e.boxes.lower[box]) / setting.problem.scales

@@ -3,8 +3,9 @@
 A box is discarded where no point of the set lies in it, or where each of its branches has a
 direction along which the energy decreases (:mod:`~polycorner.proofs.lists.directions`), or lies in
 a region whose only stationary point is known (:mod:`~polycorner.proofs.lists.acceptance`), with
-redundant functions perhaps (:mod:`~polycorner.proofs.lists.redundancy`); all others are bisected,
-once what lies outside of the set is cut off (:mod:`~polycorner.proofs.lists.contraction`).
+redundant functions perhaps (:mod:`~polycorner.proofs.lists.redundancy`,
+:mod:`~polycorner.proofs.lists.pinned`); all others are bisected, once what lies outside of the set
+is cut off (:mod:`~polycorner.proofs.lists.contraction`).
 
 The search goes in rounds.  In each, some boxes that wait are examined, in chunks that read the same
 state and change nothing, by as many threads as there are; then candidates are tried near what is
@@ -30,6 +31,7 @@ from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.examination import Examined, examine, reconsider
 from polycorner.proofs.lists.known import Known
 from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.pinning import pin
 from polycorner.proofs.lists.redundancy import Closing, close_redundant
 from polycorner.proofs.lists.settings import Setting
 from polycorner.proofs.lists.tree import Tree
@@ -143,6 +145,8 @@ class Search(Setting):
         starts = [start for closing in more for start in closing.starts]
         if starts:
             self.attempts.run(Starts.joined(starts), mapped)
+        for e in found:
+            pin(self, self.known, e, self.attempts)
         taken = sum(map(len, chunks))
         before = self.waiting.part(slice(None, len(self.waiting) - taken))
         self.waiting = joined([before, *map(self._finish, found, more)])

@@ -323,7 +323,6 @@ def test_loci_along_coordinates_that_the_energy_does_not_read():
         ([Y - X**2, 2 * X**2 - Y], Y),  # tangential contact: a cusp on either side
         ([2 - X, 2 + X, 2 - Y, 2 + Y], (X**2 - sympy.Rational(1, 10**18)) ** 2 + Y**2),
         ([2 - X, 2 + X, 2 - Y, 2 + Y], (X**2 + Y**2 - 1) ** 2),  # a circle of minima
-        ([Y, Y - X, Y + X], Y),  # a redundant contact
     ],
 )
 def test_what_is_not_decided_is_returned(parts, energy):

@@ -14,8 +14,9 @@ in ball arithmetic of 128 bits, that
 
 Boxes for which this is not shown at once are bisected.  Krawczyk's operator ([Neumaier] sec. 5.1)
 shows that a region has one KKT point with positive multipliers, and a locus one zero of the
-derivative of the energy in the coordinates that it depends on.  The list must consist of all
-regions whose point is stationary and not outside the domain, with their indices.
+derivative of the energy in the coordinates that it depends on; or more functions than coordinates
+hold a point to first order, and leave no other one in its region (``pinned.py``).  The list must
+consist of all regions whose point is stationary and not outside the domain, with their indices.
 
 In a list of corners each set of functions that may vanish in a box vanishes nowhere there, or at
 the point of a region only, or has independent gradients and too few of them for a corner, or has a

@@ -32,30 +32,37 @@ class Face:
         solved = next(filter(None, (zero(self.equations, start) for start in starts)), None)
         need(solved, f"{self.name}: no single solution with positive multipliers is shown")
         self.unknowns: list[arb] = solved or []
+        self.placed(sharp, record, self.negative(), self.active)
+        if active is None:
+            self.descends()
+            self.met = record["sample"] is not None
+            need(not self.met or self.meets(record), f"{self.name}: the sample is not in the set")
+
+    def placed(
+        self, sharp: list[list[float]], record: dict[str, Any], index: Any, given: frozenset[int]
+    ) -> None:
+        """Decide whether the point is in the set; the ``given`` functions are shown to vanish."""
+        p = self.p
         slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in self.unknowns]
         near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
         inside = all(x.contains(y) for x, y in zip(near, self.unknowns, strict=True))
         need(inside, f"{self.name}: the solution is elsewhere")
-        self.index = self.negative()
+        self.index = index
         need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
         self.point = self.at(self.unknowns)
         whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
-        stated = zip(places, *sharp, strict=False)  # what meets the domain is listed
+        stated = zip(self.places, *sharp, strict=False)  # what meets the domain is listed
         self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
         v = p.values(self.point)
         signs = p.signs(v)
-        self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
-        self.tested = sum(not shown(v[p.outputs[i]]) for i in self.zeros - self.active)
+        self.zeros = given | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
+        self.tested = sum(not shown(v[p.outputs[i]]) for i in self.zeros - given)
         self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
         self.branches = branches = p.open_sets(signs, self.zeros)
         sure = any(u <= self.zeros for u in branches)
         self.stationary = sure and all(self.active <= u for u in branches)
         self.free = any(u <= self.active for u in branches)  # all others are positive in one
         self.absent = not branches or any(u < self.active for u in branches)
-        if active is None:
-            self.descends()
-            self.met = record["sample"] is not None
-            need(not self.met or self.meets(record), f"{self.name}: the sample is not in the set")
 
     def at(self, unknowns: list[arb], middle: bool = False) -> list[arb]:
         """Return all coordinates; others may be anywhere in the domain, or are in its middle."""

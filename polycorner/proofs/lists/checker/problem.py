@@ -35,7 +35,8 @@ class Problem:
         moving = [i for i in range(self.n) if self.widths[i] > 0]
         need(data["fixed"] == [i for i in range(self.n) if i not in moving], "fixed coordinates")
         need(set(data["parameters"]) <= set(moving), "parameters")
-        self.free = [i for i in moving if i not in data["parameters"]]
+        self.parameters: list[int] = data["parameters"]
+        self.free = [i for i in moving if i not in self.parameters]
         self.minima_only: bool = data["minima_only"]
         self.periods = [number(p) if p else None for p in data["periods"]]
 

@@ -9,6 +9,7 @@ from flint import arb, arb_mat
 
 from .balls import NAN, ZERO, dot, hull, moved, need, sides
 from .faces import Face
+from .pinned import Pinned
 from .problem import Problem
 from .symmetries import Symmetry
 
@@ -25,7 +26,10 @@ class Proof:
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = Problem(data)
         self.kind = "local minima" if p.minima_only else self.kind
-        self.regions = [Face(p, r, p.free, r["active"]) for r in data["regions"]]
+        self.regions = [
+            Pinned(p, r) if "corner" in r else Face(p, r, p.free, r["active"])
+            for r in data["regions"]
+        ]
         self.ways = [
             sides(r, ("way", "way"), p.n)[0] if "way" in r else [] for r in data["regions"]
         ]
@@ -75,7 +79,8 @@ class Proof:
             return any(grows(-1, w) < 0 and leads(u, w) for w in turned)
 
         def left(u: frozenset[int]) -> bool:
-            if descends(u) or (regions and self.redundant(v, u, descends)):
+            several = regions or len(ways) > 1
+            if descends(u) or (several and self.redundant(v, u, descends)):
                 return True
             if self.p.minima_only and any(self.bends_down(u, v, w) for w in ways):
                 return True
