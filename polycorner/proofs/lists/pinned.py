@@ -24,7 +24,7 @@ If ``x`` is stationary, ``dE(x) = sum lam_i df_i(x)`` over ``S`` with ``lam_i >=
 functions of ``S`` all increase along ``u``.  Therefore ``sum lam_i c_i <= dE(x) u``; and, as
 ``f_i(p) = f_i(x)`` on ``S``, ``df_i(x) v >= -tau R_i`` and ``dE(x) v >= -tau L``.  So ``tau`` is 0.
 The same is true of ``x`` where others vanish, if ``dE(x)`` is such a combination over a part of
-``Z``.  Expanding the energy about ``p`` shows in the same way that ``p`` is a strict minimum on the
+``Z``.  Expanding the energy about ``p`` shows in the same way that ``p`` is a sharp minimum on the
 set in ``X``.
 
 Nor do all of ``Z`` vanish at another point ``x`` of ``X``: then ``|df_i(p) v| <= tau R_i``, and the
@@ -99,7 +99,7 @@ def pinned(
     widest : float
         Largest reach of the box, in scale units.
     """
-    corner = independent(slopes)
+    corner = _independent(slopes)
     if corner is None:
         return None
     around = vertices.region(q, corner, widest)
@@ -117,7 +117,7 @@ def pinned(
         return _within(vertices, (*zeros, energy), corner, point, widest)
 
 
-def independent(slopes: Array) -> tuple[int, ...] | None:
+def _independent(slopes: Array) -> tuple[int, ...] | None:
     """Return as many rows as there are columns whose gradients are far from dependent, or None."""
     from scipy.linalg import qr
 
@@ -143,11 +143,12 @@ def _within(
     if isinstance(forms, Undecided):
         return None
     slopes = [[g[i] for i in free] for g in forms.evaluate(Box(point), 1)[1]]
-    guess = _guessed(np.array([[float(x.mid()) for x in g] for g in slopes]), vertices.scales[free])
+    middles = np.array([[float(x.mid()) for x in g] for g in slopes])
+    guess = _guessed(middles, vertices.scales[free]) if np.isfinite(middles).all() else None
     if guess is None:
         return None
     steps, weights = guess
-    exact = corrected(slopes, steps, weights)
+    exact = _corrected(slopes, steps, weights)
     if exact is None:
         return None
     middle, radii = np.array([float(x.mid()) for x in point]), np.zeros_like(vertices.scales)
@@ -159,9 +160,9 @@ def _within(
         found, share = vertices.formulas.smooth(box, rows), None
         if not isinstance(found, Undecided):
             into = _into(found, box, free, reach)
-            share = shown(found, box, free, reach, steps, exact, into)
+            share = _shown(found, box, free, reach, steps, exact, into)
             if share is not None and share > ENOUGH:
-                whole = combination(exact, steps, len(free))
+                whole = _combination(exact, steps, len(free))
                 ends = np.array([outward(x) for x in (*(point[i] for i in free), *whole)])
                 sides = lower, upper, zeros, ends[:, 0], ends[:, 1], 0
                 return Pinned(*sides, corner, into, steps, weights)
@@ -193,7 +194,7 @@ def _guessed(slopes: Array, scales: Array) -> tuple[Array, Array] | None:
     return steps, weights
 
 
-def corrected(
+def _corrected(
     slopes: "list[list[Ball]]", steps: Array, weights: Array
 ) -> "list[list[Ball]] | None":
     """Return the weights with which gradients add up exactly; None if any may be negative."""
@@ -213,7 +214,7 @@ def corrected(
     return found if all(x >= 0 for row in found for x in row) else None
 
 
-def combination(exact: "list[list[Ball]]", steps: Array, n: int) -> "list[Ball]":
+def _combination(exact: "list[list[Ball]]", steps: Array, n: int) -> "list[Ball]":
     """Return positive multipliers with which the gradients add up to the energy's."""
     total = [ball(0)] * len(exact[0])
     for j in range(n):
@@ -239,6 +240,8 @@ def _into(forms: SmoothForms, box: Box, free: Sequence[int], reach: "list[Ball]"
     slopes = np.array([[float(g[i].mid()) for i in free] for g in forms.evaluate(box, 1)[1]])
     bends = np.array([float(x) for x in _bends(forms, box, free, reach)[:-1]])
     most = bends.max(initial=0.0)
+    if not (np.isfinite(slopes).all() and np.isfinite(most)):
+        return np.zeros(len(free))
     wanted = bends / most + 0.01 if most > 0 else np.ones_like(bends)
     scale = np.linalg.norm(slopes[:-1], axis=1) @ wanted / (wanted @ wanted)
     found: Any = linprog(
@@ -247,7 +250,7 @@ def _into(forms: SmoothForms, box: Box, free: Sequence[int], reach: "list[Ball]"
     return np.asarray(found.x if found.success else np.zeros(len(free)))
 
 
-def shown(
+def _shown(
     forms: SmoothForms,
     box: Box,
     free: Sequence[int],
