@@ -315,6 +315,16 @@ def redundant(rng: Generator) -> Posed:
     return simple(rng, "redundant contacts", curves, found, tree)
 
 
+def carried(rng: Generator) -> Posed:
+    """Let one of three or four curves through a point carry the force alone, or nearly."""
+    x, y = rational(rng, 2), rational(rng, 2)
+    curves = [through(rng, (x, y)) for _ in range(int(rng.integers(3, 5)))]
+    g, share = curves[0].gradient((x, y)), size(rng) / int(rng.choice([1, 1, 100]))
+    off = int(rng.integers(-1, 2)) * faint(rng)
+    found = _bowl(x - share * g[0] + off * g[1], y - share * g[1] - off * g[0])
+    return simple(rng, "carried by one contact", curves, found)
+
+
 def same_zeros(rng: Generator) -> Posed:
     """Functions that vanish on one curve, or nearly."""
     base, off = curve(rng), int(rng.integers(-1, 2)) * faint(rng)
@@ -350,5 +360,6 @@ def sides(rng: Generator) -> Posed:
 
 DRAWS = (
     whole_plane, half_planes, discs, lines_and_circles, distances, trees, near_kinks,
-    constrained_kinks, touching, weakly_active, weak_corners, redundant, same_zeros, sides,
+    constrained_kinks, touching, weakly_active, weak_corners, redundant, carried,
+    same_zeros, sides,
 )  # fmt: skip

@@ -300,10 +300,14 @@ class PlanarProblem:
         return sign(_signed_square(f.bent) * b + _signed_square(g.bent) * a) < 0
 
     def ways(self, q: Vector, zeros: frozenset[int]) -> dict[frozenset[int], int]:
-        """Return which functions that vanish make it a nondegenerate KKT point."""
+        """Return which functions that vanish make it a nondegenerate KKT point.
+
+        All do where two of them do: the energy's gradient is in the interior of their cone.
+        """
         sets = (frozenset(c) for count in range(3) for c in combinations(zeros, count))
         found = ((face, self.index(q, face)) for face in sets)
-        return {face: index for face, index in found if index is not None}
+        ways = {face: index for face, index in found if index is not None}
+        return {**ways, zeros: 0} if any(len(face) == 2 for face in ways) else ways
 
     def index(self, q: Vector, zeros: frozenset[int]) -> int | None:
         """Return the index along a face where all that is needed is strict, otherwise None."""
