@@ -115,6 +115,8 @@ class Attempts:
 
     def run(self, starts: Starts, mapped: Mapped = map) -> None:
         """Try to find loci and regions from some points, for parameters in their middles."""
+        if not len(starts.q):
+            return
         q = starts.q.copy()
         for i, side in self.setting.domain.held.items():
             q[:, i] = 0.5 * sum(side)

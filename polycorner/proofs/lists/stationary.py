@@ -25,7 +25,10 @@ Bounds = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class StationaryPoint(Value):
-    """A box with exactly one stationary point, which is a nondegenerate KKT point.
+    """A box with exactly one stationary point.
+
+    It is a nondegenerate KKT point of the active functions, or they are more than can be
+    independent and hold it to first order.
 
     Attributes
     ----------
