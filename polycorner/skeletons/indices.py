@@ -216,8 +216,11 @@ def _along(
     if found is None:
         return None
     along, across, _ = found
+    if closed:  # the last point is the first, at which the height may have its extremum
+        along[-1], across[-1] = along[0], across[0]
     total = 0
-    for k in np.flatnonzero(along[:-1] * along[1:] < 0):
+    falls = along < 0  # a height that is level at a point counts as rising there
+    for k in np.flatnonzero(falls[:-1] != falls[1:]):
         rise = across[k]
         if rise * across[k + 1] <= 0:
             ends = points[inner][[k, k + 1]]
@@ -225,7 +228,7 @@ def _along(
         if rise == 0:
             return None
         if rise > 0:
-            total += 1 if along[k] < 0 else -1
+            total += 1 if falls[k] else -1
     return total
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
 
 from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
 from polycorner.polyhedra.equations import independent_equations
@@ -174,7 +175,8 @@ class HeldPoint(EvaluatedPoint):
         if self.finite:
             self._target = np.zeros(len(rows))
             self._target[: len(held)] = -self.values[held] / sizes[: len(held)]
-            self._normal, self._factor = np.linalg.qr((rows / sizes[:, None]).T)
+            self._factor, pivots, *_ = dgeqrf((rows / sizes[:, None]).T)
+            self._normal, *_ = dorgqr(self._factor[:, : len(pivots)], pivots)
             diagonal = abs(np.diagonal(self._factor))
             self.condition = float(diagonal.min(initial=1.0))
             self.volume = float(diagonal.prod() * sizes.prod())
@@ -186,7 +188,11 @@ class HeldPoint(EvaluatedPoint):
 
     def correction(self) -> Array:
         """Return the shortest scaled step to the zeros of the linearised held functions."""
-        return np.asarray(self._normal @ np.linalg.solve(self._factor.T, self._target))
+        found, info = dtrtrs(self._factor, self._target, trans=1)
+        if info:
+            msg = "the gradients of the held functions are dependent"
+            raise np.linalg.LinAlgError(msg)
+        return np.asarray(self._normal @ found)
 
     @property
     def is_curve(self) -> bool:

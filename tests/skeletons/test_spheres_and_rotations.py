@@ -67,10 +67,12 @@ class TestSphericalPolygons:
         assert lengths == pytest.approx([2 * math.pi * 0.8, 2 * math.pi], abs=1e-9)
         assert found.euler_characteristic == 0
 
-    def test_a_cap_is_a_disc_and_the_rest_of_the_sphere_as_well(self):
-        for height in (0.9, -0.9):
-            cap = Polyhedron(SPHERE, {"cap": u[2] - height})
-            found = skeleton(cap, [[0, 0, 1]])
+    @pytest.mark.parametrize("axis", range(3))
+    def test_a_cap_is_a_disc_and_the_rest_of_the_sphere_as_well(self, axis):
+        """Also where a height happens to have its extremum at the first point of the edge."""
+        for height in (0.9, *np.linspace(-0.97, 0.97, 13).tolist()):
+            cap = Polyhedron(SPHERE, {"cap": u[axis] - height})
+            found = skeleton(cap, [np.eye(3)[axis]])
             assert counts(found) == (0, 1, 1)
             assert found.euler_characteristic == 1
 
