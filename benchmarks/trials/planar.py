@@ -236,6 +236,8 @@ class PlanarProblem:
         for u, v in self.energy.critical:
             q = (d * u - b * v) / det, (a * v - c * u) / det
             yield q[0] + self.energy.shift[0], q[1] + self.energy.shift[1]
+        for f, g in combinations(self.curves, 2):  # before points that roots only approximate
+            yield from meeting(f, g)
         for f in self.curves:
             x, y, w = f.parametrised()
             slope = self.energy.slope(x, y, w)
@@ -248,8 +250,6 @@ class PlanarProblem:
                 yield value(x, t) / value(w, t), value(y, t) / value(w, t)
             if f.bent:  # the point that the parameter does not reach
                 yield x[2], y[2]
-        for f, g in combinations(self.curves, 2):
-            yield from meeting(f, g)
 
     def firsts(self) -> tuple[int, ...]:
         """Return the first function that each one is a positive multiple of."""
