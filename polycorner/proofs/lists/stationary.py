@@ -45,8 +45,8 @@ class StationaryPoint(Value):
     orbit : int
         Number of the orbit of the declared symmetries that it belongs to.
     redundant : tuple of str
-        Other functions that vanish there; the multipliers are those of one combination without
-        them.
+        Other functions that are shown to vanish there; the multipliers are those of one
+        combination without them.
     """
 
     lower: Array
