@@ -1,7 +1,8 @@
 """Complete lists of stationary points: time, boxes a second, threads; balls and Codac beside them.
 
-Five problems: Himmelblau's function on a disc, the six-hump camel and Shubert's function on
-squares, the pair of dumbbells in the plane and in the drum.  Two references:
+Seven problems: Himmelblau's function on a disc, the six-hump camel and Shubert's function on
+squares, the pair of dumbbells in the plane and in the drum, three and four discs on the square
+torus, with radii above 0.2505 and 0.252.  Two references:
 
 - ball arithmetic (python-flint, 53 bits) enclosing the same functions and gradients on boxes of
   the same problems from Python, one at a time;
@@ -26,6 +27,7 @@ from typing import Any
 import numpy as np
 import sympy
 from side_by_side import ROOT, interleave, print_table, ratio, seconds, write
+from trials.torus_discs import several_discs, symmetries
 
 from polycorner import Manifold, Polyhedron
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
@@ -73,12 +75,21 @@ def dumbbells(radius: float) -> Problem:
     return {**given, "box": model.box, "symmetry": model.symmetry}
 
 
+def discs(count: int, least: float, unit: object = 1) -> Problem:
+    """Return discs on the square torus; the square of the unit of the radius is given."""
+    polyhedron, energy, box = several_discs(count, "square", (least, 0.6), unit)
+    symmetry = symmetries(count, "square")
+    return {"polyhedron": polyhedron, "energy": energy, "box": box, "symmetry": symmetry}
+
+
 PROBLEMS: dict[str, Callable[[], Problem]] = {
     "Himmelblau": himmelblau,
     "six-hump camel": camel,
     "Shubert": shubert,
     "dumbbells in the plane": partial(dumbbells, math.inf),
     "dumbbells in the drum": partial(dumbbells, 125.0),
+    "three discs": partial(discs, 3, 0.2505),
+    "four discs": partial(discs, 4, 0.252, (2 - sympy.sqrt(3)) / 4),
 }
 
 

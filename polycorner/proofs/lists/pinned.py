@@ -40,6 +40,7 @@ import numpy as np
 from polycorner.intervals.balls import ball, between, column, dot, entries, matrix, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
+from polycorner.polyhedra.cones import independent_rows
 from polycorner.proofs.lists.acceptance import WIDEST, Region
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
 from polycorner.proofs.lists.operators import BITS, outward
@@ -119,15 +120,9 @@ def pinned(
 
 def _independent(slopes: Array) -> tuple[int, ...] | None:
     """Return as many rows as there are columns whose gradients are far from dependent, or None."""
-    from scipy.linalg import qr
-
-    if len(slopes) < slopes.shape[1]:
-        return None
-    _, triangle, order = qr(slopes.T, pivoting=True)
-    sizes = abs(np.diag(triangle))
-    if not sizes.min(initial=np.inf) > NEAR * sizes.max(initial=0.0):
-        return None
-    return tuple(sorted(order[: slopes.shape[1]].tolist()))
+    longest = float(np.linalg.norm(slopes, axis=1).max(initial=0.0))
+    chosen = independent_rows(slopes, NEAR * longest)
+    return tuple(sorted(chosen)) if len(chosen) == slopes.shape[1] else None
 
 
 def _within(

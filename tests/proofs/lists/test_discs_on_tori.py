@@ -1,32 +1,24 @@
 """All critical configurations of two, three and four equal discs on flat tori, each counted twice.
 
-The energy is ``-r``.  Squares of distances are polynomials of the relative positions of the discs;
-written as sums of squares they are enclosed well.
+The energy is ``-r``.
 """
 
 import math
 from collections import Counter
-from itertools import combinations, permutations, product
+from itertools import permutations, product
 
 import flint
 import numpy as np
 import pytest
 import sympy as sp
 
+from benchmarks.trials.torus_discs import WHOLE, several_discs, square_of, symmetries
 from polycorner import Manifold, Polyhedron
 from polycorner.models.disks.disks import TorusDisks
-from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import stationary_points
 from polycorner.proofs.lists.checker.__main__ import main
 
-HALF = sp.Rational(1, 2)
-WHOLE = ((-1, 0, 1), (-1, 0, 1))
 LARGEST = (math.sqrt(6) - math.sqrt(2)) / 4  # of three and of four discs on the square torus
-
-
-def square_of(lattice, a, b):
-    """The square of the length of a combination of the lattice vectors."""
-    return a**2 + b**2 if lattice == "square" else (a + b / 2) ** 2 + sp.Rational(3, 4) * b**2
 
 
 # ------------------------------------------------------------------------------------- two discs
@@ -60,42 +52,6 @@ def test_two_discs(lattice, count, tmp_path, capsys):
 
 
 # -------------------------------------------------------------------------- three and four discs
-
-
-def several_discs(count, lattice, radii, unit=1):
-    """The other centres, and the radius in some unit, whose square is given.
-
-    On the square torus centres are seen from the point farthest from the first one, so that of each
-    other disc four images can touch it.  The box is the whole torus for each of them.
-    """
-    M = Manifold.euclidean([f"{c}{i}" for i in range(2, count + 1) for c in "uv"] + ["r"])
-    *centres, r = M.symbols
-    places = dict(enumerate(zip(centres[::2], centres[1::2], strict=True), start=2))
-    away, near = (HALF, ((-1, 0), (-1, 0))) if lattice == "square" else (0, WHOLE)
-    gaps = {}
-    for i, (u, v) in places.items():
-        for p, q in product(*near):
-            gaps[f"1-{i}({p},{q})"] = square_of(lattice, u + away + p, v + away + q)
-    for (i, (a, b)), (j, (u, v)) in combinations(places.items(), 2):
-        for p, q in product(*WHOLE):
-            gaps[f"{i}-{j}({p},{q})"] = square_of(lattice, u - a + p, v - b + q)
-    d = Polyhedron(M, {name: gap - 4 * unit * r**2 for name, gap in gaps.items()})
-    sides = tuple(x / math.sqrt(unit) for x in radii)
-    return d, -r, [(-0.5, 0.5)] * len(centres) + [sides]
-
-
-def symmetries(count, lattice):
-    """Symmetries of the lattice that permute and reflect coordinates, and relabellings."""
-
-    def element(labels, axes, signs):
-        order = [*(2 * i + axis for i in labels for axis in axes), 2 * len(labels)]
-        factors = np.array([*signs * len(labels), 1])
-        return Element(lambda q: factors * np.asarray(q)[order], {})
-
-    signs = product((1, -1), repeat=2) if lattice == "square" else [(1, 1), (-1, -1)]
-    every = product(permutations(range(count - 1)), permutations(range(2)), signs)
-    next(every)  # the identity
-    return Symmetry(elements=[element(*e) for e in every])
 
 
 def copies(model, configuration):

@@ -9,6 +9,7 @@ import sympy
 from scipy.optimize import nnls
 
 from benchmarks.trials.falsified import verified
+from benchmarks.trials.torus_discs import several_discs
 from polycorner import Manifold, Polyhedron
 from polycorner.proofs import stationary_points
 from polycorner.proofs.lists.pinned import Pinned
@@ -29,10 +30,7 @@ def pins(found, tmp_path):
 
 @pytest.mark.parametrize("bend", [1, 100, 10**5])
 def test_a_box_ends_before_the_next_stationary_points(bend, tmp_path):
-    """The energy decreases from a saddle on each of two sides: it is steeper than they are there.
-
-    Along ``y = x`` it is ``x - bend x^2``.
-    """
+    """There is a saddle on each of two sides: along ``y = x`` the energy is ``x - bend x^2``."""
     found = stationary_points(FAN, Y - bend * X**2, box=SIDES)
     assert found.complete
     points = sorted((*p.point.tolist(), p.index) for p in found)
@@ -114,6 +112,7 @@ def test_the_origin_is_at_rest_where_its_contacts_carry_the_energy(dimension, tm
             p = 0.5 * (pin.sharp_lower + pin.sharp_upper)[:dimension]
             x = rng.uniform(pin.lower, pin.upper, (2000, dimension))
             inside = x[np.all([f.value(x) >= 0 for f in d.functions], axis=0)]
+            assert len(inside)
             assert np.all(np.sum(d_energy(energy, M, inside) * (p - inside), axis=1) < 0)
             assert not verified(tmp_path / "list.zip")
     assert complete == {True, False}
@@ -124,3 +123,22 @@ def d_energy(energy, manifold, x):
     """The gradient of an energy at some points."""
     slopes = [sympy.lambdify([manifold.symbols], sympy.diff(energy, u)) for u in manifold.symbols]
     return np.array([[float(slope(point)) for slope in slopes] for point in x]).reshape(x.shape)
+
+
+def test_threads_and_interruptions_change_nothing(tmp_path):
+    """Two discs on the square torus: four contacts hold the densest placement."""
+    d, energy, box = several_discs(2, "square", (0.2, 0.6))
+
+    def saved(name, **options):
+        found = stationary_points(d, energy, box=box, **options)
+        return found, found.save(tmp_path / name).read_bytes()
+
+    whole, proof = saved("whole.zip")
+    assert whole.complete
+    assert len(pins(whole, tmp_path)) == 1
+    assert saved("threads.zip", workers=2)[1] == proof
+    store = tmp_path / "store"
+    part, _ = saved("part.zip", store=store, max_boxes=whole.tally.boxes // 2)
+    assert not part.complete
+    assert len(pins(part, tmp_path)) == 1
+    assert saved("resumed.zip", store=store)[1] == proof
