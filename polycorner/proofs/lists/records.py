@@ -146,7 +146,8 @@ def written(path: str | os.PathLike[str], record: Record, data: dict[str, Any]) 
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in parts.items():
-            archive.writestr(name, content)
+            # ZipInfo's date is fixed: the same list is the same file, whenever it is written.
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
     return write_atomically(path, memory.getvalue(), suffix=".zip")
 
 

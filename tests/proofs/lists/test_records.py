@@ -57,6 +57,14 @@ def test_the_subdivision_is_a_tree_whose_open_leaves_are_the_undecided_boxes(par
     assert opened == len(found.undecided) == json.loads(parts["problem.json"])["open"]
 
 
+def test_a_file_is_the_same_whenever_it_is_written(found, tmp_path, monkeypatch):
+    written = []
+    for moment in (1.0e9, 1.7e9):
+        monkeypatch.setattr("time.time", lambda moment=moment: moment)
+        written.append(found.save(tmp_path / "list.zip").read_bytes())
+    assert written[0] == written[1]
+
+
 @pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
 @pytest.mark.parametrize(
     ("formula", "operation"),
