@@ -1,0 +1,5 @@
+"""Rigid bodies in the plane and in space, and their placements without overlap."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,237 @@
+"""Arrangements: rigid bodies, what stands between them, and their placements without overlap."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, reduce
+from itertools import combinations
+from operator import mul
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polycorner import checks
+from polycorner.bodies.congruences import Congruences
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.pairs import Member, Tree, apart
+from polycorner.bodies.poses import Placement
+from polycorner.bodies.shapes import Body, Turn, turning
+from polycorner.bodies.walls import Wall, within
+from polycorner.checks import refuse
+from polycorner.polyhedra.groups import AllOf
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement(Value):
+    """Rigid bodies that must not overlap each other, fixed bodies, or walls.
+
+    The coordinates of a body ``A`` are those of its origin, ``xA yA`` or ``xA yA zA``, and of its
+    orientation: in the plane the angle ``thetaA``, counterclockwise; in space the direction ``uAx
+    uAy uAz`` of the axis of a body of revolution, and else a unit quaternion ``aAw aAx aAy aAz``.
+    Discs and balls about their origin have none.
+
+    A contact is called after what touches: ``A-B``, ``A.rod-B.2`` for parts of compounds,
+    ``A.v1-B`` for a point of a part (the end of a capsule, a vertex), ``A.e1-B.v2`` for an edge and
+    a vertex of polygons, ``A.f1-B.v2`` for a face and a vertex of polyhedra, ``A.e1>B.e2`` and
+    ``A.e1<B.e2`` for two of their edges.
+
+    Parameters
+    ----------
+    bodies : sequence of Body, or mapping from str to Body
+        Those that move; the names of a sequence are ``"1"``, ``"2"``, ...
+    walls : mapping from str to HalfSpace or Cylinder, optional
+        :func:`box` makes those of a box.
+    fixed : mapping from str to Body, optional
+        In the coordinates of space (:meth:`Body.moved`).
+    spins : bool, optional
+        Whether all orientations are coordinates, those included that change nothing about a
+        placement: needed for friction.  Default False.
+    unit : str, optional
+        Unit of length.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+
+    Examples
+    --------
+    >>> from polycorner.bodies import Arrangement, box, disc, polygon
+    >>> square = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    >>> a = Arrangement({"S": square, "D": disc(0.5)}, walls=box([-3, -3], [3, 3]))
+    >>> a.manifold.names
+    ('xS', 'yS', 'thetaS', 'xD', 'yD')
+    >>> q = a.point({"S": ([-2, 0], 0.0), "D": [1.5, 0]})
+    >>> a.polyhedron.contains(q), a.placed(q)["S"].parts[""].points[:, 0].tolist()
+    (True, [-3.0, -1.0, -1.0, -3.0])
+    """
+
+    bodies: Mapping[str, Body] | Sequence[Body]
+    walls: Mapping[str, Wall] = field(default_factory=dict)
+    fixed: Mapping[str, Body] = field(default_factory=dict)
+    spins: bool = False
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        given = self.bodies
+        if not isinstance(given, Mapping):
+            if isinstance(given, Body) or not isinstance(given, Sequence):
+                refuse("bodies", "several bodies, in a sequence or by name", given, TypeError)
+            given = {str(k): body for k, body in enumerate(given, 1)}
+        object.__setattr__(self, "bodies", dict(given))
+        for argument in ("walls", "fixed"):
+            value = dict(checks.mapping(argument, getattr(self, argument)))
+            object.__setattr__(self, argument, value)
+        if not given:
+            refuse("bodies", "at least one body", given)
+        for argument, several in (("bodies", given), ("fixed", self.fixed)):
+            for body in several.values():
+                checks.instance(argument, body, Body, "disc(1.0)")
+        for wall in self.walls.values():
+            if not isinstance(wall, Wall):
+                refuse("walls", "half-spaces and cylinders", wall, TypeError)
+        known = [*given, *self.fixed, *self.walls]
+        twice = sorted({name for name in known if known.count(name) > 1})
+        if twice:
+            refuse("fixed" if twice[0] in self.fixed else "walls", "names of their own", twice[0])
+        d = self.dimension
+        for argument, some in (("bodies", given), ("fixed", self.fixed), ("walls", self.walls)):
+            for name, one in some.items():
+                if one.dimension != d:
+                    space = "the plane" if d == 2 else "space"
+                    refuse(argument, f"all in {space}, like {next(iter(given))!r}", name)
+        super().__post_init__()
+
+    @property
+    def named(self) -> dict[str, Body]:
+        """The bodies that move, by name."""
+        return self.bodies  # type: ignore[return-value] # made a dict by __post_init__
+
+    @property
+    def dimension(self) -> int:
+        """The dimension of the space of the bodies, 2 or 3."""
+        return next(iter(self.named.values())).dimension
+
+    @cached_property
+    def scale(self) -> float:
+        """The displacement that counts as a unit: half the thickness of the thinnest part."""
+        return min(part.thickness for body in self.named.values() for part in body.parts.values())
+
+    @cached_property
+    def placements(self) -> tuple[Placement, ...]:
+        """The coordinates of each body, and where they stand."""
+        found, start = [], 0
+        for name, body in self.named.items():
+            frame = frame_of(body, spins=self.spins)
+            turn = self.scale / max(body.size, self.scale)
+            factor = frame.manifold(name, self.dimension, self.scale, turn, self.unit)
+            at = slice(start, start + factor.size)
+            found.append(Placement(name, body, frame, factor, at))
+            start = at.stop
+        return tuple(found)
+
+    @cached_property
+    def manifold(self) -> Manifold:
+        """The placements of all bodies; a unit displacement moves a body by :attr:`scale`."""
+        return reduce(mul, (placement.manifold for placement in self.placements))
+
+    @cached_property
+    def polyhedron(self) -> Polyhedron:
+        """``D``, the placements without overlap."""
+        return Polyhedron(self.manifold, AllOf(*self.contacts(excluded=True)))
+
+    def contacts(self, *, excluded: bool) -> list[Tree]:
+        """Return the and/or trees of all pairs of parts and of walls."""
+        moving = [self._members(p.name, p.body, p) for p in self.placements]
+        still = [self._members(name, body, None) for name, body in self.fixed.items()]
+        pairs = [*combinations(moving, 2), *((one, two) for one in moving for two in still)]
+        found: list[Tree] = [
+            apart(self.manifold, a, b, excluded=excluded)
+            for one, two in pairs
+            for a in one
+            for b in two
+        ]
+        for name, wall in self.walls.items():
+            found += [
+                f for one in moving for a in one for f in within(self.manifold, name, wall, a)
+            ]
+        if not found:
+            refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
+        return found
+
+    def _members(self, name: str, body: Body, placement: Placement | None) -> list[Member]:
+        frame = Frame.FIXED if placement is None else placement.frame
+        coordinates = () if placement is None else placement.manifold.names
+        return [
+            Member(f"{name}.{part}" if part else name, shape, frame, body.axis, coordinates)
+            for part, shape in body.parts.items()
+        ]
+
+    @cached_property
+    def congruences(self) -> Congruences:
+        """The motions of the whole and the exchanges that change no gap."""
+        return Congruences(self.placements, tuple(self.walls.values()), tuple(self.fixed.values()))
+
+    @cached_property
+    def symmetry(self) -> Symmetry:
+        """Motions of the whole that walls and fixed bodies allow, exchanges of equal bodies.
+
+        Also included are rotations of a body that carry it to itself; not included are mirror
+        images, and motions that carry one wall to another.  More than ten thousand exchanges
+        and rotations are left out, all of them.
+        """
+        return self.congruences.symmetry(self.polyhedron)
+
+    def point(self, placed: Mapping[str, Any]) -> Array:
+        """Return the point of given placements, ``(N,)``.
+
+        Parameters
+        ----------
+        placed : mapping from str to placement
+            For every body its origin ``(d,)``, or a pair of this and an angle in radians (in the
+            plane) or a :class:`scipy.spatial.transform.Rotation` (in space).
+        """
+        checks.mapping("placed", placed)
+        checks.names("placed", placed, self.named)
+        missing = [name for name in self.named if name not in placed]
+        if missing:
+            refuse("placed", f"a placement of {missing[0]!r} as well", [*placed])
+        parts = [
+            p.coordinates(*_placement(placed[p.name], self.dimension)) for p in self.placements
+        ]
+        return np.concatenate(parts)
+
+    def placed(self, q: ArrayLike) -> dict[str, Body]:
+        """Return the bodies where they are at a point ``(N,)``, fixed ones last.
+
+        Bodies without all coordinates of an orientation are turned by any of those that fit.
+        """
+        point = self.manifold.point(q)
+        moved = {p.name: p.moved(point) for p in self.placements}
+        return {**moved, **self.fixed}
+
+
+def frame_of(body: Body, *, spins: bool) -> Frame:
+    """Return the coordinates that tell the placements of a body apart; with ``spins`` all."""
+    axis = body.axis
+    if axis is not None and not spins:
+        if not axis.any():
+            return Frame.SHIFTED
+        if body.dimension == 3:
+            return Frame.AXIAL
+    return Frame.TURNED if body.dimension == 2 else Frame.ROTATED
+
+
+def _placement(given: Any, d: int) -> tuple[Array, Array]:
+    """Return origin and matrix of what a user gives for a placement."""
+    turn: Turn | None = None
+    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
+        given, turn = given
+    origin = checks.numbers("placed", given, f"{d} numbers, or a pair of them and a rotation")
+    if origin.shape != (d,):
+        refuse("placed", f"{d} numbers, or a pair of them and a rotation", given)
+    return origin, turning(turn, d)

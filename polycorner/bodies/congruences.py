@@ -1,0 +1,156 @@
+"""Symmetries of arrangements: motions of the whole, exchanges, rotations of a body onto itself."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg
+
+from polycorner.bodies.exchanges import elements
+from polycorner.bodies.facets import FLAT
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.poses import Placement
+from polycorner.bodies.rigid_motions import (
+    carried,
+    number,
+    reduced,
+    spin,
+    turned,
+    turned_within,
+    velocity,
+)
+from polycorner.bodies.shapes import Body
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.bodies.walls import Wall
+
+FEW = 12  # vectors of which all triple products are invariants
+
+
+@dataclass(frozen=True, eq=False)
+class Congruences(Value):
+    """The motions and exchanges of bodies that change no gap.
+
+    A velocity ``w + omega x p`` of the whole is one if it keeps every wall and every fixed body:
+    linear equations in ``(w, omega)``.
+    """
+
+    placements: tuple[Placement, ...]
+    walls: "tuple[Wall, ...]"
+    fixed: tuple[Body, ...]
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.placements[0].body.dimension
+
+    @cached_property
+    def motions(self) -> Array:
+        """A basis of the velocities ``(w, omega)`` that keep everything, ``(g, 3)``, ``(g, 6)``."""
+        d = self.dimension
+        rows = [np.empty((0, 3 if d == 2 else 6))]
+        for wall in self.walls:
+            across, held = wall.fixed_by()
+            rows.append(across @ velocity(wall.point))
+            rows += [velocity(v) - velocity(np.zeros(d)) for v in held]
+        rows += [velocity(p) for body in self.fixed for p in body.markers]
+        basis = scipy.linalg.null_space(np.concatenate(rows), rcond=FLAT).T
+        return reduced(basis) if len(basis) else basis
+
+    def symmetry(self, polyhedron: Polyhedron) -> Symmetry:
+        """Return the group, with the names that functions of a polyhedron change."""
+        fields = [*map(self._field, self.motions), *self._spins()]
+        return Symmetry(
+            fields=fields,
+            invariants=self.invariants if fields else None,
+            elements=tuple(elements(self.placements, polyhedron)),
+        )
+
+    # ------------------------------------------------------------------------- motions of the whole
+
+    def _field(self, motion: Array) -> "dict[str, sympy.Expr]":
+        """Return the velocities of all coordinates as formulas."""
+        d = self.dimension
+        found: dict[str, Any] = {}
+        numbers = [number(x) for x in motion.tolist()]
+        for p in self.placements:
+            names, symbols = p.manifold.names, p.manifold.symbols
+            moved = carried(numbers, symbols[:d])
+            found |= dict(zip(names[:d], moved, strict=True))
+            found |= dict(zip(names[d:], turned(p.frame, numbers[d:], symbols[d:]), strict=True))
+        return found
+
+    def _spins(self) -> "Iterator[dict[str, sympy.Expr]]":
+        """Rotations of bodies of revolution about their own axes."""
+        for p in self.placements:
+            if not p.spins or p.body.axis is None:
+                continue
+            names, symbols = p.manifold.names, p.manifold.symbols
+            if p.frame is Frame.TURNED:
+                yield {names[-1]: number(1.0)}
+                continue
+            axes = [p.body.axis] if p.body.axis.any() else list(np.eye(3))
+            for axis in axes:
+                turned = turned_within([number(x) for x in axis.tolist()], symbols[3:])
+                yield dict(zip(names[3:], turned, strict=True))
+
+    @cached_property
+    def _reference(self) -> tuple[Array, Array, Array]:
+        """Translations as a projection, a point that rotations keep, the axes they keep."""
+        d = self.dimension
+        free = self.motions[:, d:]
+        pure = scipy.linalg.null_space(free.T, rcond=FLAT).T @ self.motions if len(free) else free
+        shifts = scipy.linalg.orth(pure[:, :d].T) if len(pure) else np.zeros((d, 0))
+        along: Array = shifts @ shifts.T
+        across = np.eye(d) - along
+        rotations = self.motions[np.abs(free).max(axis=1) > 0] if len(free) else self.motions
+        centre = np.zeros(d)
+        if len(rotations):
+            matrix = np.concatenate([across @ spin(m[d:], d) for m in rotations])
+            target = -np.concatenate([across @ m[:d] for m in rotations])
+            centre = np.linalg.lstsq(matrix, target, rcond=None)[0]
+        turning = np.linalg.matrix_rank(rotations[:, d:], tol=FLAT) if len(rotations) else 0
+        if d == 3 and turning == 1:
+            axis = rotations[0, d:]
+            return along, centre, (axis / np.linalg.norm(axis))[None]
+        return along, centre, np.eye(d) if turning == 0 else np.empty((0, d))
+
+    def invariants(self, q: Array) -> Array:
+        """Return numbers that are equal exactly on orbits of the motions, ``(k,)``.
+
+        All vectors between centres and along bodies turn together; their lengths, products and
+        (where no body shows its three axes) triple products, and the components along axes that
+        are kept.
+        """
+        along, centre, axes = self._reference
+        d = self.dimension
+        centres = np.array([q[p.at][:d] for p in self.placements]) - centre
+        centres = (centres - along @ centres.mean(axis=0)) / self.placements[0].manifold.scales[0]
+        ways = [p.directions(q) / p.manifold.scales[-1] for p in self.placements]
+        if len(axes) == d:
+            return np.concatenate([centres.ravel(), *(w.ravel() for w in ways)])
+        points = np.concatenate([np.zeros((1, d)), centres])
+        first, second = np.triu_indices(len(points), 1)
+        found = [np.linalg.norm(points[first] - points[second], axis=1), (points @ axes.T).ravel()]
+        for k, own in enumerate(ways):
+            unit = own * self.placements[k].manifold.scales[-1]
+            found += [(unit @ (points - points[k + 1]).T).ravel(), (own @ axes.T).ravel()]
+            found += [(unit @ other.T).ravel() for other in ways[k + 1 :]]
+        if max(map(len, ways)) < d:
+            found.append(_volumes([*points[1:], *np.concatenate(ways), *axes], d))
+        return np.concatenate(found)
+
+
+def _volumes(vectors: list[Array], d: int) -> Array:
+    """Return the determinants of ``d`` vectors each, by which mirror images differ."""
+    some = combinations(vectors[:FEW], d)
+    return np.array([float(np.linalg.det(np.array(few))) for few in some])

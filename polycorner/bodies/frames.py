@@ -1,0 +1,125 @@
+"""Where the points of a body are: formulas in its coordinates and in points of its own.
+
+=============  ==========================  ====================================================
+frame          coordinates                 for
+=============  ==========================  ====================================================
+``fixed``      none                        what does not move
+``shifted``    ``x y`` or ``x y z``        discs and balls, which look the same when turned
+``turned``     ``x y theta``               bodies in the plane
+``axial``      ``x y z``, a unit vector    bodies of revolution: the direction of their axis
+``rotated``    ``x y z``, a quaternion     bodies in space
+=============  ==========================  ====================================================
+
+A point in coordinates of the body is carried to ``c + R p``; of bodies of revolution only the
+position ``s`` along the axis is needed, ``c + s u``.
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.spaces.embedding import rotation_matrix
+from polycorner.spaces.manifold import Array, Manifold
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.spaces.distances import Point
+
+AXES = "xyz"
+
+
+class Frame(Enum):
+    """The coordinates of a body; see the module."""
+
+    FIXED = "fixed"
+    SHIFTED = "shifted"
+    TURNED = "turned"
+    AXIAL = "axial"
+    ROTATED = "rotated"
+
+    def manifold(self, name: str, dimension: int, scale: float, turn: float, unit: str) -> Manifold:
+        """Return the placements of a body called ``name``.
+
+        ``scale`` and ``turn`` are the displacement and the angle that count as a unit.
+        """
+        place = Manifold.euclidean([f"{a}{name}" for a in AXES[:dimension]], scale=scale, unit=unit)
+        if self is Frame.TURNED:
+            return place * Manifold((f"theta{name}",), (2 * np.pi,), (turn,))
+        if self is Frame.AXIAL:
+            return place * Manifold.sphere([f"u{name}{a}" for a in AXES], scale=turn)
+        if self is Frame.ROTATED:
+            return place * Manifold.rotation([f"a{name}{a}" for a in "w" + AXES], scale=turn)
+        return place
+
+    def variables(self, role: int, dimension: int) -> tuple[str, ...]:
+        """Return the names of the coordinates of body ``role`` in formulas."""
+        if self is Frame.FIXED:
+            return ()
+        return self.manifold(f"_{role}_", dimension, 1.0, 1.0, "").names
+
+    def local(self, vector: Sequence[float], axis: Array | None) -> tuple[float, ...]:
+        """Return the numbers by which formulas know a point or vector of the body."""
+        if self is Frame.AXIAL and axis is not None:
+            return (float(np.dot(vector, axis)),)
+        return tuple(map(float, vector))
+
+    def count(self, dimension: int) -> int:
+        """How many such numbers there are."""
+        return 1 if self is Frame.AXIAL else dimension
+
+    def point(self, role: int, local: "Sequence[sympy.Expr]", dimension: int) -> "Point":
+        """Return where a point of body ``role`` is; in the plane the third coordinate is zero."""
+        there = self.vector(role, local, dimension)
+        if self is Frame.FIXED:
+            return there
+        centre = symbols(self.variables(role, dimension)[:dimension])
+        return _triple([c + v for c, v in zip(centre, there, strict=False)])
+
+    def vector(self, role: int, local: "Sequence[sympy.Expr]", dimension: int) -> "Point":
+        """Return the direction of a vector of body ``role``."""
+        import sympy
+
+        if self in {Frame.FIXED, Frame.SHIFTED}:
+            return _triple(local)
+        turns = symbols(self.variables(role, dimension)[dimension:])
+        if self is Frame.TURNED:
+            (theta,), (x, y) = turns, local
+            cosine, sine = sympy.cos(theta), sympy.sin(theta)
+            return _triple([cosine * x - sine * y, sine * x + cosine * y])
+        if self is Frame.AXIAL:
+            return _triple([local[0] * u for u in turns])
+        return _triple(list(rotation_matrix(turns) * sympy.Matrix(local)))
+
+    def into(self, role: int, point: "Point", dimension: int) -> "Point":
+        """Return a point of space in the coordinates of body ``role``; not for axial ones."""
+        import sympy
+
+        if self is Frame.FIXED:
+            return point
+        names = self.variables(role, dimension)
+        away = [p - c for p, c in zip(point, symbols(names[:dimension]), strict=False)]
+        if self is Frame.SHIFTED:
+            return _triple(away)
+        turns = symbols(names[dimension:])
+        if self is Frame.TURNED:
+            (theta,), (x, y) = turns, away
+            cosine, sine = sympy.cos(theta), sympy.sin(theta)
+            return _triple([cosine * x + sine * y, cosine * y - sine * x])
+        return _triple(list(rotation_matrix(turns).T * sympy.Matrix(away)))
+
+
+def symbols(names: Sequence[str]) -> "list[sympy.Symbol]":
+    """Return real symbols of the given names."""
+    import sympy
+
+    return [sympy.Symbol(name, real=True) for name in names]
+
+
+def _triple(values: "Sequence[sympy.Expr]") -> "Point":
+    import sympy
+
+    x, y, *z = values
+    return (x, y, z[0] if z else sympy.S.Zero)

@@ -1,0 +1,288 @@
+"""Gaps of rounded hulls as families of formulas, one for each kind of contact.
+
+Every gap is the distance of two features minus the radii around them (the parameter ``s``), with
+the first body in role 1 and the second in role 2:
+
+- ``points``: of two points;
+- ``segment``: of a point from a segment;
+- ``segments``: of two segments, in space;
+- ``hull``: of a point from a polygon or polyhedron, inside of it minus the depth;
+- ``side``: of a point from the plane of a face, positive outside;
+- ``crossing``: of two polyhedra along the common perpendicular of two of their edges;
+- ``hollow``: of a point from a cylinder or sphere around it.
+
+A distance that changes form is written on branches that fit together, with continuous first
+derivatives; nearest points do not matter to the first order (the envelope theorem, [Danskin]).
+"""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING
+
+from polycorner.bodies import frames
+from polycorner.bodies.frames import Frame, symbols
+from polycorner.formulas import cache
+from polycorner.formulas.families import Family
+from polycorner.spaces import distances
+from polycorner.spaces.distances import (
+    STATIONARY,
+    clamped,
+    cross,
+    distance_from,
+    dot,
+    foot,
+    minus,
+    norm,
+    segment_segment_distance,
+)
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.spaces.distances import Point
+
+    Expressions = dict[str, sympy.Expr]
+    Formulas = tuple[Expressions, Expressions]
+
+FRAMES = (Frame, Frame)
+# Edges of two polyhedra whose directions differ by less than this sine separate nothing.
+PARALLEL = 1e-9
+# The conditions under which two edges span a face of the difference of two polyhedra.
+SUPPORTS = ("left1", "right1", "left2", "right2")
+CROSSING = ("gap", *SUPPORTS, "angle")
+
+
+def _family(
+    names: tuple[str, ...],
+    one: Frame,
+    two: Frame,
+    d: int,
+    parameters: Sequence[str],
+    formulas: "Callable[[], Formulas]",
+    written: object,
+    stationary: tuple[str, ...] = (),
+) -> Family:
+    sources = cache.source_key(distances.__name__, frames.__name__, __name__)
+    key = repr((sources, written, one.value, two.value, d))
+    variables = one.variables(1, d) + two.variables(2, d)
+    return Family(names, variables, tuple(parameters), formulas, key, stationary=stationary)
+
+
+def numbers(name: str, frame: Frame, d: int) -> list[str]:
+    """Return the names of the numbers of a point or vector of a body."""
+    return [f"{name}{k}" for k in range(frame.count(d))]
+
+
+def _at(name: str, role: int, frame: Frame, d: int) -> "Point":
+    return frame.point(role, symbols(numbers(name, frame, d)), d)
+
+
+def _along(name: str, role: int, frame: Frame, d: int) -> "Point":
+    return frame.vector(role, symbols(numbers(name, frame, d)), d)
+
+
+@lru_cache(maxsize=64)
+def points(one: Frame, two: Frame, d: int) -> Family:
+    """Return the gap of two points; parameters ``p`` of 1, ``q`` of 2, ``s``."""
+    parameters = [*numbers("p", one, d), *numbers("q", two, d), "s"]
+    formulas = partial(_points, one, two, d)
+    return _family(("gap",), one, two, d, parameters, formulas, "points")
+
+
+def _points(one: Frame, two: Frame, d: int) -> "Formulas":
+    p, q = _at("p", 1, one, d), _at("q", 2, two, d)
+    return {}, {"gap": norm(minus(p, q)) - symbols(["s"])[0]}
+
+
+@lru_cache(maxsize=64)
+def segment(one: Frame, two: Frame, d: int) -> Family:
+    """Return the gap of a point and a segment; parameters ``p`` of 1, ``a``, ``b`` of 2, ``s``."""
+    ends = [*numbers("a", two, d), *numbers("b", two, d)]
+    parameters = [*numbers("p", one, d), *ends, "s"]
+    formulas = partial(_segment, one, two, d)
+    return _family(("gap",), one, two, d, parameters, formulas, "segment", ("foot",))
+
+
+def _segment(one: Frame, two: Frame, d: int) -> "Formulas":
+    p, a, b = _at("p", 1, one, d), _at("a", 2, two, d), _at("b", 2, two, d)
+    at, s = symbols(["foot", "s"])
+    along = minus(b, a)
+    definitions = {"foot": clamped(foot(p, a, b, 1 / dot(along, along)))}
+    return definitions, {"gap": distance_from(p, a, b, at) - s}
+
+
+@lru_cache(maxsize=64)
+def segments(one: Frame, two: Frame) -> Family:
+    """Return the gap of two segments in space; parameters ``a``, ``b``, ``g``, ``h``, ``s``."""
+    first = [*numbers("a", one, 3), *numbers("b", one, 3)]
+    second = [*numbers("g", two, 3), *numbers("h", two, 3)]
+    held = (*STATIONARY, "foot0", "foot1", "foot2", "foot3")
+    formulas = partial(_segments, one, two)
+    return _family(("gap",), one, two, 3, [*first, *second, "s"], formulas, "segments", held)
+
+
+def _segments(one: Frame, two: Frame) -> "Formulas":
+    names = [f"{end}{axis}" for end in ("A", "B", "G", "H") for axis in "xyz"]
+    a, b, g, h = (_symbols_of(names[k : k + 3]) for k in range(0, 12, 3))
+    written = [_at("a", 1, one, 3), _at("b", 1, one, 3), _at("g", 2, two, 3), _at("h", 2, two, 3)]
+    definitions = dict(zip(names, [c for point in written for c in point], strict=True))
+    ends = []
+    for k, (p, start, end) in enumerate(((a, g, h), (b, g, h), (g, a, b), (h, a, b))):
+        along = minus(end, start)
+        definitions[f"foot{k}"] = clamped(foot(p, start, end, 1 / dot(along, along)))
+        ends.append(distance_from(p, start, end, symbols([f"foot{k}"])[0]))
+    crossing, distance = segment_segment_distance((a, b), (g, h), ends)
+    return definitions | crossing, {"gap": distance - symbols(["s"])[0]}
+
+
+def _symbols_of(names: Sequence[str]) -> "Point":
+    x, y, z = symbols(names)
+    return (x, y, z)
+
+
+@lru_cache(maxsize=64)
+def hull(
+    one: Frame,
+    two: Frame,
+    d: int,
+    count: int,
+    faces: tuple[tuple[int, ...], ...],
+    edges: tuple[tuple[int, int], ...],
+) -> Family:
+    """Return the gap of a point and a polygon or polyhedron.
+
+    Parameters of the family: ``p`` of 1, the ``count`` vertices ``v`` of 2, normals ``n`` of its
+    faces, ``s``.  ``faces`` are vertices of each in order, ``edges`` pairs of vertices.
+    """
+    parameters = [
+        *numbers("p", one, d),
+        *(f"v{i}_{k}" for i in range(count) for k in range(d)),
+        *(f"n{f}_{k}" for f in range(len(faces)) for k in range(d)),
+        "s",
+    ]
+    feet = tuple(f"foot{k}" for k in range(len(edges)))
+    formulas = partial(_hull, one, two, d, faces, edges)
+    kind = ("hull", count, faces, edges)
+    return _family(("gap",), one, two, d, parameters, formulas, kind, feet)
+
+
+def _hull(
+    one: Frame,
+    two: Frame,
+    d: int,
+    faces: tuple[tuple[int, ...], ...],
+    edges: tuple[tuple[int, int], ...],
+) -> "Formulas":
+    """Return the distance from a hull in its own coordinates.
+
+    Over a face it is the height; elsewhere outside the least distance from the edges; inside the
+    largest height, which is negative.
+    """
+    import sympy
+
+    definitions: Expressions = {}
+
+    def define(name: str, expression: "sympy.Expr") -> "sympy.Symbol":
+        definitions[name] = expression
+        return symbols([name])[0]
+
+    def given(letter: str, i: int) -> "Point":
+        some = symbols([f"{letter}{i}_{k}" for k in range(d)])
+        return (some[0], some[1], some[2] if d == 3 else sympy.S.Zero)
+
+    inner = two.into(2, _at("p", 1, one, d), d)
+    p = tuple(define(f"inner{k}", x) if k < d else x for k, x in enumerate(inner))
+    heights, over = [], []
+    for f, face in enumerate(faces):
+        normal = given("n", f)
+        height = define(f"height{f}", dot(normal, minus(p, given("v", face[0]))))
+        heights.append(height)
+        if d == 3:
+            sides = [
+                dot(minus(p, given("v", i)), cross(minus(given("v", j), given("v", i)), normal))
+                for i, j in zip(face, (*face[1:], face[0]), strict=True)
+            ]
+            over.append((height, sympy.And(height >= 0, *(side <= 0 for side in sides))))
+    away = []
+    for k, (i, j) in enumerate(edges):
+        a, b = given("v", i), given("v", j)
+        along = minus(b, a)
+        at = define(f"foot{k}", clamped(foot(p, a, b, 1 / dot(along, along))))
+        away.append(define(f"away{k}", distance_from(p, a, b, at)))
+    inside = (sympy.Max(*heights), sympy.And(*(height <= 0 for height in heights)))
+    distance = sympy.Piecewise(inside, *over, (sympy.Min(*away), True))
+    return definitions, {"gap": distance - symbols(["s"])[0]}
+
+
+@lru_cache(maxsize=64)
+def side(one: Frame, two: Frame, d: int) -> Family:
+    """Return the height over a face; parameters ``p`` of 1, ``v``, normal ``n`` of 2, ``s``."""
+    face = [*numbers("v", two, d), *numbers("n", two, d)]
+    parameters = [*numbers("p", one, d), *face, "s"]
+    return _family(("gap",), one, two, d, parameters, partial(_side, one, two, d), "side")
+
+
+def _side(one: Frame, two: Frame, d: int) -> "Formulas":
+    p, v, n = _at("p", 1, one, d), _at("v", 2, two, d), _along("n", 2, two, d)
+    return {}, {"gap": dot(n, minus(p, v)) - symbols(["s"])[0]}
+
+
+@lru_cache(maxsize=64)
+def crossing(one: Frame, two: Frame) -> Family:
+    """Return the gap along the common perpendicular of two edges, and when it separates.
+
+    Parameters: a point ``p`` and the direction ``u`` of an edge of 1, and directions ``l`` and
+    ``r`` from it into the faces on its two sides; ``q``, ``v``, ``m``, ``k`` of 2; the side ``o``,
+    1 or -1.  With the normal ``w = o u x v`` two polyhedra are apart if the gap ``w.(q - p) / |w|``
+    is positive, the first lies below its edge (``left1``, ``right1``) and the second above its
+    own (``left2``, ``right2``), and the edges are not parallel (``angle``).
+    """
+    letters = [(one, "pulr"), (two, "qvmk")]
+    parameters = [n for frame, some in letters for c in some for n in numbers(c, frame, 3)]
+    formulas = partial(_crossing, one, two)
+    return _family(CROSSING, one, two, 3, [*parameters, "o"], formulas, "crossing")
+
+
+def _crossing(one: Frame, two: Frame) -> "Formulas":
+    import sympy
+
+    names = ("wx", "wy", "wz", "ww", "least")
+    wx, wy, wz, ww, least = symbols(names)
+    (o,) = symbols(["o"])
+    u, v = _along("u", 1, one, 3), _along("v", 2, two, 3)
+    w = tuple(o * c for c in cross(u, v))
+    bound = PARALLEL**2 * dot(u, u) * dot(v, v)
+    normal = (wx, wy, wz)
+    definitions = dict(zip(names, (*w, dot(normal, normal), bound), strict=True))
+    apart = dot(normal, minus(_at("q", 2, two, 3), _at("p", 1, one, 3)))
+    size = sympy.sqrt(sympy.Piecewise((ww, ww >= least), (least, True)))
+    below = {
+        name: -dot(normal, _along(letter, 1, one, 3))
+        for name, letter in zip(SUPPORTS[:2], "lr", strict=True)
+    }
+    above = {
+        name: dot(normal, _along(letter, 2, two, 3))
+        for name, letter in zip(SUPPORTS[2:], "mk", strict=True)
+    }
+    return definitions, {"gap": apart / size, **below, **above, "angle": ww - least}
+
+
+@lru_cache(maxsize=8)
+def hollow(one: Frame, d: int) -> Family:
+    """Return the gap of a point and a cylinder or sphere around it.
+
+    Parameters: ``p`` of 1; centre ``c`` and axis ``w`` (a unit vector; zero for a sphere or a
+    circle) in space; the radius ``s``.  With the distance ``r`` from the axis the gap is
+    ``(s^2 - r^2) / (2 s)``: smooth, and the distance to first order where it vanishes.
+    """
+    still = Frame.FIXED
+    parameters = [*numbers("p", one, d), *numbers("c", still, d), *numbers("w", still, d), "s"]
+    return _family(("gap",), one, still, d, parameters, partial(_hollow, one, d), "hollow")
+
+
+def _hollow(one: Frame, d: int) -> "Formulas":
+    (s,) = symbols(["s"])
+    axis = _along("w", 2, Frame.FIXED, d)
+    away = minus(_at("p", 1, one, d), _at("c", 2, Frame.FIXED, d))
+    squared = dot(away, away) - dot(away, axis) ** 2
+    return {}, {"gap": (s**2 - squared) / (2 * s)}

@@ -1,0 +1,224 @@
+"""Two parts are apart: the and/or tree of gaps that says so.
+
+Two hulls with interiors do not overlap if and only if a face of one of them separates them, or in
+space a plane along an edge of each (the separating axis theorem, [Er] ch. 4): a union of
+intersections of smooth functions.  Rounded hulls with the radii ``r`` and ``s`` do not overlap if
+and only if the distance of the hulls is at least ``r + s``: an intersection of distances of
+features.  These are also large where the hulls cross each other or one contains the other; the
+union, which is then never active, excludes that.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from polycorner.bodies import gaps
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.shapes import Part
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.polyhedra.groups import AllOf, AnyOf
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
+
+Tree = AllOf | AnyOf | SmoothFunction
+
+
+@dataclass(frozen=True, eq=False)
+class Member(Value):
+    """A part of a body in an arrangement.
+
+    Attributes
+    ----------
+    name : str
+        Name of the body, and of the part after a dot.
+    part : Part
+    frame : Frame
+    axis : (d,) array, optional
+        That of an axial body.
+    coordinates : tuple of str
+        Names of the body's coordinates; empty for fixed ones.
+    """
+
+    name: str
+    part: Part
+    frame: Frame
+    axis: Array | None
+    coordinates: tuple[str, ...]
+
+    def numbers(self, *vectors: Array) -> list[float]:
+        """Return the parameters of formulas for points and vectors of the body."""
+        return [x for v in vectors for x in self.frame.local(v.tolist(), self.axis)]
+
+    def vertex(self, i: int) -> str:
+        """Return what a point is called: the part itself if it has only one."""
+        return f"{self.name}.v{i + 1}" if len(self.part.points) > 1 else self.name
+
+
+def gap(
+    manifold: Manifold,
+    family: Family,
+    one: Member,
+    two: Member | None,
+    parameters: list[float],
+    label: str,
+    name: str = "gap",
+) -> SmoothFunction:
+    """Return a member of a family as a function of the coordinates of two bodies."""
+    reads = one.coordinates + (two.coordinates if two is not None else ())
+    return SmoothFunction.member(
+        family, name, manifold, parameters=parameters, reads=reads, label=label
+    )
+
+
+def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True) -> Tree:
+    """Return the gaps of two parts.
+
+    ``excluded`` says whether a union excludes rounded hulls that cross; motions, which start
+    elsewhere, do without.
+    """
+    if one.frame is Frame.FIXED:
+        one, two = two, one
+    radius = one.part.radius + two.part.radius
+    if radius == 0:
+        return separated(manifold, one, two)
+    parts = list(_distances(manifold, one, two, radius))
+    if excluded and len(one.part.points) > 1 and len(two.part.points) > 1 and _can_cross(one, two):
+        parts.append(separated(manifold, one, two))
+    return parts[0] if len(parts) == 1 else AllOf(*parts)
+
+
+def _can_cross(one: Member, two: Member) -> bool:
+    """Whether the distances are also large for hulls that cross; not of two rods in space."""
+    return one.part.dimension == 2 or bool(one.part.facets or two.part.facets)
+
+
+def _distances(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+    a, b, d = one.part.points, two.part.points, one.part.dimension
+    if len(a) == len(b) == 1:
+        numbers = [*one.numbers(a[0]), *two.numbers(b[0]), radius]
+        family = gaps.points(one.frame, two.frame, d)
+        yield gap(manifold, family, one, two, numbers, f"{one.name}-{two.name}")
+        return
+    if d == 3 and len(a) > 1 and len(b) > 1:
+        yield from _rods(manifold, one, two, radius)
+    else:
+        yield from _from_segment(manifold, one, two, radius)
+        yield from _from_segment(manifold, two, one, radius)
+    yield from _from_hull(manifold, one, two, radius)
+    yield from _from_hull(manifold, two, one, radius)
+
+
+def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+    """Distances of the points of one part from the other, which is a segment."""
+    if len(two.part.points) != 2:
+        return
+    family = gaps.segment(one.frame, two.frame, one.part.dimension)
+    for i, p in enumerate(one.part.points):
+        numbers = [*one.numbers(p), *two.numbers(*two.part.points), radius]
+        yield gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+
+
+def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+    """Distances of the points of one part from the other, which has faces."""
+    facets = two.part.facets
+    if facets is None:
+        return
+    d, vertices = two.part.dimension, two.part.points
+    edges = facets.faces if d == 2 else tuple((i, j) for i, j, _, _ in facets.edges)
+    family = gaps.hull(one.frame, two.frame, d, len(vertices), facets.faces, edges)
+    shape = [*vertices.ravel().tolist(), *facets.normals.ravel().tolist()]
+    for i, p in enumerate(one.part.points):
+        numbers = [*one.numbers(p), *shape, radius]
+        yield gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+
+
+def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+    """Distances of all edges in space."""
+    family = gaps.segments(one.frame, two.frame)
+    for (i, first), (j, second) in product(_edges(one), _edges(two)):
+        numbers = [*one.numbers(*first), *two.numbers(*second), radius]
+        yield gap(manifold, family, one, two, numbers, f"{one.name}{i}-{two.name}{j}")
+
+
+def _edges(member: Member) -> list[tuple[str, Array]]:
+    """Return the ends of all edges with the ends of their names; a segment is its own edge."""
+    points, facets = member.part.points, member.part.facets
+    if facets is None:
+        return [("", points)]
+    return [(f".e{k + 1}", points[[i, j]]) for k, (i, j, _, _) in enumerate(facets.edges)]
+
+
+def separated(manifold: Manifold, one: Member, two: Member) -> Tree:
+    """Return the union over all planes that may separate two hulls, segments included."""
+    branches = [*_by_faces(manifold, one, two), *_by_faces(manifold, two, one)]
+    if one.part.dimension == 3:
+        branches += _by_edges(manifold, one, two)
+    return AnyOf(*branches)
+
+
+def _by_faces(manifold: Manifold, one: Member, two: Member) -> Iterator[Tree]:
+    """Faces of the second that have all points of the first outside; both sides of a segment."""
+    d, points = two.part.dimension, two.part.points
+    if two.part.facets is not None:
+        faces = [
+            (points[face[0]], normal)
+            for face, normal in zip(two.part.facets.faces, two.part.facets.normals, strict=True)
+        ]
+    elif d == 2:
+        along = points[1] - points[0]
+        normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+        faces = [(points[0], normal), (points[0], -normal)]
+    else:
+        return
+    family, letter = gaps.side(one.frame, two.frame, d), "e" if d == 2 else "f"
+    for f, (point, normal) in enumerate(faces):
+        face = [*two.numbers(point, normal), 0.0]
+        label = f"{two.name}.{letter}{f + 1}-{one.name}"
+        yield AllOf(
+            *(
+                gap(manifold, family, one, two, [*one.numbers(p), *face], f"{label}.v{i + 1}")
+                for i, p in enumerate(one.part.points)
+            )
+        )
+
+
+def _by_edges(manifold: Manifold, one: Member, two: Member) -> Iterator[Tree]:
+    """Pairs of edges, on either side, whose common perpendicular separates."""
+    family = gaps.crossing(one.frame, two.frame)
+    # A segment lies on both sides of each of its planes.
+    flat = [k for k, member in enumerate((one, two)) if member.part.facets is None]
+    needless = [name for k in flat for name in gaps.SUPPORTS[2 * k : 2 * k + 2]]
+    conditions = [name for name in gaps.CROSSING if name not in needless]
+    for (i, first), (j, second) in product(
+        enumerate(_supports(one.part)), enumerate(_supports(two.part))
+    ):
+        for side in (1.0, -1.0):
+            numbers = [*one.numbers(*first), *two.numbers(*second), side]
+            sign = ">" if side > 0 else "<"
+            label = f"{one.name}.e{i + 1}{sign}{two.name}.e{j + 1}"
+            labels = [label, *(f"{label} {name}" for name in conditions[1:])]
+            yield AllOf(
+                *(
+                    gap(manifold, family, one, two, numbers, *some)
+                    for some in zip(labels, conditions, strict=True)
+                )
+            )
+
+
+def _supports(part: Part) -> list[tuple[Array, Array, Array, Array]]:
+    """Return of every edge a point, its direction, and the ways from it into both faces."""
+    points, facets = part.points, part.facets
+    if facets is None:
+        return [(points[0], points[1] - points[0], np.zeros(3), np.zeros(3))]
+    found = []
+    for i, j, left, right in facets.edges:
+        along = points[j] - points[i]
+        ways = (
+            np.cross(facets.normals[left], along),
+            -np.cross(facets.normals[right], along),
+        )
+        found.append((points[i], along, *ways))
+    return found

@@ -1,0 +1,103 @@
+"""Bodies that move, their coordinates, and where these put them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from polycorner.bodies.facets import FLAT
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.shapes import Body
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Value
+
+
+@dataclass(frozen=True, eq=False)
+class Placement(Value):
+    """A body that moves, and its coordinates among those of all.
+
+    Attributes
+    ----------
+    name : str
+    body : Body
+    frame : Frame
+    manifold : Manifold
+        The body's own placements.
+    at : slice
+        Where its coordinates stand.
+    """
+
+    name: str
+    body: Body
+    frame: Frame
+    manifold: Manifold
+    at: slice
+
+    @property
+    def axis(self) -> Array:
+        """The axis of a body of revolution."""
+        axis = self.body.axis
+        assert axis is not None, self.name
+        return axis
+
+    @property
+    def spins(self) -> bool:
+        """Whether there are coordinates that change nothing about the placement."""
+        return self.frame in {Frame.TURNED, Frame.ROTATED} and self.revolves
+
+    @property
+    def revolves(self) -> bool:
+        """Whether the body is one of revolution about its origin: a disc, in space an axis."""
+        axis = self.body.axis
+        return axis is not None and (self.body.dimension == 3 or not axis.any())
+
+    def coordinates(self, origin: Array, matrix: Array) -> Array:
+        """Return the coordinates of a placement."""
+        if self.frame is Frame.TURNED:
+            return np.append(origin, math.atan2(matrix[1, 0], matrix[0, 0]))
+        if self.frame is Frame.AXIAL:
+            return np.append(origin, matrix @ self.axis)
+        if self.frame is Frame.ROTATED:
+            return np.append(origin, Rotation.from_matrix(matrix).as_quat()[[3, 0, 1, 2]])
+        return origin
+
+    def pose(self, q: Array) -> tuple[Array, Array]:
+        """Return origin and matrix of the body at a point of all coordinates."""
+        d, own = self.body.dimension, q[self.at]
+        origin, turned = own[:d], own[d:]
+        if self.frame is Frame.TURNED:
+            cosine, sine = math.cos(turned[0]), math.sin(turned[0])
+            return origin, np.array([[cosine, -sine], [sine, cosine]])
+        if self.frame is Frame.AXIAL:
+            return origin, _carrying(self.axis, turned)
+        if self.frame is Frame.ROTATED:
+            return origin, Rotation.from_quat(turned[[1, 2, 3, 0]]).as_matrix()
+        return origin, np.eye(d)
+
+    def moved(self, q: Array) -> Body:
+        """Return the body in its place."""
+        origin, matrix = self.pose(q)
+        parts = {name: part.moved(origin, matrix) for name, part in self.body.parts.items()}
+        return Body(parts)
+
+    def directions(self, q: Array) -> Array:
+        """Return vectors ``(k, d)`` that show how the body is turned."""
+        if self.frame is Frame.SHIFTED or (self.revolves and not self.axis.any()):
+            return np.empty((0, self.body.dimension))
+        _, matrix = self.pose(q)
+        return (matrix @ self.axis)[None] if self.revolves else matrix.T
+
+
+def _carrying(a: Array, b: Array) -> Array:
+    """Return a rotation that carries the unit vector ``a`` to ``b``."""
+    across = np.cross(a, b)
+    sine, cosine = float(np.linalg.norm(across)), float(a @ b)
+    if sine <= FLAT:
+        across = np.cross(a, np.eye(3)[np.argmin(abs(a))])
+        sine = float(np.linalg.norm(across))
+        angle = 0.0 if cosine > 0 else math.pi
+    else:
+        angle = math.atan2(sine, cosine)
+    matrix: Array = Rotation.from_rotvec(angle * across / sine).as_matrix()
+    return matrix
