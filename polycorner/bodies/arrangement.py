@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from itertools import combinations
 from operator import mul
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,8 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
+
+ORIENTATIONS = ("needed", "all", "none")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +49,9 @@ class Arrangement(Value):
         :func:`box` makes those of a box.
     fixed : mapping from str to Body, optional
         In the coordinates of space (:meth:`Body.moved`).
-    spins : bool, optional
-        Whether all orientations are coordinates, those included that change nothing about a
-        placement: needed for friction.  Default False.
+    orientations : {"needed", "all", "none"}, optional
+        Which are coordinates: those of bodies that do not look the same when turned (default); all,
+        as friction needs them; or none, so that bodies are shifted only.
     unit : str, optional
         Unit of length.
 
@@ -73,7 +75,7 @@ class Arrangement(Value):
     bodies: Mapping[str, Body] | Sequence[Body]
     walls: Mapping[str, Wall] = field(default_factory=dict)
     fixed: Mapping[str, Body] = field(default_factory=dict)
-    spins: bool = False
+    orientations: Literal["needed", "all", "none"] = "needed"
     unit: str = ""
 
     def __post_init__(self) -> None:
@@ -94,6 +96,7 @@ class Arrangement(Value):
         for wall in self.walls.values():
             if not isinstance(wall, Wall):
                 refuse("walls", "half-spaces and cylinders", wall, TypeError)
+        checks.choice("orientations", self.orientations, ORIENTATIONS)
         known = [*given, *self.fixed, *self.walls]
         twice = sorted({name for name in known if known.count(name) > 1})
         if twice:
@@ -126,7 +129,7 @@ class Arrangement(Value):
         """The coordinates of each body, and where they stand."""
         found, start = [], 0
         for name, body in self.named.items():
-            frame = frame_of(body, spins=self.spins)
+            frame = frame_of(body, self.orientations)
             turn = self.scale / max(body.size, self.scale)
             factor = frame.manifold(name, self.dimension, self.scale, turn, self.unit)
             at = slice(start, start + factor.size)
@@ -200,10 +203,19 @@ class Arrangement(Value):
         missing = [name for name in self.named if name not in placed]
         if missing:
             refuse("placed", f"a placement of {missing[0]!r} as well", [*placed])
-        parts = [
-            p.coordinates(*_placement(placed[p.name], self.dimension)) for p in self.placements
-        ]
-        return np.concatenate(parts)
+        found = []
+        for p in self.placements:
+            origin, matrix = _placement(placed[p.name], self.dimension)
+            if (
+                p.frame is Frame.SHIFTED
+                and not p.is_round
+                and (matrix != np.eye(len(origin))).any()
+            ):
+                refuse(
+                    "placed", f"no rotation of {p.name!r}, which is shifted only", placed[p.name]
+                )
+            found.append(p.coordinates(origin, matrix))
+        return np.concatenate(found)
 
     def placed(self, q: ArrayLike) -> dict[str, Body]:
         """Return the bodies where they are at a point ``(N,)``, fixed ones last.
@@ -215,11 +227,12 @@ class Arrangement(Value):
         return {**moved, **self.fixed}
 
 
-def frame_of(body: Body, *, spins: bool) -> Frame:
-    """Return the coordinates that tell the placements of a body apart; with ``spins`` all."""
-    axis = body.axis
-    if axis is not None and not spins:
-        if not axis.any():
+def frame_of(body: Body, orientations: str) -> Frame:
+    """Return the coordinates of a body; see :class:`Arrangement`."""
+    if orientations == "none":
+        return Frame.SHIFTED
+    if body.axis is not None and orientations == "needed":
+        if not body.axis.any():
             return Frame.SHIFTED
         if body.dimension == 3:
             return Frame.AXIAL

@@ -63,6 +63,8 @@ class Congruences(Value):
             rows.append(across @ velocity(wall.point))
             rows += [velocity(v) - velocity(np.zeros(d)) for v in held]
         rows += [velocity(p) for body in self.fixed for p in body.markers]
+        if any(p.frame is Frame.SHIFTED and not p.is_round for p in self.placements):
+            rows.append(np.eye(rows[0].shape[1])[d:])
         basis = scipy.linalg.null_space(np.concatenate(rows), rcond=FLAT).T
         return reduced(basis) if len(basis) else basis
 

@@ -107,7 +107,7 @@ def _own_turns(p: Placement) -> list[tuple[Array, Array]]:
     """
     body, d = p.body, p.body.dimension
     identity = (np.zeros(d), np.eye(d))
-    if p.frame is Frame.SHIFTED or (p.revolves and body.axis is not None and not body.axis.any()):
+    if p.frame is Frame.SHIFTED or p.is_round:
         return [identity]
     middle = body.markers.mean(axis=0)
     found = [identity]

@@ -40,6 +40,11 @@ class Frame(Enum):
     AXIAL = "axial"
     ROTATED = "rotated"
 
+    @property
+    def turns(self) -> bool:
+        """Whether bodies turn."""
+        return self not in {Frame.FIXED, Frame.SHIFTED}
+
     def manifold(self, name: str, dimension: int, scale: float, turn: float, unit: str) -> Manifold:
         """Return the placements of a body called ``name``.
 
@@ -82,7 +87,7 @@ class Frame(Enum):
         """Return the direction of a vector of body ``role``."""
         import sympy
 
-        if self in {Frame.FIXED, Frame.SHIFTED}:
+        if not self.turns:
             return _triple(local)
         turns = symbols(self.variables(role, dimension)[dimension:])
         if self is Frame.TURNED:

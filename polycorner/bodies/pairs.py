@@ -11,10 +11,12 @@ union, which is then never active, excludes that.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from polycorner.bodies import gaps
+from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.shapes import Part
 from polycorner.formulas.families import Family
@@ -153,36 +155,62 @@ def _edges(member: Member) -> list[tuple[str, Array]]:
 
 def separated(manifold: Manifold, one: Member, two: Member) -> Tree:
     """Return the union over all planes that may separate two hulls, segments included."""
-    branches = [*_by_faces(manifold, one, two), *_by_faces(manifold, two, one)]
+    first, second = _faces(one.part), _faces(two.part)
+    if not (one.frame.turns or two.frame.turns):
+        # A face and its opposite of the other body are parallel for good, and say the same.
+        first = [f for f in first if all(f.normal @ g.normal > FLAT - 1 for g in second)]
+    branches = [_outside(manifold, one, two, face) for face in second]
+    branches += [_outside(manifold, two, one, face) for face in first]
     if one.part.dimension == 3:
         branches += _by_edges(manifold, one, two)
     return AnyOf(*branches)
 
 
-def _by_faces(manifold: Manifold, one: Member, two: Member) -> Iterator[Tree]:
-    """Faces of the second that have all points of the first outside; both sides of a segment."""
-    d, points = two.part.dimension, two.part.points
-    if two.part.facets is not None:
-        faces = [
-            (points[face[0]], normal)
-            for face, normal in zip(two.part.facets.faces, two.part.facets.normals, strict=True)
-        ]
-    elif d == 2:
+class _Face(NamedTuple):
+    name: str
+    point: Array
+    normal: Array
+
+
+def _faces(part: Part) -> list[_Face]:
+    """Return the faces of a part; in the plane both sides of a segment."""
+    points, facets = part.points, part.facets
+    if facets is None and part.dimension == 3:
+        return []
+    if facets is None:
         along = points[1] - points[0]
         normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
-        faces = [(points[0], normal), (points[0], -normal)]
+        found = [(points[0], normal), (points[0], -normal)]
     else:
-        return
-    family, letter = gaps.side(one.frame, two.frame, d), "e" if d == 2 else "f"
-    for f, (point, normal) in enumerate(faces):
-        face = [*two.numbers(point, normal), 0.0]
-        label = f"{two.name}.{letter}{f + 1}-{one.name}"
-        yield AllOf(
-            *(
-                gap(manifold, family, one, two, [*one.numbers(p), *face], f"{label}.v{i + 1}")
-                for i, p in enumerate(one.part.points)
-            )
-        )
+        starts = [points[face[0]] for face in facets.faces]
+        found = list(zip(starts, facets.normals, strict=True))
+    letter = "e" if part.dimension == 2 else "f"
+    return [_Face(f"{letter}{f + 1}", *some) for f, some in enumerate(found)]
+
+
+def _outside(manifold: Manifold, one: Member, two: Member, face: _Face) -> Tree:
+    """All points of the first are outside of a face of the second."""
+    family = gaps.side(one.frame, two.frame, two.part.dimension)
+    numbers = [*two.numbers(face.point, face.normal), 0.0]
+    label = f"{two.name}.{face.name}-{one.name}"
+    lowest = nearest(one, face.normal, turning=two.frame.turns)
+    some = [
+        gap(manifold, family, one, two, [*one.numbers(p), *numbers], f"{label}.v{i + 1}")
+        for i, p in lowest
+    ]
+    return some[0] if len(some) == 1 else AllOf(*some)
+
+
+def nearest(member: Member, normal: Array, *, turning: bool) -> list[tuple[int, Array]]:
+    """Return the points of a part, with their numbers, that may be nearest to a plane.
+
+    If neither the plane nor the body turns it is always the same one.
+    """
+    points = member.part.points
+    if turning or member.frame.turns:
+        return list(enumerate(points))
+    i = int(np.argmin(points @ normal))
+    return [(i, points[i])]
 
 
 def _by_edges(manifold: Manifold, one: Member, two: Member) -> Iterator[Tree]:

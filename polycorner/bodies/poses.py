@@ -47,10 +47,14 @@ class Placement(Value):
         return self.frame in {Frame.TURNED, Frame.ROTATED} and self.revolves
 
     @property
+    def is_round(self) -> bool:
+        """Whether the body looks the same when turned about its origin."""
+        return self.body.axis is not None and not self.body.axis.any()
+
+    @property
     def revolves(self) -> bool:
         """Whether the body is one of revolution about its origin: a disc, in space an axis."""
-        axis = self.body.axis
-        return axis is not None and (self.body.dimension == 3 or not axis.any())
+        return self.is_round or (self.body.dimension == 3 and self.body.axis is not None)
 
     def coordinates(self, origin: Array, matrix: Array) -> Array:
         """Return the coordinates of a placement."""
@@ -83,7 +87,7 @@ class Placement(Value):
 
     def directions(self, q: Array) -> Array:
         """Return vectors ``(k, d)`` that show how the body is turned."""
-        if self.frame is Frame.SHIFTED or (self.revolves and not self.axis.any()):
+        if self.frame is Frame.SHIFTED or self.is_round:
             return np.empty((0, self.body.dimension))
         _, matrix = self.pose(q)
         return (matrix @ self.axis)[None] if self.revolves else matrix.T

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.bodies import gaps
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.pairs import Member, gap
+from polycorner.bodies.pairs import Member, gap, nearest
 from polycorner.checks import refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
@@ -150,6 +150,9 @@ def within(manifold: Manifold, name: str, wall: Wall, member: Member) -> list[Sm
     if isinstance(wall, Cylinder) and wall.radius <= radius:
         refuse("walls", f"a radius of {name!r} above that of {member.name!r}", wall.radius)
     numbers, family = wall.numbers(radius), wall.family(member.frame)
+    points = list(enumerate(member.part.points))
+    if isinstance(wall, HalfSpace):
+        points = nearest(member, wall.normal, turning=False)
     return [
         gap(
             manifold,
@@ -159,7 +162,7 @@ def within(manifold: Manifold, name: str, wall: Wall, member: Member) -> list[Sm
             [*member.numbers(p), *numbers],
             f"{member.vertex(i)}-{name}",
         )
-        for i, p in enumerate(member.part.points)
+        for i, p in points
     ]
 
 

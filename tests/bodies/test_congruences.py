@@ -39,12 +39,15 @@ CASES = {
     "in a circle": (Arrangement([disc(1), disc(1)], {"ring": Cylinder(5, point=[1, 0])}), 1, 2),
     "around a disc": (Arrangement([SQUARE], fixed={"peg": disc(1, at=[3, 1])}), 1, 4),
     "around a square": (Arrangement([SQUARE], fixed={"peg": SQUARE}), 0, 4),
-    "spinning disc": (Arrangement([disc(1), SQUARE], spins=True), 4, 4),
+    "spinning disc": (Arrangement([disc(1), SQUARE], orientations="all"), 4, 4),
+    "shifted squares": (Arrangement([SQUARE, SQUARE], orientations="none"), 2, 2),
+    "shifted discs": (Arrangement([disc(1), disc(1)], orientations="none"), 3, 2),
+    "shifted cubes": (Arrangement([CUBE, CUBE, sphere(1)], orientations="none"), 3, 2),
     "balls": (Arrangement([sphere(1)] * 4), 6, 24),
     "rods": (Arrangement([ROD, ROD]), 6, 8),
     "pears": (Arrangement([PEAR, PEAR, sphere(1)]), 6, 2),
-    "spinning rod": (Arrangement([ROD, CUBE], spins=True), 7, 48),
-    "spinning ball": (Arrangement([sphere(1), CUBE], spins=True), 9, 24),
+    "spinning rod": (Arrangement([ROD, CUBE], orientations="all"), 7, 48),
+    "spinning ball": (Arrangement([sphere(1), CUBE], orientations="all"), 9, 24),
     "tetrahedra": (Arrangement([TETRAHEDRON, TETRAHEDRON]), 6, 12 * 12 * 2),
     "bent": (Arrangement([BENT, BENT]), 6, 2 * 2 * 2),
     "rods on a floor": (Arrangement([ROD, ROD], {"floor": FLOOR}), 3, 8),
@@ -59,7 +62,9 @@ CASES = {
 def anywhere(a, rng):
     d = a.dimension
     turns = [
-        rng.uniform(-3, 3)
+        None
+        if a.orientations == "none"
+        else rng.uniform(-3, 3)
         if d == 2
         else Rotation.random(random_state=np.random.RandomState(rng.integers(2**31)))
         for _ in a.named

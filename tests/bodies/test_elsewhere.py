@@ -84,15 +84,17 @@ def test_distances_and_overlaps_are_those_of_fcl(first, second):
     assert together
 
 
-@pytest.mark.parametrize("spins", [False, True])
+@pytest.mark.parametrize("orientations", ["needed", "all", "none"])
 @pytest.mark.parametrize("pair", [("rod", "rod"), ("block", "rod"), ("dumbbell", "ball")])
-def test_derivatives_are_those_of_differences(pair, spins):
+def test_derivatives_are_those_of_differences(pair, orientations):
     """Along lines, of first and second order."""
-    rng = np.random.default_rng(len(pair[0]) + spins)
-    a = Arrangement([BODIES[kind] for kind in pair], spins=spins)
+    rng = np.random.default_rng([len(pair[0]), len(orientations)])
+    a = Arrangement([BODIES[kind] for kind in pair], orientations=orientations)
     space, h = a.manifold, 1e-4
     for _ in range(20):
         turns = Rotation.random(2, random_state=np.random.RandomState(rng.integers(2**31)))
+        if orientations == "none":
+            turns = [None, None]
         shift = 3 * Rotation.random(random_state=np.random.RandomState(1)).apply([1, 0, 0])
         q = a.point({"1": ([0, 0, 0], turns[0]), "2": (shift, turns[1])})
         v = rng.standard_normal(space.size)

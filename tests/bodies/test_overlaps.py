@@ -47,7 +47,9 @@ def anywhere(rng, a, reach=1.7):
     placed = {}
     for name in a.named:
         turn = (
-            rng.uniform(-7, 7)
+            None
+            if a.orientations == "none"
+            else rng.uniform(-7, 7)
             if a.dimension == 2
             else Rotation.random(random_state=np.random.RandomState(rng.integers(2**31)))
         )
@@ -67,15 +69,17 @@ def least(a, q):
     )
 
 
-@pytest.mark.parametrize("spins", [False, True])
+@pytest.mark.parametrize("orientations", ["needed", "all", "none"])
 @pytest.mark.parametrize("second", ["ball", "rod", "rounded", "sharp"])
 @pytest.mark.parametrize("first", ["ball", "rod", "rounded", "sharp"])
 @pytest.mark.parametrize("d", [2, 3])
-def test_a_placement_is_free_if_no_point_is_in_both(d, first, second, spins):
-    rng = np.random.default_rng([d, len(first), len(second), spins])
+def test_a_placement_is_free_if_no_point_is_in_both(d, first, second, orientations):
+    rng = np.random.default_rng([d, len(first), len(second), len(orientations)])
     free = []
     for _ in range(3):
-        a = Arrangement([some_body(rng, d, first), some_body(rng, d, second)], spins=spins)
+        a = Arrangement(
+            [some_body(rng, d, first), some_body(rng, d, second)], orientations=orientations
+        )
         for _ in range(25):
             q = anywhere(rng, a)
             expected = least(a, q)
