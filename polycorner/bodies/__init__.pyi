@@ -1,4 +1,5 @@
 from .arrangement import Arrangement
+from .masses import Mass, mass_of
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
 from .walls import Cylinder, HalfSpace, box
 
@@ -7,11 +8,13 @@ __all__ = [
     "Body",
     "Cylinder",
     "HalfSpace",
+    "Mass",
     "Part",
     "box",
     "capsule",
     "compound",
     "disc",
+    "mass_of",
     "polygon",
     "polytope",
     "sphere",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from itertools import combinations
+from itertools import combinations, product
 from operator import mul
 from typing import Any, Literal
 
@@ -12,12 +12,16 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.congruences import Congruences
+from polycorner.bodies.dynamics import energies, friction_of, masses_of, smooth
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.pairs import Member, Tree, apart
+from polycorner.bodies.masses import Mass
+from polycorner.bodies.pairs import Member, Tree, apart, distances
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body, Turn, turning
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
@@ -148,31 +152,95 @@ class Arrangement(Value):
         return Polyhedron(self.manifold, AllOf(*self.contacts(excluded=True)))
 
     def contacts(self, *, excluded: bool) -> list[Tree]:
-        """Return the and/or trees of all pairs of parts and of walls."""
-        moving = [self._members(p.name, p.body, p) for p in self.placements]
-        still = [self._members(name, body, None) for name, body in self.fixed.items()]
-        pairs = [*combinations(moving, 2), *((one, two) for one in moving for two in still)]
-        found: list[Tree] = [
-            apart(self.manifold, a, b, excluded=excluded)
-            for one, two in pairs
-            for a in one
-            for b in two
-        ]
-        for name, wall in self.walls.items():
-            found += [
-                f for one in moving for a in one for f in within(self.manifold, name, wall, a)
-            ]
+        """Return the and/or trees of all pairs of parts, and the gaps at walls.
+
+        ``excluded`` says whether rounded parts that cross each other are excluded as well, by
+        unions that are never active.
+        """
+        found = [apart(self.manifold, *pair, excluded=excluded) for pair in self._pairs]
+        found += [function for _, function, *_ in self._at_walls]
         if not found:
             refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
         return found
+
+    @cached_property
+    def _pairs(self) -> list[tuple[Member, Member]]:
+        """Two parts each, of different bodies of which one moves."""
+        moving = [self._members(p.name, p.body, p) for p in self.placements]
+        still = [self._members(name, body, None) for name, body in self.fixed.items()]
+        pairs = [*combinations(moving, 2), *product(moving, still)]
+        return [parts for pair in pairs for parts in product(*pair)]
+
+    @cached_property
+    def _at_walls(self) -> list[tuple[Wall, SmoothFunction, Member, Array]]:
+        """The gaps at walls with parts and their points."""
+        return [
+            (wall, function, member, point)
+            for name, wall in self.walls.items()
+            for p in self.placements
+            for member in self._members(p.name, p.body, p)
+            for function, point in within(self.manifold, name, wall, member)
+        ]
 
     def _members(self, name: str, body: Body, placement: Placement | None) -> list[Member]:
         frame = Frame.FIXED if placement is None else placement.frame
         coordinates = () if placement is None else placement.manifold.names
         return [
-            Member(f"{name}.{part}" if part else name, shape, frame, body.axis, coordinates)
+            Member(name, f"{name}.{part}" if part else name, shape, frame, body.axis, coordinates)
             for part, shape in body.parts.items()
         ]
+
+    def system(
+        self,
+        *,
+        gravity: ArrayLike | None = None,
+        density: float = 1.0,
+        masses: Mapping[str, Mass] | None = None,
+        friction: float | Mapping[str, float] = 0.0,
+        restitution: float | Mapping[str, float] = 0.0,
+    ) -> System:
+        """Return the mechanical system of the bodies, all of them one body of the engine.
+
+        Parameters
+        ----------
+        gravity : (d,) array, optional
+            Force per mass; default none.
+        density : float, optional
+            Mass per area or volume of bodies without a mass of their own.
+        masses : mapping from str to Mass, optional
+        friction : float or mapping from str to float, optional
+            Coulomb's coefficient, static and dynamic, for all contacts or by name; needs
+            ``orientations="all"``.  Not covered: edges in space, polygons and polyhedra that touch
+            bodies.
+        restitution : float or mapping from str to float, optional
+            As in :class:`~polycorner.System`.
+
+        Raises
+        ------
+        NotImplementedError
+            For two sharp polygons or polyhedra, and for friction that is not covered.
+
+        Examples
+        --------
+        A disc rolls down a slope without slipping, with 2/3 of the acceleration of a sliding one:
+
+        >>> from polycorner import simulate
+        >>> from polycorner.bodies import Arrangement, HalfSpace, disc
+        >>> slope = {"slope": HalfSpace([0, 1], [0, 0])}
+        >>> a = Arrangement({"A": disc(1.0)}, slope, orientations="all")
+        >>> rolling = a.system(gravity=[3.0, -10.0], friction=0.5)
+        >>> path = simulate(rolling, rolling.state(a.point({"A": [0, 1]})), 1.0, 1e-3)
+        >>> path.v[-1].round(6).tolist()
+        [[2.0, 0.0, -2.0]]
+        """
+        pull = np.zeros(self.dimension) if gravity is None else gravity
+        known = masses_of(self.placements, density, masses or {})
+        kinetic, potential = energies(self.placements, known, pull)
+        polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))
+        touches = [touch for pair in self._pairs for touch in distances(self.manifold, *pair)]
+        walls = [(f.name, wall, member, point) for wall, f, member, point in self._at_walls]
+        rubbing = friction_of(self.placements, touches, walls, friction)
+        return System(polyhedron, kinetic, potential, friction=rubbing, restitution=restitution)
 
     @cached_property
     def congruences(self) -> Congruences:

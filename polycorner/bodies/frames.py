@@ -59,11 +59,11 @@ class Frame(Enum):
             return place * Manifold.rotation([f"a{name}{a}" for a in "w" + AXES], scale=turn)
         return place
 
-    def variables(self, role: int, dimension: int) -> tuple[str, ...]:
-        """Return the names of the coordinates of body ``role`` in formulas."""
+    def variables(self, name: str, dimension: int) -> tuple[str, ...]:
+        """Return the names of the coordinates of a body called ``name``."""
         if self is Frame.FIXED:
             return ()
-        return self.manifold(f"_{role}_", dimension, 1.0, 1.0, "").names
+        return self.manifold(name, dimension, 1.0, 1.0, "").names
 
     def local(self, vector: Sequence[float], axis: Array | None) -> tuple[float, ...]:
         """Return the numbers by which formulas know a point or vector of the body."""
@@ -75,21 +75,21 @@ class Frame(Enum):
         """How many such numbers there are."""
         return 1 if self is Frame.AXIAL else dimension
 
-    def point(self, role: int, local: "Sequence[sympy.Expr]", dimension: int) -> "Point":
-        """Return where a point of body ``role`` is; in the plane the third coordinate is zero."""
-        there = self.vector(role, local, dimension)
+    def point(self, name: str, local: "Sequence[sympy.Expr]", dimension: int) -> "Point":
+        """Return where a point of a body is; in the plane the third coordinate is zero."""
+        there = self.vector(name, local, dimension)
         if self is Frame.FIXED:
             return there
-        centre = symbols(self.variables(role, dimension)[:dimension])
+        centre = symbols(self.variables(name, dimension)[:dimension])
         return _triple([c + v for c, v in zip(centre, there, strict=False)])
 
-    def vector(self, role: int, local: "Sequence[sympy.Expr]", dimension: int) -> "Point":
-        """Return the direction of a vector of body ``role``."""
+    def vector(self, name: str, local: "Sequence[sympy.Expr]", dimension: int) -> "Point":
+        """Return the direction of a vector of a body."""
         import sympy
 
         if not self.turns:
             return _triple(local)
-        turns = symbols(self.variables(role, dimension)[dimension:])
+        turns = symbols(self.variables(name, dimension)[dimension:])
         if self is Frame.TURNED:
             (theta,), (x, y) = turns, local
             cosine, sine = sympy.cos(theta), sympy.sin(theta)
@@ -98,13 +98,13 @@ class Frame(Enum):
             return _triple([local[0] * u for u in turns])
         return _triple(list(rotation_matrix(turns) * sympy.Matrix(local)))
 
-    def into(self, role: int, point: "Point", dimension: int) -> "Point":
-        """Return a point of space in the coordinates of body ``role``; not for axial ones."""
+    def into(self, name: str, point: "Point", dimension: int) -> "Point":
+        """Return a point of space in the coordinates of a body; not for axial ones."""
         import sympy
 
         if self is Frame.FIXED:
             return point
-        names = self.variables(role, dimension)
+        names = self.variables(name, dimension)
         away = [p - c for p, c in zip(point, symbols(names[:dimension]), strict=False)]
         if self is Frame.SHIFTED:
             return _triple(away)

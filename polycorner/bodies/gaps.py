@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     Expressions = dict[str, sympy.Expr]
     Formulas = tuple[Expressions, Expressions]
 
-FRAMES = (Frame, Frame)
+FIRST, SECOND = "_1_", "_2_"  # the bodies in roles 1 and 2
 # Edges of two polyhedra whose directions differ by less than this sine separate nothing.
 PARALLEL = 1e-9
 # The conditions under which two edges span a face of the difference of two polyhedra.
@@ -64,7 +64,7 @@ def _family(
 ) -> Family:
     sources = cache.source_key(distances.__name__, frames.__name__, __name__)
     key = repr((sources, written, one.value, two.value, d))
-    variables = one.variables(1, d) + two.variables(2, d)
+    variables = one.variables(FIRST, d) + two.variables(SECOND, d)
     return Family(names, variables, tuple(parameters), formulas, key, stationary=stationary)
 
 
@@ -73,11 +73,11 @@ def numbers(name: str, frame: Frame, d: int) -> list[str]:
     return [f"{name}{k}" for k in range(frame.count(d))]
 
 
-def _at(name: str, role: int, frame: Frame, d: int) -> "Point":
+def _at(name: str, role: str, frame: Frame, d: int) -> "Point":
     return frame.point(role, symbols(numbers(name, frame, d)), d)
 
 
-def _along(name: str, role: int, frame: Frame, d: int) -> "Point":
+def _along(name: str, role: str, frame: Frame, d: int) -> "Point":
     return frame.vector(role, symbols(numbers(name, frame, d)), d)
 
 
@@ -90,7 +90,7 @@ def points(one: Frame, two: Frame, d: int) -> Family:
 
 
 def _points(one: Frame, two: Frame, d: int) -> "Formulas":
-    p, q = _at("p", 1, one, d), _at("q", 2, two, d)
+    p, q = _at("p", FIRST, one, d), _at("q", SECOND, two, d)
     return {}, {"gap": norm(minus(p, q)) - symbols(["s"])[0]}
 
 
@@ -104,7 +104,7 @@ def segment(one: Frame, two: Frame, d: int) -> Family:
 
 
 def _segment(one: Frame, two: Frame, d: int) -> "Formulas":
-    p, a, b = _at("p", 1, one, d), _at("a", 2, two, d), _at("b", 2, two, d)
+    p, a, b = _at("p", FIRST, one, d), _at("a", SECOND, two, d), _at("b", SECOND, two, d)
     at, s = symbols(["foot", "s"])
     along = minus(b, a)
     definitions = {"foot": clamped(foot(p, a, b, 1 / dot(along, along)))}
@@ -124,7 +124,12 @@ def segments(one: Frame, two: Frame) -> Family:
 def _segments(one: Frame, two: Frame) -> "Formulas":
     names = [f"{end}{axis}" for end in ("A", "B", "G", "H") for axis in "xyz"]
     a, b, g, h = (_symbols_of(names[k : k + 3]) for k in range(0, 12, 3))
-    written = [_at("a", 1, one, 3), _at("b", 1, one, 3), _at("g", 2, two, 3), _at("h", 2, two, 3)]
+    written = [
+        _at("a", FIRST, one, 3),
+        _at("b", FIRST, one, 3),
+        _at("g", SECOND, two, 3),
+        _at("h", SECOND, two, 3),
+    ]
     definitions = dict(zip(names, [c for point in written for c in point], strict=True))
     ends = []
     for k, (p, start, end) in enumerate(((a, g, h), (b, g, h), (g, a, b), (h, a, b))):
@@ -190,7 +195,7 @@ def _hull(
         some = symbols([f"{letter}{i}_{k}" for k in range(d)])
         return (some[0], some[1], some[2] if d == 3 else sympy.S.Zero)
 
-    inner = two.into(2, _at("p", 1, one, d), d)
+    inner = two.into(SECOND, _at("p", FIRST, one, d), d)
     p = tuple(define(f"inner{k}", x) if k < d else x for k, x in enumerate(inner))
     heights, over = [], []
     for f, face in enumerate(faces):
@@ -223,7 +228,7 @@ def side(one: Frame, two: Frame, d: int) -> Family:
 
 
 def _side(one: Frame, two: Frame, d: int) -> "Formulas":
-    p, v, n = _at("p", 1, one, d), _at("v", 2, two, d), _along("n", 2, two, d)
+    p, v, n = _at("p", FIRST, one, d), _at("v", SECOND, two, d), _along("n", SECOND, two, d)
     return {}, {"gap": dot(n, minus(p, v)) - symbols(["s"])[0]}
 
 
@@ -249,19 +254,19 @@ def _crossing(one: Frame, two: Frame) -> "Formulas":
     names = ("wx", "wy", "wz", "ww", "least")
     wx, wy, wz, ww, least = symbols(names)
     (o,) = symbols(["o"])
-    u, v = _along("u", 1, one, 3), _along("v", 2, two, 3)
+    u, v = _along("u", FIRST, one, 3), _along("v", SECOND, two, 3)
     w = tuple(o * c for c in cross(u, v))
     bound = PARALLEL**2 * dot(u, u) * dot(v, v)
     normal = (wx, wy, wz)
     definitions = dict(zip(names, (*w, dot(normal, normal), bound), strict=True))
-    apart = dot(normal, minus(_at("q", 2, two, 3), _at("p", 1, one, 3)))
+    apart = dot(normal, minus(_at("q", SECOND, two, 3), _at("p", FIRST, one, 3)))
     size = sympy.sqrt(sympy.Piecewise((ww, ww >= least), (least, True)))
     below = {
-        name: -dot(normal, _along(letter, 1, one, 3))
+        name: -dot(normal, _along(letter, FIRST, one, 3))
         for name, letter in zip(SUPPORTS[:2], "lr", strict=True)
     }
     above = {
-        name: dot(normal, _along(letter, 2, two, 3))
+        name: dot(normal, _along(letter, SECOND, two, 3))
         for name, letter in zip(SUPPORTS[2:], "mk", strict=True)
     }
     return definitions, {"gap": apart / size, **below, **above, "angle": ww - least}
@@ -282,7 +287,7 @@ def hollow(one: Frame, d: int) -> Family:
 
 def _hollow(one: Frame, d: int) -> "Formulas":
     (s,) = symbols(["s"])
-    axis = _along("w", 2, Frame.FIXED, d)
-    away = minus(_at("p", 1, one, d), _at("c", 2, Frame.FIXED, d))
+    axis = _along("w", SECOND, Frame.FIXED, d)
+    away = minus(_at("p", FIRST, one, d), _at("c", SECOND, Frame.FIXED, d))
     squared = dot(away, away) - dot(away, axis) ** 2
     return {}, {"gap": (s**2 - squared) / (2 * s)}

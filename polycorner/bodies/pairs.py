@@ -34,8 +34,8 @@ class Member(Value):
 
     Attributes
     ----------
-    name : str
-        Name of the body, and of the part after a dot.
+    body, name : str
+        Name of the body; and that of the part after it and a dot.
     part : Part
     frame : Frame
     axis : (d,) array, optional
@@ -44,6 +44,7 @@ class Member(Value):
         Names of the body's coordinates; empty for fixed ones.
     """
 
+    body: str
     name: str
     part: Part
     frame: Frame
@@ -86,7 +87,7 @@ def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True
     radius = one.part.radius + two.part.radius
     if radius == 0:
         return separated(manifold, one, two)
-    parts = list(_distances(manifold, one, two, radius))
+    parts: list[Tree] = [touch.gap for touch in distances(manifold, one, two)]
     if excluded and len(one.part.points) > 1 and len(two.part.points) > 1 and _can_cross(one, two):
         parts.append(separated(manifold, one, two))
     return parts[0] if len(parts) == 1 else AllOf(*parts)
@@ -97,12 +98,24 @@ def _can_cross(one: Member, two: Member) -> bool:
     return one.part.dimension == 2 or bool(one.part.facets or two.part.facets)
 
 
-def _distances(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+class Touch(NamedTuple):
+    """The gap of a point of one part, or an edge, and another part."""
+
+    gap: SmoothFunction
+    one: Member
+    point: Array | None
+    two: Member
+
+
+def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
+    """Yield the gaps of two parts of which one is rounded."""
+    radius = one.part.radius + two.part.radius
     a, b, d = one.part.points, two.part.points, one.part.dimension
     if len(a) == len(b) == 1:
         numbers = [*one.numbers(a[0]), *two.numbers(b[0]), radius]
         family = gaps.points(one.frame, two.frame, d)
-        yield gap(manifold, family, one, two, numbers, f"{one.name}-{two.name}")
+        function = gap(manifold, family, one, two, numbers, f"{one.name}-{two.name}")
+        yield Touch(function, one, a[0], two)
         return
     if d == 3 and len(a) > 1 and len(b) > 1:
         yield from _rods(manifold, one, two, radius)
@@ -113,17 +126,18 @@ def _distances(manifold: Manifold, one: Member, two: Member, radius: float) -> I
     yield from _from_hull(manifold, two, one, radius)
 
 
-def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
     """Distances of the points of one part from the other, which is a segment."""
     if len(two.part.points) != 2:
         return
     family = gaps.segment(one.frame, two.frame, one.part.dimension)
     for i, p in enumerate(one.part.points):
         numbers = [*one.numbers(p), *two.numbers(*two.part.points), radius]
-        yield gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+        function = gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+        yield Touch(function, one, p, two)
 
 
-def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
     """Distances of the points of one part from the other, which has faces."""
     facets = two.part.facets
     if facets is None:
@@ -134,15 +148,17 @@ def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> I
     shape = [*vertices.ravel().tolist(), *facets.normals.ravel().tolist()]
     for i, p in enumerate(one.part.points):
         numbers = [*one.numbers(p), *shape, radius]
-        yield gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+        function = gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+        yield Touch(function, one, p, two)
 
 
-def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Tree]:
+def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
     """Distances of all edges in space."""
     family = gaps.segments(one.frame, two.frame)
     for (i, first), (j, second) in product(_edges(one), _edges(two)):
         numbers = [*one.numbers(*first), *two.numbers(*second), radius]
-        yield gap(manifold, family, one, two, numbers, f"{one.name}{i}-{two.name}{j}")
+        function = gap(manifold, family, one, two, numbers, f"{one.name}{i}-{two.name}{j}")
+        yield Touch(function, one, None, two)
 
 
 def _edges(member: Member) -> list[tuple[str, Array]]:

@@ -144,8 +144,10 @@ def box(low: ArrayLike, high: ArrayLike) -> dict[str, HalfSpace]:
     return walls
 
 
-def within(manifold: Manifold, name: str, wall: Wall, member: Member) -> list[SmoothFunction]:
-    """Return the gaps of a part and a wall."""
+def within(
+    manifold: Manifold, name: str, wall: Wall, member: Member
+) -> list[tuple[SmoothFunction, Array]]:
+    """Return the gaps of a part and a wall, and the points of the part that they are of."""
     radius = member.part.radius
     if isinstance(wall, Cylinder) and wall.radius <= radius:
         refuse("walls", f"a radius of {name!r} above that of {member.name!r}", wall.radius)
@@ -153,17 +155,12 @@ def within(manifold: Manifold, name: str, wall: Wall, member: Member) -> list[Sm
     points = list(enumerate(member.part.points))
     if isinstance(wall, HalfSpace):
         points = nearest(member, wall.normal, turning=False)
-    return [
-        gap(
-            manifold,
-            family,
-            member,
-            None,
-            [*member.numbers(p), *numbers],
-            f"{member.vertex(i)}-{name}",
-        )
-        for i, p in points
-    ]
+    found = []
+    for i, p in points:
+        label = f"{member.vertex(i)}-{name}"
+        function = gap(manifold, family, member, None, [*member.numbers(p), *numbers], label)
+        found.append((function, p))
+    return found
 
 
 def _vector(argument: str, given: Any, size: int | None = None, *, zero: bool = False) -> Array:

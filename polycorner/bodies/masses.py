@@ -1,0 +1,184 @@
+"""Mass, centre of mass and inertia of bodies of uniform density.
+
+A rounded polygon consists of the polygon, a rectangle on every edge and a sector of a circle at
+every vertex; a capsule in space of a cylinder and two half balls.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from polycorner import checks
+from polycorner.bodies.shapes import Body, Part
+from polycorner.checks import refuse
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+
+@dataclass(frozen=True, eq=False)
+class Mass(Value):
+    """How a rigid body resists forces and torques.
+
+    Parameters
+    ----------
+    mass : float
+    centre : (d,) array
+        The centre of mass, in coordinates of the body.
+    inertia : float or (3, 3) array
+        Moment of inertia about the centre of mass: in the plane a number; in space the matrix in
+        the axes of the body, or three principal moments about these.
+
+    Raises
+    ------
+    ValueError
+        For a mass that is not positive, and for moments that no body has: in space each principal
+        moment is at most the sum of the others.
+    """
+
+    mass: float
+    centre: Array
+    inertia: Any = field(default=0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", checks.real("mass", self.mass, above=0))
+        centre = checks.numbers("centre", self.centre, "2 or 3 numbers")
+        if centre.shape not in {(2,), (3,)} or not np.isfinite(centre).all():
+            refuse("centre", "2 or 3 finite numbers", self.centre)
+        object.__setattr__(self, "centre", centre)
+        if len(centre) == 2:
+            inertia = checks.real("inertia", self.inertia, above=0)
+            object.__setattr__(self, "inertia", inertia)
+        else:
+            object.__setattr__(self, "inertia", _tensor(self.inertia))
+        super().__post_init__()
+
+
+def _tensor(given: Any) -> Array:
+    """Return a matrix of inertia ``(3, 3)``, or raise."""
+    expected = "three moments or a symmetric 3 x 3 matrix"
+    matrix = checks.numbers("inertia", given, expected)
+    matrix = np.diag(matrix) if matrix.shape == (3,) else matrix
+    if matrix.shape != (3, 3) or not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0):
+        refuse("inertia", expected, given)
+    low, middle, high = np.linalg.eigvalsh(matrix)
+    if low <= 0 or high > (low + middle) * (1 + 1e-9):
+        moments = ", ".join(f"{x:.6g}" for x in (low, middle, high))
+        msg = (
+            "inertia: expected positive principal moments, none larger than the sum of the others; "
+            f"got {moments}"
+        )
+        raise ValueError(msg)
+    return (matrix + matrix.T) / 2
+
+
+def mass_of(body: Body, density: float = 1.0) -> Mass:
+    """Return the mass of a body of uniform density, per area in the plane or volume in space.
+
+    Parts that overlap count twice.
+
+    Raises
+    ------
+    NotImplementedError
+        For rounded polyhedra.
+    """
+    density = checks.real("density", density, above=0)
+    pieces = [piece for part in body.parts.values() for piece in _pieces(part)]
+    mass = sum(piece.amount for piece in pieces)
+    centre = np.asarray(sum(piece.amount * piece.centre for piece in pieces)) / mass
+    second = np.zeros((len(centre), len(centre)))
+    for piece in pieces:
+        away = piece.centre - centre
+        second += piece.second + piece.amount * np.outer(away, away)
+    inertia = np.trace(second) * np.eye(len(centre)) - second
+    planar = len(centre) == 2
+    return Mass(density * mass, centre, density * (np.trace(second) if planar else inertia))
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Area or volume, centroid, and second moments ``(d, d)`` about it: integrals of ``x x^T``."""
+
+    amount: float
+    centre: Array
+    second: Array
+
+
+def _pieces(part: Part) -> Iterator[_Piece]:
+    if part.dimension == 2:
+        yield from _planar(part)
+    elif len(part.points) <= 2:
+        yield _rod(part)
+    elif part.radius > 0:
+        msg = "density: expected no rounded polyhedron; give its Mass"
+        raise NotImplementedError(msg)
+    else:
+        middle = part.points.mean(axis=0)
+        for triangle in ConvexHull(part.points).simplices:
+            yield _simplex(np.vstack([middle, part.points[triangle]]))
+
+
+def _planar(part: Part) -> Iterator[_Piece]:
+    points, r = part.points, part.radius
+    for i in range(1, len(points) - 1):
+        yield _simplex(points[[0, i, i + 1]])
+    if r == 0:
+        return
+    if len(points) == 1:
+        yield _Piece(math.pi * r**2, points[0], np.eye(2) * math.pi * r**4 / 4)
+        return
+    after = np.roll(points, -1, axis=0) - points
+    for start, along in zip(points, after, strict=True):
+        length = float(np.linalg.norm(along))
+        t = along / length
+        n = np.array([t[1], -t[0]])
+        second = (np.outer(t, t) * length**2 + np.outer(n, n) * r**2) * length * r / 12
+        yield _Piece(length * r, start + along / 2 + n * r / 2, second)
+    ways = np.arctan2(after[:, 1], after[:, 0])
+    for point, before, way in zip(points, np.roll(ways, 1), ways, strict=True):
+        angle = (way - before) % math.tau
+        bisector = before + angle / 2 - math.pi / 2
+        yield _sector(point, r, angle, np.array([math.cos(bisector), math.sin(bisector)]))
+
+
+def _sector(apex: Array, r: float, angle: float, b: Array) -> _Piece:
+    """Return a sector of a circle about the direction ``b``."""
+    area = angle * r**2 / 2
+    away = 4 * r * math.sin(angle / 2) / (3 * angle)
+    c = np.array([-b[1], b[0]])
+    along, across = (r**4 / 8 * (angle + side * math.sin(angle)) for side in (1, -1))
+    about_apex = np.outer(b, b) * along + np.outer(c, c) * across
+    return _Piece(area, apex + away * b, about_apex - area * away**2 * np.outer(b, b))
+
+
+def _simplex(corners: Array) -> _Piece:
+    """Return a triangle or tetrahedron.
+
+    The integral of ``x x^T`` about the centroid is ``V / ((d + 1) (d + 2))`` times its sum over the
+    corners.
+    """
+    d = corners.shape[1]
+    amount = abs(float(np.linalg.det(corners[1:] - corners[0]))) / math.factorial(d)
+    centre = corners.mean(axis=0)
+    away = corners - centre
+    return _Piece(amount, centre, amount / ((d + 1) * (d + 2)) * away.T @ away)
+
+
+def _rod(part: Part) -> _Piece:
+    """Return a ball or a capsule in space."""
+    r, points = part.radius, part.points
+    ball = 4 * math.pi * r**3 / 3
+    if len(points) == 1:
+        return _Piece(ball, points[0], np.eye(3) * ball * r**2 / 5)
+    along = points[1] - points[0]
+    length = float(np.linalg.norm(along))
+    u = along / length
+    tube = math.pi * r**2 * length
+    # The half balls' centroids are 3 r / 8 outside of the ends of the tube.
+    axial = tube * length**2 / 12 + ball * (r**2 / 5 + length**2 / 4 + 3 * r * length / 8)
+    radial = tube * r**2 / 4 + ball * r**2 / 5
+    uu = np.outer(u, u)
+    return _Piece(tube + ball, points.mean(axis=0), axial * uu + radial * (np.eye(3) - uu))

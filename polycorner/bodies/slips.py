@@ -1,0 +1,131 @@
+"""Slip velocities where a point of one body touches another body or a wall.
+
+With the point ``p`` inside the rounding of radius ``r``, the nearest point ``q`` of the other
+part, and the unit normal ``n`` from ``q`` to ``p``, the bodies touch at ``p - r n``.  The slip is
+the difference of their velocities there along tangents: in the plane ``n`` turned left; in space a
+basis that depends on ``n`` without a singular direction ([Duff]).
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.pairs import Member, Touch
+from polycorner.bodies.poses import Placement
+from polycorner.bodies.walls import HalfSpace, Wall
+from polycorner.motion.contacts import velocities
+from polycorner.motion.rotations import angular_velocity
+from polycorner.spaces.distances import cross, dot, foot, minus, norm
+from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.spaces.distances import Point
+
+
+def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, ...]":
+    """Return one component of the slip of two bodies in the plane, two in space.
+
+    Raises
+    ------
+    NotImplementedError
+        Between edges in space, and at polygons and polyhedra.
+    """
+    if touch.point is None or len(touch.two.part.points) > 2:
+        msg = (
+            f"friction: expected contacts of discs, balls, capsules and walls; got "
+            f"{touch.gap.name!r}, where the nearest points of edges and faces are not covered"
+        )
+        raise NotImplementedError(msg)
+    p = _at(touch.one, touch.point)
+    q, *end = (_at(touch.two, point) for point in touch.two.part.points)
+    if end:
+        along = minus(end[0], q)
+        at = _clamped(foot(p, q, end[0], 1 / dot(along, along)))
+        q = (q[0] + at * along[0], q[1] + at * along[1], q[2] + at * along[2])
+    apart = minus(p, q)
+    normal = _scaled(apart, 1 / norm(apart))
+    return _slip(placements, touch.one, p, normal, touch.two)
+
+
+def slip_at_wall(
+    placements: dict[str, Placement], wall: Wall, member: Member, point: Array
+) -> "tuple[sympy.Expr, ...]":
+    """Return the slip of a point of a body at a wall."""
+    p = _at(member, point)
+    if isinstance(wall, HalfSpace):
+        normal = _fixed(wall.normal)
+    else:
+        away = minus(p, _fixed(wall.point))
+        if wall.axis is not None:
+            axis = _fixed(wall.axis)
+            away = minus(away, _scaled(axis, dot(away, axis)))
+        normal = _scaled(away, -1 / norm(away))
+    return _slip(placements, member, p, normal, None)
+
+
+def _slip(
+    placements: dict[str, Placement], one: Member, p: "Point", normal: "Point", two: Member | None
+) -> "tuple[sympy.Expr, ...]":
+    place = minus(p, _scaled(normal, one.part.radius))
+    velocity = _velocity(placements, one, place)
+    if two is not None:
+        velocity = minus(velocity, _velocity(placements, two, place))
+    if one.part.dimension == 2:
+        return (normal[0] * velocity[1] - normal[1] * velocity[0],)
+    return tuple(dot(tangent, velocity) for tangent in _tangents(normal))
+
+
+def _velocity(placements: dict[str, Placement], member: Member, place: "Point") -> "Point":
+    """Return the velocity that a place has as a point of a body."""
+    import sympy
+
+    zero = sympy.S.Zero
+    if member.frame is Frame.FIXED:
+        return (zero, zero, zero)
+    manifold = placements[member.body].manifold
+    d = member.part.dimension
+    rates = velocities(manifold)
+    centre = (*manifold.symbols[:d], zero)
+    moving = (*rates[:d], zero)
+    spin: Point = (zero, zero, zero)
+    if member.frame is Frame.TURNED:
+        spin = (zero, zero, rates[d])
+    elif member.frame is Frame.ROTATED:
+        x, y, z = angular_velocity(manifold, frame="space")
+        spin = (x, y, z)
+    turning = cross(spin, minus(place, (centre[0], centre[1], centre[2])))
+    return (moving[0] + turning[0], moving[1] + turning[1], moving[2] + turning[2])
+
+
+def _tangents(n: "Point") -> "tuple[Point, Point]":
+    """Return two unit vectors orthogonal to a unit vector and to each other."""
+    import sympy
+
+    x, y, z = n
+    side = sympy.Piecewise((1, z >= 0), (-1, True))
+    a = -1 / (side + z)
+    b = x * y * a
+    return (1 + side * x**2 * a, side * b, -side * x), (b, side + y**2 * a, -y)
+
+
+def _clamped(at: "sympy.Expr") -> "sympy.Expr":
+    """Return a position on a segment, without the branches that a condition must not contain."""
+    import sympy
+
+    return sympy.Min(sympy.Max(at, 0, evaluate=False), 1, evaluate=False)
+
+
+def _at(member: Member, point: Array) -> "Point":
+    return member.frame.point(member.body, member.numbers(point), member.part.dimension)
+
+
+def _fixed(vector: Array) -> "Point":
+    x, y, z = np.append(vector, np.zeros(3 - len(vector))).tolist()
+    return (x, y, z)
+
+
+def _scaled(vector: "Point", factor: "sympy.Expr | float") -> "Point":
+    return (factor * vector[0], factor * vector[1], factor * vector[2])

@@ -1,0 +1,225 @@
+"""Motion of arrangements: inertia against samples, known motions, conservation laws."""
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from polycorner import simulate
+from polycorner.bodies import (
+    Arrangement,
+    Cylinder,
+    HalfSpace,
+    Mass,
+    capsule,
+    compound,
+    disc,
+    mass_of,
+    polygon,
+    polytope,
+    sphere,
+)
+
+TRIANGLE = [[0, 0], [2, 0], [1, 1.5]]
+SIMPLEX = [[0, 0, 0], [1, 0, 0], [0, 2, 0], [0.3, 0, 1]]
+GROUND = {"ground": HalfSpace([0, 1], [0, 0])}
+FLOOR = {"floor": HalfSpace([0, 0, 1], [0, 0, 0])}
+
+
+def distance_from(part, points):
+    """Distances of points from a part's hull, from its segments and half-spaces."""
+    corners = part.points
+    if len(corners) == 1:
+        return np.linalg.norm(points - corners[0], axis=1)
+    if len(corners) > 2:
+        hull = ConvexHull(corners)
+        outside = (points @ hull.equations[:, :-1].T + hull.equations[:, -1]).max(axis=1)
+        if part.radius == 0:
+            return np.maximum(outside, 0)
+    found = []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        along = end - start
+        at = np.clip((points - start) @ along / (along @ along), 0, 1)
+        found.append(np.linalg.norm(points - start - at[:, None] * along, axis=1))
+    away = np.min(found, axis=0)
+    return np.where(outside <= 0, 0, away) if len(corners) > 2 else away
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        disc(0.7, at=[1, 1]),
+        capsule([0, 0], [1, 2], 0.3),
+        polygon(TRIANGLE),
+        polygon(TRIANGLE, 0.4),
+        sphere(0.5, at=[1, 0, 0]),
+        capsule([0, 0, 0], [1, 2, 1], 0.3),
+        polytope(SIMPLEX),
+    ],
+)
+def test_mass_centre_and_inertia_are_those_of_samples(body):
+    rng, count = np.random.default_rng(0), 400_000
+    (part,) = body.parts.values()
+    low, high = part.points.min(axis=0) - part.radius, part.points.max(axis=0) + part.radius
+    points = low + (high - low) * rng.random((count, body.dimension))
+    inside = points[distance_from(part, points) <= part.radius]
+    volume = np.prod(high - low) * len(inside) / count
+    away = inside - inside.mean(axis=0)
+    second = volume * away.T @ away / len(inside)
+    found = mass_of(body, density=2.0)
+    assert found.mass == pytest.approx(2 * volume, rel=0.01)
+    np.testing.assert_allclose(found.centre, inside.mean(axis=0), atol=0.01)
+    trace = np.trace(second)
+    expected = trace if body.dimension == 2 else trace * np.eye(3) - second
+    np.testing.assert_allclose(found.inertia, 2 * expected, atol=0.015 * 2 * trace)
+
+
+def test_a_compound_has_the_inertia_of_its_parts():
+    ball = mass_of(sphere(0.5))
+    dumbbell = mass_of(compound([sphere(0.5, at=[0, 0, z]) for z in (-1, 1)]))
+    assert dumbbell.mass == pytest.approx(2 * ball.mass)
+    across = 2 * (ball.inertia[0, 0] + ball.mass)
+    np.testing.assert_allclose(
+        dumbbell.inertia, np.diag([across, across, 2 * ball.inertia[2, 2]]), atol=1e-12
+    )
+
+
+def run(a, system, placed, v, t_end, dt=1e-3):
+    return simulate(system, system.state(a.point(placed), v), t_end, dt)
+
+
+def test_a_ball_rolls_down_a_slope():
+    """At 5/7 of the acceleration of one that slides, and it turns about the right axis."""
+    a = Arrangement({"A": sphere(0.5)}, FLOOR, orientations="all")
+    system = a.system(gravity=[1.0, 0, -5.0], friction=0.4)
+    path = run(a, system, {"A": [0, 0, 0.5]}, np.zeros(7), 1.0)
+    np.testing.assert_allclose(path.v[-1, 0, :3], [5 / 7, 0, 0], atol=1e-9)
+    turned = path.q[-1, 0, 3:]
+    angle = 2 * np.arctan2(turned[2], turned[0])
+    assert angle == pytest.approx(path.q[-1, 0, 0] / 0.5, abs=2e-3)
+
+
+def test_a_square_slides_and_a_rounded_one_tips():
+    """Pushed by a tilted weight: it slides beyond the coefficient of friction, sticks below."""
+    square = polygon([[-1, -0.2], [1, -0.2], [1, 0.2], [-1, 0.2]])
+    a = Arrangement({"A": square}, GROUND, orientations="all")
+    for push, expected in ((2.0, 0.0), (4.0, 1.0)):
+        system = a.system(gravity=[push, -10.0], friction=0.3)
+        path = run(a, system, {"A": [0, 0.2]}, np.zeros(3), 1.0)
+        np.testing.assert_allclose(path.v[-1, 0], [expected, 0, 0], atol=1e-9)
+
+
+def test_a_disc_slides_around_a_circle_as_a_pendulum_swings():
+    a = Arrangement({"A": disc(0.2)}, {"ring": Cylinder(1.2)})
+    system = a.system(gravity=[0.0, -1.0])
+    start = [np.sin(0.01), -np.cos(0.01)]
+    path = run(a, system, {"A": start}, np.zeros(2), np.pi, 1e-3)
+    assert path.q[-1, 0, 0] == pytest.approx(-np.sin(0.01), rel=1e-3)
+
+
+def momenta(a, masses, q, v):
+    """Linear and angular momentum, from centres of mass and angular velocities."""
+    d = a.dimension
+    linear, angular = np.zeros(d), np.zeros(1 if d == 2 else 3)
+    h = 1e-6
+    for p in a.placements:
+        mass = masses[p.name]
+        ends = [p.pose(q + side * h * v) for side in (1, -1)]
+        centre, matrix = p.pose(q)
+        moved = [origin + turn @ mass.centre for origin, turn in ends]
+        velocity = (moved[0] - moved[1]) / (2 * h)
+        spin = (ends[0][1] - ends[1][1]) / (2 * h) @ matrix.T
+        place = centre + matrix @ mass.centre
+        linear += mass.mass * velocity
+        if d == 2:
+            angular += mass.mass * np.cross([*place, 0], [*velocity, 0])[2:]
+            angular += mass.inertia * spin[1, 0]
+        else:
+            omega = np.array([spin[2, 1], spin[0, 2], spin[1, 0]])
+            angular += mass.mass * np.cross(place, velocity)
+            angular += matrix @ mass.inertia @ matrix.T @ omega
+    return np.concatenate([linear, angular])
+
+
+PAIRS = {
+    "discs": (disc(0.5), disc(0.8)),
+    "capsules": (capsule([-1, 0], [1, 0], 0.3), capsule([-0.5, 0.2], [0.7, 0], 0.2)),
+    "compounds": (compound([disc(0.3, at=[-1, 0]), disc(0.5, at=[1, 0])]), disc(0.4, at=[0.2, 0])),
+    "balls": (sphere(0.5), sphere(0.8)),
+    "ball and capsule": (sphere(0.5), capsule([0.2, -0.6, 0], [0, 0.7, 0], 0.3)),
+}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.7])
+@pytest.mark.parametrize("pair", PAIRS)
+def test_collisions_keep_momentum_and_angular_momentum(pair, friction):
+    one, two = PAIRS[pair]
+    a = Arrangement({"A": one, "B": two}, orientations="all")
+    system = a.system(friction=friction, restitution=0.0 if friction else 1.0)
+    masses = {name: mass_of(body) for name, body in a.named.items()}
+    d = a.dimension
+    away = np.array([3.0, 0.3]) if d == 2 else np.array([3.0, 0.3, 0.2])
+    q = a.point({"A": np.zeros(d), "B": away})
+    v = np.zeros(a.manifold.size)
+    for p in a.placements:
+        spin = (
+            [0.7]
+            if d == 2
+            else a.manifold.frame(q)[p.at.start + 3 : p.at.stop, :]
+            @ (np.linspace(0.4, -0.8, a.manifold.dimension))
+        )
+        v[p.at.start + d : p.at.stop] = spin
+        v[p.at.start] = 2.0 if p.name == "A" else -1.0
+    path = simulate(system, system.state(q, v), 1.2, 1e-4)
+    assert path.events
+    before = momenta(a, masses, path.q[0, 0], path.v[0, 0])
+    after = momenta(a, masses, path.q[-1, 0], path.v[-1, 0])
+    np.testing.assert_allclose(after, before, atol=2e-3 * np.abs(before).max())
+    kinetic = [path.kinetic[k] for k in (0, -1)]
+    assert kinetic[1] < kinetic[0] + 1e-3
+    if not friction:
+        assert kinetic[1] == pytest.approx(kinetic[0], rel=2e-3)
+
+
+def test_a_capsule_falls_on_another_and_lies_still():
+    rod = capsule([-1, 0, 0], [1, 0, 0], 0.2)
+    a = Arrangement({"A": rod}, FLOOR)
+    system = a.system(gravity=[0, 0, -10.0])
+    turn = Rotation.from_euler("y", 0.5)
+    path = run(a, system, {"A": ([0, 0, 1.0], turn)}, np.zeros(6), 3.0)
+    assert path.q[-1, 0, 2] == pytest.approx(0.2, abs=1e-6)
+    assert path.q[-1, 0, 5] == pytest.approx(0.0, abs=1e-6)
+
+
+def masses(mass, centre, inertia):
+    return lambda: Mass(mass, centre, inertia)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "said"),
+    [
+        (lambda: Arrangement([polygon(TRIANGLE)] * 2).system(), NotImplementedError, "rounded"),
+        (lambda: Arrangement([disc(1)] * 2).system(friction=0.1), ValueError, "orientations"),
+        (lambda: Arrangement([disc(1)] * 2).system(friction=-1), ValueError, "friction"),
+        (lambda: Arrangement([disc(1)] * 2).system(gravity=[1, 2, 3]), ValueError, "gravity"),
+        (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
+        (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),
+        (lambda: Arrangement([disc(1)] * 2).system(masses={"1": 1}), TypeError, "masses"),
+        (masses(0, [0, 0], 1), ValueError, "mass"),
+        (masses(1, [0, 0], 0), ValueError, "inertia"),
+        (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),
+        (masses(1, [0, 0, 0], [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), ValueError, "inertia"),
+        (masses(1, [0], 1), ValueError, "centre"),
+        (lambda: mass_of(polytope(SIMPLEX, 0.1)), NotImplementedError, "Mass"),
+        (
+            lambda: Arrangement([polygon(TRIANGLE, 0.1), disc(1)], orientations="all").system(
+                friction=0.2
+            ),
+            NotImplementedError,
+            "friction",
+        ),
+    ],
+)
+def test_what_is_not_covered_is_refused(make, kind, said):
+    with pytest.raises(kind, match=said):
+        make()
