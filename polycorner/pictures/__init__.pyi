@@ -1,3 +1,4 @@
+from .arrangements import draw_arrangement
 from .clusters import draw_clusters, draw_motion
 from .disks import draw_critical
 from .packings import draw_packing
@@ -22,6 +23,7 @@ __all__ = [
     "SharpSurface",
     "View",
     "components_of_complement",
+    "draw_arrangement",
     "draw_cells",
     "draw_clusters",
     "draw_critical",
