@@ -204,11 +204,9 @@ def polygon(vertices: ArrayLike, radius: float = 0.0) -> Body:
     points = _points("vertices", vertices, 2)
     if len(points) < 3:
         refuse("vertices", "at least three", vertices)
-    after = np.roll(points, -1, axis=0) - points
-    before = np.roll(after, 1, axis=0)
-    turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    if np.sum(turns) < 0:
-        points, turns = points[::-1], -turns[::-1]
+    if _turns(points)[0].sum() < 0:
+        points = points[::-1]
+    turns, ways = _turns(points)
     flat = FLAT * np.ptp(points, axis=0).max() ** 2
     if turns.min() <= flat:
         k = int(np.argmin(turns))
@@ -219,12 +217,18 @@ def polygon(vertices: ArrayLike, radius: float = 0.0) -> Body:
             f"got a turn {wrong} at ({place})"
         )
         raise ValueError(msg)
-    ways = np.arctan2(after[:, 1], after[:, 0])
-    turned = float(np.mod(np.diff(ways, append=ways[0]), math.tau).sum())
-    if turned > 1.5 * math.tau:
+    if np.mod(np.diff(ways, append=ways[0]), math.tau).sum() > 1.5 * math.tau:
         msg = "vertices: expected the vertices of a convex polygon in order; got a star"
         raise ValueError(msg)
     return _simple(points, checks.real("radius", radius, least=0))
+
+
+def _turns(points: Array) -> tuple[Array, Array]:
+    """Return how much a polygon turns left at each vertex, as areas, and its edges' headings."""
+    after = np.roll(points, -1, axis=0) - points
+    before = np.roll(after, 1, axis=0)
+    turns = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return turns, np.arctan2(after[:, 1], after[:, 0])
 
 
 def polytope(vertices: ArrayLike, radius: float = 0.0) -> Body:

@@ -1,6 +1,7 @@
 from .abundance import Richness, richness
 from .certificate import Certificate, certify
 from .crossings import Crossing, crossing
+from .immobility import Immobility, Mobility, immobility
 from .lemma import Condition, Residuals
 from .methods import minimise, stationary_on
 from .multistart import minima
@@ -14,7 +15,9 @@ __all__ = [
     "Condition",
     "Crossing",
     "Entrapment",
+    "Immobility",
     "Minima",
+    "Mobility",
     "Problem",
     "Residuals",
     "Richness",
@@ -22,6 +25,7 @@ __all__ = [
     "Verdict",
     "certify",
     "crossing",
+    "immobility",
     "minima",
     "minimise",
     "richness",

@@ -81,6 +81,9 @@ class CornerRegistry:
             self.note(f"a walk ended outside the polyhedron at {written_point(point.q)}", lost=True)
             return None
         point = self._polished(point, active)
+        if self.polyhedron.is_union:
+            # Functions that vanish to rounding now may have been out of tolerance before.
+            active = point.active() or active
         key = self._key(point.q)
         for k in self._alike(point.q, key):
             record = self.records[k]
