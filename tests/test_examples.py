@@ -2,6 +2,7 @@
 
 import math
 import re
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,14 @@ from examples import (
     ex18_packing,
     ex19_all_equilibria,
     ex20_rigid_clusters,
+    ex21_docking,
+    ex22_sliding_squares,
+    ex23_gripper,
 )
+from polycorner import stratum_at
+from polycorner.minimisation import Mobility
 from polycorner.polyhedra import LocalType
+from tests.support.divisions import divisions
 
 ROOT = Path(__file__).parents[1]
 
@@ -209,3 +216,54 @@ def test_impacts_and_stacks():
     assert result.apart == pytest.approx([0, 0, 1], abs=1e-12)
     assert result.kept == pytest.approx(result.housner, abs=5e-3)
     assert result.moved == (0, 0)
+
+
+@pytest.mark.parametrize(("first", "second"), [(2, 2), (3, 2), (3, 3), (4, 2), (4, 3)])
+def test_docking(first, second):
+    """As many dockings as divisions of rigid clusters; each edge joins two of them."""
+    _, found = ex21_docking.main(first, second)
+    assert len(found.corners) == divisions(first, second)
+    assert not any(edge.is_closed for edge in found.edges)
+
+
+def test_docking_figure(tmp_path):
+    ex21_docking.draw(*ex21_docking.main(2, 2), tmp_path / "docking.png")
+    assert (tmp_path / "docking.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_sliding_squares():
+    """All corners, by solving for every four functions, which are linear."""
+    squares, found = ex22_sliding_squares.main(2)
+    d = squares.polyhedron
+    rows, offsets = d.gradients(np.zeros(4)), d.values(np.zeros(4))
+    expected = set()
+    for some in combinations(range(len(rows)), 4):
+        if abs(np.linalg.det(rows[list(some)])) < 0.5:
+            continue
+        q = np.linalg.solve(rows[list(some)], -offsets[list(some)])
+        if d.contains(q, tolerance=1e-9) and stratum_at(d, q).dimension == 0:
+            expected.add(tuple(np.round(q, 6) + 0.0))
+    assert {tuple(np.round(c.point, 6) + 0.0) for c in found.corners} == expected
+
+
+@pytest.mark.slow
+def test_three_sliding_squares_have_two_components():
+    squares, found = ex22_sliding_squares.main(3)
+    reached = {tuple(np.round(c.point, 6) + 0.0) for c in found.corners}
+    exchanged = {q[2:4] + q[:2] + q[4:] for q in reached}
+    turned = {q[2:] + q[:2] for q in reached}
+    assert not reached & exchanged
+    assert reached == turned
+    assert all(squares.polyhedron.contains(q, tolerance=1e-5) for q in exchanged)
+
+
+def test_gripper(tmp_path):
+    grips = ex23_gripper.main()
+    assert {name: held.mobility for name, (_, held) in grips.items()} == {
+        "five fingers": Mobility.FIRST_ORDER,
+        "three fingers": Mobility.SECOND_ORDER,
+        "pinwheel": Mobility.MOBILE,
+        "notched jaws": Mobility.FIRST_ORDER,
+        "flat jaws": Mobility.MOBILE,
+    }
+    assert len(ex23_gripper.draw(grips, tmp_path)) == 5

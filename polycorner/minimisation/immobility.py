@@ -12,14 +12,15 @@ such that ``df_i v >= 0`` and ``dh_j v = 0``.
   ``L < 0`` to second order ([RB], [CW]).
 - *Mobile*: if ``v`` in ``C`` and ``w`` have ``df_i w + v' d2f_i v > 0`` wherever ``df_i v = 0``,
   and ``dh_j w + v' d2h_j v = 0`` with independent ``dh_j``, then ``D`` contains a curve
-  ``q + t v + t^2 w / 2 + ...``.
+  ``q + t v + t^2 w / 2 + ...``.  Or no function falls along a line (a great circle) from ``q``, as
+  where a flat side slides: compared at three points, to rounding.
 
 A positive ``lam_i`` has ``df_i v = 0`` on all of ``C``, so that ``L`` matters on its span only.
 Where second derivatives jump, as where a contact reaches the end of an edge, only the first order
 counts.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -34,6 +35,8 @@ from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 NEARBY = 1e-5  # displacement, in scale units, across which second derivatives may jump
+LINE = (1e-3, 1e-2, 1e-1)  # where points of a line are compared, in scale units
+ROUNDING = 1e-12  # by which functions may fall along it
 JUMP = 1e-2  # change of a scaled second derivative that counts as one
 
 
@@ -42,7 +45,7 @@ class Mobility(Enum):
 
     FIRST_ORDER = "immobile to first order: form closure (Reuleaux)"
     SECOND_ORDER = "immobile to second order, by a stress (Rimon and Burdick)"
-    MOBILE = "mobile: a motion leaves the point, to first or second order"
+    MOBILE = "mobile: a motion leaves the point"
     UNDECIDED = "undecided: neither first nor second order tells"
 
 
@@ -141,7 +144,7 @@ def _of_pieces(
         units = gradients / lengths
         local = _Local(units[rows], units[held], hessians[rows + held])
         smooth = not (jumps[rows + held] > JUMP * np.maximum(1, abs(hessians[rows + held]))).any()
-        answer = local.answer(smooth=smooth)
+        answer = local.answer(lambda v: _slides(polyhedron, q, v), smooth=smooth)
         weights = zip([*piece, *names[count:]], answer.weights, strict=False)
         per = lengths[rows + held, 0]
         stress = {name: w / size for (name, w), size in zip(weights, per, strict=False)}
@@ -155,6 +158,13 @@ def _jumps(polyhedron: Polyhedron, q: Array) -> Array:
     steps = NEARBY * polyhedron.manifold.scale_array * rng.uniform(-1, 1, (16, len(q)))
     hessians = polyhedron.bundle.evaluate(q + steps, 2)[2]
     return np.asarray(np.ptp(hessians, axis=0))
+
+
+def _slides(polyhedron: Polyhedron, q: Array, v: Array) -> bool:
+    """Whether points along a line, in scaled coordinates, are in the polyhedron up to rounding."""
+    manifold = polyhedron.manifold
+    ways = np.array(LINE)[:, None] * v * manifold.scale_array
+    return bool(np.all(polyhedron.contains(manifold.moved(q, ways), tolerance=ROUNDING)))
 
 
 @dataclass(frozen=True)
@@ -172,8 +182,11 @@ class _Local:
     equations: Array
     bends: Array
 
-    def answer(self, *, smooth: bool) -> _Answer:
-        """Return the verdict; to first order only if second derivatives jump."""
+    def answer(self, slides: Callable[[Array], bool], *, smooth: bool) -> _Answer:
+        """Return the verdict; to first order only if second derivatives jump.
+
+        ``slides`` says whether no function falls along a line.
+        """
         nothing = np.empty(0)
         tight, inner = self._tight()
         if not tight and inner.any():
@@ -187,7 +200,7 @@ class _Local:
         if largest < -RANK_TOLERANCE:
             return _Answer(Mobility.SECOND_ORDER, weights)
         for v in self._candidates(span, inner, weights):
-            if self._moves(v):
+            if self._moves(v) or slides(v):
                 return _Answer(Mobility.MOBILE, nothing, v)
         return _Answer(Mobility.UNDECIDED, nothing)
 
