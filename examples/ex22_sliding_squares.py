@@ -8,7 +8,7 @@ The squares slide without turning, so that two of them are apart if one of four 
 them: a union, and the polyhedron is made of flat pieces that meet at concave corners.  Three
 squares leave one place free.  They follow each other around the box, in one of two cyclic orders
 that no motion exchanges: the placements have two components, each homotopy equivalent to a circle,
-as the cubical complex of Alpert, Bauer, Kahle, MacPherson and Spendlove (2023) shows.
+as the cubical complex of Alpert, Bauer, Kahle, MacPherson and Spendlove ([ABKMS]) shows.
 
 Run it to draw corners: ``python examples/ex22_sliding_squares.py [FOLDER]``.
 """

@@ -18,6 +18,7 @@ ROOMS = (
     "polycorner.minimisation",
     "polycorner.proofs",
     "polycorner.motion",
+    "polycorner.bodies",
     "polycorner.models",
     "polycorner.files",
     "polycorner.sweeps",

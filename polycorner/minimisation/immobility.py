@@ -57,8 +57,8 @@ class Immobility(Value):
     ----------
     mobility : Mobility
     stress : mapping from str to float
-        Of functions and equations: weights, those of functions positive, whose gradients balance.
-        They hold the point to second order; empty otherwise.
+        Of functions and equations: weights whose gradients balance, those of functions at least
+        zero with the sum 1.  They hold the point to second order; empty otherwise.
     motion : (N,) array, optional
         The velocity of a motion that leaves the point, in the manifold's coordinates.
     """
@@ -145,9 +145,9 @@ def _of_pieces(
         local = _Local(units[rows], units[held], hessians[rows + held])
         smooth = not (jumps[rows + held] > JUMP * np.maximum(1, abs(hessians[rows + held]))).any()
         answer = local.answer(lambda v: _slides(polyhedron, q, v), smooth=smooth)
-        weights = zip([*piece, *names[count:]], answer.weights, strict=False)
-        per = lengths[rows + held, 0]
-        stress = {name: w / size for (name, w), size in zip(weights, per, strict=False)}
+        forces = answer.weights / lengths[rows + held, 0] if len(answer.weights) else answer.weights
+        total = forces[: len(rows)].sum() or 1.0
+        stress = dict(zip([*piece, *names[count:]], (forces / total).tolist(), strict=False))
         motion = None if answer.motion is None else answer.motion * scales
         yield Immobility(answer.mobility, stress, motion)
 
