@@ -99,12 +99,16 @@ def _can_cross(one: Member, two: Member) -> bool:
 
 
 class Touch(NamedTuple):
-    """The gap of a point of one part, or an edge, and another part."""
+    """The gap of two parts, and which of their features it is the distance of.
+
+    Features are one point ``(1, d)``, two ends of an edge ``(2, d)``, or all points of a hull.
+    """
 
     gap: SmoothFunction
     one: Member
-    point: Array | None
+    first: Array
     two: Member
+    second: Array
 
 
 def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
@@ -115,7 +119,7 @@ def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
         numbers = [*one.numbers(a[0]), *two.numbers(b[0]), radius]
         family = gaps.points(one.frame, two.frame, d)
         function = gap(manifold, family, one, two, numbers, f"{one.name}-{two.name}")
-        yield Touch(function, one, a[0], two)
+        yield Touch(function, one, a, two, b)
         return
     if d == 3 and len(a) > 1 and len(b) > 1:
         yield from _rods(manifold, one, two, radius)
@@ -134,7 +138,7 @@ def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -
     for i, p in enumerate(one.part.points):
         numbers = [*one.numbers(p), *two.numbers(*two.part.points), radius]
         function = gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
-        yield Touch(function, one, p, two)
+        yield Touch(function, one, p[None], two, two.part.points)
 
 
 def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
@@ -149,7 +153,7 @@ def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> I
     for i, p in enumerate(one.part.points):
         numbers = [*one.numbers(p), *shape, radius]
         function = gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
-        yield Touch(function, one, p, two)
+        yield Touch(function, one, p[None], two, two.part.points)
 
 
 def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
@@ -158,7 +162,7 @@ def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterat
     for (i, first), (j, second) in product(_edges(one), _edges(two)):
         numbers = [*one.numbers(*first), *two.numbers(*second), radius]
         function = gap(manifold, family, one, two, numbers, f"{one.name}{i}-{two.name}{j}")
-        yield Touch(function, one, None, two)
+        yield Touch(function, one, first, two, second)
 
 
 def _edges(member: Member) -> list[tuple[str, Array]]:

@@ -13,7 +13,7 @@ import numpy as np
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.pairs import Member, Touch
 from polycorner.bodies.poses import Placement
-from polycorner.bodies.walls import HalfSpace, Wall
+from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
 from polycorner.motion.contacts import velocities
 from polycorner.motion.rotations import angular_velocity
 from polycorner.spaces.distances import cross, dot, foot, minus, norm
@@ -31,29 +31,29 @@ def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, .
     Raises
     ------
     NotImplementedError
-        Between edges in space, and at polygons and polyhedra.
+        Between edges in space, whose nearest points would make formulas of a hundred thousand
+        terms, and at the sides of polygons and polyhedra.
     """
-    if touch.point is None or len(touch.two.part.points) > 2:
+    if len(touch.first) > 1 or len(touch.second) > 2:
         msg = (
-            f"friction: expected contacts of discs, balls, capsules and walls; got "
-            f"{touch.gap.name!r}, where the nearest points of edges and faces are not covered"
+            "friction: expected contacts of a disc, a ball or an end of a capsule with one of "
+            f"these, a capsule or a wall; got {touch.gap.name!r}"
         )
         raise NotImplementedError(msg)
-    p = _at(touch.one, touch.point)
-    q, *end = (_at(touch.two, point) for point in touch.two.part.points)
-    if end:
-        along = minus(end[0], q)
-        at = _clamped(foot(p, q, end[0], 1 / dot(along, along)))
+    p, q = _at(touch.one, touch.first[0]), _at(touch.two, touch.second[0])
+    if len(touch.second) > 1:
+        end = _at(touch.two, touch.second[1])
+        along = minus(end, q)
+        at = _clamped(foot(p, q, end, 1 / dot(along, along)))
         q = (q[0] + at * along[0], q[1] + at * along[1], q[2] + at * along[2])
     apart = minus(p, q)
-    normal = _scaled(apart, 1 / norm(apart))
-    return _slip(placements, touch.one, p, normal, touch.two)
+    return _slip(placements, touch.one, p, _scaled(apart, 1 / norm(apart)), touch.two)
 
 
 def slip_at_wall(
     placements: dict[str, Placement], wall: Wall, member: Member, point: Array
 ) -> "tuple[sympy.Expr, ...]":
-    """Return the slip of a point of a body at a wall."""
+    """Return the slip of a point of a body at a wall, which may turn."""
     p = _at(member, point)
     if isinstance(wall, HalfSpace):
         normal = _fixed(wall.normal)
@@ -63,16 +63,24 @@ def slip_at_wall(
             axis = _fixed(wall.axis)
             away = minus(away, _scaled(axis, dot(away, axis)))
         normal = _scaled(away, -1 / norm(away))
-    return _slip(placements, member, p, normal, None)
+    return _slip(placements, member, p, normal, wall)
 
 
 def _slip(
-    placements: dict[str, Placement], one: Member, p: "Point", normal: "Point", two: Member | None
+    placements: dict[str, Placement],
+    one: Member,
+    p: "Point",
+    normal: "Point",
+    two: Member | Wall,
 ) -> "tuple[sympy.Expr, ...]":
     place = minus(p, _scaled(normal, one.part.radius))
     velocity = _velocity(placements, one, place)
-    if two is not None:
+    if isinstance(two, Member):
         velocity = minus(velocity, _velocity(placements, two, place))
+    elif isinstance(two, Cylinder) and two.spin:
+        axis = (0.0, 0.0, 1.0) if two.axis is None else _fixed(two.axis)
+        around = cross(_scaled(axis, two.spin), minus(place, _fixed(two.point)))
+        velocity = minus(velocity, around)
     if one.part.dimension == 2:
         return (normal[0] * velocity[1] - normal[1] * velocity[0],)
     return tuple(dot(tangent, velocity) for tangent in _tangents(normal))

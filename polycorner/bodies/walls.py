@@ -75,11 +75,15 @@ class Cylinder(Value):
         The direction of the axis of a cylinder in space; without it, a circle or a sphere.
     point : (d,) array, optional
         A point of the axis, or the centre; default the origin.  Needed for a sphere.
+    spin : float, optional
+        Angular velocity of the wall about its axis, in rad/s; of a circle counterclockwise.
+        Friction drags bodies along.  Default 0; a sphere does not turn.
     """
 
     radius: float
     axis: Array | None = None
     point: Array = field(default_factory=lambda: np.zeros(2))
+    spin: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", checks.real("radius", self.radius, above=0))
@@ -91,6 +95,9 @@ class Cylinder(Value):
                 point = np.zeros(3)
         d = 3 if self.axis is not None else np.size(point)
         object.__setattr__(self, "point", _vector("point", point, d, zero=True))
+        object.__setattr__(self, "spin", checks.real("spin", self.spin))
+        if self.spin and self.axis is None and d == 3:
+            refuse("spin", "0 for a sphere, which has no axis", self.spin)
         super().__post_init__()
 
     @property

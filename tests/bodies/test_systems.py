@@ -117,6 +117,31 @@ def test_a_disc_slides_around_a_circle_as_a_pendulum_swings():
     assert path.q[-1, 0, 0] == pytest.approx(-np.sin(0.01), rel=1e-3)
 
 
+def test_a_disc_in_a_turning_circle_rolls_in_place_or_is_carried():
+    """It stays where gravity balances friction on a smooth bearing: nowhere but at the bottom."""
+    a = Arrangement({"A": disc(0.2)}, {"ring": Cylinder(1.2, spin=2.0)}, orientations="all")
+    system = a.system(gravity=[0.0, -10.0], friction=0.8)
+    path = run(a, system, {"A": [0, -1.0]}, np.array([0, 0, 2.0 * 1.2 / 0.2]), 1.0)
+    np.testing.assert_allclose(path.q[-1, 0, :2], [0, -1], atol=1e-6)
+    assert path.v[-1, 0, 2] == pytest.approx(12.0)
+
+
+def test_a_ball_in_a_turning_pipe_keeps_the_pipes_pace():
+    """Without weight it is carried around by the wall once it rolls: no slip at the contact."""
+    pipe = {"pipe": Cylinder(1.0, axis=[0, 0, 1], spin=1.5)}
+    a = Arrangement({"A": sphere(0.2)}, pipe, orientations="all")
+    system = a.system(gravity=[0, -10.0, 0], friction=0.8)
+    path = run(a, system, {"A": [0, -0.8, 0]}, np.zeros(7), 3.0)
+    # At the bottom the wall moves with 1.5 along x; the ball rolls beneath it.
+    q, v = path.q[-1, 0], path.v[-1, 0]
+    turn = a.manifold.frame(q)[3:, 3:]
+    body_omega = np.linalg.lstsq(turn, v[3:], rcond=None)[0]
+    omega = Rotation.from_quat(q[[4, 5, 6, 3]]).apply(body_omega)
+    down = q[:3] * [1, 1, 0] / 0.8
+    slip = v[:3] + np.cross(omega, 0.2 * down) - np.cross([0, 0, 1.5], down)
+    np.testing.assert_allclose(slip - (slip @ down) * down, 0, atol=1e-4)
+
+
 def momenta(a, masses, q, v):
     """Linear and angular momentum, from centres of mass and angular velocities."""
     d = a.dimension
@@ -205,6 +230,13 @@ def masses(mass, centre, inertia):
         (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"1": 1}), TypeError, "masses"),
+        (
+            lambda: Arrangement([capsule([0, 0, 0], [1, 0, 0], 1)] * 2, orientations="all").system(
+                friction=0.2
+            ),
+            NotImplementedError,
+            "friction",
+        ),
         (masses(0, [0, 0], 1), ValueError, "mass"),
         (masses(1, [0, 0], 0), ValueError, "inertia"),
         (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),
