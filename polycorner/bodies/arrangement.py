@@ -210,8 +210,7 @@ class Arrangement(Value):
         masses : mapping from str to Mass, optional
         friction : float or mapping from str to float, optional
             Coulomb's coefficient, static and dynamic, for all contacts or by name; needs
-            ``orientations="all"``.  Not covered: two rods in space, polygons and polyhedra that
-            touch bodies.
+            ``orientations="all"``.  Not covered: polygons and polyhedra that touch bodies.
         restitution : float or mapping from str to float, optional
             As in :class:`~polycorner.System`.
 

@@ -16,7 +16,7 @@ from polycorner.bodies.poses import Placement
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
 from polycorner.motion.contacts import velocities
 from polycorner.motion.rotations import angular_velocity
-from polycorner.spaces.distances import cross, dot, foot, minus, norm
+from polycorner.spaces.distances import PARALLEL, cross, dot, foot, minus, norm
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -31,23 +31,36 @@ def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, .
     Raises
     ------
     NotImplementedError
-        Between edges in space, whose nearest points would make formulas of a hundred thousand
-        terms, and at the sides of polygons and polyhedra.
+        At the sides of polygons and polyhedra.
     """
-    if len(touch.first) > 1 or len(touch.second) > 2:
+    if len(touch.second) > 2:
         msg = (
-            "friction: expected contacts of a disc, a ball or an end of a capsule with one of "
-            f"these, a capsule or a wall; got {touch.gap.name!r}"
+            "friction: expected contacts of discs, balls, capsules, edges and walls; got "
+            f"{touch.gap.name!r}, where the nearest point of a polygon or polyhedron is not covered"
         )
         raise NotImplementedError(msg)
-    p, q = _at(touch.one, touch.first[0]), _at(touch.two, touch.second[0])
-    if len(touch.second) > 1:
-        end = _at(touch.two, touch.second[1])
-        along = minus(end, q)
-        at = _clamped(foot(p, q, end, 1 / dot(along, along)))
-        q = (q[0] + at * along[0], q[1] + at * along[1], q[2] + at * along[2])
+    p, q = _nearest(
+        [_at(touch.one, point) for point in touch.first],
+        [_at(touch.two, point) for point in touch.second],
+    )
     apart = minus(p, q)
     return _slip(placements, touch.one, p, _scaled(apart, 1 / norm(apart)), touch.two)
+
+
+def _nearest(first: "list[Point]", second: "list[Point]") -> "tuple[Point, Point]":
+    """Return the nearest points of two points or segments ([Er] sec. 5.1.9)."""
+    (p, *p_end), (q, *q_end) = first, second
+    if not q_end:
+        return p, q
+    v = minus(q_end[0], q)
+    if not p_end:
+        return p, _plus(q, v, _clamped(foot(p, q, q_end[0], 1 / dot(v, v))))
+    u, w = minus(p_end[0], p), minus(p, q)
+    a, e, b, c, f = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
+    normal = cross(u, v)
+    s = _clamped((b * f - c * e) / (dot(normal, normal) + PARALLEL**2 * a * e))
+    t = _clamped((b * s + f) / e)
+    return _plus(p, u, _clamped((b * t - c) / a)), _plus(q, v, t)
 
 
 def slip_at_wall(
@@ -117,6 +130,10 @@ def _tangents(n: "Point") -> "tuple[Point, Point]":
     a = -1 / (side + z)
     b = x * y * a
     return (1 + side * x**2 * a, side * b, -side * x), (b, side + y**2 * a, -y)
+
+
+def _plus(p: "Point", u: "Point", at: "sympy.Expr") -> "Point":
+    return (p[0] + at * u[0], p[1] + at * u[1], p[2] + at * u[2])
 
 
 def _clamped(at: "sympy.Expr") -> "sympy.Expr":

@@ -171,6 +171,10 @@ PAIRS = {
     "capsules": (capsule([-1, 0], [1, 0], 0.3), capsule([-0.5, 0.2], [0.7, 0], 0.2)),
     "compounds": (compound([disc(0.3, at=[-1, 0]), disc(0.5, at=[1, 0])]), disc(0.4, at=[0.2, 0])),
     "balls": (sphere(0.5), sphere(0.8)),
+    "capsules in space": (
+        capsule([0, -0.8, -0.2], [0, 0.9, 0.3], 0.3),
+        capsule([0.2, 0.1, -0.9], [-0.1, 0, 0.7], 0.2),
+    ),
     "ball and capsule": (sphere(0.5), capsule([0.2, -0.6, 0], [0, 0.7, 0], 0.3)),
 }
 
@@ -230,13 +234,6 @@ def masses(mass, centre, inertia):
         (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"1": 1}), TypeError, "masses"),
-        (
-            lambda: Arrangement([capsule([0, 0, 0], [1, 0, 0], 1)] * 2, orientations="all").system(
-                friction=0.2
-            ),
-            NotImplementedError,
-            "friction",
-        ),
         (masses(0, [0, 0], 1), ValueError, "mass"),
         (masses(1, [0, 0], 0), ValueError, "inertia"),
         (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),
