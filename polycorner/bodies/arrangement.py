@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.congruences import Congruences
-from polycorner.bodies.dynamics import energies, friction_of, masses_of, smooth
+from polycorner.bodies.dynamics import between, energies, friction_of, masses_of, smooth
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.masses import Mass
-from polycorner.bodies.pairs import Member, Tree, apart, distances
+from polycorner.bodies.pairs import Member, Tree, apart, distances, members
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body, Turn, turning
 from polycorner.bodies.walls import Wall, within
@@ -29,6 +29,7 @@ from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 ORIENTATIONS = ("needed", "all", "none")
+BETWEEN = "between"  # the name of the contacts among repeated bodies
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +37,8 @@ class Arrangement(Value):
     """Rigid bodies that must not overlap each other, fixed bodies, or walls.
 
     The coordinates of a body ``A`` are those of its origin, ``xA yA`` or ``xA yA zA``, and of its
-    orientation: in the plane the angle ``thetaA``, counterclockwise; in space the direction ``uAx
-    uAy uAz`` of the axis of a body of revolution, and else a unit quaternion ``aAw aAx aAy aAz``.
+    orientation: in the plane the angle ``thetaA``, counterclockwise; in space the direction ``uxA
+    uyA uzA`` of the axis of a body of revolution, and else a unit quaternion ``awA axA ayA azA``.
     Discs and balls about their origin have none.
 
     A contact is called after what touches: ``A-B``, ``A.rod-B.2`` for parts of compounds,
@@ -166,8 +167,8 @@ class Arrangement(Value):
     @cached_property
     def _pairs(self) -> list[tuple[Member, Member]]:
         """Two parts each, of different bodies of which one moves."""
-        moving = [self._members(p.name, p.body, p) for p in self.placements]
-        still = [self._members(name, body, None) for name, body in self.fixed.items()]
+        moving = [members(p.name, p.body, p) for p in self.placements]
+        still = [members(name, body, None) for name, body in self.fixed.items()]
         pairs = [*combinations(moving, 2), *product(moving, still)]
         return [parts for pair in pairs for parts in product(*pair)]
 
@@ -178,16 +179,8 @@ class Arrangement(Value):
             (wall, function, member, point)
             for name, wall in self.walls.items()
             for p in self.placements
-            for member in self._members(p.name, p.body, p)
+            for member in members(p.name, p.body, p)
             for function, point in within(self.manifold, name, wall, member)
-        ]
-
-    def _members(self, name: str, body: Body, placement: Placement | None) -> list[Member]:
-        frame = Frame.FIXED if placement is None else placement.frame
-        coordinates = () if placement is None else placement.manifold.names
-        return [
-            Member(name, f"{name}.{part}" if part else name, shape, frame, body.axis, coordinates)
-            for part, shape in body.parts.items()
         ]
 
     def system(
@@ -198,8 +191,13 @@ class Arrangement(Value):
         masses: Mapping[str, Mass] | None = None,
         friction: float | Mapping[str, float] = 0.0,
         restitution: float | Mapping[str, float] = 0.0,
+        count: int = 1,
     ) -> System:
-        """Return the mechanical system of the bodies, all of them one body of the engine.
+        """Return the mechanical system of the bodies.
+
+        Several bodies are one dense system of the engine, with states ``(N,)``.  A single one may
+        be repeated: ``count`` bodies like it, with states ``(count, N)``, touch each other as well,
+        and near ones are found by the first two coordinates.
 
         Parameters
         ----------
@@ -210,9 +208,12 @@ class Arrangement(Value):
         masses : mapping from str to Mass, optional
         friction : float or mapping from str to float, optional
             Coulomb's coefficient, static and dynamic, for all contacts or by name; needs
-            ``orientations="all"``.  Not covered: polygons and polyhedra that touch bodies.
+            ``orientations="all"``.  The name of the contacts among repeated bodies is
+            ``"between"``.  Not covered: polygons and polyhedra that touch bodies.
         restitution : float or mapping from str to float, optional
-            As in :class:`~polycorner.System`.
+            As in :class:`~polycorner.System`; names as for ``friction``.
+        count : int, optional
+            Default 1.
 
         Raises
         ------
@@ -233,13 +234,24 @@ class Arrangement(Value):
         [[2.0, 0.0, -2.0]]
         """
         pull = np.zeros(self.dimension) if gravity is None else gravity
+        if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
+            refuse("count", "1 for several bodies; one body may be repeated", count)
         known = masses_of(self.placements, density, masses or {})
         kinetic, potential = energies(self.placements, known, pull)
         polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))
         touches = [touch for pair in self._pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point in self._at_walls]
-        rubbing = friction_of(self.placements, touches, walls, friction)
-        return System(polyhedron, kinetic, potential, friction=rubbing, restitution=restitution)
+        friction, rubbing = _without(friction, BETWEEN)
+        restitution, bouncing = _without(restitution, BETWEEN)
+        return System(
+            polyhedron,
+            kinetic,
+            potential,
+            friction=friction_of(self.placements, touches, walls, friction),
+            restitution=restitution,
+            count=count,
+            between=between(self.placements[0], rubbing, bouncing) if count > 1 else None,
+        )
 
     @cached_property
     def congruences(self) -> Congruences:
@@ -292,6 +304,16 @@ class Arrangement(Value):
         point = self.manifold.point(q)
         moved = {p.name: p.moved(point) for p in self.placements}
         return {**moved, **self.fixed}
+
+
+Coefficients = float | Mapping[str, float]
+
+
+def _without(given: Coefficients, name: str) -> tuple[Coefficients, float]:
+    """Return the coefficients by name without one, and that one."""
+    if not isinstance(given, Mapping):
+        return given, given
+    return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)
 
 
 def frame_of(body: Body, orientations: str) -> Frame:

@@ -1,25 +1,34 @@
 """The mechanical system of an arrangement: inertia, weight, contacts and friction."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
-from polycorner.bodies.frames import Frame
+from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.masses import Mass, mass_of
-from polycorner.bodies.pairs import Member, Touch
+from polycorner.bodies.pairs import Member, Touch, distances, members
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.slips import slip, slip_at_wall
 from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
-from polycorner.motion.contacts import Friction, velocities
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.motion.contacts import (
+    PAIR,
+    ContactFamily,
+    Friction,
+    velocities,
+)
+from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.rotations import rotational_energy
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
     import sympy
@@ -100,16 +109,75 @@ def friction_of(
     coefficients = {k: checks.real("friction", mu, least=0) for k, mu in by_name.items()}
     found = []
     for label, mu in coefficients.items():
-        law, members = laws[label]
+        law, rubbing = laws[label]
         if mu == 0:
             continue
-        for member in members:
-            if member.frame in {Frame.SHIFTED, Frame.AXIAL}:
-                missing = "coordinates of all rotations (orientations='all')"
-                refuse("friction", f"{missing}, those of {member.body!r} too", mu)
+        _check_turning(rubbing, mu)
         shape = Interval(mu) if placements[0].body.dimension == 2 else Disc(mu)
         found.append(Friction(f"{label} slips", law(), shape, label))
     return tuple(found)
+
+
+def _check_turning(rubbing: list[Member], mu: float) -> None:
+    for member in rubbing:
+        if member.frame in {Frame.SHIFTED, Frame.AXIAL}:
+            missing = "coordinates of all rotations (orientations='all')"
+            refuse("friction", f"{missing}, those of {member.body!r} too", mu)
+
+
+def between(p: Placement, mu: float, restitution: float) -> ContactFamily:
+    """Return the contacts of any two of several bodies like one, with friction if ``mu > 0``.
+
+    The two are called after the body, with 1 and 2, and so are their coordinates.
+    """
+    pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
+    space = pair[0].manifold * pair[1].manifold
+    one, two = (members(some.name, some.body, some) for some in pair)
+    touches = [t for parts in product(one, two) for t in distances(space, *parts)]
+    gaps, definitions = _written([t.gap for t in touches])
+    slips: dict[str, Any] = {}
+    shape: ConvexSet | None = None
+    if mu > 0:
+        _check_turning([one[0], two[0]], mu)
+        named = {some.name: some for some in pair}
+        slips = {t.gap.name: slip(named, t) for t in touches}
+        shape = Interval(mu) if p.body.dimension == 2 else Disc(mu)
+    return ContactFamily(
+        gaps,
+        2 * p.body.size / p.manifold.scales[0],
+        p.manifold.names[:2],
+        slip=slips,
+        static=shape,
+        restitution=restitution,
+        definitions=definitions,
+    )
+
+
+def _written(
+    gaps: list[SmoothFunction],
+) -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+    """Return gaps and their definitions in the coordinates, with parameters as numbers."""
+    import sympy
+
+    found: dict[str, sympy.Expr] = {}
+    shared: dict[str, sympy.Expr] = {}
+    for k, gap in enumerate(gaps):
+        family = gap.family
+        definitions, expressions = family.formulas()
+        coordinates = [gap.manifold.symbols[i] for i in gap.reads]
+        numbers = map(sympy.Float, gap.parameters)
+        known = dict(zip(symbols(family.variables), coordinates, strict=True))
+        known |= dict(zip(symbols(family.parameters), numbers, strict=True))
+        known |= {s: symbols([f"{s}_{k}"])[0] for s in symbols([*definitions])}
+        shared |= {f"{name}_{k}": e.xreplace(known) for name, e in definitions.items()}
+        found[gap.name] = expressions[gap.member_name].xreplace(known)
+    return found, shared
+
+
+def _renamed(p: Placement, name: str) -> Manifold:
+    """Return the manifold of a body of another name."""
+    named = p.frame.manifold(name, p.body.dimension, 1.0, 1.0, "")
+    return replace(named, scales=p.manifold.scales, units=p.manifold.units)
 
 
 def smooth(polyhedron: Polyhedron) -> Polyhedron:

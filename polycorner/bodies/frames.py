@@ -54,9 +54,9 @@ class Frame(Enum):
         if self is Frame.TURNED:
             return place * Manifold((f"theta{name}",), (2 * np.pi,), (turn,))
         if self is Frame.AXIAL:
-            return place * Manifold.sphere([f"u{name}{a}" for a in AXES], scale=turn)
+            return place * Manifold.sphere([f"u{a}{name}" for a in AXES], scale=turn)
         if self is Frame.ROTATED:
-            return place * Manifold.rotation([f"a{name}{a}" for a in "w" + AXES], scale=turn)
+            return place * Manifold.rotation([f"a{a}{name}" for a in "w" + AXES], scale=turn)
         return place
 
     def variables(self, name: str, dimension: int) -> tuple[str, ...]:

@@ -18,7 +18,8 @@ import numpy as np
 from polycorner.bodies import gaps
 from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.shapes import Part
+from polycorner.bodies.poses import Placement
+from polycorner.bodies.shapes import Body, Part
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf
@@ -58,6 +59,16 @@ class Member(Value):
     def vertex(self, i: int) -> str:
         """Return what a point is called: the part itself if it has only one."""
         return f"{self.name}.v{i + 1}" if len(self.part.points) > 1 else self.name
+
+
+def members(name: str, body: Body, placement: Placement | None) -> list[Member]:
+    """Return the parts of a body, fixed if it has no coordinates."""
+    frame = Frame.FIXED if placement is None else placement.frame
+    coordinates = () if placement is None else placement.manifold.names
+    return [
+        Member(name, f"{name}.{part}" if part else name, shape, frame, body.axis, coordinates)
+        for part, shape in body.parts.items()
+    ]
 
 
 def gap(

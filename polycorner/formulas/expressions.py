@@ -23,15 +23,17 @@ SPREAD = 2.0  # size, in scale units, of the region of the lines that is sampled
 
 def kinks(expressions: "Iterable[sympy.Expr]") -> tuple[str, ...]:
     """Return the subexpressions across which derivatives of the expressions may jump, as text."""
-    found: dict[str, None] = {}
+    found: list[sympy.Basic] = []
     waiting: list[sympy.Basic] = list(expressions)
+    seen: set[sympy.Basic] = set()
     while waiting:
         part = waiting.pop()
-        if part.args:
+        if part.args and part not in seen:
+            seen.add(part)
             waiting += part.args
             if type(part).__name__ in KINKED:
-                found[str(part)] = None
-    return tuple(found)
+                found.append(part)
+    return tuple(dict.fromkeys(map(str, found)))
 
 
 def announce(name: str, found: Sequence[str]) -> None:

@@ -155,6 +155,8 @@ class ContactFamily(Value):
         ``static``.
     restitution : float, optional
         Newton's coefficient ``0 <= e <= 1``; default 0, plastic.
+    definitions : mapping from str to sympy.Expr, optional
+        Intermediate quantities that the gaps use by name, each also in later ones.
 
     Raises
     ------
@@ -169,8 +171,10 @@ class ContactFamily(Value):
     static: ConvexSet | None = None
     dynamic: ConvexSet | None = None
     restitution: float = 0.0
+    definitions: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "definitions", dict(mapping("definitions", self.definitions)))
         if not mapping("gaps", self.gaps):
             refuse("gaps", "at least one gap of a pair", self.gaps)
         object.__setattr__(self, "gaps", dict(self.gaps))
@@ -219,7 +223,7 @@ class ContactFamily(Value):
         )
         n = manifold.size
         return PairContacts(
-            Family.of(self.gaps, coordinates),
+            Family.of(self.gaps, coordinates, definitions=self.definitions),
             (),
             tuple((body, c) for body in range(2) for c in range(n)),
             slips,

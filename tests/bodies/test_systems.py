@@ -252,3 +252,44 @@ def masses(mass, centre, inertia):
 def test_what_is_not_covered_is_refused(make, kind, said):
     with pytest.raises(kind, match=said):
         make()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("d", [2, 3])
+def test_repeated_bodies_move_as_if_they_were_listed(d, friction):
+    """Three of a compound fall on each other, once as one system, once as three of a kind."""
+    ends = [0.5 * np.eye(d)[0], -0.5 * np.eye(d)[0]]
+    body = compound([*((disc if d == 2 else sphere)(0.3, at=e) for e in ends), capsule(*ends, 0.2)])
+    ground, gravity = (GROUND, [0.0, -10.0]) if d == 2 else (FLOOR, [0.0, 0.0, -10.0])
+    one = Arrangement({"A": body}, ground, orientations="all")
+    three = Arrangement({"A": body, "B": body, "C": body}, ground, orientations="all")
+    up = np.eye(d)[-1]
+    places = [0.3 * up, 1.1 * up + 0.1 * np.eye(d)[0], 2.0 * up - 0.2 * np.eye(d)[0]]
+    turns = [0.0, 0.3, -0.2]
+    if d == 3:
+        turns = [Rotation.from_rotvec([0.1 * a, 0.2, a]) for a in turns]
+        turns[0] = None
+    starts = [one.point({"A": (p, t)}) for p, t in zip(places, turns, strict=True)]
+    listed = three.system(gravity=gravity, friction=friction)
+    repeated = one.system(gravity=gravity, friction=friction, count=3)
+    first = simulate(listed, listed.state(np.concatenate(starts)), 0.25, 5e-4)
+    second = simulate(repeated, repeated.state(np.array(starts)), 0.25, 5e-4)
+    assert any(len(bodies) == 2 for bodies, *_ in second.touching[-1])
+    np.testing.assert_allclose(first.q[-1].reshape(3, -1), second.q[-1], atol=2e-3)
+
+
+def test_only_one_body_can_be_repeated():
+    with pytest.raises(ValueError, match="count: expected 1 for several bodies"):
+        Arrangement([disc(1), disc(1)]).system(count=2)
+    with pytest.raises(ValueError, match="count"):
+        Arrangement({"A": disc(1)}, GROUND).system(count=0)
+
+
+def test_coefficients_by_name():
+    a = Arrangement({"A": disc(1)}, GROUND, orientations="all")
+    system = a.system(friction={"between": 0.3}, restitution={"between": 0.5}, count=2)
+    assert not system.friction
+    assert system.between.static is not None
+    assert system.between.restitution == 0.5
+    with pytest.raises(ValueError, match="friction: expected names among A-ground"):
+        a.system(friction={"A-wall": 0.3})
