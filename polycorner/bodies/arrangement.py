@@ -49,7 +49,8 @@ class Arrangement(Value):
     Parameters
     ----------
     bodies : sequence of Body, or mapping from str to Body
-        Those that move; the names of a sequence are ``"1"``, ``"2"``, ...
+        Those that move; the names of a sequence are ``"1"``, ``"2"``, ...  Names have letters,
+        digits and ``_``.
     walls : mapping from str to HalfSpace or Cylinder, optional
         :func:`box` makes those of a box.
     fixed : mapping from str to Body, optional
@@ -84,35 +85,31 @@ class Arrangement(Value):
     unit: str = ""
 
     def __post_init__(self) -> None:
-        given = self.bodies
-        if not isinstance(given, Mapping):
-            if isinstance(given, Body) or not isinstance(given, Sequence):
-                refuse("bodies", "several bodies, in a sequence or by name", given, TypeError)
-            given = {str(k): body for k, body in enumerate(given, 1)}
-        object.__setattr__(self, "bodies", dict(given))
+        object.__setattr__(self, "bodies", _named(self.bodies))
         for argument in ("walls", "fixed"):
             value = dict(checks.mapping(argument, getattr(self, argument)))
             object.__setattr__(self, argument, value)
-        if not given:
-            refuse("bodies", "at least one body", given)
-        for argument, several in (("bodies", given), ("fixed", self.fixed)):
+        for argument, several in (("bodies", self.named), ("fixed", self.fixed)):
             for body in several.values():
                 checks.instance(argument, body, Body, "disc(1.0)")
         for wall in self.walls.values():
             if not isinstance(wall, Wall):
                 refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
-        known = [*given, *self.fixed, *self.walls]
+        self._check_together()
+        super().__post_init__()
+
+    def _check_together(self) -> None:
+        """Raise ValueError for a name of two things, or things in the plane and in space."""
+        known = [*self.named, *self.fixed, *self.walls]
         twice = sorted({name for name in known if known.count(name) > 1})
         if twice:
             refuse("fixed" if twice[0] in self.fixed else "walls", "names of their own", twice[0])
-        d = self.dimension
-        for argument, some in (("bodies", given), ("fixed", self.fixed), ("walls", self.walls)):
-            for name, one in some.items():
-                if one.dimension != d:
-                    space = "the plane" if d == 2 else "space"
-                    refuse(argument, f"all in {space}, like {next(iter(given))!r}", name)
-        super().__post_init__()
+        for argument in ("bodies", "fixed", "walls"):
+            for name, one in getattr(self, argument).items():
+                if one.dimension != self.dimension:
+                    space = "the plane" if self.dimension == 2 else "space"
+                    refuse(argument, f"all in {space}, like {next(iter(self.named))!r}", name)
 
     @property
     def named(self) -> dict[str, Body]:
@@ -241,8 +238,11 @@ class Arrangement(Value):
         polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))
         touches = [touch for pair in self._pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point in self._at_walls]
-        friction, rubbing = _without(friction, BETWEEN)
-        restitution, bouncing = _without(restitution, BETWEEN)
+        family = None
+        if count > 1:
+            friction, rubbing = _without(friction, BETWEEN)
+            restitution, bouncing = _without(restitution, BETWEEN)
+            family = between(self.placements[0], rubbing, bouncing)
         return System(
             polyhedron,
             kinetic,
@@ -250,7 +250,7 @@ class Arrangement(Value):
             friction=friction_of(self.placements, touches, walls, friction),
             restitution=restitution,
             count=count,
-            between=between(self.placements[0], rubbing, bouncing) if count > 1 else None,
+            between=family,
         )
 
     @cached_property
@@ -307,6 +307,20 @@ class Arrangement(Value):
 
 
 Coefficients = float | Mapping[str, float]
+
+
+def _named(given: Any) -> dict[str, Body]:
+    """Return bodies by name, numbered from 1 if they have none."""
+    if not isinstance(given, Mapping):
+        if isinstance(given, Body) or not isinstance(given, Sequence):
+            refuse("bodies", "several bodies, in a sequence or by name", given, TypeError)
+        given = {str(k): body for k, body in enumerate(given, 1)}
+    if not given:
+        refuse("bodies", "at least one body", given)
+    for name in given:
+        if not isinstance(name, str) or not f"x{name}".isidentifier():
+            refuse("bodies", "names of letters, digits and _, as coordinates have", name)
+    return dict(given)
 
 
 def _without(given: Coefficients, name: str) -> tuple[Coefficients, float]:

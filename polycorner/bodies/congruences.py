@@ -102,8 +102,8 @@ class Congruences(Value):
                 continue
             axes = [p.body.axis] if p.body.axis.any() else list(np.eye(3))
             for axis in axes:
-                turned = turned_within([number(x) for x in axis.tolist()], symbols[3:])
-                yield dict(zip(names[3:], turned, strict=True))
+                rates = turned_within([number(x) for x in axis.tolist()], symbols[3:])
+                yield dict(zip(names[3:], rates, strict=True))
 
     @cached_property
     def _reference(self) -> tuple[Array, Array, Array]:

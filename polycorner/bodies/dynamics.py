@@ -33,6 +33,7 @@ from polycorner.spaces.manifold import Array, Manifold
 if TYPE_CHECKING:
     import sympy
 
+SAME = 1e-9  # relative deviation that counts as none
 AtWall = tuple[str, Wall, Member, Array]  # label of the gap, wall, part, point
 Law = Callable[[], "tuple[sympy.Expr, ...]"]
 
@@ -47,8 +48,26 @@ def masses_of(placements: tuple[Placement, ...], density: float, given: Any) -> 
         checks.instance("masses", mass, Mass, "Mass(1.0, [0.0, 0.0], 0.5)")
         if len(mass.centre) != p.body.dimension:
             refuse("masses", f"a centre of {p.body.dimension} numbers for {p.name!r}", mass.centre)
+        if not _as_round_as_the_body(p, mass):
+            expected = f"a mass of {p.name!r} that looks the same when turned as the body does"
+            refuse("masses", f"{expected}, or orientations='all'", mass)
         found[p.name] = mass
     return found
+
+
+def _as_round_as_the_body(p: Placement, mass: Mass) -> bool:
+    """Whether the coordinates of a body tell how its mass is placed."""
+    size = SAME * p.body.size
+    if p.frame is Frame.SHIFTED and p.is_round:
+        return bool(np.abs(mass.centre).max() <= size)
+    if p.frame is not Frame.AXIAL:
+        return True
+    off = mass.centre - (mass.centre @ p.axis) * p.axis
+    along = p.axis @ mass.inertia @ p.axis
+    across = (np.trace(mass.inertia) - along) / 2
+    even = across * np.eye(3) + (along - across) * np.outer(p.axis, p.axis)
+    skew = np.abs(mass.inertia - even).max()
+    return bool(np.abs(off).max() <= size and skew <= SAME * np.trace(mass.inertia))
 
 
 def energies(
@@ -130,6 +149,7 @@ def between(p: Placement, mu: float, restitution: float) -> ContactFamily:
 
     The two are called after the body, with 1 and 2, and so are their coordinates.
     """
+    mu = checks.real("friction", mu, least=0)
     pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
     space = pair[0].manifold * pair[1].manifold
     one, two = (members(some.name, some.body, some) for some in pair)

@@ -132,7 +132,13 @@ def test_arrangements_can_be_pickled():
             ValueError,
             "bodies: expected all in the plane",
         ),
+        (
+            lambda: Arrangement({"left arm": disc(1)}),
+            ValueError,
+            "bodies: expected names .*'left arm'",
+        ),
         (lambda: Arrangement(TWO, {"w": 1}), TypeError, "walls"),
+        (lambda: Cylinder(1, point=[0, 0, 0], spin=1.0), ValueError, "spin"),
         (lambda: Arrangement(TWO, {"w": HalfSpace([0, 0, 1], [0, 0, 0])}), ValueError, "walls"),
         (lambda: Arrangement(TWO, fixed={"1": disc(1)}), ValueError, "fixed: .* own; got '1'"),
         (lambda: Arrangement(TWO, orientations="some"), ValueError, "orientations"),

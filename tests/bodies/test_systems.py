@@ -234,6 +234,23 @@ def masses(mass, centre, inertia):
         (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"1": 1}), TypeError, "masses"),
+        (
+            lambda: Arrangement({"A": disc(1)}, GROUND).system(friction=-1, count=2),
+            ValueError,
+            "friction",
+        ),
+        (
+            lambda: Arrangement([disc(1)] * 2).system(masses={"1": Mass(1, [0.1, 0], 1)}),
+            ValueError,
+            "masses: .* '1' that looks the same",
+        ),
+        (
+            lambda: Arrangement([capsule([0, 0, -1], [0, 0, 1], 1)] * 2).system(
+                masses={"2": Mass(1, [0, 0, 0.2], [1, 1.2, 1])}
+            ),
+            ValueError,
+            "masses: .* '2' that looks the same",
+        ),
         (masses(0, [0, 0], 1), ValueError, "mass"),
         (masses(1, [0, 0], 0), ValueError, "inertia"),
         (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),
