@@ -16,7 +16,7 @@ from polycorner.bodies.dynamics import between, energies, friction_of, masses_of
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.pairs import Member, Tree, apart, distances, members
-from polycorner.bodies.poses import Placement
+from polycorner.bodies.poses import Placement, frame_of
 from polycorner.bodies.shapes import Body, Turn, turning
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
@@ -254,11 +254,6 @@ class Arrangement(Value):
         )
 
     @cached_property
-    def congruences(self) -> Congruences:
-        """The motions of the whole and the exchanges that change no gap."""
-        return Congruences(self.placements, tuple(self.walls.values()), tuple(self.fixed.values()))
-
-    @cached_property
     def symmetry(self) -> Symmetry:
         """Motions of the whole that walls and fixed bodies allow, exchanges of equal bodies.
 
@@ -266,7 +261,8 @@ class Arrangement(Value):
         images, and motions that carry one wall to another.  More than ten thousand exchanges
         and rotations are left out, all of them.
         """
-        return self.congruences.symmetry(self.polyhedron)
+        around = tuple(self.walls.values()), tuple(self.fixed.values())
+        return Congruences(self.placements, *around).symmetry(self.polyhedron)
 
     def point(self, placed: Mapping[str, Any]) -> Array:
         """Return the point of given placements, ``(N,)``.
@@ -328,18 +324,6 @@ def _without(given: Coefficients, name: str) -> tuple[Coefficients, float]:
     if not isinstance(given, Mapping):
         return given, given
     return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)
-
-
-def frame_of(body: Body, orientations: str) -> Frame:
-    """Return the coordinates of a body; see :class:`Arrangement`."""
-    if orientations == "none":
-        return Frame.SHIFTED
-    if body.axis is not None and orientations == "needed":
-        if not body.axis.any():
-            return Frame.SHIFTED
-        if body.dimension == 3:
-            return Frame.AXIAL
-    return Frame.TURNED if body.dimension == 2 else Frame.ROTATED
 
 
 def _placement(given: Any, d: int) -> tuple[Array, Array]:

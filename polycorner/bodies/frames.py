@@ -1,4 +1,4 @@
-"""Where the points of a body are: formulas in its coordinates and in points of its own.
+"""Coordinates of a body, and formulas for where these put its points.
 
 =============  ==========================  ====================================================
 frame          coordinates                 for

@@ -81,9 +81,7 @@ class Placement(Value):
 
     def moved(self, q: Array) -> Body:
         """Return the body in its place."""
-        origin, matrix = self.pose(q)
-        parts = {name: part.moved(origin, matrix) for name, part in self.body.parts.items()}
-        return Body(parts)
+        return self.body.carried(*self.pose(q))
 
     def directions(self, q: Array) -> Array:
         """Return vectors ``(k, d)`` that show how the body is turned."""
@@ -91,6 +89,18 @@ class Placement(Value):
             return np.empty((0, self.body.dimension))
         _, matrix = self.pose(q)
         return (matrix @ self.axis)[None] if self.revolves else matrix.T
+
+
+def frame_of(body: Body, orientations: str) -> Frame:
+    """Return the coordinates of a body: for orientations ``"needed"``, ``"all"`` or ``"none"``."""
+    if orientations == "none":
+        return Frame.SHIFTED
+    if body.axis is not None and orientations == "needed":
+        if not body.axis.any():
+            return Frame.SHIFTED
+        if body.dimension == 3:
+            return Frame.AXIAL
+    return Frame.TURNED if body.dimension == 2 else Frame.ROTATED
 
 
 def _carrying(a: Array, b: Array) -> Array:

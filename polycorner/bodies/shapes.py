@@ -120,8 +120,11 @@ class Body(Value):
         """
         d = self.dimension
         shift = np.zeros(d) if by is None else _points("by", [by], d)[0]
-        matrix = turning(turn, d)
-        return Body({name: part.moved(shift, matrix) for name, part in self.parts.items()})
+        return self.carried(shift, turning(turn, d))
+
+    def carried(self, origin: Array, matrix: Array) -> "Body":
+        """Return the body with its origin elsewhere, turned by a matrix ``(d, d)``."""
+        return Body({name: part.moved(origin, matrix) for name, part in self.parts.items()})
 
     def same(self, other: "Body") -> bool:
         """Whether two bodies have equal parts in the same order, up to rounding."""
@@ -141,8 +144,8 @@ def turning(turn: Turn | None, dimension: int) -> Array:
     if turn is None:
         return np.eye(dimension)
     if dimension == 3:
-        checks.instance("turn", turn, Rotation, "Rotation.from_rotvec([0, 0, 0.5])")
-        matrix: Array = turn.as_matrix()  # type: ignore[union-attr] # the line above
+        rotation = checks.instance("turn", turn, Rotation, "Rotation.from_rotvec([0, 0, 0.5])")
+        matrix: Array = rotation.as_matrix()
         return matrix
     angle = checks.real("turn", turn)
     cosine, sine = math.cos(angle), math.sin(angle)

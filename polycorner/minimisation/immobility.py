@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.checks import instance, refuse
+from polycorner.errors import SolverError
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, stratum_at
@@ -98,6 +99,8 @@ def immobility(
     ------
     ValueError
         If the point is not in ``D``.
+    SolverError
+        If a small programme cannot be solved.
 
     Examples
     --------
@@ -132,18 +135,23 @@ def _of_pieces(
     scales = polyhedron.manifold.scale_array
     _, gradients, hessians = polyhedron.bundle.evaluate(q, 2)
     names = (*polyhedron.names, *polyhedron.equation_names)
-    gradients = gradients * scales
+    finite = np.asarray(np.isfinite(gradients).all(axis=1))
+    gradients = np.where(finite[:, None], gradients, 0.0) * scales
     lengths = np.linalg.norm(gradients, axis=1)[:, None]
     lengths[lengths == 0] = 1.0
+    units = gradients / lengths
     hessians = hessians * np.outer(scales, scales) / lengths[..., None]
     count = len(polyhedron.names)
     held = list(range(count, len(names)))
     jumps = _jumps(polyhedron, q) * np.outer(scales, scales) / lengths[..., None]
     for piece in pieces:
         rows = [names.index(name) for name in piece]
-        units = gradients / lengths
+        if not finite[rows + held].all():
+            yield Immobility(Mobility.UNDECIDED, {})
+            continue
         local = _Local(units[rows], units[held], hessians[rows + held])
-        smooth = not (jumps[rows + held] > JUMP * np.maximum(1, abs(hessians[rows + held]))).any()
+        sizes, changes = np.maximum(1, abs(hessians[rows + held])), jumps[rows + held]
+        smooth = bool((np.isfinite(sizes + changes) & (changes <= JUMP * sizes)).all())
         answer = local.answer(lambda v: _slides(polyhedron, q, v), smooth=smooth)
         forces = answer.weights / lengths[rows + held, 0] if len(answer.weights) else answer.weights
         total = forces[: len(rows)].sum() or 1.0
@@ -157,7 +165,8 @@ def _jumps(polyhedron: Polyhedron, q: Array) -> Array:
     rng = np.random.default_rng(0)
     steps = NEARBY * polyhedron.manifold.scale_array * rng.uniform(-1, 1, (16, len(q)))
     hessians = polyhedron.bundle.evaluate(q + steps, 2)[2]
-    return np.asarray(np.ptp(hessians, axis=0))
+    with np.errstate(invalid="ignore"):  # of infinite ones
+        return np.asarray(np.ptp(hessians, axis=0))
 
 
 def _slides(polyhedron: Polyhedron, q: Array, v: Array) -> bool:
@@ -244,7 +253,14 @@ class _Local:
         limits = [weights[:k] >= 0, cp.sum(weights[:k]) <= 1, cp.abs(x) <= 1]
         limits.append(top * np.eye(span.shape[1]) - total >> 0)
         problem = cp.Problem(cp.Minimize(top), limits)
-        problem.solve(solver=cp.CLARABEL)
+        try:
+            problem.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError as error:
+            msg = "Clarabel found no solution of a small semidefinite programme"
+            raise SolverError(msg) from error
+        if weights.value is None:
+            msg = f"Clarabel found no solution of a small semidefinite programme: {problem.status}"
+            raise SolverError(msg)
         return np.asarray(weights.value), float(top.value)
 
     def _candidates(self, span: Array, inner: Array, weights: Array) -> Iterator[Array]:
@@ -265,7 +281,7 @@ class _Local:
         tight = [i for i, slope in enumerate(slopes) if slope <= RANK_TOLERANCE]
         k, n = len(self.functions), len(v)
         bent = np.array([v @ bend @ v for bend in self.bends])
-        # w in units of the largest curvature, so that a bound of one is enough for 1/bound.
+        # Accelerations up to a thousand times the largest curvature are tried.
         reach = 1e3 * max(1.0, float(np.abs(bent).max(initial=0.0)))
         equations = self.equations
         start = np.zeros(n)

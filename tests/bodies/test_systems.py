@@ -99,8 +99,7 @@ def test_a_ball_rolls_down_a_slope():
     assert angle == pytest.approx(path.q[-1, 0, 0] / 0.5, abs=2e-3)
 
 
-def test_a_square_slides_and_a_rounded_one_tips():
-    """Pushed by a tilted weight: it slides beyond the coefficient of friction, sticks below."""
+def test_a_block_slides_beyond_the_coefficient_of_friction_and_sticks_below():
     square = polygon([[-1, -0.2], [1, -0.2], [1, 0.2], [-1, 0.2]])
     a = Arrangement({"A": square}, GROUND, orientations="all")
     for push, expected in ((2.0, 0.0), (4.0, 1.0)):
@@ -117,8 +116,8 @@ def test_a_disc_slides_around_a_circle_as_a_pendulum_swings():
     assert path.q[-1, 0, 0] == pytest.approx(-np.sin(0.01), rel=1e-3)
 
 
-def test_a_disc_in_a_turning_circle_rolls_in_place_or_is_carried():
-    """It stays where gravity balances friction on a smooth bearing: nowhere but at the bottom."""
+def test_a_disc_in_a_turning_circle_rolls_in_place():
+    """At the bottom it turns with the wall and stays where it is."""
     a = Arrangement({"A": disc(0.2)}, {"ring": Cylinder(1.2, spin=2.0)}, orientations="all")
     system = a.system(gravity=[0.0, -10.0], friction=0.8)
     path = run(a, system, {"A": [0, -1.0]}, np.array([0, 0, 2.0 * 1.2 / 0.2]), 1.0)
@@ -127,12 +126,11 @@ def test_a_disc_in_a_turning_circle_rolls_in_place_or_is_carried():
 
 
 def test_a_ball_in_a_turning_pipe_keeps_the_pipes_pace():
-    """Without weight it is carried around by the wall once it rolls: no slip at the contact."""
+    """It is dragged along until it rolls: then nothing slips at the contact."""
     pipe = {"pipe": Cylinder(1.0, axis=[0, 0, 1], spin=1.5)}
     a = Arrangement({"A": sphere(0.2)}, pipe, orientations="all")
     system = a.system(gravity=[0, -10.0, 0], friction=0.8)
     path = run(a, system, {"A": [0, -0.8, 0]}, np.zeros(7), 3.0)
-    # At the bottom the wall moves with 1.5 along x; the ball rolls beneath it.
     q, v = path.q[-1, 0], path.v[-1, 0]
     turn = a.manifold.frame(q)[3:, 3:]
     body_omega = np.linalg.lstsq(turn, v[3:], rcond=None)[0]

@@ -179,6 +179,15 @@ def test_jumps_of_curvature_decide_nothing():
     assert immobility(d, [0, 0]).mobility is Mobility.UNDECIDED
 
 
+def test_infinite_slopes_decide_nothing():
+    import sympy
+
+    space = Manifold.euclidean("x y")
+    x, y = space.symbols
+    d = Polyhedron(space, [sympy.sqrt(x), -x + y, -y])
+    assert immobility(d, [0, 0]).mobility is Mobility.UNDECIDED
+
+
 def test_a_point_outside_is_refused():
     space = Manifold.euclidean("x y")
     x, y = space.symbols
