@@ -32,6 +32,7 @@ from examples import (
     ex21_docking,
     ex22_sliding_squares,
     ex23_gripper,
+    ex24_tippe_top,
 )
 from polycorner import stratum_at
 from polycorner.minimisation import Mobility
@@ -267,3 +268,8 @@ def test_gripper(tmp_path):
         "flat jaws": Mobility.MOBILE,
     }
     assert len(ex23_gripper.draw(grips, tmp_path)) == 5
+
+
+def test_tippe_top():  # more in tests/bodies/test_tippe_top.py
+    turned = ex24_tippe_top.spun(ex24_tippe_top.oiled(), 100, seconds=10)
+    assert ex24_tippe_top.inclinations(turned)[-1] == pytest.approx(math.pi, abs=1e-2)
