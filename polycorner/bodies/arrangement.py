@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from itertools import combinations, product
 from operator import mul
 from typing import Any, Literal
 
@@ -11,13 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.bodies.arguments import named, placement
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.dynamics import between, energies, friction_of, masses_of, smooth
 from polycorner.bodies.frames import Frame
+from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.masses import Mass
+from polycorner.bodies.neighbours import Pair, check_room, pairs
 from polycorner.bodies.pairs import Member, Tree, apart, distances, members
 from polycorner.bodies.poses import Placement, frame_of
-from polycorner.bodies.shapes import Body, Turn, turning
+from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
@@ -60,11 +62,28 @@ class Arrangement(Value):
         as friction needs them; or none, so that bodies are shifted only.
     unit : str, optional
         Unit of length.
+    period : sequence of float, optional
+        The lengths of a periodic box, None or ``inf`` in directions in which it has no ends; see
+        the notes.  Walls have to be parallel to the periodic directions.
 
     Raises
     ------
     TypeError, ValueError
         Naming the parameter, what was expected and what came.
+
+    Notes
+    -----
+    In a periodic box bodies have images, displaced by whole periods, and must not overlap any of
+    another body or of their own.  There is a gap for every image that can touch: ``A-B`` for the
+    nearest one, or ``A-B``, ``A-B[1,0]``, ... for several; ``A-A[1,0]`` for a body that is longer
+    than a period.
+
+    The distance to one of several images is no function of positions modulo the period ``L``:
+    with a body that goes round the box, images change places.  So positions are circles of period
+    ``m L``, with the least whole ``m`` such that two bodies ``m L / 2`` apart are clear of each
+    other, and the gap of an image belongs to the nearest of its copies ``m L`` apart.  This is
+    smooth wherever bodies can touch, and shifts by ``L`` are elements of the :attr:`symmetry`.  For
+    bodies shorter than about ``L / 2``, ``m = 1``.
 
     Examples
     --------
@@ -83,9 +102,10 @@ class Arrangement(Value):
     fixed: Mapping[str, Body] = field(default_factory=dict)
     orientations: Literal["needed", "all", "none"] = "needed"
     unit: str = ""
+    period: Sequence[float | None] | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bodies", _named(self.bodies))
+        object.__setattr__(self, "bodies", named(self.bodies))
         for argument in ("walls", "fixed"):
             value = dict(checks.mapping(argument, getattr(self, argument)))
             object.__setattr__(self, argument, value)
@@ -97,6 +117,9 @@ class Arrangement(Value):
                 refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
         self._check_together()
+        if self.period is not None:
+            object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
+        check_room(self.lattice, self.placements, self.walls)
         super().__post_init__()
 
     def _check_together(self) -> None:
@@ -122,6 +145,11 @@ class Arrangement(Value):
         return next(iter(self.named.values())).dimension
 
     @cached_property
+    def lattice(self) -> Lattice:
+        """The displacements of images."""
+        return lattice(self.period, self.dimension)
+
+    @cached_property
     def scale(self) -> float:
         """The displacement that counts as a unit: half the thickness of the thinnest part."""
         return min(part.thickness for body in self.named.values() for part in body.parts.values())
@@ -130,10 +158,13 @@ class Arrangement(Value):
     def placements(self) -> tuple[Placement, ...]:
         """The coordinates of each body, and where they stand."""
         found, start = [], 0
+        turns = self.lattice.turns([*self.named.values()], [*self.fixed.values()])
+        periods = (self.lattice.lengths * turns).tolist()
         for name, body in self.named.items():
             frame = frame_of(body, self.orientations)
             turn = self.scale / max(body.size, self.scale)
-            factor = frame.manifold(name, self.dimension, self.scale, turn, self.unit)
+            units = self.scale, turn, self.unit
+            factor = frame.manifold(name, self.dimension, *units, periods)
             at = slice(start, start + factor.size)
             found.append(Placement(name, body, frame, factor, at))
             start = at.stop
@@ -162,12 +193,9 @@ class Arrangement(Value):
         return found
 
     @cached_property
-    def _pairs(self) -> list[tuple[Member, Member]]:
-        """Two parts each, of different bodies of which one moves."""
-        moving = [members(p.name, p.body, p) for p in self.placements]
-        still = [members(name, body, None) for name, body in self.fixed.items()]
-        pairs = [*combinations(moving, 2), *product(moving, still)]
-        return [parts for pair in pairs for parts in product(*pair)]
+    def _pairs(self) -> list[Pair]:
+        """Two parts each, of different bodies of which one moves, and of a body and its image."""
+        return pairs(self.lattice, self.placements, dict(self.fixed))
 
     @cached_property
     def _at_walls(self) -> list[tuple[Wall, SmoothFunction, Member, Array]]:
@@ -215,7 +243,8 @@ class Arrangement(Value):
         Raises
         ------
         NotImplementedError
-            For two sharp polygons or polyhedra, and for friction that is not covered.
+            For two sharp polygons or polyhedra, for friction that is not covered, and in a periodic
+            box.
 
         Examples
         --------
@@ -230,6 +259,9 @@ class Arrangement(Value):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
+        if self.lattice.axes:
+            msg = "system: expected no period; a periodic box has placements, but no motion"
+            raise NotImplementedError(msg)
         pull = np.zeros(self.dimension) if gravity is None else gravity
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
@@ -261,7 +293,7 @@ class Arrangement(Value):
         images, and motions that carry one wall to another.  More than ten thousand exchanges
         and rotations are left out, all of them.
         """
-        around = tuple(self.walls.values()), tuple(self.fixed.values())
+        around = tuple(self.walls.values()), tuple(self.fixed.values()), self.lattice
         return Congruences(self.placements, *around).symmetry(self.polyhedron)
 
     def point(self, placed: Mapping[str, Any]) -> Array:
@@ -280,7 +312,7 @@ class Arrangement(Value):
             refuse("placed", f"a placement of {missing[0]!r} as well", [*placed])
         found = []
         for p in self.placements:
-            origin, matrix = _placement(placed[p.name], self.dimension)
+            origin, matrix = placement(placed[p.name], self.dimension)
             if (
                 p.frame is Frame.SHIFTED
                 and not p.is_round
@@ -305,33 +337,8 @@ class Arrangement(Value):
 Coefficients = float | Mapping[str, float]
 
 
-def _named(given: Any) -> dict[str, Body]:
-    """Return bodies by name, numbered from 1 if they have none."""
-    if not isinstance(given, Mapping):
-        if isinstance(given, Body) or not isinstance(given, Sequence):
-            refuse("bodies", "several bodies, in a sequence or by name", given, TypeError)
-        given = {str(k): body for k, body in enumerate(given, 1)}
-    if not given:
-        refuse("bodies", "at least one body", given)
-    for name in given:
-        if not isinstance(name, str) or not f"x{name}".isidentifier():
-            refuse("bodies", "names of letters, digits and _, as coordinates have", name)
-    return dict(given)
-
-
 def _without(given: Coefficients, name: str) -> tuple[Coefficients, float]:
     """Return the coefficients by name without one, and that one."""
     if not isinstance(given, Mapping):
         return given, given
     return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)
-
-
-def _placement(given: Any, d: int) -> tuple[Array, Array]:
-    """Return origin and matrix of what a user gives for a placement."""
-    turn: Turn | None = None
-    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
-        given, turn = given
-    origin = checks.numbers("placed", given, f"{d} numbers, or a pair of them and a rotation")
-    if origin.shape != (d,):
-        refuse("placed", f"{d} numbers, or a pair of them and a rotation", given)
-    return origin, turning(turn, d)

@@ -1,5 +1,6 @@
 """Symmetries of arrangements: motions of the whole, exchanges, rotations of a body onto itself."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ import scipy.linalg
 from polycorner.bodies.exchanges import elements
 from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
+from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import (
     carried,
@@ -40,13 +42,14 @@ FEW = 12  # vectors of which all triple products are invariants
 class Congruences(Value):
     """The motions and exchanges of bodies that change no gap.
 
-    A velocity ``w + omega x p`` of the whole is one if it keeps every wall and every fixed body:
-    linear equations in ``(w, omega)``.
+    A velocity ``w + omega x p`` of the whole is one if it keeps every wall, every fixed body and
+    the periods: linear equations in ``(w, omega)``.
     """
 
     placements: tuple[Placement, ...]
     walls: "tuple[Wall, ...]"
     fixed: tuple[Body, ...]
+    lattice: Lattice
 
     @property
     def dimension(self) -> int:
@@ -63,6 +66,7 @@ class Congruences(Value):
             rows.append(across @ velocity(wall.point))
             rows += [velocity(v) - velocity(np.zeros(d)) for v in held]
         rows += [velocity(p) for body in self.fixed for p in body.markers]
+        rows += [velocity(v) - velocity(np.zeros(d)) for v in self.lattice.directions]
         if any(p.frame is Frame.SHIFTED and not p.is_round for p in self.placements):
             rows.append(np.eye(rows[0].shape[1])[d:])
         basis = scipy.linalg.null_space(np.concatenate(rows), rcond=FLAT).T
@@ -74,8 +78,21 @@ class Congruences(Value):
         return Symmetry(
             fields=fields,
             invariants=self.invariants if fields else None,
-            elements=tuple(elements(self.placements, polyhedron)),
+            elements=tuple(elements(self.placements, polyhedron, self._shifts())),
         )
+
+    def _shifts(self) -> list[list[Array]]:
+        """Return the shifts of each body by whole periods, where its coordinates go round several.
+
+        Shifts of the whole are left out where they are motions.
+        """
+        periods = np.array(self.placements[0].manifold.periods[: self.dimension])
+        counts = np.ones(self.dimension, dtype=int)
+        for axis in self.lattice.axes:
+            counts[axis] = round(periods[axis] / self.lattice.lengths[axis])
+        found = [self.lattice.shift(some) for some in self.lattice.images(tuple(counts.tolist()))]
+        others = [found] * (len(self.placements) - 1)
+        return [found if self.fixed else found[:1], *others]
 
     # ------------------------------------------------------------------------- motions of the whole
 
@@ -131,18 +148,22 @@ class Congruences(Value):
 
         All vectors between centres and along bodies turn together; their lengths, products and
         (where no body shows its three axes) triple products, and the components along axes that
-        are kept.
+        are kept.  Along periodic axes, points of a circle.
         """
         along, centre, axes = self._reference
         d = self.dimension
-        centres = np.array([q[p.at][:d] for p in self.placements]) - centre
+        places = np.array([q[p.at][:d] for p in self.placements])
+        around = self._around(places)
+        centres = places - centre
+        centres[:, list(self.lattice.axes)] = 0.0
         centres = (centres - along @ centres.mean(axis=0)) / self.placements[0].manifold.scales[0]
         ways = [p.directions(q) / p.manifold.scales[-1] for p in self.placements]
         if len(axes) == d:
-            return np.concatenate([centres.ravel(), *(w.ravel() for w in ways)])
+            return np.concatenate([around, centres.ravel(), *(w.ravel() for w in ways)])
         points = np.concatenate([np.zeros((1, d)), centres])
         first, second = np.triu_indices(len(points), 1)
-        found = [np.linalg.norm(points[first] - points[second], axis=1), (points @ axes.T).ravel()]
+        found = [around, np.linalg.norm(points[first] - points[second], axis=1)]
+        found.append((points @ axes.T).ravel())
         for k, own in enumerate(ways):
             unit = own * self.placements[k].manifold.scales[-1]
             found += [(unit @ (points - points[k + 1]).T).ravel(), (own @ axes.T).ravel()]
@@ -150,6 +171,14 @@ class Congruences(Value):
         if max(map(len, ways)) < d:
             found.append(_volumes([*points[1:], *np.concatenate(ways), *axes], d))
         return np.concatenate(found)
+
+    def _around(self, places: Array) -> Array:
+        """Return points of circles that tell places along periodic axes; modulo motions."""
+        manifold, axes = self.placements[0].manifold, list(self.lattice.axes)
+        away = places[:, axes] if self.fixed else (places[1:] - places[0])[:, axes]
+        radii = np.array(manifold.periods)[axes] / math.tau
+        turns, units = away / radii, radii / manifold.scales[0]
+        return np.concatenate([(units * np.cos(turns)).ravel(), (units * np.sin(turns)).ravel()])
 
 
 def _volumes(vectors: list[Array], d: int) -> Array:

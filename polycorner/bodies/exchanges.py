@@ -1,7 +1,7 @@
 """Finite symmetries of arrangements: exchanges of bodies, rotations of a body onto itself."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, permutations, product
 
@@ -23,23 +23,29 @@ SAME = 1e-6  # relative distance up to which points are one
 SAMPLES = 12  # random points at which functions are told apart
 
 
-def elements(placements: tuple[Placement, ...], polyhedron: Polyhedron) -> Iterator[Element]:
+def elements(
+    placements: tuple[Placement, ...],
+    polyhedron: Polyhedron,
+    shifts: Sequence[Sequence[Array]],
+) -> Iterator[Element]:
     """Yield exchanges of equal bodies with rotations of bodies onto themselves, no identity.
 
-    None where there would be more than ten thousand.  How functions change their names is found
-    by their values at random points and at the images of these.
+    With them go ``shifts`` of each body, the first of which is zero.  None where there would be
+    more than ten thousand.  How functions change their names is found by their values at random
+    points and at the images of these.
     """
     groups = _equal(placements)
     turns = [_own_turns(p) for p in placements]
-    count = math.prod(math.factorial(len(group)) for group in groups) * math.prod(map(len, turns))
+    count = math.prod(math.factorial(len(group)) for group in groups)
+    count *= math.prod(map(len, [*turns, *shifts]))
     if count > MOST_ELEMENTS:
         return
     points = _samples(placements, polyhedron)
     values = polyhedron.values(points)
-    changes = product(_orders(groups), product(*turns))
+    changes = product(_orders(groups), product(*turns), product(*shifts))
     next(changes)  # the identity
-    for order, some in changes:
-        change = Exchange(placements, order, some)
+    for some in changes:
+        change = Exchange(placements, *some)
         images = polyhedron.values(np.array([change(q) for q in points]))
         yield Element(change, _renaming(polyhedron.names, values.T, images.T))
 
@@ -76,27 +82,32 @@ def _samples(placements: tuple[Placement, ...], polyhedron: Polyhedron) -> Array
 
 @dataclass(frozen=True, eq=False)
 class Exchange(Value):
-    """A map of points: body ``k`` takes the place of body ``order[k]``, turned onto itself."""
+    """A map of points: body ``k`` takes the place of body ``order[k]``, turned onto itself.
+
+    Then it is shifted.
+    """
 
     placements: tuple[Placement, ...]
     order: tuple[int, ...]
     turns: "tuple[tuple[Array, Array], ...]"
+    shifts: "tuple[Array, ...]"
 
     def __call__(self, q: Array) -> Array:
         """Return the image of a point ``(N,)``."""
         found = []
-        for p, source, (shift, turn) in zip(self.placements, self.order, self.turns, strict=True):
+        changes = zip(self.placements, self.order, self.turns, self.shifts, strict=True)
+        for p, source, (shift, turn), by in changes:
             if p.frame is Frame.AXIAL:
                 # The matrix of a body of revolution is not unique; its axis is.
                 there = q[self.placements[source].at]
                 u = there[3:]
                 found += [
-                    there[:3] + (shift @ p.axis) * u,
+                    there[:3] + (shift @ p.axis) * u + by,
                     (turn @ p.axis) @ p.axis * u,
                 ]
                 continue
             origin, matrix = self.placements[source].pose(q)
-            found.append(p.coordinates(origin + matrix @ shift, matrix @ turn))
+            found.append(p.coordinates(origin + matrix @ shift + by, matrix @ turn))
         return np.concatenate(found)
 
 

@@ -45,12 +45,23 @@ class Frame(Enum):
         """Whether bodies turn."""
         return self not in {Frame.FIXED, Frame.SHIFTED}
 
-    def manifold(self, name: str, dimension: int, scale: float, turn: float, unit: str) -> Manifold:
+    def manifold(
+        self,
+        name: str,
+        dimension: int,
+        scale: float,
+        turn: float,
+        unit: str,
+        periods: Sequence[float] = (),
+    ) -> Manifold:
         """Return the placements of a body called ``name``.
 
-        ``scale`` and ``turn`` are the displacement and the angle that count as a unit.
+        ``scale`` and ``turn`` are the displacement and the angle that count as a unit, ``periods``
+        those of the position.
         """
-        place = Manifold.euclidean([f"{a}{name}" for a in AXES[:dimension]], scale=scale, unit=unit)
+        d = dimension
+        names = tuple(f"{a}{name}" for a in AXES[:d])
+        place = Manifold(names, tuple(periods), (scale,) * d, (unit,) * d)
         if self is Frame.TURNED:
             return place * Manifold((f"theta{name}",), (2 * np.pi,), (turn,))
         if self is Frame.AXIAL:

@@ -9,7 +9,7 @@ union, which is then never active, excludes that.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
 
@@ -18,6 +18,8 @@ import numpy as np
 from polycorner.bodies import gaps
 from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
+from polycorner.bodies.images import Image, nearest_image, own
+from polycorner.bodies.lattices import middle
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body, Part
 from polycorner.formulas.families import Family
@@ -43,6 +45,10 @@ class Member(Value):
         That of an axial body.
     coordinates : tuple of str
         Names of the body's coordinates; empty for fixed ones.
+    middle : (d,) array
+        A point of the body, of fixed ones of the part.
+    image : Image, optional
+        In a periodic box, which image it is.
     """
 
     body: str
@@ -51,6 +57,13 @@ class Member(Value):
     frame: Frame
     axis: Array | None
     coordinates: tuple[str, ...]
+    middle: Array
+    image: Image | None = None
+
+    def at(self, mark: str, image: Image) -> "Member":
+        """Return an image of it, with a mark on the name of the body."""
+        name = self.body + mark + self.name[len(self.body) :]
+        return replace(self, name=name, image=image)
 
     def numbers(self, *vectors: Array) -> list[float]:
         """Return the parameters of formulas for points and vectors of the body."""
@@ -66,7 +79,15 @@ def members(name: str, body: Body, placement: Placement | None) -> list[Member]:
     frame = Frame.FIXED if placement is None else placement.frame
     coordinates = () if placement is None else placement.manifold.names
     return [
-        Member(name, f"{name}.{part}" if part else name, shape, frame, body.axis, coordinates)
+        Member(
+            name,
+            f"{name}.{part}" if part else name,
+            shape,
+            frame,
+            body.axis,
+            coordinates,
+            middle(shape.points if placement is None else body.markers),
+        )
         for part, shape in body.parts.items()
     ]
 
@@ -82,9 +103,29 @@ def gap(
 ) -> SmoothFunction:
     """Return a member of a family as a function of the coordinates of two bodies."""
     reads = one.coordinates + (two.coordinates if two is not None else ())
+    if two is not None and (one.image or two.image):
+        family, further, reads = _imaged(family, one, two)
+        parameters = parameters + further
     return SmoothFunction.member(
         family, name, manifold, parameters=parameters, reads=reads, label=label
     )
+
+
+def _imaged(
+    family: Family, one: Member, two: Member
+) -> tuple[Family, list[float], tuple[str, ...]]:
+    """Return the family of gaps of images, its further parameters, and what it reads."""
+    d = one.part.dimension
+    image, sign = (one.image, 1.0) if one.image else (two.image, -1.0)
+    assert image is not None, two.name
+    shift = (sign * image.shift).tolist()
+    if one.body == two.body:
+        return own(family, one.frame, d), shift, one.coordinates[d:]
+    lengths = image.periods[list(image.axes)].tolist()
+    eccentric = (bool(one.middle.any()), bool(two.middle.any()))
+    middles = [x for m in (one, two) if m.middle.any() for x in m.numbers(m.middle)]
+    made = nearest_image(family, one.frame, two.frame, d, image.axes, eccentric)
+    return made, [*middles, *shift, *lengths], one.coordinates + two.coordinates
 
 
 def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True) -> Tree:
@@ -99,14 +140,21 @@ def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True
     if radius == 0:
         return separated(manifold, one, two)
     parts: list[Tree] = [touch.gap for touch in distances(manifold, one, two)]
-    if excluded and len(one.part.points) > 1 and len(two.part.points) > 1 and _can_cross(one, two):
+    if excluded and _can_cross(one, two):
         parts.append(separated(manifold, one, two))
     return parts[0] if len(parts) == 1 else AllOf(*parts)
 
 
 def _can_cross(one: Member, two: Member) -> bool:
     """Whether the distances are also large for hulls that cross; not of two rods in space."""
+    if min(len(one.part.points), len(two.part.points)) == 1 or _are_parallel(one, two):
+        return False
     return one.part.dimension == 2 or bool(one.part.facets or two.part.facets)
+
+
+def _are_parallel(one: Member, two: Member) -> bool:
+    """Whether they are a rod and its own image."""
+    return one.part is two.part and one.body == two.body and len(one.part.points) == 2
 
 
 class Touch(NamedTuple):
@@ -136,7 +184,9 @@ def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
         yield from _rods(manifold, one, two, radius)
     else:
         yield from _from_segment(manifold, one, two, radius)
-        yield from _from_segment(manifold, two, one, radius)
+        # A rod and its image exchange their ends when turned about the point between them.
+        if not _are_parallel(one, two):
+            yield from _from_segment(manifold, two, one, radius)
     yield from _from_hull(manifold, one, two, radius)
     yield from _from_hull(manifold, two, one, radius)
 

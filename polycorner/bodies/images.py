@@ -1,0 +1,163 @@
+"""Gaps of images: of the nearest one of another body, and of a body to an image of itself.
+
+The images of a body are displaced by whole numbers of periods.  Gaps depend on the displacement
+``w`` of two bodies alone, so that a family of gaps becomes one of images when ``w`` is replaced:
+
+- for two bodies by its representative in ``(-T/2, T/2]``, ``T`` a multiple of the period: the
+  formula is ``T / 2 pi`` times the angle of ``w``, smooth except where it jumps by ``T``;
+- for a body and its own image by a constant, so that orientations are left as variables.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
+from itertools import chain
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.bodies.frames import Frame, symbols
+from polycorner.bodies.gaps import FIRST, SECOND, numbers
+from polycorner.formulas import cache
+from polycorner.formulas.families import Family
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    import sympy
+
+    from polycorner.bodies.gaps import Formulas
+
+
+MIDDLES = ("first", "second")
+
+
+@dataclass(frozen=True, eq=False)
+class Image(Value):
+    """Where an image is.
+
+    Attributes
+    ----------
+    shift : (d,) array
+        Its displacement from the body.
+    periods : (d,) array
+        By which images are the same; ``inf`` where there are none.
+    """
+
+    shift: Array
+    periods: Array
+
+    @cached_property
+    def axes(self) -> tuple[int, ...]:
+        """The directions in which there are images."""
+        return tuple(np.flatnonzero(np.isfinite(self.periods)).tolist())
+
+
+def _numbered(name: str, d: int) -> list[str]:
+    return [f"{name}{k}" for k in range(d)]
+
+
+@lru_cache(maxsize=256)
+def nearest_image(
+    family: Family,
+    one: Frame,
+    two: Frame,
+    d: int,
+    axes: tuple[int, ...],
+    eccentric: tuple[bool, bool],
+) -> Family:
+    """Return the gaps of a family to the nearest image.
+
+    Further parameters: the middles ``first`` and ``second`` of bodies that are ``eccentric``, by
+    whose displacement the nearest image is meant, in coordinates of the body; ``shift`` of the
+    first against the second; ``period`` along ``axes``.
+    """
+    middles = [
+        numbers(name, frame, d)
+        for name, frame, is_off in zip(MIDDLES, (one, two), eccentric, strict=True)
+        if is_off
+    ]
+    further = [*chain(*middles), *_numbered("shift", d), *(f"period{k}" for k in axes)]
+    formulas = partial(_nearest, family, one, two, d, axes, eccentric)
+    key = repr((cache.source_key(__name__), family.key, "nearest", axes, eccentric))
+    parameters = (*family.parameters, *further)
+    return Family(
+        family.names, family.variables, parameters, formulas, key, stationary=family.stationary
+    )
+
+
+def _nearest(
+    family: Family,
+    one: Frame,
+    two: Frame,
+    d: int,
+    axes: tuple[int, ...],
+    eccentric: tuple[bool, bool],
+) -> "Formulas":
+    import sympy
+
+    definitions: dict[str, sympy.Expr] = {}
+
+    def define(name: str, expression: "sympy.Expr") -> "sympy.Symbol":
+        definitions[name] = expression
+        return symbols([name])[0]
+
+    origins, middles = [], []
+    for role, name, frame, is_off in zip(
+        (FIRST, SECOND), MIDDLES, (one, two), eccentric, strict=True
+    ):
+        local = symbols(numbers(name, frame, d))
+        middle = frame.vector(role, local, d)[:d] if is_off else (sympy.S.Zero,) * d
+        middles.append([define(f"{name}_{k}", x) for k, x in enumerate(middle)])
+        origins.append(symbols(frame.variables(role, d)[:d]) or [sympy.S.Zero] * d)
+    places: dict[sympy.Symbol, sympy.Expr] = {}
+    for k, shift in enumerate(symbols(_numbered("shift", d))):
+        (first, second), (p, q) = ((some[0][k], some[1][k]) for some in (origins, middles))
+        away = first + p - second - q + shift
+        if k in axes:
+            unit = symbols([f"period{k}"])[0] / (2 * sympy.pi)
+            turn = define(f"turn{k}", away / unit)
+            away = unit * sympy.atan2(sympy.sin(turn), sympy.cos(turn))
+        near = define(f"near{k}", away)
+        # The middle of the second is at zero if it moves, that of the first ``near`` from it.
+        if one is Frame.FIXED:
+            places[second] = p - near - q
+        elif two is Frame.FIXED:
+            places[first] = q + near - p
+        else:
+            places |= {first: near - p, second: -q}
+    return _placed(family, places, definitions)
+
+
+@lru_cache(maxsize=256)
+def own(family: Family, frame: Frame, d: int) -> Family:
+    """Return the gaps of a family between a body and an image of itself.
+
+    Further parameters: ``shift`` of the first against the second.
+    """
+    parameters = (*family.parameters, *_numbered("shift", d))
+    variables = frame.variables(FIRST, d)[d:]
+    key = repr((cache.source_key(__name__), family.key, "own"))
+    formulas = partial(_own, family, frame, d)
+    return Family(family.names, variables, parameters, formulas, key, stationary=family.stationary)
+
+
+def _own(family: Family, frame: Frame, d: int) -> "Formulas":
+    import sympy
+
+    first, second = (symbols(frame.variables(role, d)) for role in (FIRST, SECOND))
+    shifts = symbols(_numbered("shift", d))
+    places: dict[sympy.Symbol, sympy.Expr] = dict(zip(first[:d], shifts, strict=True))
+    places |= dict.fromkeys(second[:d], sympy.S.Zero)
+    places |= dict(zip(second[d:], first[d:], strict=True))
+    return _placed(family, places, {})
+
+
+def _placed(
+    family: Family,
+    places: "dict[sympy.Symbol, sympy.Expr]",
+    definitions: "dict[str, sympy.Expr]",
+) -> "Formulas":
+    """Return the formulas of a family with other expressions for the places of bodies."""
+    known, expressions = family.formulas()
+    definitions = definitions | {name: e.xreplace(places) for name, e in known.items()}
+    return definitions, {name: e.xreplace(places) for name, e in expressions.items()}
