@@ -1,6 +1,7 @@
 from .arrangement import Arrangement
 from .masses import Mass, mass_of
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
+from .thinning import thinned
 from .walls import Cylinder, HalfSpace, box
 
 __all__ = [
@@ -18,4 +19,5 @@ __all__ = [
     "polygon",
     "polytope",
     "sphere",
+    "thinned",
 ]

@@ -186,19 +186,19 @@ class Arrangement(Value):
         ``excluded`` says whether rounded parts that cross each other are excluded as well, by
         unions that are never active.
         """
-        found = [apart(self.manifold, *pair, excluded=excluded) for pair in self._pairs]
-        found += [function for _, function, *_ in self._at_walls]
+        found = [apart(self.manifold, *pair, excluded=excluded) for pair in self.pairs]
+        found += [function for _, function, *_ in self.at_walls]
         if not found:
             refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
         return found
 
     @cached_property
-    def _pairs(self) -> list[Pair]:
+    def pairs(self) -> list[Pair]:
         """Two parts each, of different bodies of which one moves, and of a body and its image."""
         return pairs(self.lattice, self.placements, dict(self.fixed))
 
     @cached_property
-    def _at_walls(self) -> list[tuple[Wall, SmoothFunction, Member, Array]]:
+    def at_walls(self) -> list[tuple[Wall, SmoothFunction, Member, Array]]:
         """The gaps at walls with parts and their points."""
         return [
             (wall, function, member, point)
@@ -268,8 +268,8 @@ class Arrangement(Value):
         known = masses_of(self.placements, density, masses or {})
         kinetic, potential = energies(self.placements, known, pull)
         polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))
-        touches = [touch for pair in self._pairs for touch in distances(self.manifold, *pair)]
-        walls = [(f.name, wall, member, point) for wall, f, member, point in self._at_walls]
+        touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
+        walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
         family = None
         if count > 1:
             friction, rubbing = _without(friction, BETWEEN)

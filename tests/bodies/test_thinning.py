@@ -1,0 +1,92 @@
+"""Bodies with smaller radii: the gaps of bodies that are made so, and where they jam."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from polycorner import minimise
+from polycorner.bodies import (
+    Arrangement,
+    Cylinder,
+    HalfSpace,
+    capsule,
+    compound,
+    disc,
+    polygon,
+    sphere,
+    thinned,
+)
+
+
+def plane(r):
+    """Bodies in the plane, all radii smaller by 0.3 - r; the peg keeps its own."""
+    return Arrangement(
+        {
+            "A": capsule([-0.5, 0], [0.5, 0], r),
+            "B": compound([disc(r + 0.1), disc(r, at=[0, 0.7])]),
+            "C": polygon([[0, 0], [1, 0], [0, 1]], r),
+        },
+        {"floor": HalfSpace([0, 1], [0, -2])},
+        {"peg": disc(0.2)},
+        period=[1.6, None],
+    )
+
+
+def space(r):
+    """Bodies in space."""
+    walls = {"floor": HalfSpace([0, 0, 1], [0, 0, -2]), "drum": Cylinder(3.0, axis=[0, 0, 1])}
+    rod = capsule([0, 0, -0.5], [0, 0, 0.5], r)
+    return Arrangement([rod, sphere(r, at=[0, 0.2, 0]), rod], walls, orientations="all")
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([plane, space]), st.floats(0.01, 0.3))
+def test_gaps_are_those_of_thinner_bodies(seed, make, r):
+    rng = np.random.default_rng(seed)
+    thick, thin = make(0.3), make(r)
+    places = {}
+    for name in thick.named:
+        turn = rng.uniform(-3, 3)
+        if thick.dimension == 3:
+            turn = Rotation.random(random_state=np.random.RandomState(rng.integers(2**31)))
+        places[name] = (rng.uniform(-2, 2, thick.dimension), turn)
+    d = thinned(thick)
+    q = np.append(thick.point(places), 0.3 - r)
+    # Images are counted by the radii, so that thinner bodies may have fewer.
+    found = dict(zip(d.names, d.values(q), strict=True))
+    assert (found.pop("full"), found.pop("thin")) == pytest.approx((0.3 - r, r))
+    expected = thin.polyhedron.values(thin.point(places))
+    if make is space:
+        # The gap of a cylinder is (R^2 - d^2) / 2R with R less the radius.
+        np.testing.assert_allclose([*found.values()], expected, atol=1e-9)
+    assert d.contains(q) == thin.polyhedron.contains(thin.point(places))
+
+
+def test_a_ball_and_a_rod_in_a_pipe():
+    """Side by side, they grow to a quarter of its width."""
+    rod = capsule([0, 0, -1], [0, 0, 1], 0.45)
+    a = Arrangement([rod], {"pipe": Cylinder(1.0, axis=[0, 0, 1])}, {"core": rod})
+    d = thinned(a)
+    t = d.manifold.symbols[-1]
+    placed = a.point({"1": ([0.6, 0.1, 0], Rotation.from_rotvec([0.02, 0.01, 0]))})
+    jammed = minimise(d, t, np.append(placed, 0.3))
+    # The core keeps its radius: 0.45 + 2 r = 1.
+    assert 0.45 - jammed.point[-1] == pytest.approx(0.275, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind", "said"),
+    [
+        (lambda: thinned(1), TypeError, "arrangement: expected an Arrangement"),
+        (
+            lambda: thinned(Arrangement([disc(1), polygon([[0, 0], [1, 0], [0, 1]])])),
+            ValueError,
+            "arrangement: expected rounded bodies, which have a radius; got '2'",
+        ),
+        (lambda: thinned(Arrangement([disc(1)] * 2), "2t"), ValueError, "names"),
+    ],
+)
+def test_what_is_refused(make, kind, said):
+    with pytest.raises(kind, match=said):
+        make()
