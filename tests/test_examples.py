@@ -33,11 +33,14 @@ from examples import (
     ex22_sliding_squares,
     ex23_gripper,
     ex24_tippe_top,
+    ex25_rods_jam,
 )
-from polycorner import stratum_at
+from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
+from polycorner.models.disks.disks import TorusDisks
 from polycorner.polyhedra import LocalType
 from tests.support.divisions import divisions
+from tests.support.hulls import distance
 
 ROOT = Path(__file__).parents[1]
 
@@ -273,3 +276,35 @@ def test_gripper(tmp_path):
 def test_tippe_top():  # more in tests/bodies/test_tippe_top.py
     turned = ex24_tippe_top.spun(ex24_tippe_top.oiled(), 100, seconds=10)
     assert ex24_tippe_top.inclinations(turned)[-1] == pytest.approx(math.pi, abs=1e-2)
+
+
+def test_rods_jam(tmp_path):
+    found = ex25_rods_jam.main()
+    for name, radius in ex25_rods_jam.KNOWN.items():
+        assert found[name].radius == pytest.approx(radius, abs=1e-9)
+    critical = TorusDisks(3, "square").critical(np.random.default_rng(0))
+    assert found["three periodic discs"].radius == pytest.approx(max(c.radius for c in critical))
+    for name, jam in found.items():
+        locus = name.split()[1] == "periodic"
+        expected = Verdict.MINIMUM_ALONG_LOCUS if locus else Verdict.STRICT_MINIMUM
+        assert jam.certificate.verdict is expected
+    assert len(ex25_rods_jam.draw(found, tmp_path)) == len(found)
+
+
+def test_jammed_rods_cannot_grow():
+    """No placement nearby has more room, by distances from their definition."""
+    case = ex25_rods_jam.CASES["four rods"]
+    jam = ex25_rods_jam.jammed(*case, 12)
+    rng = np.random.default_rng(0)
+    q, scale = jam.point, jam.rods.manifold.scale_array
+    assert room(jam.rods, q) == pytest.approx(jam.radius, abs=1e-9)
+    for size in (1e-3, 1e-2, 1e-1):
+        for _ in range(100):
+            assert room(jam.rods, q + size * scale * rng.standard_normal(len(q))) < jam.radius
+
+
+def room(rods, q):
+    """The radius that segments in a square may have: by their ends, and half their distances."""
+    segments = [body.markers for body in rods.placed(q).values()]
+    walls = min(min(ends.min(), 1 - ends.max()) for ends in segments)
+    return min(walls, *(distance(a, b) / 2 for a, b in combinations(segments, 2)))

@@ -39,7 +39,8 @@ def draw_arrangement(
     """Draw the bodies at one point or several, side by side at the same scale.
 
     Bodies have different colours, fixed ones are grey.  In the plane the outside of walls is grey;
-    in space walls are not drawn.
+    in space walls are not drawn.  A periodic box has dashed sides; in the plane all images are
+    drawn that are seen, in space those whose origins are in the box.
 
     Parameters
     ----------
@@ -64,8 +65,8 @@ def draw_arrangement(
     figure = Figure(figsize=(CELL * columns, (CELL + 0.2) * rows), layout="constrained")
     space = {"projection": "3d"} if arrangement.dimension == 3 else {}
     grid = figure.subplots(rows, columns, squeeze=False, subplot_kw=space)
-    placed = [arrangement.placed(q) for q in places]
-    window = _window([body for bodies in placed for body in bodies.values()])
+    placed = [_in_the_box(arrangement, arrangement.placed(q)) for q in places]
+    window = _window(arrangement, [body for bodies in placed for body in bodies.values()])
     for k, axes in enumerate(grid.flat):
         axes.set_axis_off()
         if k < len(placed):
@@ -76,11 +77,25 @@ def draw_arrangement(
     return figure
 
 
-def _window(bodies: Sequence[Body]) -> Array:
-    """Return two opposite corners ``(2, d)`` of a cube around all bodies."""
+def _in_the_box(arrangement: Arrangement, placed: dict[str, Body]) -> dict[str, Body]:
+    """Return bodies displaced by whole periods so that the means of their points are in the box."""
+    lattice = arrangement.lattice
+    return {
+        name: body.moved(
+            lattice.shift(tuple(-np.floor(body.markers.mean(axis=0) / lattice.lengths)))
+        )
+        for name, body in placed.items()
+    }
+
+
+def _window(arrangement: Arrangement, bodies: Sequence[Body]) -> Array:
+    """Return two opposite corners ``(2, d)`` of a cube around all bodies, or the periodic box."""
     parts = [part for body in bodies for part in body.parts.values()]
     low = np.min([part.points.min(axis=0) - part.radius for part in parts], axis=0)
     high = np.max([part.points.max(axis=0) + part.radius for part in parts], axis=0)
+    lengths = arrangement.lattice.lengths
+    periodic = np.isfinite(lengths)
+    low, high = np.where(periodic, 0.0, low), np.where(periodic, lengths, high)
     half = (0.5 + MARGIN) * (high - low).max()
     return np.array([(low + high) / 2 - half, (low + high) / 2 + half])
 
@@ -97,9 +112,14 @@ def _draw_plane(
     for wall in arrangement.walls.values():
         _draw_wall(axes, wall, window)
     for name, colour in _colours(arrangement).items():
-        for part in placed[name].parts.values():
-            outline = _outline(part)
-            axes.add_patch(Polygon(outline, facecolor=colour, edgecolor=OUTLINE, linewidth=0.8))
+        for image in arrangement.lattice.copies(placed[name], low, high):
+            for part in image.parts.values():
+                outline = _outline(part)
+                axes.add_patch(Polygon(outline, facecolor=colour, edgecolor=OUTLINE, linewidth=0.8))
+    for axis in arrangement.lattice.axes:
+        for place in (0.0, arrangement.lattice.lengths[axis]):
+            draw = axes.axvline if axis == 0 else axes.axhline
+            draw(place, color=OUTLINE, linestyle="--", linewidth=0.8)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
 
 

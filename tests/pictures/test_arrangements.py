@@ -1,0 +1,42 @@
+"""Pictures of arrangements: walls, bodies, and images in periodic boxes."""
+
+import numpy as np
+import pytest
+from matplotlib.patches import Polygon
+
+from polycorner.bodies import Arrangement, HalfSpace, capsule, disc, sphere
+from polycorner.pictures import draw_arrangement
+
+
+def outlines(figure):
+    """The lowest and highest corners of all outlines, ``(k, 2, 2)``."""
+    patches = [p.get_xy() for p in figure.axes[0].patches if isinstance(p, Polygon)]
+    return np.array([[xy.min(axis=0), xy.max(axis=0)] for xy in patches])
+
+
+def test_bodies_are_drawn_once_without_a_period():
+    a = Arrangement([disc(0.1), disc(0.2)], {"floor": HalfSpace([0, 1], [0, 0])})
+    assert len(outlines(draw_arrangement(a, a.point({"1": [0, 1], "2": [1, 1]})))) == 3
+
+
+def test_images_reach_into_the_box_from_all_sides():
+    a = Arrangement([disc(0.1), disc(0.1)], period=[1, 1])
+    figure = draw_arrangement(a, a.point({"1": [5, -3], "2": [0.5, 0.5]}))
+    assert len(figure.axes[0].lines) == 4
+    middles = {tuple(np.round(some.mean(axis=0), 2) + 0.0) for some in outlines(figure)}
+    assert middles == {(0, 0), (0, 1), (1, 0), (1, 1), (0.5, 0.5)}
+
+
+def test_in_a_channel_there_are_images_along_it():
+    a = Arrangement([capsule([0, 0], [0.5, 0], 0.1), disc(0.1)], period=[1, None])
+    figure = draw_arrangement(a, a.point({"1": [0.7, 0], "2": [0.3, 0.4]}))
+    assert len(figure.axes[0].lines) == 2
+    assert len(outlines(figure)) == 3
+
+
+def test_in_space_bodies_are_in_the_box():
+    a = Arrangement([sphere(0.1), sphere(0.2)], period=[1, 1, 1])
+    figure = draw_arrangement(a, a.point({"1": [5.1, -2.9, 0], "2": [0.5, 0.5, 0.5]}))
+    low, high = figure.axes[0].get_xlim()
+    assert (low, high) == pytest.approx((-0.15, 1.15), abs=0.05)
+    assert len(figure.axes[0].collections) == 2
