@@ -289,9 +289,9 @@ class Arrangement(Value):
     def symmetry(self) -> Symmetry:
         """Motions of the whole that walls and fixed bodies allow, exchanges of equal bodies.
 
-        Also included are rotations of a body that carry it to itself; not included are mirror
-        images, and motions that carry one wall to another.  More than ten thousand exchanges
-        and rotations are left out, all of them.
+        Also included are rotations of a body that carry it to itself, and its shifts by periods;
+        not included are mirror images, and motions that carry one wall to another.  More than ten
+        thousand exchanges, rotations and shifts are left out, all of them.
         """
         around = tuple(self.walls.values()), tuple(self.fixed.values()), self.lattice
         return Congruences(self.placements, *around).symmetry(self.polyhedron)

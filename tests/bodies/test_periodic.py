@@ -21,6 +21,7 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
+from polycorner.minimisation import Mobility, immobility
 from tests.support.hulls import margin
 
 seeds = st.integers(0, 2**32 - 1)
@@ -256,6 +257,16 @@ def test_two_discs_on_a_torus():
     for corner in found.corners:
         x, y = np.sort(abs((corner.point[2:] - corner.point[:2] + 0.5) % 1 - 0.5))
         assert (x, y) == pytest.approx((math.sqrt(0.36 - 0.25), 0.5))
+
+
+def test_a_lattice_of_pegs_holds_a_disc():
+    """A disc between a peg and its images: a corner, from which there is no way."""
+    a = Arrangement([disc(0.3)], fixed={"peg": disc(math.sqrt(0.5) - 0.3)}, period=[1, 1])
+    q = a.point({"1": [0.5, 0.5]})
+    assert immobility(a.polyhedron, q).mobility is Mobility.FIRST_ORDER
+    loose = Arrangement([disc(0.3)], fixed={"peg": disc(0.38)}, period=[1, 1])
+    found = skeleton(loose.polyhedron, [q], symmetry=loose.symmetry)
+    assert (len(found.corners), len(found.edges)) == (4, 4)
 
 
 def test_without_a_period_nothing_changes():
