@@ -187,6 +187,9 @@ class Work(NamedTuple):
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
     may_divide: Annotated[Any, whole("1")]  # whether shorter steps follow if this is not solved
     awake: Annotated[Any, whole("N")]
+    touched: Annotated[
+        Any, whole("N")
+    ]  # 0: by nothing; 1: by surroundings only; 2: by other bodies
     evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
     speed: Annotated[Any, real("N")]
     island_speed: Annotated[Any, real("N")]  # largest velocity in the body's island
@@ -209,7 +212,7 @@ class Work(NamedTuple):
     island_start: Annotated[Any, whole("N+1")]  # in `order`, for the body that represents it
     cursor: Annotated[Any, whole("N+1")]
     neighbours: Annotated[Any, whole("P 2")]
-    list_status: Annotated[Any, whole("2")]  # number of neighbours, whether the list is valid
+    list_status: Annotated[Any, whole("3")]  # numbers of neighbours; whether valid; of contacts
     examined: Annotated[Any, whole("P")]  # whether a pair was examined in this step
     least_gap: Annotated[Any, real("P")]  # of a pair at the midpoint; 0: not known
     listed_position: Annotated[Any, real("N 2")]  # positions when the list was made
@@ -226,7 +229,7 @@ class Work(NamedTuple):
     block_set: Annotated[Any, whole("B")]  # set of admissible friction
     origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches
     block_load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
-    is_error: Annotated[Any, whole("B")]  # whether a gap is so small that it may be left as it is
+    is_error: Annotated[Any, whole("B")]  # 1: a gap so small that it may be left as it is; 2: bent
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
     before: Annotated[Any, real("B 2")]  # J v before the step
     free: Annotated[Any, real("B 2")]  # J v after forces alone

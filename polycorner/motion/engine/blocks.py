@@ -4,11 +4,22 @@ import numpy as np
 
 from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
-from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
+from polycorner.motion.engine.bounds import (
+    acts,
+    curvature_change,
+    equation_offset,
+    least_velocity,
+    least_velocity_of,
+)
+from polycorner.motion.engine.evaluation import (
+    ALONE,
+    TOGETHER,
+    evaluate_gaps,
+    evaluate_pair_gaps,
+)
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.neighbours import (
     TOUCHING,
-    ZERO_GAP,
     detection_distance,
     heap_sort,
     key_of,
@@ -23,7 +34,6 @@ from polycorner.motion.engine.rows import (
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import entry, load, store, zeros
 
-ELASTIC = 1e-6  # scaled travel in a step up to which an impact that bounces is slow
 DEPENDENT = 1e-4  # sine of the angle to other equations below which one follows from them
 STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothing
 
@@ -65,58 +75,6 @@ def respond(model, work, at, side, i):
                 slope = entry(J, at + side + a)
                 value = value + slope * load(work.inverse_mass, (i * k + a) * K + c)
         store(work.response, at + side + c, value)
-
-
-@compiled
-def curvature_change(gap, before, following, h, scale):
-    """Return the change of a gap by curvature alone where bodies slide or roll past each other."""
-    change = following - gap - h * before
-    if abs(change) <= ZERO_GAP * scale or abs(h * before) > 4.0 * abs(change):
-        return 0.0
-    return change
-
-
-@compiled
-def is_slow(model, work, before, bounce):
-    """Return whether a gap closes at a velocity at which impacts need not be located."""
-    return -before * model.step <= (work.near[0] if bounce == 0.0 else ELASTIC) * model.gap_unit
-
-
-@compiled
-def acts(model, work, gap, before, bounce, closed):
-    """Return whether a contact acts in a located step: it is closed, or about to close slowly."""
-    if closed or gap <= ZERO_GAP * model.gap_unit:
-        return True
-    near = work.near[0] if bounce == 0.0 else ELASTIC
-    return gap <= near * model.gap_unit and is_slow(model, work, before, bounce)
-
-
-@compiled
-def least_velocity(model, work, gap, closed, before, free, change, bounce, h):
-    """Return the least normal velocity that a contact allows after the step; whether it bounces.
-
-    Forces act for half of the step before a bounce, and for half of it afterwards.
-    """
-    if work.located[0] and (closed or gap <= ZERO_GAP * model.gap_unit):
-        gap = min(gap, 0.0)
-    forced = free - before
-    if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(forced) * (model.step / h):
-        return 0.5 * (forced - bounce * (free + before)), ONE
-    reached = gap + change
-    if -ZERO_GAP * model.gap_unit < reached < 0.0:
-        return 0.0, ZERO
-    if reached < 0.0:  # separated no faster than by forces and curvature within a step
-        return min(-reached / h, abs(forced) + abs(change) / h), ZERO
-    return -reached / (model.step if work.located[0] else h), ZERO
-
-
-@compiled
-def equation_offset(model, gap, change, h):
-    """Return ``d`` of the velocity ``J v + d = 0`` that keeps an equation where it is.
-
-    The midpoint is on it already: the equation holds at the next one if all steps are equal.
-    """
-    return change / h + gap / model.step
 
 
 @compiled
@@ -199,6 +157,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         else:
             if closed or not work.located[0]:
                 change = curvature_change(gap, before, work.gap_next[i, g], h, model.gap_unit)
+            work.touched[i] = ALONE
             least, work.bounces[b] = least_velocity(
                 model, work, gap, closed, before, free, change, model.restitution[g], h
             )
@@ -218,6 +177,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         count += 1
         first = model.slip_start[f]
         new_block(work, b, i, NONE, model.slip_start[f + 1] - first)
+        work.touched[i] = ALONE
         for r in range(work.block_rows[b]):
             work.offset[b, r] = work.slip_offset[i, first + r]
             work.impulse[b, r] = state.friction[i, f, r] * share
@@ -247,6 +207,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
         return count
     n = count
     new_block(work, n, i, j, ZERO)
+    work.touched[i] = work.touched[j] = TOGETHER
     copy_lanes(model, rows, at, work.jacobian, row_at(model, n, ZERO))
     copy_lanes(model, rows, at + K, work.jacobian, row_at(model, n, ZERO) + K)
     change = 0.0
@@ -317,3 +278,26 @@ def assemble_blocks(model, state, work, h, contacts):
                 work.pair_gap_next[g] = work.scratch[model.pair_inputs + g]
         blocks = add_pair_blocks(model, state, work, contact, h, blocks)
     return blocks
+
+
+@compiled
+def renew_blocks(model, state, work, blocks, h):
+    """Start blocks that were solved from their impulses, with new velocities after forces alone.
+
+    The least velocities that contacts allow follow, unless they were changed for other reasons.
+    """
+    for b in range(blocks):
+        i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+        if j >= 0:
+            work.touched[i] = work.touched[j] = TOGETHER
+        elif not work.bilateral[b]:
+            work.touched[i] = max(work.touched[i], ALONE)
+        former = work.free[b, 0]
+        for r in range(max(1, work.block_rows[b])):
+            at = row_at(model, b, r)
+            work.free[b, r] = row_times(model, work.jacobian, at, work.v_free, i, j)
+        if work.block_rows[b] == 0 and not work.bilateral[b]:
+            least = least_velocity_of(model, state, work, b, former, h)
+            if work.offset[b, 0] == -least:
+                work.offset[b, 0] = -least_velocity_of(model, state, work, b, work.free[b, 0], h)
+        apply_impulses(model, work, b, work.impulse[b, 0], work.impulse[b, 1])

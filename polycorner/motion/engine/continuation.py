@@ -17,6 +17,7 @@ FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and 
 FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path
 EASY_STEPS = 8  # Newton steps up to which the next factor is smaller
 LOAD_ROUNDS = 20  # convex problems that are solved, at most
+IDLE_ROUNDS = 5  # of these without progress
 MANY, FEW_ROUNDS = 600, 4  # blocks of a large island, and problems in it if steps may be divided
 GRIP = 1e3  # speed of slip that first loads stop, over that of the island
 LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
@@ -89,7 +90,7 @@ def iterate_loads(model, state, work, first, last, n, goal, softness, grip):
     go to and fro, only a share of their change is taken over.  Large islands
     whose step may be divided are given a few problems only.
     """
-    share, former = 1.0, np.inf
+    share, former, best, idle = 1.0, np.inf, np.inf, 0
     few = work.may_divide[0] and last - first > MANY
     for _ in range(FEW_ROUNDS if few else LOAD_ROUNDS):
         detach_loads(work, first, last, 1.0 if former == np.inf else share)
@@ -109,7 +110,9 @@ def iterate_loads(model, state, work, first, last, n, goal, softness, grip):
             copy_impulses(work, first, last, work.impulse, work.loaded)
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             state.counts[NEWTON_STEPS] += steps
-        if worst <= goal:
+        idle = 0 if worst < 0.5 * best else idle + 1
+        best = min(best, worst)
+        if worst <= goal or idle == IDLE_ROUNDS:
             return
         copy_impulses(work, first, last, work.loaded, work.impulse)
         recompute_velocities(model, work, first, last)

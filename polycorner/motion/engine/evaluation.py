@@ -7,8 +7,14 @@ from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
 from polycorner.motion.engine.random import gaussian, held_integral
 
-# Change of a velocity, relative to the speed, below which forces are those of the step.
-SETTLED = 1e-14
+ALONE, TOGETHER = (
+    1,
+    2,
+)  # how a body is touched: by its surroundings only, or by other bodies as well
+
+# Change of a velocity, relative to the speed, below which forces that depend on it are settled: for
+# bodies that nothing touches; and over the tolerance, for those that touch no other, and that do.
+SETTLED, SETTLED_ALONE, SETTLED_TOGETHER = 1e-14, 1e-2, 1.0
 ON_EQUATIONS = 1e-10  # scaled distance up to which a body is on its equations
 MOST_APPROACHES = 8  # Newton steps onto them
 BENDING = 1e-8  # weight of the change of place, relative to the equations
@@ -16,8 +22,11 @@ KICK = 32  # index of the first random impulse; those below are of chattering lo
 
 
 @compiled
-def evaluate_forces(model, work, i, v, h):
-    """Evaluate mass and forces of a body at the midpoint; return where its loads are in scratch."""
+def evaluate_forces(model, work, i, v, h, mass):
+    """Evaluate forces of a body at the midpoint, and its mass if asked for.
+
+    Return where its loads are in scratch.
+    """
     k, scratch = model.dimension, work.scratch
     for c in range(k):
         scratch[c] = work.q_mid[i, c]
@@ -26,7 +35,7 @@ def evaluate_forces(model, work, i, v, h):
     f0 = 2 * k
     call_kernel(model.force_kernel, start, base, start + 8 * f0, start, start)
     upper = k * (k + 1) // 2
-    if not (model.constant_mass and work.mass[i, 0, 0] > 0.0):
+    if mass and not (model.constant_mass and work.mass[i, 0, 0] > 0.0):
         invert(scratch, f0, k, work.mass[i], work.inverse_mass[i])
     at = f0 + upper
     for c in range(k):
@@ -63,7 +72,7 @@ def evaluate_body(model, state, work, i, h, time, index):
             work.kick[i, c] = random_impulse(model, i, c, h, time, index)
     if model.unilateral < model.restitution.size:
         approach_equations(model, work, i)
-    at = evaluate_forces(model, work, i, state.v, h)
+    at = evaluate_forces(model, work, i, state.v, h, True)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))
         for j in range(model.loads):
@@ -122,6 +131,15 @@ def approach_equations(model, work, i):
 
 
 @compiled
+def settled(model, work, i):
+    """Return the change of a velocity, relative to the speed, that is none."""
+    if not work.touched[i]:
+        return SETTLED
+    share = SETTLED_TOGETHER if work.touched[i] == TOGETHER else SETTLED_ALONE
+    return max(SETTLED, share * model.tolerance)
+
+
+@compiled
 def update_forces(model, state, work, h):
     """Evaluate forces at the mean velocities of the step; return whether any changed.
 
@@ -135,7 +153,7 @@ def update_forces(model, state, work, h):
         for c in range(k):
             work.v_mean[i, c] = 0.5 * (state.v[i, c] + work.v_new[i, c])
             work.former_force[i, c] = work.force[i, c]
-        evaluate_forces(model, work, i, work.v_mean, h)
+        evaluate_forces(model, work, i, work.v_mean, h, False)
         change, speed = 0.0, 0.0
         for c in range(k):
             value = 0.0
@@ -144,7 +162,7 @@ def update_forces(model, state, work, h):
                 value += work.inverse_mass[i, c, a] * difference
             change = max(change, abs(value) * model.units[c])
             speed += (abs(work.v_new[i, c]) + abs(state.v[i, c])) * model.units[c]
-        if change > SETTLED * speed:
+        if change > settled(model, work, i) * speed:
             changed = True
             continue
         for c in range(k):

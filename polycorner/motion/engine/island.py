@@ -5,10 +5,11 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
 from polycorner.motion.engine.band import number_bodies
-from polycorner.motion.engine.blocks import STRAIGHT, equation_offset
+from polycorner.motion.engine.blocks import STRAIGHT
+from polycorner.motion.engine.bounds import equation_offset
 from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
-from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps
+from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import speed_of
@@ -27,6 +28,7 @@ FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
 SMALL = 8  # lanes of a small island
 FEW = 8  # blocks of a small island up to which sweeps, which may be exact, come first
 SPARE = 1e-2  # share of the tolerance to which small islands are solved if possible
+BENT = 2  # of a velocity bound: it was raised for the curvature of its gap
 SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
@@ -87,7 +89,7 @@ def leave_errors(work, first, last):
     """Let small errors of closed gaps be."""
     for s in range(first, last):
         b = work.order[s]
-        if work.block_rows[b] == 0 and work.is_error[b]:
+        if work.block_rows[b] == 0 and work.is_error[b] == 1:
             work.offset[b, 0] = 0.0
 
 
@@ -193,10 +195,12 @@ def rests(model, state, work, first, last, speed):
 def solve_islands(model, state, work, blocks, h):
     """Solve all islands; those in which gaps would close by their curvature, a second time.
 
-    Equations are solved for until they hold at the next midpoint.
+    Equations are solved for until they hold at the next midpoint, here if forces do not depend on
+    the velocity; if they do, see :func:`follow_curvature`.
     """
     starts = work.island_start
-    most = 2 if model.unilateral == model.restitution.size else MOST_CORRECTIONS
+    here = model.unilateral < model.restitution.size and not model.follows_velocity
+    most = MOST_CORRECTIONS if here else 2
     for attempt in range(most):
         for i in range(model.bodies):
             if starts[i + 1] > starts[i] and (attempt == 0 or work.curves_shut[i]):
@@ -239,29 +243,82 @@ def correct_curvature(model, state, work, blocks, h):
             gap = work.contact_gap[work.origin[b, 1]]
             following = work.scratch[model.pair_inputs + g]
         if work.bilateral[b]:
-            found = bend_equation(model, work, b, gap, following, h) or found
+            if model.follows_velocity:
+                continue
+            if bend_equation(model, work, b, gap, following, h, model.tolerance):
+                work.curves_shut[island_of(work, b)] = 1
+                found = True
             continue
         target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
         if following < target - CURVATURE_DEPTH * model.gap_unit:
             work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
             work.offset[b, 0] = (gap - work.block_load[b] - target) / h
-            work.is_error[b] = 0
+            work.is_error[b] = BENT
             work.curves_shut[island_of(work, b)] = 1
             found = True
     return found
 
 
 @compiled
-def bend_equation(model, work, b, gap, following, h):
-    """Correct an equation that does not hold at the next midpoint; return whether it does not."""
+def bend_equation(model, work, b, gap, following, h, share):
+    """Correct an equation that does not hold at the next midpoint; return whether it does not.
+
+    It does up to a share of what bodies travel.
+    """
     never_inline()
     if h <= STRAIGHT * model.step:
         return False
     speed = work.island_speed[work.block_bodies[b, 0]]
     missed = abs(following - gap + h * gap / model.step)
-    if missed <= MISSED * model.gap_unit + model.tolerance * h * speed:
+    if missed <= MISSED * model.gap_unit + share * h * speed:
         return False
     work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
     work.offset[b, 0] = equation_offset(model, gap, -work.block_load[b], h)
-    work.curves_shut[island_of(work, b)] = 1
     return True
+
+
+@compiled
+def bend_bound(model, work, b, gap, following, h, share):
+    """Correct the bound of a contact whose gap curves otherwise; return whether it does."""
+    never_inline()
+    speed = work.island_speed[work.block_bodies[b, 0]]
+    closing = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
+    more = closing - work.block_load[b]
+    if abs(more) <= MISSED * model.gap_unit + share * h * speed:
+        return False
+    work.block_load[b] = closing
+    work.offset[b, 0] -= more / h
+    return True
+
+
+@compiled
+def follow_curvature(model, state, work, blocks, h):
+    """Correct equations and bounds that curve otherwise than they were solved for.
+
+    The bounds are those that :func:`correct_curvature` raised.  Return whether there are any.
+    """
+    k, found = model.dimension, False
+    for i in range(model.bodies):
+        for c in range(k):
+            work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
+    first, second = NONE, NONE
+    for b in range(blocks):
+        if work.block_rows[b] > 0 or not (work.bilateral[b] or work.is_error[b] == BENT):
+            continue
+        i, j, g = work.block_bodies[b, 0], work.block_bodies[b, 1], work.origin[b, 2]
+        share, away = settled(model, work, i), i != first or j != second
+        if j < 0:
+            if away:
+                evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
+            gap, following = work.gap[i, g], work.gap_next[i, g]
+        else:
+            if away:
+                evaluate_pair_gaps(model, work, i, j, work.q_next)
+            gap = work.contact_gap[work.origin[b, 1]]
+            following = work.scratch[model.pair_inputs + g]
+        first, second = i, j
+        if work.bilateral[b]:
+            found = bend_equation(model, work, b, gap, following, h, share) or found
+        else:
+            found = bend_bound(model, work, b, gap, following, h, share) or found
+    return found

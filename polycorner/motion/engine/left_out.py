@@ -12,7 +12,7 @@ than shorter steps for all.
 """
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_GAP
-from polycorner.motion.engine.blocks import is_slow
+from polycorner.motion.engine.bounds import is_slow
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP, speed_of, travel
@@ -148,7 +148,7 @@ def body_misses(model, state, work, i, h):
     for g in range(model.restitution.size):
         f, following = work.gap[i, g], work.gap_next[i, g]
         if state.touches[i, g]:
-            if following < -deep or (g >= model.unilateral and following > deep):
+            if following < min(-deep, f) or (g >= model.unilateral and following > deep):
                 return True
             continue
         rate = rate_of(model, work.gradient, work.v_new, i, g)

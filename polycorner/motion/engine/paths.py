@@ -13,7 +13,7 @@ it from above, with bisection where there is a bracket.
 
 import numpy as np
 
-from polycorner.motion.engine.blocks import acts
+from polycorner.motion.engine.bounds import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP, find_contact, square_distance
@@ -195,7 +195,7 @@ def acceptable_to(model, state, work, i, j, h, out):
             length = min(length, first_in_gap(model, state, work, i, j, g, acting, h, out))
         if acting:
             following = work.way_gap[FULL, g]
-            sunk = sunk or following < -deep
+            sunk = sunk or following < min(-deep, work.way_gap[NEXT, g])
             sunk = sunk or (j < 0 and g >= model.unilateral and following > deep)
     if sunk and h > SHORTEST_PART * model.step:
         length = min(length, 0.5 * h)

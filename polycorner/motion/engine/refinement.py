@@ -31,7 +31,7 @@ from polycorner.motion.engine.stepping import attempt, commit
 
 SHORTEST_SOLVED = 1.0 / 16.0  # of a step, to which parts are halved to be solved
 MOST_PARTS = 100_000  # of one step, beyond which the rest is done at once
-MOST_SWEEPS, MEAN_SWEEPS = 1000, 50  # over islands, in all and for each part more, the same
+MOST_SWEEPS, MEAN_SWEEPS = 1000, 50  # over islands, in all and for each try more, the same
 MOST_TRIES = 100  # of one part
 
 
@@ -99,7 +99,7 @@ def refine(model, state, work, log, root, index, count):
     H, begin = model.step, index * model.step
     gather(model, state, work, root, begin + 0.5 * H, index)
     room = 2 * model.contact_room + model.bodies * (3 + model.restitution.size)
-    next_length, exact, parts, spent = H, True, 0, state.counts[SWEEPS]
+    next_length, exact, parts, tried, spent = H, True, 0, 0, state.counts[SWEEPS]
     while state.elapsed[root] < H:
         if count + room > model.event_room:
             return EVENTS_FULL, count
@@ -132,8 +132,8 @@ def refine(model, state, work, log, root, index, count):
             count = record_failure(model, work, log, island, time + 0.5 * h, count)
             exact = False
         count = commit(model, state, work, log, blocks, h, time, index, True, count)
-        parts += 1
-        allowed = MOST_SWEEPS + MEAN_SWEEPS * parts
+        parts, tried = parts + 1, tried + tries
+        allowed = MOST_SWEEPS + MEAN_SWEEPS * tried
         if exact and (parts == MOST_PARTS or state.counts[SWEEPS] - spent > allowed):
             exact = False
             state.counts[UNSOLVED] += 1

@@ -32,7 +32,7 @@ from polycorner.motion.engine.arrays import (
     PAIR_FRICTION,
     SUBSTRATE_WORK,
 )
-from polycorner.motion.engine.blocks import assemble_blocks
+from polycorner.motion.engine.blocks import assemble_blocks, renew_blocks
 from polycorner.motion.engine.contact_list import (
     EXIT,
     MOTION,
@@ -44,7 +44,7 @@ from polycorner.motion.engine.contact_list import (
     takes_part,
 )
 from polycorner.motion.engine.evaluation import update_forces
-from polycorner.motion.engine.island import solve_islands
+from polycorner.motion.engine.island import follow_curvature, solve_islands
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
 from polycorner.motion.engine.partition import find_islands
@@ -78,6 +78,7 @@ def start_bodies(model, state, work):
             before = abs(state.v[i, c] - carried) * model.units[c]
             speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
         work.speed[i], work.island_speed[i] = speed, speed
+        work.touched[i] = 0
         for g in range(model.restitution.size):
             finite = finite and not np.isnan(work.gap[i, g])
     return finite
@@ -121,13 +122,14 @@ def book_work(model, state, work, blocks, h):
 
 
 @compiled
-def solve(model, state, work, h, time, index):
+def solve(model, state, work, h, time, index, solved):
     """Solve a step for the bodies that are awake and those that they wake.
 
-    Return whether all contacts fit in the workspace, and the number of blocks.
+    If ``solved`` blocks were solved before, with other forces, they remain, and start from the
+    impulses found.  Return whether all contacts fit in the workspace, and the number of blocks.
     """
-    contacts, blocks = ZERO, ZERO
-    if model.pair_kernel != 0:
+    contacts, blocks = work.list_status[2] if solved else ZERO, solved
+    if model.pair_kernel != 0 and not solved:
         if outdated(model, state, work, h, time) and not list_neighbours(
             model, state, work, h, time
         ):
@@ -135,12 +137,15 @@ def solve(model, state, work, h, time, index):
         for s in range(work.list_status[0]):
             work.examined[s] = 0
     while True:
-        if model.pair_kernel != 0:
-            contacts = detect_contacts(model, state, work, h, contacts)
-            if contacts < 0:
-                return False, blocks
-        blocks = assemble_blocks(model, state, work, h, contacts)
-        find_islands(model, work, blocks)
+        if solved:
+            renew_blocks(model, state, work, blocks, h)
+        else:
+            if model.pair_kernel != 0:
+                contacts = detect_contacts(model, state, work, h, contacts)
+                if contacts < 0:
+                    return False, blocks
+            blocks = assemble_blocks(model, state, work, h, contacts)
+            find_islands(model, work, blocks)
         solve_islands(model, state, work, blocks, h)
         store_impulses(model, state, work, blocks, h)
         if model.pair_kernel == 0 or not wake_neighbours(
@@ -148,14 +153,28 @@ def solve(model, state, work, h, time, index):
         ):
             break
         start_bodies(model, state, work)
+        solved = ZERO
+    work.list_status[2] = contacts
     return True, blocks
+
+
+@compiled
+def unsolved(model, work):
+    """Return whether an island is not solved to the tolerance."""
+    for i in range(model.bodies):
+        if work.island_start[i + 1] > work.island_start[i] and (
+            work.island_residual[i] > model.tolerance
+        ):
+            return True
+    return False
 
 
 @compiled
 def attempt(model, state, work, h, time, index, any_awake):
     """Solve a step for the velocities of the bodies that are awake, which have been evaluated.
 
-    Forces that depend on the velocity are those of its mean over the step.  Return why it cannot be
+    Forces that depend on the velocity are those of its mean over the step, for which it is solved
+    several times.  A part of a step that is not solved is left at that.  Return why it cannot be
     done, or DONE, and the number of blocks.
     """
     blocks = ZERO
@@ -164,10 +183,13 @@ def attempt(model, state, work, h, time, index, any_awake):
             return NOT_FINITE, blocks
         if not any_awake:
             break
-        fits, blocks = solve(model, state, work, h, time, index)
+        fits, blocks = solve(model, state, work, h, time, index, blocks)
         if not fits:
             return CONTACTS_FULL, blocks
-        if not (model.follows_velocity and update_forces(model, state, work, h)):
+        if not model.follows_velocity or (work.located[0] and unsolved(model, work)):
+            break
+        curved = follow_curvature(model, state, work, blocks, h)
+        if not update_forces(model, state, work, h) and not curved:
             break
     for i in range(model.bodies):
         for c in range(model.dimension):
