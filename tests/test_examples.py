@@ -34,6 +34,7 @@ from examples import (
     ex23_gripper,
     ex24_tippe_top,
     ex25_rods_jam,
+    ex26_drum_in_space,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -308,3 +309,14 @@ def room(rods, q):
     segments = [body.markers for body in rods.placed(q).values()]
     walls = min(min(ends.min(), 1 - ends.max()) for ends in segments)
     return min(walls, *(distance(a, b) / 2 for a, b in combinations(segments, 2)))
+
+
+def test_in_space_dumbbells_roll_and_pairs_climb_as_in_the_developed_drum(tmp_path):
+    found = ex26_drum_in_space.main()
+    assert found.onsets == pytest.approx(found.rest, abs=0.02)  # degrees; two independent ways
+    assert found.onsets == pytest.approx(found.formula, rel=3 / 122)  # the order of r / R
+    right, left = np.diff(found.pairs[[0, -1], :, :, 1].mean(axis=-1), axis=0)[0]
+    assert right > 1.5
+    assert left < -1.5
+    assert found.lift < 0.01
+    assert ex26_drum_in_space.draw(found, tmp_path / "drum.png").exists()

@@ -10,10 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
-from polycorner.bodies.arguments import named, placement
+from polycorner.bodies.arguments import check_together, coordinates, named, rates
 from polycorner.bodies.congruences import Congruences
-from polycorner.bodies.dynamics import between, energies, friction_of, masses_of, smooth
-from polycorner.bodies.frames import Frame
+from polycorner.bodies.dynamics import (
+    Coefficients,
+    between,
+    energies,
+    friction_of,
+    masses_of,
+    smooth,
+    without,
+)
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.neighbours import Pair, check_room, pairs
@@ -116,23 +123,11 @@ class Arrangement(Value):
             if not isinstance(wall, Wall):
                 refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
-        self._check_together()
+        check_together(self.named, self.fixed, self.walls)
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
         check_room(self.lattice, self.placements, self.walls)
         super().__post_init__()
-
-    def _check_together(self) -> None:
-        """Raise ValueError for a name of two things, or things in the plane and in space."""
-        known = [*self.named, *self.fixed, *self.walls]
-        twice = sorted({name for name in known if known.count(name) > 1})
-        if twice:
-            refuse("fixed" if twice[0] in self.fixed else "walls", "names of their own", twice[0])
-        for argument in ("bodies", "fixed", "walls"):
-            for name, one in getattr(self, argument).items():
-                if one.dimension != self.dimension:
-                    space = "the plane" if self.dimension == 2 else "space"
-                    refuse(argument, f"all in {space}, like {next(iter(self.named))!r}", name)
 
     @property
     def named(self) -> dict[str, Body]:
@@ -214,8 +209,10 @@ class Arrangement(Value):
         gravity: ArrayLike | None = None,
         density: float = 1.0,
         masses: Mapping[str, Mass] | None = None,
-        friction: float | Mapping[str, float] = 0.0,
+        friction: Coefficients = 0.0,
+        rolling: Coefficients = 0.0,
         restitution: float | Mapping[str, float] = 0.0,
+        exits: Mapping[str, float] | None = None,
         count: int = 1,
     ) -> System:
         """Return the mechanical system of the bodies.
@@ -231,12 +228,18 @@ class Arrangement(Value):
         density : float, optional
             Mass per area or volume of bodies without a mass of their own.
         masses : mapping from str to Mass, optional
-        friction : float or mapping from str to float, optional
-            Coulomb's coefficient, static and dynamic, for all contacts or by name; needs
+        friction : float, (float, float), or mapping from str to these, optional
+            Coulomb's coefficient, or a static and a dynamic one, for all contacts or by name; needs
             ``orientations="all"``.  The name of the contacts among repeated bodies is
             ``"between"``.  Not covered: polygons and polyhedra that touch bodies.
+        rolling : the same, optional
+            Coefficients of rolling resistance: the torque across the normal is at most
+            ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
+            (r + s)`` for two rounded parts.  None among repeated bodies.
         restitution : float or mapping from str to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
+        exits : mapping from str to float, optional
+            As in :class:`~polycorner.System`.
         count : int, optional
             Default 1.
 
@@ -272,17 +275,18 @@ class Arrangement(Value):
         walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
         family = None
         if count > 1:
-            friction, rubbing = _without(friction, BETWEEN)
-            restitution, bouncing = _without(restitution, BETWEEN)
+            friction, rubbing = without(friction, BETWEEN)
+            restitution, bouncing = without(restitution, BETWEEN)
             family = between(self.placements[0], rubbing, bouncing)
         return System(
             polyhedron,
             kinetic,
             potential,
-            friction=friction_of(self.placements, touches, walls, friction),
+            friction=friction_of(self.placements, touches, walls, friction, rolling),
             restitution=restitution,
             count=count,
             between=family,
+            exits=exits or {},
         )
 
     @cached_property
@@ -305,24 +309,19 @@ class Arrangement(Value):
             For every body its origin ``(d,)``, or a pair of this and an angle in radians (in the
             plane) or a :class:`scipy.spatial.transform.Rotation` (in space).
         """
-        checks.mapping("placed", placed)
-        checks.names("placed", placed, self.named)
-        missing = [name for name in self.named if name not in placed]
-        if missing:
-            refuse("placed", f"a placement of {missing[0]!r} as well", [*placed])
-        found = []
-        for p in self.placements:
-            origin, matrix = placement(placed[p.name], self.dimension)
-            if (
-                p.frame is Frame.SHIFTED
-                and not p.is_round
-                and (matrix != np.eye(len(origin))).any()
-            ):
-                refuse(
-                    "placed", f"no rotation of {p.name!r}, which is shifted only", placed[p.name]
-                )
-            found.append(p.coordinates(origin, matrix))
-        return np.concatenate(found)
+        return coordinates(placed, self.placements)
+
+    def velocity(self, q: ArrayLike, moving: Mapping[str, Any]) -> Array:
+        """Return the velocities of the coordinates ``(N,)`` of bodies that move at a point.
+
+        Parameters
+        ----------
+        q : (N,) array
+        moving : mapping from str to velocity
+            For bodies that do not rest the velocity of the origin ``(d,)``, or a pair of this and
+            the angular velocity in rad/s: counterclockwise, or ``(3,)`` in the axes of space.
+        """
+        return rates(self.manifold.point(q), moving, self.placements)
 
     def placed(self, q: ArrayLike) -> dict[str, Body]:
         """Return the bodies where they are at a point ``(N,)``, fixed ones last.
@@ -332,13 +331,3 @@ class Arrangement(Value):
         point = self.manifold.point(q)
         moved = {p.name: p.moved(point) for p in self.placements}
         return {**moved, **self.fixed}
-
-
-Coefficients = float | Mapping[str, float]
-
-
-def _without(given: Coefficients, name: str) -> tuple[Coefficients, float]:
-    """Return the coefficients by name without one, and that one."""
-    if not isinstance(given, Mapping):
-        return given, given
-    return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)

@@ -14,7 +14,7 @@ from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.pairs import Member, Touch, distances, members
 from polycorner.bodies.poses import Placement
-from polycorner.bodies.slips import slip, slip_at_wall
+from polycorner.bodies.slips import rolling, rolling_at_wall, slip, slip_at_wall
 from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 SAME = 1e-9  # relative deviation that counts as none
 AtWall = tuple[str, Wall, Member, Array]  # label of the gap, wall, part, point
 Law = Callable[[], "tuple[sympy.Expr, ...]"]
+Coefficient = float | tuple[float, float]  # static and dynamic
+Coefficients = Coefficient | Mapping[str, Coefficient]
 
 
 def masses_of(placements: tuple[Placement, ...], density: float, given: Any) -> dict[str, Mass]:
@@ -114,60 +116,86 @@ def _rotation(p: Placement, mass: Mass, rates: "tuple[sympy.Symbol, ...]") -> "s
 
 
 def friction_of(
-    placements: tuple[Placement, ...], touches: list[Touch], walls: list[AtWall], given: Any
+    placements: tuple[Placement, ...],
+    touches: list[Touch],
+    walls: list[AtWall],
+    sliding: Coefficients,
+    rolls: Coefficients,
 ) -> tuple[Friction, ...]:
-    """Return dry friction at the contacts with a positive coefficient."""
+    """Return dry friction and rolling resistance where a coefficient is positive."""
     named = {p.name: p for p in placements}
-    laws: dict[str, tuple[Law, list[Member]]] = {
-        t.gap.name: (partial(slip, named, t), [t.one, t.two]) for t in touches
-    }
-    for label, wall, member, point in walls:
-        laws[label] = (partial(slip_at_wall, named, wall, member, point), [member])
-    by_name = given if isinstance(given, Mapping) else dict.fromkeys(laws, given)
-    checks.names("friction", by_name, laws)
-    coefficients = {k: checks.real("friction", mu, least=0) for k, mu in by_name.items()}
+    d = placements[0].body.dimension
     found = []
-    for label, mu in coefficients.items():
-        law, rubbing = laws[label]
-        if mu == 0:
-            continue
-        _check_turning(rubbing, mu)
-        shape = Interval(mu) if placements[0].body.dimension == 2 else Disc(mu)
-        found.append(Friction(f"{label} slips", law(), shape, label))
+    for argument, given, kind, verb, at_body, at_wall in (
+        ("friction", sliding, "sliding", "slips", slip, slip_at_wall),
+        ("rolling", rolls, "rolling", "rolls", rolling, rolling_at_wall),
+    ):
+        laws: dict[str, tuple[Law, list[Member]]] = {
+            t.gap.name: (partial(at_body, named, t), [t.one, t.two]) for t in touches
+        }
+        for label, wall, member, point in walls:
+            laws[label] = (partial(at_wall, named, wall, member, point), [member])
+        by_name = given if isinstance(given, Mapping) else dict.fromkeys(laws, given)
+        checks.names(argument, by_name, laws)
+        for label, value in by_name.items():
+            static, dynamic = _both(argument, value)
+            if static == 0:
+                continue
+            law, rubbing = laws[label]
+            _check_turning(argument, rubbing, value)
+            sets = _set(static, d), _set(dynamic, d)
+            found.append(Friction(f"{label} {verb}", law(), sets[0], label, sets[1], kind))
     return tuple(found)
 
 
-def _check_turning(rubbing: list[Member], mu: float) -> None:
+def _both(argument: str, given: Any) -> tuple[float, float]:
+    """Return the static and the dynamic one of a coefficient, which may be the same."""
+    expected = "a coefficient >= 0, or a pair of a static and a smaller dynamic one"
+    pair = np.array(checks.numbers(argument, given, expected), dtype=np.float64)
+    if pair.shape not in {(), (2,)} or not np.isfinite(pair).all() or (pair < 0).any():
+        refuse(argument, expected, given)
+    static, dynamic = np.broadcast_to(pair, 2).tolist()
+    if dynamic > static:
+        refuse(argument, expected, given)
+    return static, dynamic
+
+
+def _set(mu: float, dimension: int) -> ConvexSet:
+    return Interval(mu) if dimension == 2 else Disc(mu)
+
+
+def _check_turning(argument: str, rubbing: list[Member], given: Any) -> None:
     for member in rubbing:
         if member.frame in {Frame.SHIFTED, Frame.AXIAL}:
             missing = "coordinates of all rotations (orientations='all')"
-            refuse("friction", f"{missing}, those of {member.body!r} too", mu)
+            refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
-def between(p: Placement, mu: float, restitution: float) -> ContactFamily:
+def between(p: Placement, mu: Coefficient, restitution: float) -> ContactFamily:
     """Return the contacts of any two of several bodies like one, with friction if ``mu > 0``.
 
     The two are called after the body, with 1 and 2, and so are their coordinates.
     """
-    mu = checks.real("friction", mu, least=0)
+    static, dynamic = _both("friction", mu)
     pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
     space = pair[0].manifold * pair[1].manifold
     one, two = (members(some.name, some.body, some) for some in pair)
     touches = [t for parts in product(one, two) for t in distances(space, *parts)]
     gaps, definitions = _written([t.gap for t in touches])
     slips: dict[str, Any] = {}
-    shape: ConvexSet | None = None
-    if mu > 0:
-        _check_turning([one[0], two[0]], mu)
+    sets: tuple[ConvexSet | None, ConvexSet | None] = (None, None)
+    if static > 0:
+        _check_turning("friction", [one[0], two[0]], mu)
         named = {some.name: some for some in pair}
         slips = {t.gap.name: slip(named, t) for t in touches}
-        shape = Interval(mu) if p.body.dimension == 2 else Disc(mu)
+        sets = _set(static, p.body.dimension), _set(dynamic, p.body.dimension)
     return ContactFamily(
         gaps,
         2 * p.body.size / p.manifold.scales[0],
         p.manifold.names[:2],
         slip=slips,
-        static=shape,
+        static=sets[0],
+        dynamic=sets[1],
         restitution=restitution,
         definitions=definitions,
     )
@@ -209,3 +237,10 @@ def smooth(polyhedron: Polyhedron) -> Polyhedron:
         )
         raise NotImplementedError(msg)
     return polyhedron
+
+
+def without(given: Any, name: str) -> tuple[Any, Any]:
+    """Return coefficients by name without one, and that one; one for all is both."""
+    if not isinstance(given, Mapping):
+        return given, given
+    return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)

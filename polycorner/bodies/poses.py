@@ -79,6 +79,22 @@ class Placement(Value):
             return origin, Rotation.from_quat(turned[[1, 2, 3, 0]]).as_matrix()
         return origin, np.eye(d)
 
+    def rates(self, q: Array, velocity: Array, spin: Array) -> Array:
+        """Return the velocities of the coordinates for those of the body.
+
+        ``spin`` is the angular velocity ``(3,)``; in the plane its third component counts.
+        """
+        d, turned = self.body.dimension, q[self.at][self.body.dimension :]
+        if self.frame is Frame.TURNED:
+            return np.append(velocity, spin[2])
+        if self.frame is Frame.AXIAL:
+            return np.append(velocity, np.cross(spin, turned))
+        if self.frame is Frame.ROTATED:
+            scalar, vector = turned[0], turned[1:]  # a' = (0, spin) a / 2
+            change = [-spin @ vector, *(scalar * spin + np.cross(spin, vector))]
+            return np.append(velocity, np.array(change) / 2)
+        return velocity[:d]
+
     def moved(self, q: Array) -> Body:
         """Return the body in its place."""
         return self.body.carried(*self.pose(q))

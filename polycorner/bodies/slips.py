@@ -1,9 +1,11 @@
-"""Slip velocities where a point of one body touches another body or a wall.
+"""Slip and rolling velocities where a point of one body touches another body or a wall.
 
 With the point ``p`` inside the rounding of radius ``r``, the nearest point ``q`` of the other
 part, and the unit normal ``n`` from ``q`` to ``p``, the bodies touch at ``p - r n``.  The slip is
 the difference of their velocities there along tangents: in the plane ``n`` turned left; in space a
-basis that depends on ``n`` without a singular direction ([Duff]).
+basis that depends on ``n`` without a singular direction ([Duff]).  The rolling velocity is the
+difference of the angular velocities along the same directions (in the plane, the difference itself)
+times ``r``, between bodies of radii ``r`` and ``s`` times ``r s / (r + s)``.
 """
 
 from typing import TYPE_CHECKING
@@ -39,12 +41,26 @@ def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, .
             f"{touch.gap.name!r}, where the nearest point of a polygon or polyhedron is not covered"
         )
         raise NotImplementedError(msg)
+    p, normal = _place(touch)
+    return _slip(placements, touch.one, p, normal, touch.two)
+
+
+def rolling(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, ...]":
+    """Return the rolling velocity of two bodies, of as many components as the slip."""
+    _, normal = _place(touch)
+    r, s = touch.one.part.radius, touch.two.part.radius
+    radius = r * s / (r + s) if r and s else 0.0
+    return _rolling(placements, touch.one, normal, touch.two, radius)
+
+
+def _place(touch: Touch) -> "tuple[Point, Point]":
+    """Return the nearest point of the first part, and the normal from the second to it."""
     p, q = _nearest(
         [_at(touch.one, point) for point in touch.first],
         [_at(touch.two, point) for point in touch.second],
     )
     apart = minus(p, q)
-    return _slip(placements, touch.one, p, _scaled(apart, 1 / norm(apart)), touch.two)
+    return p, _scaled(apart, 1 / norm(apart))
 
 
 def _nearest(first: "list[Point]", second: "list[Point]") -> "tuple[Point, Point]":
@@ -68,15 +84,26 @@ def slip_at_wall(
 ) -> "tuple[sympy.Expr, ...]":
     """Return the slip of a point of a body at a wall, which may turn."""
     p = _at(member, point)
+    return _slip(placements, member, p, _inward(wall, p), wall)
+
+
+def rolling_at_wall(
+    placements: dict[str, Placement], wall: Wall, member: Member, point: Array
+) -> "tuple[sympy.Expr, ...]":
+    """Return the rolling velocity of a point of a body at a wall, which may turn."""
+    normal = _inward(wall, _at(member, point))
+    return _rolling(placements, member, normal, wall, member.part.radius)
+
+
+def _inward(wall: Wall, p: "Point") -> "Point":
+    """Return the normal of a wall next to a point."""
     if isinstance(wall, HalfSpace):
-        normal = _fixed(wall.normal)
-    else:
-        away = minus(p, _fixed(wall.point))
-        if wall.axis is not None:
-            axis = _fixed(wall.axis)
-            away = minus(away, _scaled(axis, dot(away, axis)))
-        normal = _scaled(away, -1 / norm(away))
-    return _slip(placements, member, p, normal, wall)
+        return _fixed(wall.normal)
+    away = minus(p, _fixed(wall.point))
+    if wall.axis is not None:
+        axis = _fixed(wall.axis)
+        away = minus(away, _scaled(axis, dot(away, axis)))
+    return _scaled(away, -1 / norm(away))
 
 
 def _slip(
@@ -87,38 +114,58 @@ def _slip(
     two: Member | Wall,
 ) -> "tuple[sympy.Expr, ...]":
     place = minus(p, _scaled(normal, one.part.radius))
-    velocity = _velocity(placements, one, place)
-    if isinstance(two, Member):
-        velocity = minus(velocity, _velocity(placements, two, place))
-    elif isinstance(two, Cylinder) and two.spin:
-        axis = (0.0, 0.0, 1.0) if two.axis is None else _fixed(two.axis)
-        around = cross(_scaled(axis, two.spin), minus(place, _fixed(two.point)))
-        velocity = minus(velocity, around)
+    velocity = minus(_velocity(placements, one, place), _velocity(placements, two, place))
     if one.part.dimension == 2:
         return (normal[0] * velocity[1] - normal[1] * velocity[0],)
     return tuple(dot(tangent, velocity) for tangent in _tangents(normal))
 
 
-def _velocity(placements: dict[str, Placement], member: Member, place: "Point") -> "Point":
-    """Return the velocity that a place has as a point of a body."""
+def _rolling(
+    placements: dict[str, Placement],
+    one: Member,
+    normal: "Point",
+    two: Member | Wall,
+    radius: float,
+) -> "tuple[sympy.Expr, ...]":
+    spin = _scaled(minus(_spin(placements, one), _spin(placements, two)), radius)
+    if one.part.dimension == 2:
+        return (spin[2],)
+    return tuple(dot(tangent, spin) for tangent in _tangents(normal))
+
+
+def _velocity(placements: dict[str, Placement], thing: Member | Wall, place: "Point") -> "Point":
+    """Return the velocity that a place has as a point of a body or a wall."""
     import sympy
 
     zero = sympy.S.Zero
-    if member.frame is Frame.FIXED:
-        return (zero, zero, zero)
-    manifold = placements[member.body].manifold
-    d = member.part.dimension
-    rates = velocities(manifold)
-    centre = (*manifold.symbols[:d], zero)
-    moving = (*rates[:d], zero)
-    spin: Point = (zero, zero, zero)
-    if member.frame is Frame.TURNED:
-        spin = (zero, zero, rates[d])
-    elif member.frame is Frame.ROTATED:
-        x, y, z = angular_velocity(manifold, frame="space")
-        spin = (x, y, z)
-    turning = cross(spin, minus(place, (centre[0], centre[1], centre[2])))
-    return (moving[0] + turning[0], moving[1] + turning[1], moving[2] + turning[2])
+    spin = _spin(placements, thing)
+    if isinstance(thing, Member) and thing.frame is not Frame.FIXED:
+        manifold, d = placements[thing.body].manifold, thing.part.dimension
+        x, y, z = (*manifold.symbols[:d], zero)[:3]
+        turning = cross(spin, minus(place, (x, y, z)))
+        x, y, z = (*velocities(manifold)[:d], zero)[:3]
+        return (x + turning[0], y + turning[1], z + turning[2])
+    if isinstance(thing, Cylinder) and thing.spin:
+        return cross(spin, minus(place, _fixed(thing.point)))
+    return (zero, zero, zero)
+
+
+def _spin(placements: dict[str, Placement], thing: Member | Wall) -> "Point":
+    """Return the angular velocity of a body or a wall; in the plane its third component."""
+    import sympy
+
+    zero = sympy.S.Zero
+    if isinstance(thing, Cylinder) and thing.spin:
+        axis = np.array([0.0, 0.0, 1.0]) if thing.axis is None else thing.axis
+        return _scaled(_fixed(axis), thing.spin)
+    if isinstance(thing, Member) and thing.frame is not Frame.FIXED:
+        manifold = placements[thing.body].manifold
+        if thing.frame is Frame.TURNED:
+            return (zero, zero, velocities(manifold)[thing.part.dimension])
+        if thing.frame is Frame.ROTATED:
+            x, y, z = angular_velocity(manifold, frame="space")
+            return (x, y, z)
+    return (zero, zero, zero)
 
 
 def _tangents(n: "Point") -> "tuple[Point, Point]":

@@ -2,6 +2,7 @@ from .drum import DumbbellDrum
 from .formulas import plane_heading_formula
 from .imperfections import OutOfRound, Shaking, UnevenFriction, Wobble
 from .pair import DumbbellPair
+from .rigid import RigidDumbbells
 from .statics.critical import critical_length, critical_rod_radius, plane_critical_formula
 from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
 from .statics.keel import Keel, RestRegion
@@ -23,6 +24,7 @@ __all__ = [
     "PairMap",
     "RelativePlacements",
     "RestRegion",
+    "RigidDumbbells",
     "Shaking",
     "UnevenFriction",
     "Wobble",

@@ -158,8 +158,8 @@ def test_dry_friction_falls_short_by_its_first_order():
 def test_on_a_rough_table_the_top_rolls_and_does_not_rise(motions):
     for path in motions["rough"]:
         _, slip = observed(path)
-        later = path.times > 1
-        assert slip[later].max() < 1e-9
+        later, speed = path.times > 1, np.abs(path.v).max()
+        assert slip[later].max() < 2 * path.solver.tolerance * speed
         assert inclinations(path).max() < top.TILT + 1e-3
 
 
