@@ -1,6 +1,5 @@
 """Velocity bounds: how fast a gap may close in a step, and which contacts act in one."""
 
-
 from polycorner.motion.engine.arrays import OWN_GAP
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP

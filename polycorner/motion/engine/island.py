@@ -11,12 +11,13 @@ from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
+from polycorner.motion.engine.grip import keeps_grip
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
-from polycorner.motion.engine.rest import find_rest_velocity
+from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
 from polycorner.motion.engine.rows import copy_velocity
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
@@ -162,6 +163,9 @@ def solve_island(model, state, work, first, last):
         and rests(model, state, work, first, last, speed)
     ):
         worst = residual(model, work, first, last, 0.0)
+    solved = worst <= model.tolerance * speed
+    if keeps_grip(model, state, work, first, last, speed, solved):
+        worst = residual(model, work, first, last, 0.0)
     return worst / speed
 
 
@@ -180,6 +184,8 @@ def rests(model, state, work, first, last, speed):
                 continue
             for c in range(k):
                 v[i, c] = state.v[i, c]
+            if state.rests[i] and not keeps_contacts(model, work, state.normal, i, state.v[i]):
+                return False  # the velocity of rest changes from place to place
             if not work.awake[i] or state.rests[i]:
                 continue
             if not find_rest_velocity(model, work, state.normal, i, rest):
