@@ -34,11 +34,12 @@ SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
 @compiled
-def iterate(model, state, work, first, last, speed, sweeps):
+def iterate(model, state, work, first, last, speed, sweeps, again):
     """Solve an island by rounds of Gauss-Seidel sweeps and Newton steps; return the residual.
 
     Small islands, which cost little, are solved more exactly than asked, and begin with Newton
-    steps if they have more than a few blocks.  Where a round does not do, the small errors of
+    steps if they have more than a few blocks; so do islands that are solved ``again``, from a
+    solution that is nearly theirs.  Where a round does not do, the small errors of
     closed gaps are left as they are: contacts that stick in closed loops cannot correct all of
     them, and would jam.  Where the next does not do either, the island is given up if its step may
     be divided, which costs less unless it is large; if not, the solution is continued from that of
@@ -49,7 +50,8 @@ def iterate(model, state, work, first, last, speed, sweeps):
     goal, worst = model.tolerance * speed, np.inf
     n = number_bodies(model, state, work, first, last)
     small = 0 < n * model.lanes <= SMALL
-    direct, enough = small and last - first > FEW, SPARE * goal if small else goal
+    direct = n > 0 and (again or (small and last - first > FEW))
+    enough = SPARE * goal if small else goal
     worst = residual(model, work, first, last, 0.0)
     if worst <= enough:
         return worst
@@ -73,9 +75,11 @@ def iterate(model, state, work, first, last, speed, sweeps):
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
-                if work.may_divide[0] and last - first <= MANY:
+                if work.may_divide[0] == 1 and last - first <= MANY:
                     break
                 worst = continue_island(model, state, work, first, last, n, goal, hard)
+                if worst > goal and work.may_divide[0]:
+                    break
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:
                     break
@@ -120,7 +124,7 @@ def switch_reversed_slips(model, state, work, first, last):
 
 
 @compiled
-def solve_island(model, state, work, first, last):
+def solve_island(model, state, work, first, last, again):
     """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
 
     For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
@@ -152,7 +156,7 @@ def solve_island(model, state, work, first, last):
     if at_rest and rests(model, state, work, first, last, speed):
         return residual(model, work, first, last, 0.0) / speed
     while True:
-        worst = iterate(model, state, work, first, last, speed, model.sweeps)
+        worst = iterate(model, state, work, first, last, speed, model.sweeps, again)
         if worst > model.tolerance * speed or not switch_reversed_slips(
             model, state, work, first, last
         ):
@@ -198,8 +202,8 @@ def rests(model, state, work, first, last, speed):
 
 
 @compiled
-def solve_islands(model, state, work, blocks, h):
-    """Solve all islands; those in which gaps would close by their curvature, a second time.
+def solve_islands(model, state, work, blocks, h, again):
+    """Solve all islands, perhaps ``again``; those whose gaps would close by curvature, twice.
 
     Equations are solved for until they hold at the next midpoint, here if forces do not depend on
     the velocity; if they do, see :func:`follow_curvature`.
@@ -210,7 +214,9 @@ def solve_islands(model, state, work, blocks, h):
     for attempt in range(most):
         for i in range(model.bodies):
             if starts[i + 1] > starts[i] and (attempt == 0 or work.curves_shut[i]):
-                work.island_residual[i] = solve_island(model, state, work, starts[i], starts[i + 1])
+                work.island_residual[i] = solve_island(
+                    model, state, work, starts[i], starts[i + 1], again or attempt > 0
+                )
         if attempt == most - 1 or not correct_curvature(model, state, work, blocks, h):
             break
 
