@@ -185,7 +185,7 @@ class Work(NamedTuple):
     joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
     near: Annotated[Any, real("1")]  # which of the two distances holds for the bodies at hand
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
-    may_divide: Annotated[Any, whole("1")]  # whether shorter steps follow if this is not solved
+    may_divide: Annotated[Any, whole("1")]  # 1: not solved, shorter steps follow; 2: halved
     awake: Annotated[Any, whole("N")]
     touched: Annotated[
         Any, whole("N")

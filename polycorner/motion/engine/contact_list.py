@@ -6,6 +6,7 @@ from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAI
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import TOUCHING, key_of
 from polycorner.motion.engine.paths import release_time
+from polycorner.motion.engine.rows import sticks
 
 PARTING = 100.0 * TOUCHING  # scaled gap beyond which a contact is lost
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
@@ -50,16 +51,6 @@ def store_sticking(model, state, work, blocks):
         if work.origin[b, 0] == OWN_FRICTION and takes_part(work, b):
             i, f = work.origin[b, 1], work.origin[b, 2]
             state.sticks[i, f] = 1 if sticks(model, work, b) else 0
-
-
-@compiled
-def sticks(model, work, b):
-    """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
-    slip = abs(work.after[b, 0]) + (abs(work.after[b, 1]) if work.block_rows[b] == 2 else 0.0)
-    speed = work.island_speed[work.block_bodies[b, 0]]
-    if work.block_bodies[b, 1] >= 0:
-        speed = max(speed, work.island_speed[work.block_bodies[b, 1]])
-    return slip <= 2.0 * model.tolerance * speed
 
 
 @compiled

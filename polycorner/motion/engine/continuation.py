@@ -10,15 +10,21 @@ import numpy as np
 from polycorner.motion.engine.arrays import NEWTON_STEPS
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
 from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.multipliers import STEPS_OF_ROUND, approach
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.rows import load_on
 
 FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and at its end
 FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path
 EASY_STEPS = 8  # Newton steps up to which the next factor is smaller
-LOAD_ROUNDS = 20  # convex problems that are solved, at most
-IDLE_ROUNDS = 5  # of these without progress
-MANY, FEW_ROUNDS = 600, 4  # blocks of a large island, and problems in it if steps may be divided
+LOAD_ROUNDS = 60  # convex problems, at most
+IDLE_ROUNDS = 8  # of these without progress
+MANY, FEW_ROUNDS = 600, 16  # blocks of a large island, and problems in it if steps may be divided
+FIRST_YIELD, LEAST_YIELD, MOST_YIELD = 1e-1, 1e-7, 1e1  # softness of rounds of these
+HARDER, EASY_ROUND = 0.1, 10  # factor of the softness after a round of few Newton steps
+TRIED_YIELD, TRIED_ROUNDS = 1e-3, 3  # softness, and rounds, after which Newton's method is tried
+EXACT = 0.1  # share of the residual to which a round is solved
+HALVED = 2  # of ``work.may_divide``: a part of a step that is halved if it is not solved
 GRIP = 1e3  # speed of slip that first loads stop, over that of the island
 LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
 
@@ -30,10 +36,12 @@ def continue_island(model, state, work, first, last, n, goal, softness):
     First the loads of friction are iterated; else the compliance of the contacts is taken from
     ``FIRST_COMPLIANCE`` to zero, from the impulses at hand; else from one to zero, from no
     impulses; else loads are iterated from those under which everything sticks.  If none of these
-    leads to a solution, the impulses remain what they were.
+    leads to a solution, the impulses remain what they were.  Large islands for which shorter steps
+    follow are given the first two attempts.
     """
     copy_impulses(work, first, last, work.impulse, work.rigid)
-    for attempt in range(4):
+    few = work.may_divide[0] and last - first > MANY
+    for attempt in range(2 if few else 4):
         if attempt in (0, 3):
             grip = GRIP * goal / model.tolerance if attempt == 3 else 0.0
             iterate_loads(model, state, work, first, last, n, goal, softness, grip)
@@ -86,39 +94,67 @@ def iterate_loads(model, state, work, first, last, n, goal, softness, grip):
     """Solve an island with known loads of friction, again and again with the loads that result.
 
     The first loads are those at hand, or stop a slip of the speed ``grip`` if it is not zero.  In
-    Painleve's paradox only this start leads to the impulse that stops the slip.  Where the loads
-    go to and fro, only a share of their change is taken over.  Large islands
-    whose step may be divided are given a few problems only.
+    Painleve's paradox only this start leads to the impulse that stops the slip.  Each problem is
+    one round of :func:`approach`, which need not end at its solution; as rounds become harder, they
+    do.  Where the loads go to and fro, only a share of their change is taken over.  From some of
+    the impulses found, Newton's method is tried for the problem itself.
     """
-    share, former, best, idle = 1.0, np.inf, np.inf, 0
+    share, former, best, idle, yielding = 1.0, np.inf, np.inf, 0, FIRST_YIELD
+    worst, hard = residual(model, work, first, last, 0.0), 0
     few = work.may_divide[0] and last - first > MANY
     for _ in range(FEW_ROUNDS if few else LOAD_ROUNDS):
-        detach_loads(work, first, last, 1.0 if former == np.inf else share)
+        detach_loads(work, first, last, share)
         if former == np.inf and grip > 0.0:
-            for s in range(first, last):
-                b = work.order[s]
-                if work.pressing[b] <= -2:
-                    work.block_load[b] = grip * work.delassus[b, 3]
-        worst = residual(model, work, first, last, 0.0)
-        steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
+            grip_all(work, first, last, grip)
+        copy_impulses(work, first, last, work.impulse, work.initial)
+        enough = EXACT * max(goal, min(worst, goal / model.tolerance))
+        steps = approach(model, work, first, last, n, yielding, enough)
         state.counts[NEWTON_STEPS] += steps
-        if worst > goal:
-            follow(model, state, work, first, last, n, goal, FIRST_COMPLIANCE)
         attach_loads(work, first, last)
+        if steps == STEPS_OF_ROUND:
+            copy_impulses(work, first, last, work.initial, work.impulse)
+        recompute_velocities(model, work, first, last)
         worst = residual(model, work, first, last, 0.0)
-        if worst > goal:
-            copy_impulses(work, first, last, work.impulse, work.loaded)
-            steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
-            state.counts[NEWTON_STEPS] += steps
-        idle = 0 if worst < 0.5 * best else idle + 1
-        best = min(best, worst)
+        if steps == STEPS_OF_ROUND:
+            yielding /= HARDER
+            if yielding > MOST_YIELD:
+                return
+            continue
+        if yielding <= TRIED_YIELD:
+            hard += 1
+            if worst > goal and hard % TRIED_ROUNDS == 1:
+                worst = try_newton(model, state, work, first, last, n, goal, softness, worst)
+            idle = 0 if worst < 0.5 * best else idle + 1
+            best = min(best, worst)
         if worst <= goal or idle == IDLE_ROUNDS:
             return
-        copy_impulses(work, first, last, work.loaded, work.impulse)
-        recompute_velocities(model, work, first, last)
         if worst > 0.5 * former:
             share = max(LEAST_CHANGE, 0.7 * share)
         former = worst
+        if steps <= EASY_ROUND:
+            yielding = max(LEAST_YIELD, HARDER * yielding)
+
+
+@compiled
+def try_newton(model, state, work, first, last, n, goal, softness, worst):
+    """Try Newton's method from impulses, which remain if it fails; return the residual."""
+    copy_impulses(work, first, last, work.impulse, work.loaded)
+    steps, least = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
+    state.counts[NEWTON_STEPS] += steps
+    if least <= goal:
+        return least
+    copy_impulses(work, first, last, work.loaded, work.impulse)
+    recompute_velocities(model, work, first, last)
+    return residual(model, work, first, last, 0.0)
+
+
+@compiled
+def grip_all(work, first, last, grip):
+    """Give known loads to friction that stop a slip of this speed."""
+    for s in range(first, last):
+        b = work.order[s]
+        if work.pressing[b] <= -2:
+            work.block_load[b] = grip * work.delassus[b, 3]
 
 
 @compiled

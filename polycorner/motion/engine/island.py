@@ -11,12 +11,13 @@ from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
+from polycorner.motion.engine.grip import keeps_grip
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
-from polycorner.motion.engine.rest import find_rest_velocity
+from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
 from polycorner.motion.engine.rows import copy_velocity
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
@@ -33,11 +34,12 @@ SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
 @compiled
-def iterate(model, state, work, first, last, speed, sweeps):
+def iterate(model, state, work, first, last, speed, sweeps, again):
     """Solve an island by rounds of Gauss-Seidel sweeps and Newton steps; return the residual.
 
     Small islands, which cost little, are solved more exactly than asked, and begin with Newton
-    steps if they have more than a few blocks.  Where a round does not do, the small errors of
+    steps if they have more than a few blocks; so do islands that are solved ``again``, from a
+    solution that is nearly theirs.  Where a round does not do, the small errors of
     closed gaps are left as they are: contacts that stick in closed loops cannot correct all of
     them, and would jam.  Where the next does not do either, the island is given up if its step may
     be divided, which costs less unless it is large; if not, the solution is continued from that of
@@ -48,7 +50,8 @@ def iterate(model, state, work, first, last, speed, sweeps):
     goal, worst = model.tolerance * speed, np.inf
     n = number_bodies(model, state, work, first, last)
     small = 0 < n * model.lanes <= SMALL
-    direct, enough = small and last - first > FEW, SPARE * goal if small else goal
+    direct = n > 0 and (again or (small and last - first > FEW))
+    enough = SPARE * goal if small else goal
     worst = residual(model, work, first, last, 0.0)
     if worst <= enough:
         return worst
@@ -72,9 +75,11 @@ def iterate(model, state, work, first, last, speed, sweeps):
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
-                if work.may_divide[0] and last - first <= MANY:
+                if work.may_divide[0] == 1 and last - first <= MANY:
                     break
                 worst = continue_island(model, state, work, first, last, n, goal, hard)
+                if worst > goal and work.may_divide[0]:
+                    break
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:
                     break
@@ -119,7 +124,7 @@ def switch_reversed_slips(model, state, work, first, last):
 
 
 @compiled
-def solve_island(model, state, work, first, last):
+def solve_island(model, state, work, first, last, again):
     """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
 
     For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
@@ -151,7 +156,7 @@ def solve_island(model, state, work, first, last):
     if at_rest and rests(model, state, work, first, last, speed):
         return residual(model, work, first, last, 0.0) / speed
     while True:
-        worst = iterate(model, state, work, first, last, speed, model.sweeps)
+        worst = iterate(model, state, work, first, last, speed, model.sweeps, again)
         if worst > model.tolerance * speed or not switch_reversed_slips(
             model, state, work, first, last
         ):
@@ -161,6 +166,9 @@ def solve_island(model, state, work, first, last):
         and not at_rest
         and rests(model, state, work, first, last, speed)
     ):
+        worst = residual(model, work, first, last, 0.0)
+    solved = worst <= model.tolerance * speed
+    if keeps_grip(model, state, work, first, last, speed, solved):
         worst = residual(model, work, first, last, 0.0)
     return worst / speed
 
@@ -180,6 +188,8 @@ def rests(model, state, work, first, last, speed):
                 continue
             for c in range(k):
                 v[i, c] = state.v[i, c]
+            if state.rests[i] and not keeps_contacts(model, work, state.normal, i, state.v[i]):
+                return False  # the velocity of rest changes from place to place
             if not work.awake[i] or state.rests[i]:
                 continue
             if not find_rest_velocity(model, work, state.normal, i, rest):
@@ -192,8 +202,8 @@ def rests(model, state, work, first, last, speed):
 
 
 @compiled
-def solve_islands(model, state, work, blocks, h):
-    """Solve all islands; those in which gaps would close by their curvature, a second time.
+def solve_islands(model, state, work, blocks, h, again):
+    """Solve all islands, perhaps ``again``; those whose gaps would close by curvature, twice.
 
     Equations are solved for until they hold at the next midpoint, here if forces do not depend on
     the velocity; if they do, see :func:`follow_curvature`.
@@ -204,7 +214,9 @@ def solve_islands(model, state, work, blocks, h):
     for attempt in range(most):
         for i in range(model.bodies):
             if starts[i + 1] > starts[i] and (attempt == 0 or work.curves_shut[i]):
-                work.island_residual[i] = solve_island(model, state, work, starts[i], starts[i + 1])
+                work.island_residual[i] = solve_island(
+                    model, state, work, starts[i], starts[i + 1], again or attempt > 0
+                )
         if attempt == most - 1 or not correct_curvature(model, state, work, blocks, h):
             break
 

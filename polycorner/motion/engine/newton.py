@@ -47,7 +47,7 @@ def newton_steps(model, work, first, last, n, goal, softness, compliance, worst)
         if (
             settled
             or worst <= 1e-2 * goal
-            or (idle == IDLE_NEWTON_STEPS and compliance == 0.0)
+            or (idle >= IDLE_NEWTON_STEPS and (compliance == 0.0 or least <= goal))
             or steps == ROUND_NEWTON_STEPS
         ):
             break

@@ -21,6 +21,7 @@ from polycorner.motion.engine.arrays import (
     UNSOLVED,
 )
 from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
+from polycorner.motion.engine.continuation import HALVED
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
@@ -111,6 +112,7 @@ def refine(model, state, work, log, root, index, count):
         while True:
             if rest - h <= INSTANT * H:
                 h = rest
+            work.may_divide[0] = HALVED if exact and h > SHORTEST_SOLVED * H else 0
             why, blocks = solve_part(model, state, work, h, time, index)
             if why != DONE:
                 return why, count

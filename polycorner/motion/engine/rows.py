@@ -104,3 +104,13 @@ def apply_impulses(model, work, b, along, across):
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
     if along != 0.0 or across != 0.0:
         add_rows(model, work, work.response, b, along, across, work.v_new, i, j)
+
+
+@compiled
+def sticks(model, work, b):
+    """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
+    slip = abs(work.after[b, 0]) + (abs(work.after[b, 1]) if work.block_rows[b] == 2 else 0.0)
+    speed = work.island_speed[work.block_bodies[b, 0]]
+    if work.block_bodies[b, 1] >= 0:
+        speed = max(speed, work.island_speed[work.block_bodies[b, 1]])
+    return slip <= 2.0 * model.tolerance * speed

@@ -146,7 +146,7 @@ def solve(model, state, work, h, time, index, solved):
                     return False, blocks
             blocks = assemble_blocks(model, state, work, h, contacts)
             find_islands(model, work, blocks)
-        solve_islands(model, state, work, blocks, h)
+        solve_islands(model, state, work, blocks, h, solved > 0)
         store_impulses(model, state, work, blocks, h)
         if model.pair_kernel == 0 or not wake_neighbours(
             model, state, work, blocks, h, time + 0.5 * h, index
