@@ -1,17 +1,19 @@
-"""Gaps of two dumbbells in space, timed beside FCL, and motion of several in a tray.
+"""Gaps of two dumbbells in space, timed beside FCL, and motion of several, in a tray and a drum.
 
 Each placement has nine gaps: four of balls, four of a ball and a rod, one of the rods.
 """
 
 import statistics
 import time
+from functools import cache
 
 import fcl
 import numpy as np
+from scipy.spatial.transform import Rotation
 from side_by_side import interleave, print_table, write
 
 from polycorner import simulate
-from polycorner.bodies import Arrangement, HalfSpace, capsule, compound, sphere
+from polycorner.bodies import Arrangement, Cylinder, HalfSpace, capsule, compound, sphere
 from polycorner.spaces.manifold import Array
 
 ROUNDS = 5
@@ -24,6 +26,7 @@ DUMBBELL = compound(
         "rod": capsule([0, 0, -LENGTH / 2], [0, 0, LENGTH / 2], ROD),
     }
 )
+RADIUS = 125.0
 COUNTS = (1, 4, 12)
 STEPS = 200
 
@@ -57,7 +60,52 @@ def main() -> None:
     speeds = {str(count): speed(count) for count in COUNTS}
     rows = [(count, f"{value:.0f}") for count, value in speeds.items()]
     print_table("Dumbbells on a floor, steps of 1 ms", ["dumbbells", "steps a second"], rows)
-    write("bodies", {"ns": nanoseconds, "fcl over polycorner": factor, "steps a second": speeds})
+    drums = {"rows": in_drum(rows_of(60), 500), "heap": in_drum(heap_of(60), 200)}
+    rows = [(name, f"{value:.0f}") for name, value in drums.items()]
+    print_table("Sixty dumbbells in a drum, steps of 1 ms", ["start", "steps a second"], rows)
+    found = {"ns": nanoseconds, "fcl over polycorner": factor, "steps a second": speeds}
+    write("bodies", {**found, "steps a second in the drum": drums})
+
+
+def rows_of(count: int) -> Array:
+    """Return dumbbells along the axis of the drum, side by side in rows of six."""
+    row, column = np.divmod(np.arange(count), 6)
+    phi = (column - 2.5) * 0.09
+    away = RADIUS - BALL
+    places = np.stack([away * np.sin(phi), 30.0 * row, -away * np.cos(phi)], axis=-1)
+    turns = Rotation.from_rotvec(np.stack([0 * phi, -phi, 0 * phi], axis=-1))
+    return np.array([drum().point({"D": at}) for at in zip(places, turns, strict=True)])
+
+
+def heap_of(count: int) -> Array:
+    """Return dumbbells that turn in all directions, in layers above the drum; they fall."""
+    rng = np.random.default_rng(0)
+    layer, rest = np.divmod(np.arange(count), 15)
+    x, y = np.divmod(rest, 3)
+    places = np.stack([23.0 * (x - 2), 23.0 * (y - 1), 23.0 * layer - 100], axis=-1)
+    turns = Rotation.random(count, random_state=rng)
+    return np.array([drum().point({"D": at}) for at in zip(places, turns, strict=True)])
+
+
+@cache
+def drum() -> Arrangement:
+    """Return a dumbbell in the turning drum, its rod along ``y``."""
+    ends = np.array([[0, -LENGTH / 2, 0], [0, LENGTH / 2, 0]])
+    rod = capsule(*ends, ROD)
+    body = compound({"1": sphere(BALL, at=ends[0]), "2": sphere(BALL, at=ends[1]), "rod": rod})
+    wall = Cylinder(RADIUS, axis=[0, 1, 0], spin=0.1)
+    return Arrangement({"D": body}, {"drum": wall}, orientations="all")
+
+
+def in_drum(start: Array, steps: int) -> float:
+    """Return the steps a second of dumbbells that rub in the drum."""
+    down = [0, 0, -9810.0]
+    system = drum().system(gravity=down, density=1e-3, friction=0.3, count=len(start))
+    state = system.state(start)
+    simulate(system, state, 0.005, 1e-3)
+    begin = time.perf_counter()
+    simulate(system, state, 1e-3 * steps, 1e-3)
+    return steps / (time.perf_counter() - begin)
 
 
 def in_fcl(pair: Arrangement, q: Array) -> list[list[fcl.CollisionObject]]:

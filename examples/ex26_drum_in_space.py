@@ -55,8 +55,9 @@ class Result:
 
 def main() -> Result:
     headings = np.radians(HEADINGS)
-    onsets = [onset(RigidDumbbells(DRUM), theta) for theta in headings]
-    rest = [rest_limit(DRUM, theta) for theta in headings]
+    one = RigidDumbbells(DRUM)
+    onsets = [onset(one, theta) for theta in headings]
+    rest = [rest_limit(one, theta) for theta in headings]
     two = RigidDumbbells(replace(DRUM, count=2))
     paths, lifts = [], []
     for hand, heading in PAIRS:
@@ -77,14 +78,14 @@ def onset(rigid: RigidDumbbells, heading: float) -> float:
     return float(phi[np.argmax(np.diff(phi) < 0)])
 
 
-def rest_limit(drum: DumbbellDrum, heading: float) -> float:
+def rest_limit(rigid: RigidDumbbells, heading: float) -> float:
     """Return the azimuth up to which forces can hold a dumbbell at rest."""
-    return float(brentq(lambda phi: shortage(drum, phi, heading), 0.0, 0.3))
+    return float(brentq(lambda phi: shortage(rigid, phi, heading), 0.0, 0.3, xtol=1e-7))
 
 
-def shortage(drum: DumbbellDrum, phi: float, heading: float) -> float:
+def shortage(rigid: RigidDumbbells, phi: float, heading: float) -> float:
     """Return how much rolling resistance a dumbbell at rest lacks, over weight and radius."""
-    q = RigidDumbbells(drum).state([phi, 0.0, heading]).q
+    drum, q = rigid.drum, rigid.state([phi, 0.0, heading]).q
     rod = Rotation.from_quat(q[3:], scalar_first=True).apply([0.0, drum.length / 2, 0.0])
     load, grip, twist = cp.Variable(2), cp.Variable((2, 3)), cp.Variable((2, 3))
     lacking = cp.Variable()
@@ -116,13 +117,13 @@ def draw(result: Result, path: Path) -> Path:
     for k, (name, colour) in enumerate((("right", "#0072B2"), ("left", "#009E73"))):
         eta, theta = (result.pairs[:, k, :, i].mean(axis=1) for i in (1, 2))
         above.plot(result.times, eta - eta[0], color=colour, label=f"{name}-handed, in space")
-        below.plot(result.times, np.degrees(theta), color=colour)
+        below.plot(result.times, np.degrees(abs(theta)), color=colour)
         planar = result.planar
         above.plot(planar.times, planar.eta[:, k], "--", color=colour, label="developed drum")
-        heading = np.degrees(planar.q[:, k, :, 2].mean(axis=-1))
-        below.plot(planar.times, heading, "--", color=colour)
+        heading = abs(planar.q[:, k, :, 2].mean(axis=-1))
+        below.plot(planar.times, np.degrees(heading), "--", color=colour)
     above.set(ylabel="axial position η (mm)")
-    below.set(ylabel="heading θ (degrees)", xlabel="time (s)")
+    below.set(ylabel="|heading θ| (degrees)", xlabel="time (s)")
     above.legend()
     return save(figure, path)
 

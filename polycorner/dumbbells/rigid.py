@@ -9,7 +9,7 @@ The axis of the drum is ``y``, rising where the drum is tilted; the lowest line 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -103,7 +103,7 @@ class RigidDumbbells(Value):
         )
 
     def state(self, q: ArrayLike) -> State:
-        """Return the state of dumbbells that lie on the drum and move with it.
+        """Return the state of dumbbells that lie on the drum, move with it and stick to it.
 
         Parameters
         ----------
@@ -118,9 +118,9 @@ class RigidDumbbells(Value):
         speeds = [
             self.arrangement.velocity(p, {"D": (np.cross(spin, p[:3]), spin)}) for p in places
         ]
-        if self.drum.count == 1:
-            return self.system.state(places[0], speeds[0])
-        return self.system.state(places, np.array(speeds))
+        alone = self.drum.count == 1
+        state = self.system.state(*((places[0], speeds[0]) if alone else (places, speeds)))
+        return replace(state, sticking=np.ones_like(state.sticking))  # slips are rounding errors
 
     def _place(self, phi: float, eta: float, theta: float) -> Array:
         """Return the coordinates of a dumbbell with both balls on the drum."""

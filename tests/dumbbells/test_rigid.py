@@ -34,10 +34,11 @@ def test_a_state_moves_with_the_drum():
 def test_the_limit_of_rest_is_that_of_the_developed_drum_up_to_the_order_of_its_curvature():
     """Deviations fall with the radius of the drum; the limit is computed by convex programmes."""
     wide = replace(example.DRUM, drum_radius=500.0)
-    for theta in np.radians([-25.0, -8.0, 8.0, 20.0]):
+    narrow, wide = RigidDumbbells(example.DRUM), RigidDumbbells(wide)
+    for theta in np.radians([-25.0, 20.0]):
         near, far = (
-            example.rest_limit(drum, theta) - example.onset_azimuths(drum, [theta])[0]
-            for drum in (example.DRUM, wide)
+            example.rest_limit(rigid, theta) - example.onset_azimuths(rigid.drum, [theta])[0]
+            for rigid in (narrow, wide)
         )
         assert abs(near) < 3 / 122 * math.radians(6)
         assert abs(far) < 0.35 * abs(near)
