@@ -32,7 +32,7 @@ from polycorner.dumbbells.dynamics.starts import nested_pair
 from polycorner.spaces.manifold import Array
 
 DRUM = DumbbellDrum(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
-HEADINGS = (-8.0, 0.0, 8.0, 20.0)  # degrees
+HEADINGS = (-25.0, -8.0, 0.0, 8.0, 20.0)  # degrees
 PAIRS = (("R", 8.0), ("L", -8.0))  # hands and headings of nested pairs
 DURATION, STEP, EVERY = 20.0, 2e-3, 10
 
