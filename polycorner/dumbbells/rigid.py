@@ -107,18 +107,17 @@ class RigidDumbbells(Value):
 
         Parameters
         ----------
-        q : (3,) or (count, 3) array
+        q : (count, 3) array, or (3,) of a single one
             ``phi``, ``eta`` in mm and ``theta`` of each dumbbell, in rad.
         """
-        given = reals(q, "q")
-        if given.shape not in {(3,), (self.drum.count, 3)}:
+        given, alone = reals(q, "q"), self.drum.count == 1
+        if given.shape != (self.drum.count, 3) and not (alone and given.shape == (3,)):
             refuse("q", f"shape ({self.drum.count}, 3) for phi, eta, theta", given.shape)
         places = np.array([self._place(*row) for row in given.reshape(-1, 3).tolist()])
         spin = np.array([0.0, -self.drum.spin, 0.0])
         speeds = [
             self.arrangement.velocity(p, {"D": (np.cross(spin, p[:3]), spin)}) for p in places
         ]
-        alone = self.drum.count == 1
         state = self.system.state(*((places[0], speeds[0]) if alone else (places, speeds)))
         return replace(state, sticking=np.ones_like(state.sticking))  # slips are rounding errors
 

@@ -84,3 +84,5 @@ def test_bad_input():
         RigidDumbbells(shaken)
     with pytest.raises(ValueError, match="q: expected shape"):
         RigidDumbbells(DumbbellDrum()).state([[0.0, 0.0]])
+    with pytest.raises(ValueError, match=r"q: expected shape \(2, 3\)"):
+        RigidDumbbells(DumbbellDrum(count=2)).state([0.0, 0.0, 0.0])
