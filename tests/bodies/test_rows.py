@@ -1,4 +1,4 @@
-"""Dumbbells that rub side by side in a drum: impacts, sticking in closed loops, forces that follow."""
+"""Dumbbells that rub side by side in a drum: impacts, and sticking in closed loops."""
 
 import numpy as np
 import pytest
