@@ -156,4 +156,4 @@ class RigidDumbbells(Value):
         bundle = self.arrangement.polyhedron.bundle
         flat = places.reshape(-1, places.shape[-1])
         gaps = np.array([bundle.evaluate(p, 0)[0][:2] for p in flat])
-        return gaps.max(axis=-1).reshape(places.shape[:-1])
+        return np.asarray(gaps.max(axis=-1)).reshape(places.shape[:-1])

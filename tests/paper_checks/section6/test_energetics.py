@@ -80,7 +80,7 @@ def test_a_heading_that_is_right_in_the_drum_only_nearly_is_not_called_exact():
 
 def test_each_way_of_missing_a_rest_locus_is_noticed():
     for named in (frozenset({"G"}), energetics.NAMED | {"crossed"}):
-        assert energetics.only_loci(named, starts=200).verdict is Verdict.REFUTED
+        assert energetics.only_loci(named, energetics.OTHERS[:1]).verdict is Verdict.REFUTED
 
 
 def test_the_components_of_delta_are_its_images_under_relabelling():
