@@ -143,17 +143,17 @@ class RigidDumbbells(Value):
         q : (..., 7) array
         """
         places = np.asarray(q, dtype=np.float64)
-        x, y, z = np.moveaxis(places[..., :3], -1, 0)
-        w, i, j, k = np.moveaxis(places[..., 3:], -1, 0)
-        rod = 2 * (i * j - w * k), w**2 - i**2 + j**2 - k**2, 2 * (j * k + w * i)
-        phi = np.arctan2(x, -z)
-        around = rod[0] * np.cos(phi) + rod[2] * np.sin(phi)
-        return np.stack([phi, y, np.arctan2(around, rod[1])], axis=-1)
+        flat = places.reshape(-1, places.shape[-1])
+        rod = Rotation.from_quat(flat[:, 3:], scalar_first=True).apply([0.0, 1.0, 0.0])
+        phi = np.arctan2(flat[:, 0], -flat[:, 2])
+        around = rod[:, 0] * np.cos(phi) + rod[:, 2] * np.sin(phi)
+        found = np.stack([phi, flat[:, 1], np.arctan2(around, rod[:, 1])], axis=-1)
+        return found.reshape(*places.shape[:-1], 3)
 
     def lifts(self, q: ArrayLike) -> Array:
         """Return how far the farther ball of each dumbbell is from the drum, ``(...)``, in mm."""
         places = np.asarray(q, dtype=np.float64)
-        bundle = self.arrangement.polyhedron.bundle
-        flat = places.reshape(-1, places.shape[-1])
-        gaps = np.array([bundle.evaluate(p, 0)[0][:2] for p in flat])
+        polyhedron = self.arrangement.polyhedron
+        balls = [polyhedron.names.index(name) for name in BALLS]
+        gaps = polyhedron.values(places.reshape(-1, places.shape[-1]))[:, balls]
         return np.asarray(gaps.max(axis=-1)).reshape(places.shape[:-1])
