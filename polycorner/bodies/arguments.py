@@ -1,4 +1,4 @@
-"""Arguments of arrangements: bodies by name, placements."""
+"""Arguments of arrangements: bodies by name, placements, motions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Which parts of bodies, and which of their images, can touch."""
+"""Pairs of parts that can touch, and of parts and images of others."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations, product
