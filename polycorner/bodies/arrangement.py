@@ -21,6 +21,7 @@ from polycorner.bodies.dynamics import (
     smooth,
     without,
 )
+from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.neighbours import Pair, check_room, pairs
@@ -185,7 +186,7 @@ class Arrangement(Value):
         found += [function for _, function, *_ in self.at_walls]
         if not found:
             refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
-        return found
+        return together(found)
 
     @cached_property
     def pairs(self) -> list[Pair]:

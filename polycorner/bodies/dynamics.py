@@ -17,6 +17,7 @@ from polycorner.bodies.poses import Placement
 from polycorner.bodies.slips import rolling, rolling_at_wall, slip, slip_at_wall
 from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
+from polycorner.formulas.compositions import Term, composition
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.contacts import (
     PAIR,
@@ -207,19 +208,14 @@ def _written(
     """Return gaps and their definitions in the coordinates, with parameters as numbers."""
     import sympy
 
-    found: dict[str, sympy.Expr] = {}
-    shared: dict[str, sympy.Expr] = {}
-    for k, gap in enumerate(gaps):
-        family = gap.family
-        definitions, expressions = family.formulas()
-        coordinates = [gap.manifold.symbols[i] for i in gap.reads]
-        numbers = map(sympy.Float, gap.parameters)
-        known = dict(zip(symbols(family.variables), coordinates, strict=True))
-        known |= dict(zip(symbols(family.parameters), numbers, strict=True))
-        known |= {s: symbols([f"{s}_{k}"])[0] for s in symbols([*definitions])}
-        shared |= {f"{name}_{k}": e.xreplace(known) for name, e in definitions.items()}
-        found[gap.name] = expressions[gap.member_name].xreplace(known)
-    return found, shared
+    terms = {}
+    for gap in gaps:
+        family, read = gap.family, [gap.manifold.symbols[i] for i in gap.reads]
+        formal = symbols([*family.variables, *family.parameters])
+        places = dict(zip(formal, [*read, *map(sympy.Float, gap.parameters)], strict=True))
+        terms[gap.name] = Term(family, gap.member_name, places)
+    definitions, expressions = composition(terms)
+    return expressions, definitions
 
 
 def _renamed(p: Placement, name: str) -> Manifold:

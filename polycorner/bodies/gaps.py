@@ -81,6 +81,20 @@ def _along(name: str, role: str, frame: Frame, d: int) -> "Point":
     return frame.vector(role, symbols(numbers(name, frame, d)), d)
 
 
+def _placed(*points: "tuple[str, Point]") -> "tuple[Expressions, list[Point]]":
+    """Return definitions of the coordinates of points, and the points by these names.
+
+    Distances then read coordinates, which are computed once, and not what these are sums of.
+    """
+    definitions: Expressions = {}
+    found = []
+    for name, point in points:
+        x, y, z = (f"{name}{axis}" for axis in frames.AXES)
+        definitions |= dict(zip((x, y, z), point, strict=True))
+        found.append(tuple(symbols([x, y, z])))
+    return definitions, found
+
+
 @lru_cache(maxsize=64)
 def points(one: Frame, two: Frame, d: int) -> Family:
     """Return the gap of two points; parameters ``p`` of 1, ``q`` of 2, ``s``."""
@@ -90,8 +104,8 @@ def points(one: Frame, two: Frame, d: int) -> Family:
 
 
 def _points(one: Frame, two: Frame, d: int) -> "Formulas":
-    p, q = _at("p", FIRST, one, d), _at("q", SECOND, two, d)
-    return {}, {"gap": norm(minus(p, q)) - symbols(["s"])[0]}
+    definitions, (p, q) = _placed(("P", _at("p", FIRST, one, d)), ("Q", _at("q", SECOND, two, d)))
+    return definitions, {"gap": norm(minus(p, q)) - symbols(["s"])[0]}
 
 
 @lru_cache(maxsize=64)
@@ -104,10 +118,11 @@ def segment(one: Frame, two: Frame, d: int) -> Family:
 
 
 def _segment(one: Frame, two: Frame, d: int) -> "Formulas":
-    p, a, b = _at("p", FIRST, one, d), _at("a", SECOND, two, d), _at("b", SECOND, two, d)
-    at, s = symbols(["foot", "s"])
+    ends = [(end.upper(), _at(end, SECOND, two, d)) for end in "ab"]
+    definitions, (p, a, b) = _placed(("P", _at("p", FIRST, one, d)), *ends)
+    per, at, s = symbols(["per", "foot", "s"])
     along = minus(b, a)
-    definitions = {"foot": clamped(foot(p, a, b, 1 / dot(along, along)))}
+    definitions |= {"per": 1 / dot(along, along), "foot": clamped(foot(p, a, b, per))}
     return definitions, {"gap": distance_from(p, a, b, at) - s}
 
 
@@ -122,27 +137,17 @@ def segments(one: Frame, two: Frame) -> Family:
 
 
 def _segments(one: Frame, two: Frame) -> "Formulas":
-    names = [f"{end}{axis}" for end in ("A", "B", "G", "H") for axis in "xyz"]
-    a, b, g, h = (_symbols_of(names[k : k + 3]) for k in range(0, 12, 3))
-    written = [
-        _at("a", FIRST, one, 3),
-        _at("b", FIRST, one, 3),
-        _at("g", SECOND, two, 3),
-        _at("h", SECOND, two, 3),
-    ]
-    definitions = dict(zip(names, [c for point in written for c in point], strict=True))
-    ends = []
+    roles = [(end, FIRST, one) for end in "ab"] + [(end, SECOND, two) for end in "gh"]
+    written = [(end.upper(), _at(end, role, frame, 3)) for end, role, frame in roles]
+    definitions, (a, b, g, h) = _placed(*written)
+    ends = symbols([f"end{k}" for k in range(4)])
     for k, (p, start, end) in enumerate(((a, g, h), (b, g, h), (g, a, b), (h, a, b))):
-        along = minus(end, start)
-        definitions[f"foot{k}"] = clamped(foot(p, start, end, 1 / dot(along, along)))
-        ends.append(distance_from(p, start, end, symbols([f"foot{k}"])[0]))
+        along, (per, at) = minus(end, start), symbols([f"per{k}", f"foot{k}"])
+        definitions[f"per{k}"] = 1 / dot(along, along)
+        definitions[f"foot{k}"] = clamped(foot(p, start, end, per))
+        definitions[f"end{k}"] = distance_from(p, start, end, at)
     crossing, distance = segment_segment_distance((a, b), (g, h), ends)
     return definitions | crossing, {"gap": distance - symbols(["s"])[0]}
-
-
-def _symbols_of(names: Sequence[str]) -> "Point":
-    x, y, z = symbols(names)
-    return (x, y, z)
 
 
 @lru_cache(maxsize=64)

@@ -18,6 +18,7 @@ import numpy as np
 from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.gaps import FIRST, SECOND, numbers
 from polycorner.formulas import cache
+from polycorner.formulas.compositions import substituted
 from polycorner.formulas.families import Family
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
@@ -125,7 +126,8 @@ def _nearest(
             places[first] = q + near - p
         else:
             places |= {first: near - p, second: -q}
-    return _placed(family, places, definitions)
+    known, expressions = substituted(family.formulas(), places)
+    return definitions | known, expressions
 
 
 @lru_cache(maxsize=256)
@@ -149,15 +151,4 @@ def _own(family: Family, frame: Frame, d: int) -> "Formulas":
     places: dict[sympy.Symbol, sympy.Expr] = dict(zip(first[:d], shifts, strict=True))
     places |= dict.fromkeys(second[:d], sympy.S.Zero)
     places |= dict(zip(second[d:], first[d:], strict=True))
-    return _placed(family, places, {})
-
-
-def _placed(
-    family: Family,
-    places: "dict[sympy.Symbol, sympy.Expr]",
-    definitions: "dict[str, sympy.Expr]",
-) -> "Formulas":
-    """Return the formulas of a family with other expressions for the places of bodies."""
-    known, expressions = family.formulas()
-    definitions = definitions | {name: e.xreplace(places) for name, e in known.items()}
-    return definitions, {name: e.xreplace(places) for name, e in expressions.items()}
+    return substituted(family.formulas(), places)

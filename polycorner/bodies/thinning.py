@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.frames import Frame, symbols
+from polycorner.bodies.kernels import together
 from polycorner.bodies.pairs import Tree, apart
 from polycorner.bodies.walls import HalfSpace
 from polycorner.checks import instance, refuse
 from polycorner.formulas import cache
+from polycorner.formulas.compositions import substituted
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf
@@ -20,8 +22,6 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
-    import sympy
-
     from polycorner.bodies.gaps import Formulas
 
 BY, WEIGHT = "thinner", "weight"
@@ -88,7 +88,7 @@ def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True)
     t = manifold.symbols[-1]
     least = min(radii.values())
     limits = SmoothFunction(FULL, t, manifold), SmoothFunction(THIN, least - t, manifold)
-    return Polyhedron(manifold, AllOf(*gaps, *limits))
+    return Polyhedron(manifold, AllOf(*together(gaps), *limits))
 
 
 def _lifted(tree: Tree, manifold: Manifold, weight: float) -> Tree:
@@ -126,9 +126,4 @@ def _thinner(family: Family) -> Family:
 
 def _formulas(family: Family) -> "Formulas":
     s, t, w = symbols(["s", BY, WEIGHT])
-    definitions, expressions = family.formulas()
-
-    def thin(some: "dict[str, sympy.Expr]") -> "dict[str, sympy.Expr]":
-        return {name: e.xreplace({s: s - w * t}) for name, e in some.items()}
-
-    return thin(dict(definitions)), thin(dict(expressions))
+    return substituted(family.formulas(), {s: s - w * t})

@@ -4,7 +4,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.expressions import kinks
@@ -173,7 +173,9 @@ def _is_shared(family: Family, definitions: "Expressions") -> bool:
 
 
 def _is_importable(function: Any) -> bool:
-    """Return whether a function is found under its name in its module."""
+    """Return whether a function, or that of a partial one, is found under its name."""
+    if isinstance(function, partial):
+        return _is_importable(function.func)
     module = sys.modules.get(getattr(function, "__module__", ""))
     return getattr(module, getattr(function, "__qualname__", ""), None) is function
 

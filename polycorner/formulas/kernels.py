@@ -23,6 +23,9 @@ from polycorner.spaces.manifold import Array
 
 LOG = logging.getLogger("polycorner.compilation")
 MANY = 64  # points from which on they are evaluated in lanes
+# Numbers a point, above which code for lanes takes longer to compile than it will ever save: nine
+# gaps of two rigid bodies in space with second derivatives take 20 s, and a microsecond less each.
+MOST_IN_LANES = 1000
 
 
 class Kernel:
@@ -124,7 +127,7 @@ class CompiledKernel:
     @cached_property
     def _lanes(self) -> Any:
         """The code for batches in lanes; None for polynomials, whose loops are as fast."""
-        if isinstance(self.kernel.program, Polynomial):
+        if self._size - self._k > MOST_IN_LANES or isinstance(self.kernel.program, Polynomial):
             return None
         engine, (batch,), _ = self._code(emit_lanes, f"{self._name}_lanes", ("batch",))
         call = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 5)(batch)

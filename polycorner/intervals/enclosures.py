@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.formulas.programs import Graph, Payload, Program
+from polycorner.formulas.grafts import rebuilt
+from polycorner.formulas.programs import Graph, Program
 from polycorner.formulas.ranges import arguments
-from polycorner.formulas.translate import UNARY, compile_expressions
+from polycorner.formulas.translate import compile_expressions
 from polycorner.intervals.balls import ANALYTIC, constant, operations
 from polycorner.intervals.tapes import Box, Tape, needed
 from polycorner.spaces.manifold import Manifold
@@ -101,21 +102,8 @@ def written(
             msg = f"{f.name}: the operation {op} has no enclosure in ball arithmetic"
             raise ValueError(msg)
         else:
-            placed[a] = _rebuilt(graph, op, args, placed)
+            placed[a] = rebuilt(graph, op, args, placed)
     return placed
-
-
-def _rebuilt(graph: Graph, op: str, args: tuple[Payload, ...], placed: dict[int, int]) -> int:
-    """Write one operation into another graph, its arguments being there already."""
-    if op == "const":
-        return graph.const(args[0])
-    if op == "var":
-        return graph.node(op, *args)
-    children = [placed[int(arg)] for arg in args]
-    if op in {"add", "sub", "neg", "mul", "div", "select"}:
-        result: int = getattr(graph, op)(*children)
-        return result
-    return graph.unary(op, *children) if op in UNARY else graph.node(op, *children)
 
 
 class Formulas:
@@ -234,7 +222,7 @@ class Formulas:
         for a in sorted(taken):
             op, args = self.graph.nodes[a]
             direct = taken[a] == a
-            placed[a] = _rebuilt(graph, op, args, placed) if direct else placed[taken[a]]
+            placed[a] = rebuilt(graph, op, args, placed) if direct else placed[taken[a]]
         outputs = tuple([placed[self.outputs[row]] for row in rows])
         return SmoothForms(graph, outputs, self.dimension, self.inputs)
 

@@ -27,21 +27,34 @@ class Group(Value):
     ----------
     family : Family or Shape
         What has the kernel.
-    column : int
-        Which of the kernel's outputs the functions are.
     rows : (m,) array of int
-        Their positions among all rows.
-    reads : (m, k) array of int
-        The coordinates that each of them reads.
-    parameters : (m, p) array
-        Their parameters.
+        Positions of the functions among all rows.
+    columns : (m,) array of int
+        Which of the kernel's outputs each function is.
+    places : (m,) array of int
+        Which of the ``c`` choices of coordinates and parameters each function has.
+    reads : (c, k) array of int
+        The coordinates that are read.
+    parameters : (c, p) array
     """
 
     family: Any
-    column: int
     rows: Indices
+    columns: Indices
+    places: Indices
     reads: Indices
     parameters: Array
+
+    @classmethod
+    def separate(cls, family: Any, reads: Indices, parameters: Array) -> "Group":
+        """Return the group of functions that are the first output each, in the order of rows."""
+        order = np.arange(len(reads))
+        return cls(family, order, np.zeros_like(order), order, reads, parameters)
+
+    @property
+    def read(self) -> Indices:
+        """The coordinates that each function reads, ``(m, k)``."""
+        return self.reads[self.places]
 
     def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
         """Return values ``(m,)``, derivatives ``(m, k)`` and second derivatives ``(m, k, k)``."""
@@ -51,15 +64,18 @@ class Group(Value):
         parts = self.family.kernel.over(
             q[self.reads], parameters.ctypes.data, order, len(parameters)
         )
-        return tuple([part[:, self.column] for part in parts])
+        return tuple([part[self.places, self.columns] for part in parts])
 
     def part(self, chosen: Indices) -> "Group":
         """Return some of the functions, given by their positions in the group."""
-        return replace(
-            self,
-            rows=self.rows[chosen],
-            reads=self.reads[chosen],
-            parameters=self.parameters[chosen],
+        used, places = np.unique(self.places[chosen], return_inverse=True)
+        return Group(
+            self.family,
+            self.rows[chosen],
+            self.columns[chosen],
+            places,
+            self.reads[used],
+            self.parameters[used],
         )
 
 
@@ -82,12 +98,11 @@ class SparseRows(Value):
     @classmethod
     def of(cls, functions: "Sequence[SmoothFunction]", dimension: int) -> "SparseRows":
         """Return the rows of functions, one after the other."""
-        found: dict[Any, tuple[Any, int, list[Any]]] = {}
+        found: dict[Any, tuple[Any, list[Any]]] = {}
         for row, f in enumerate(functions):
             family, reads, parameters, column = resolve(f)
-            key = (family.key or id(family), column, len(reads))
-            members = found.setdefault(key, (family, column, []))[2]
-            members.append((row, reads, parameters))
+            key = (family.key or id(family), len(reads))
+            found.setdefault(key, (family, []))[1].append((row, column, (reads, parameters)))
         groups = tuple([_group(*parts) for parts in found.values()])
         return cls(groups, len(functions), dimension)
 
@@ -126,7 +141,7 @@ class SparseRows(Value):
             values[group.rows] = value
             entries.append(slope.ravel())
             rows.append(np.repeat(group.rows, group.reads.shape[1]))
-            columns.append(group.reads.ravel())
+            columns.append(group.read.ravel())
         return values, _assembled(entries, rows, columns, (self.count, self.dimension))
 
     def curvature(self, q: Array, weights: Array) -> csr_array:
@@ -137,22 +152,24 @@ class SparseRows(Value):
             if not len(used.rows):
                 continue
             bent = used.evaluate(q, 2)[2] * weights[used.rows][:, None, None]
-            k = used.reads.shape[1]
+            read, k = used.read, used.reads.shape[1]
             entries.append(bent.ravel())
-            rows.append(np.repeat(used.reads, k, axis=1).ravel())
-            columns.append(np.tile(used.reads, (1, k)).ravel())
+            rows.append(np.repeat(read, k, axis=1).ravel())
+            columns.append(np.tile(read, (1, k)).ravel())
         return _assembled(entries, rows, columns, (self.dimension, self.dimension))
 
 
-def _group(family: Any, column: int, members: list[Any]) -> Group:
-    rows, reads, parameters = zip(*members, strict=True)
-    k, p = len(reads[0]), len(parameters[0])
+def _group(family: Any, members: list[Any]) -> Group:
+    rows, columns, bound = zip(*members, strict=True)
+    number = {some: c for c, some in enumerate(dict.fromkeys(bound))}
+    reads, parameters = zip(*number, strict=True)
     return Group(
         family,
-        column,
         np.array(rows, dtype=np.int64),
-        np.array(reads, dtype=np.int64).reshape(len(rows), k),
-        np.array(parameters, dtype=np.float64).reshape(len(rows), p),
+        np.array(columns, dtype=np.int64),
+        np.array([number[some] for some in bound], dtype=np.int64),
+        np.array(reads, dtype=np.int64).reshape(len(number), -1),
+        np.array(parameters, dtype=np.float64).reshape(len(number), -1),
     )
 
 

@@ -84,7 +84,7 @@ def rows_of(
     n = bodies * dimension + 1
     reads = np.column_stack([places.reshape(len(pairs), 2 * dimension), np.full(len(pairs), n - 1)])
     parameters = np.column_stack([images, sums])
-    group = Group(gap(dimension), 0, np.arange(len(pairs)), reads, parameters)
+    group = Group.separate(gap(dimension), reads, parameters)
     return SparseRows((group,) if len(pairs) else (), len(pairs), n)
 
 
