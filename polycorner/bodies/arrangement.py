@@ -295,11 +295,25 @@ class Arrangement(Value):
         """Motions of the whole that walls and fixed bodies allow, exchanges of equal bodies.
 
         Also included are rotations of a body that carry it to itself, and its shifts by periods;
-        not included are mirror images, and motions that carry one wall to another.  More than ten
-        thousand exchanges, rotations and shifts are left out, all of them.
+        not included are mirror images, and motions that carry one wall to another
+        (:attr:`full_symmetry`).  More than ten thousand exchanges, rotations and shifts are left
+        out, all of them.
         """
+        return self._congruences.symmetry(self.polyhedron)
+
+    @cached_property
+    def full_symmetry(self) -> Symmetry:
+        """:attr:`symmetry` and the isometries that carry walls and fixed bodies to each other.
+
+        Among them are mirror images, where every body is equal to its own, and the symmetries of a
+        box, walls or periods, whose sides are parallel to the axes.  The same limit holds.
+        """
+        return self._congruences.symmetry(self.polyhedron, full=True)
+
+    @cached_property
+    def _congruences(self) -> Congruences:
         around = tuple(self.walls.values()), tuple(self.fixed.values()), self.lattice
-        return Congruences(self.placements, *around).symmetry(self.polyhedron)
+        return Congruences(self.placements, *around)
 
     def point(self, placed: Mapping[str, Any]) -> Array:
         """Return the point of given placements, ``(N,)``.

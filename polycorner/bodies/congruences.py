@@ -13,6 +13,7 @@ import scipy.linalg
 from polycorner.bodies.exchanges import elements
 from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
+from polycorner.bodies.isometries import isometries
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import (
@@ -72,14 +73,18 @@ class Congruences(Value):
         basis = scipy.linalg.null_space(np.concatenate(rows), rcond=FLAT).T
         return reduced(basis) if len(basis) else basis
 
-    def symmetry(self, polyhedron: Polyhedron) -> Symmetry:
-        """Return the group, with the names that functions of a polyhedron change."""
-        fields = [*map(self._field, self.motions), *self._spins()]
-        return Symmetry(
-            fields=fields,
-            invariants=self.invariants if fields else None,
-            elements=tuple(elements(self.placements, polyhedron, self._shifts())),
-        )
+    def symmetry(self, polyhedron: Polyhedron, *, full: bool = False) -> Symmetry:
+        """Return the group, with the names that functions of a polyhedron change.
+
+        ``full`` says whether isometries are in it that are no motions.
+        """
+        fields, d = [*map(self._field, self.motions), *self._spins()], self.dimension
+        carrying = [(np.zeros(d), np.eye(d))]
+        if full:
+            carrying = isometries(self.walls, self.fixed, self.lattice, self.motions[:, d:])
+        found = elements(self.placements, polyhedron, self._shifts(), carrying)
+        invariants = self.invariants if fields else None
+        return Symmetry(fields=fields, invariants=invariants, elements=tuple(found))
 
     def _shifts(self) -> list[list[Array]]:
         """Return the shifts of each body by whole periods, where its coordinates go round several.

@@ -1,4 +1,10 @@
-"""Finite symmetries of arrangements: exchanges of bodies, rotations of a body onto itself."""
+"""Finite symmetries of arrangements: exchanges, isometries of space, congruences of a body.
+
+An isometry ``p -> c + S p`` of space carries a body at ``(o, M)`` to ``(c + S o, S M K)``, where
+``K`` is a congruence of the body with itself (about its origin here, for simplicity): a rotation if
+``S`` is one, and a rotation with a reflection if ``S`` is a mirror image, so that ``S M K`` is a
+rotation again.  A body without such a ``K`` is not equal to its mirror image.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -18,6 +24,8 @@ from polycorner.polyhedra.symmetry import Element
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
+Isometry = tuple[Array, Array]  # p -> shift + matrix p
+
 MOST_ELEMENTS = 10_000
 SAME = 1e-6  # relative distance up to which points are one
 SAMPLES = 12  # random points at which functions are told apart
@@ -27,22 +35,27 @@ def elements(
     placements: tuple[Placement, ...],
     polyhedron: Polyhedron,
     shifts: Sequence[Sequence[Array]],
+    isometries: Sequence[Isometry],
 ) -> Iterator[Element]:
     """Yield exchanges of equal bodies with rotations of bodies onto themselves, no identity.
 
-    With them go ``shifts`` of each body, the first of which is zero.  None where there would be
-    more than ten thousand.  How functions change their names is found by their values at random
-    points and at the images of these.
+    With them go ``isometries`` of space, and ``shifts`` of each body; the first ones of both change
+    nothing.  None where there would be more than ten thousand.  How functions change their names is
+    found by their values at random points and at the images of these.
     """
     groups = _equal(placements)
-    turns = [_own_turns(p) for p in placements]
-    count = math.prod(math.factorial(len(group)) for group in groups)
-    count *= math.prod(map(len, [*turns, *shifts]))
+    turns = [[_own_turns(p, matrix) for p in placements] for _, matrix in isometries]
+    count = sum(math.prod(map(len, some)) for some in turns) * math.prod(map(len, shifts))
+    count *= math.prod(math.factorial(len(group)) for group in groups)
     if count > MOST_ELEMENTS:
         return
     points = _samples(placements, polyhedron)
     values = polyhedron.values(points)
-    changes = product(_orders(groups), product(*turns), product(*shifts))
+    changes = (
+        (isometry, *some)
+        for isometry, own in zip(isometries, turns, strict=True)
+        for some in product(_orders(groups), product(*own), product(*shifts))
+    )
     next(changes)  # the identity
     for some in changes:
         change = Exchange(placements, *some)
@@ -84,79 +97,100 @@ def _samples(placements: tuple[Placement, ...], polyhedron: Polyhedron) -> Array
 class Exchange(Value):
     """A map of points: body ``k`` takes the place of body ``order[k]``, turned onto itself.
 
-    Then it is shifted.
+    Then the whole is carried by an isometry, and the body shifted.
     """
 
     placements: tuple[Placement, ...]
+    isometry: Isometry
     order: tuple[int, ...]
-    turns: "tuple[tuple[Array, Array], ...]"
+    turns: "tuple[Isometry, ...]"
     shifts: "tuple[Array, ...]"
 
     def __call__(self, q: Array) -> Array:
         """Return the image of a point ``(N,)``."""
         found = []
+        (start, whole), d = self.isometry, self.placements[0].body.dimension
         changes = zip(self.placements, self.order, self.turns, self.shifts, strict=True)
         for p, source, (shift, turn), by in changes:
             if p.frame is Frame.AXIAL:
                 # The matrix of a body of revolution is not unique; its axis is.
                 there = q[self.placements[source].at]
-                u = there[3:]
-                found += [
-                    there[:3] + (shift @ p.axis) * u + by,
-                    (turn @ p.axis) @ p.axis * u,
-                ]
+                u = there[d:]
+                origin = start + whole @ (there[:d] + (shift @ p.axis) * u) + by
+                found += [origin, (turn @ p.axis) @ p.axis * (whole @ u)]
                 continue
             origin, matrix = self.placements[source].pose(q)
-            found.append(p.coordinates(origin + matrix @ shift + by, matrix @ turn))
+            origin = start + whole @ (origin + matrix @ shift) + by
+            found.append(p.coordinates(origin, whole @ matrix @ turn))
         return np.concatenate(found)
 
 
-def _own_turns(p: Placement) -> list[tuple[Array, Array]]:
-    """Return the rotations that carry a body to itself, ``p -> shift + turn p``; identity first.
+def _own_turns(p: Placement, whole: Array) -> list[Isometry]:
+    """Return the congruences of a body with itself, ``p -> shift + turn p``; identity first.
 
-    Of bodies of revolution only one that exchanges the ends of the axis is returned.
+    They are rotations, or mirror images if the matrix ``whole`` of an isometry is one.  Of bodies
+    of revolution only one of those is returned that exchange the ends of the axis, or keep them; of
+    bodies that do not turn the one that makes up for the isometry.
     """
     body, d = p.body, p.body.dimension
-    identity = (np.zeros(d), np.eye(d))
-    if p.frame is Frame.SHIFTED or p.is_round:
-        return [identity]
+    mirror = np.linalg.det(whole) < 0
+    flip = np.diag([-1.0 if mirror else 1.0, *[1.0] * (d - 1)])
+    if p.is_round:
+        return [(np.zeros(d), flip)]
     middle = body.markers.mean(axis=0)
-    found = [identity]
-    for turn in _candidates(body.markers - middle, body.axis if p.revolves else None):
+    away = body.markers - middle
+    if p.frame is Frame.SHIFTED:
+        candidates: Iterator[Array] = iter([whole.T])
+    elif p.revolves and body.axis is not None:
+        candidates = _along(body.axis, mirror=mirror)
+    else:
+        candidates = (turn @ flip for turn in _candidates(away @ flip, away))
+    found = [] if mirror or p.frame is Frame.SHIFTED else [(np.zeros(d), np.eye(d))]
+    for turn in candidates:
         shift = middle - turn @ middle
         known = any(np.abs(turn - other).max() <= SAME for _, other in found)
-        if not known and _is_carried(body, shift, turn):
+        if not known and carries(body, body, shift, turn):
             found.append((shift, turn))
     return found
 
 
-def _candidates(away: Array, axis: Array | None) -> Iterator[Array]:
-    """Return every rotation that may carry markers about their middle to each other."""
-    d = away.shape[1]
-    if axis is not None:
-        across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
-        yield Rotation.from_rotvec(math.pi * across / np.linalg.norm(across)).as_matrix()
-        return
-    lengths = np.linalg.norm(away, axis=1)
+def _along(axis: Array, *, mirror: bool) -> Iterator[Array]:
+    """Return a congruence of a line in space that keeps its ends, and one that exchanges them."""
+    across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
+    half_turn = Rotation.from_rotvec(math.pi * across / np.linalg.norm(across)).as_matrix()
+    if mirror:
+        yield -half_turn @ (2 * np.outer(axis, axis) - np.eye(3))
+        yield -np.eye(3)
+    else:
+        yield np.eye(3)
+        yield half_turn
+
+
+def _candidates(source: Array, target: Array) -> Iterator[Array]:
+    """Return every rotation that may carry markers about their middle to others."""
+    d = source.shape[1]
+    lengths, others = (np.linalg.norm(some, axis=1) for some in (source, target))
     first = int(np.argmax(lengths))
     if d == 2:
-        for other in away[abs(lengths - lengths[first]) <= FLAT * lengths[first]]:
-            yield _plane_frame(other) @ _plane_frame(away[first]).T
+        for other in target[abs(others - lengths[first]) <= FLAT * lengths[first]]:
+            yield _plane_frame(other) @ _plane_frame(source[first]).T
         return
-    apart = np.linalg.norm(np.cross(away, away[first]), axis=1)
+    apart = np.linalg.norm(np.cross(source, source[first]), axis=1)
     second = int(np.argmax(apart))
-    own = _space_frame(away[first], away[second])
+    own = _space_frame(source[first], source[second])
     tolerance = SAME * lengths[first] ** 2
-    gram = away @ away.T
-    for i, j in permutations(range(len(away)), 2):
-        wanted = gram[np.ix_([first, second], [first, second])]
+    wanted = (source @ source.T)[np.ix_([first, second], [first, second])]
+    gram = target @ target.T
+    for i, j in permutations(range(len(target)), 2):
         if np.abs(gram[np.ix_([i, j], [i, j])] - wanted).max() <= tolerance:
-            yield _space_frame(away[i], away[j]) @ own.T
+            yield _space_frame(target[i], target[j]) @ own.T
 
 
-def _is_carried(body: Body, shift: Array, turn: Array) -> bool:
-    """Whether a rotation carries every part to a part."""
-    left = list(body.parts.values())
+def carries(body: Body, onto: Body, shift: Array, turn: Array) -> bool:
+    """Whether an isometry carries the parts of a body to those of another."""
+    left = list(onto.parts.values())
+    if len(left) != len(body.parts):
+        return False
     for part in body.parts.values():
         image = part.points @ turn.T + shift
         for other in left:

@@ -18,6 +18,7 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
+from tests.support.arrangements import anywhere
 
 SQUARE = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 WEDGE = polygon([[0, 0], [2, 0], [0, 1]], 0.1)
@@ -57,20 +58,6 @@ CASES = {
     "around a ball": (Arrangement([BENT], fixed={"B": sphere(1, at=[1, 2, 3])}), 3, 2),
     "around a rod": (Arrangement([BENT], fixed={"B": ROD}), 1, 2),
 }
-
-
-def anywhere(a, rng):
-    d = a.dimension
-    turns = [
-        None
-        if a.orientations == "none"
-        else rng.uniform(-3, 3)
-        if d == 2
-        else Rotation.random(random_state=np.random.RandomState(rng.integers(2**31)))
-        for _ in a.named
-    ]
-    places = 2 * rng.standard_normal((len(turns), d))
-    return a.point(dict(zip(a.named, zip(places, turns, strict=True), strict=True)))
 
 
 @pytest.mark.parametrize("case", CASES)

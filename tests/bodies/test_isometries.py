@@ -1,0 +1,147 @@
+"""Full symmetries of arrangements: symmetries of the box, and mirror images of equal bodies.
+
+The oracle knows no walls, frames or names: an isometry that is written out carries the bodies of a
+placement, and it is looked up which element of the group gives the same bodies.
+"""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+
+from polycorner import minimise, skeleton
+from polycorner.bodies import (
+    Arrangement,
+    Cylinder,
+    HalfSpace,
+    box,
+    capsule,
+    compound,
+    disc,
+    polygon,
+    polytope,
+    sphere,
+)
+from tests.support.arrangements import anywhere
+
+SQUARE = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+WEDGE = polygon([[0, 0], [2, 0], [0, 1]], 0.1)  # has no mirror image among its rotations
+KITE = polygon([[-1, 0], [0, -1], [2, 0], [0, 1]])
+ROD = capsule([-1, 0, 0], [1, 0, 0], 0.3)
+CUBE = polytope(np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T)
+BENT = compound([sphere(0.5), sphere(0.5, at=[1, 0, 0]), sphere(0.5, at=[0, 1, 0])])
+SCREW = compound([sphere(0.5, at=p) for p in ([0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1])])
+CHANNEL = {"floor": HalfSpace([0, 1], [0, 0]), "roof": HalfSpace([0, -1], [0, 3])}
+RING = Cylinder(5, point=[1, 0])
+
+# Arrangement and the order of its full finite group: isometries x exchanges x congruences.
+CASES = {
+    "discs in a square": (Arrangement([disc(1)] * 2, box([0, 0], [6, 6])), 8 * 2),
+    "discs in a rectangle": (Arrangement([disc(1)] * 2, box([0, 0], [6, 7])), 4 * 2),
+    "squares in a square": (Arrangement([SQUARE] * 2, box([-3, -3], [3, 3])), 8 * 2 * 16),
+    "wedge in a square": (Arrangement([WEDGE], box([-3, -3], [3, 3])), 4),
+    "kite and wedge": (Arrangement([KITE, WEDGE], box([-3, -3], [3, 3])), 4),
+    "kites in a rectangle": (Arrangement([KITE] * 2, box([-3, -3], [3, 4])), 4 * 2),
+    "shifted wedge": (Arrangement([WEDGE], box([-3, -3], [3, 3]), orientations="none"), 1),
+    "shifted squares": (Arrangement([SQUARE], box([0, 0], [6, 6]), orientations="none"), 8),
+    "free squares": (Arrangement([SQUARE] * 2), 2 * 2 * 16),
+    "free wedges": (Arrangement([WEDGE] * 2), 2),
+    "in a ring": (Arrangement([disc(1), KITE], {"ring": RING}), 2),
+    "on a floor": (Arrangement([KITE], {"floor": HalfSpace([0, 1], [0, 0])}), 2),
+    "around a square": (Arrangement([disc(1)], fixed={"peg": SQUARE}), 8),
+    "around a wedge": (Arrangement([disc(1)], fixed={"peg": WEDGE}), 1),
+    "periodic square": (Arrangement([disc(0.4)] * 2, period=[4, 4]), 8 * 2),
+    "periodic rectangle": (Arrangement([disc(0.4)] * 2, period=[4, 5]), 4 * 2),
+    "channel": (Arrangement([disc(0.4)] * 2, CHANNEL, period=[4, None]), 4 * 2),
+    "rods in a cube": (Arrangement([ROD], box([0, 0, 0], [6, 6, 6])), 48 * 2),
+    "rods in a brick": (Arrangement([ROD] * 2, box([0, 0, 0], [6, 6, 7])), 16 * 2 * 4),
+    "bent in a pipe": (Arrangement([BENT], {"pipe": Cylinder(5, axis=[0, 0, 1])}), 4 * 2),
+    "screw in a pipe": (Arrangement([SCREW], {"pipe": Cylinder(5, axis=[0, 0, 1])}), 2 * 2),
+    "screw and ball": (Arrangement([SCREW, sphere(1)]), 2),
+    "cube and ball": (Arrangement([CUBE, sphere(1)]), 24 * 2),
+    "spinning rod": (Arrangement([ROD, sphere(1)], orientations="all"), 2 * 2),
+}
+IN_A_BOX = ["discs in a square", "discs in a rectangle", "squares in a square", "rods in a cube"]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_elements_rename_gaps_and_are_as_many_as_isometries_allow(case):
+    a, count = CASES[case]
+    elements = a.full_symmetry.elements
+    assert len(elements) + 1 == count
+    q = anywhere(a, np.random.default_rng(len(case)))
+    before = a.polyhedron.values(q)
+    places = {name: k for k, name in enumerate(a.polyhedron.names)}
+    for element in elements[:: max(1, len(elements) // 12)]:
+        after = a.polyhedron.values(element.apply(q))
+        images = [places[element.names.get(name, name)] for name in places]
+        assert sorted(images) == sorted(places.values())
+        assert after[images] == pytest.approx(before, abs=1e-9)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_symmetry_is_contained_in_the_full_one(case):
+    a, _ = CASES[case]
+    assert len(a.symmetry.elements) <= len(a.full_symmetry.elements)
+    assert len(a.symmetry.fields) == len(a.full_symmetry.fields)
+
+
+def figure(bodies):
+    """Return the parts of all bodies as a set of rounded points and radii."""
+    return {
+        (round(part.radius, 6), frozenset(tuple(p) for p in part.points.round(6).tolist()))
+        for body in bodies.values()
+        for part in body.parts.values()
+    }
+
+
+@pytest.mark.parametrize("case", IN_A_BOX)
+def test_elements_are_the_isometries_of_the_box(case):
+    """Every symmetry of the box, written out, is an element, and every element is one."""
+    a, _ = CASES[case]
+    d, q = a.dimension, anywhere(a, np.random.default_rng(3))
+    low, high = a.walls["left"].point, a.walls["right"].point
+    middle, sizes = (low + high) / 2, high - low
+    wanted = set()
+    for order, signs in product(permutations(range(d)), product((1, -1), repeat=d)):
+        if np.array_equal(sizes[list(order)], sizes):
+            matrix = np.diag(signs) @ np.eye(d)[list(order)]
+            moved = {n: b.carried(middle - matrix @ middle, matrix) for n, b in a.placed(q).items()}
+            wanted.add(frozenset(figure(moved)))
+    images = [q, *(element.apply(q) for element in a.full_symmetry.elements)]
+    assert {frozenset(figure(a.placed(image))) for image in images} == wanted
+
+
+@pytest.mark.parametrize(("size", "edges"), [([4, 4], 1), ([4, 5], 2)])
+def test_a_disc_in_a_box_has_one_corner_modulo_the_box(size, edges):
+    a = Arrangement([disc(1)], box([0, 0], size))
+    start = a.point({"1": [1.5, 1.7]})
+    plain = skeleton(a.polyhedron, [start], symmetry=a.symmetry)
+    full = skeleton(a.polyhedron, [start], symmetry=a.full_symmetry)
+    assert (len(plain.corners), len(plain.edges)) == (4, 4)
+    assert (len(full.corners), len(full.edges)) == (1, edges)
+
+
+def test_two_discs_lie_in_a_corner_of_a_square_in_one_way():
+    """Descents that end in mirror images end in one orbit; others do not."""
+    a = Arrangement([disc(1)] * 2, box([0, 0], [3.6, 3.6]))
+    y = a.manifold.symbols[1] + a.manifold.symbols[3]
+    left, right = (
+        minimise(a.polyhedron, y, a.point({"1": [x, 1.1], "2": [3.6 - x, 2.5]})).point
+        for x in (1.1, 2.5)
+    )
+    assert not a.symmetry.relabellings(a.manifold, left, right, 1e-6)
+    assert a.full_symmetry.relabellings(a.manifold, left, right, 1e-6)
+    upside_down = np.array([left[0], 3.6 - left[1], left[2], 3.6 - left[3]])
+    assert a.full_symmetry.relabellings(a.manifold, left, upside_down, 1e-6)
+    assert not a.full_symmetry.relabellings(a.manifold, left, left + 0.1, 1e-6)
+
+
+def test_mirror_images_of_balls_are_one_orbit_and_those_of_a_screw_are_not():
+    q = np.array([0, 0, 0, 2, 0, 0, 0, 2, 0, 0.3, 0.4, 2], dtype=float)
+    balls = Arrangement([sphere(r) for r in (0.5, 0.6, 0.7, 0.8)])
+    mirrored = q * np.tile([1, 1, -1], 4)
+    assert balls.full_symmetry.relabellings(balls.manifold, q, mirrored, 1e-9)
+    screw = Arrangement([SCREW, sphere(0.4)])
+    here, there = (screw.point({"1": [0, 0, 0], "2": [x, 2.0, -0.3]}) for x in (0.2, 0.7))
+    assert not screw.full_symmetry.relabellings(screw.manifold, here, there, 1e-9)
