@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from polycorner.formulas import cache
+from polycorner.formulas import cache, compositions, grafts
 from polycorner.formulas.compositions import Term, composition, stationary, symbol
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
@@ -119,10 +119,14 @@ def _family(bound: tuple[_Bound, ...], variables: int, parameters: int) -> Famil
         tuple(f"v{k}" for k in range(variables)),
         tuple(f"p{k}" for k in range(1, parameters + 1)),
         partial(_formulas, bound),
-        repr((cache.source_key(__name__), [(b.family.key, *b[1:]) for b in bound])),
+        repr((_sources(), [(b.family.key, *b[1:]) for b in bound])),
         stationary=stationary(b.family for b in bound),
         bound=bound,
     )
+
+
+def _sources() -> str:
+    return cache.source_key(compositions.__name__, grafts.__name__, __name__)
 
 
 def _formulas(bound: tuple[_Bound, ...]) -> "Formulas":
