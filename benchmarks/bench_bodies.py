@@ -1,23 +1,31 @@
-"""Gaps of two dumbbells in space, timed beside FCL, and motion of several, in a tray and a drum.
+"""Gaps of two dumbbells in space beside plain C and FCL; motion of several, in a tray and a drum.
 
-Each placement has nine gaps: four of balls, four of a ball and a rod, one of the rods.
+Each placement has nine gaps: four of balls, four of a ball and a rod, one of the rods.  The C is
+``gaps_space.c``, written by hand for several pairs at once; it agrees before it is timed.  For gaps
+the clock is that of the processor.
 """
 
+import ctypes
 import statistics
+import tempfile
 import time
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
+from typing import Any
 
 import fcl
 import numpy as np
+from bench_kernels import AGREEMENT, BLOCK, compiled_c
 from scipy.spatial.transform import Rotation
-from side_by_side import interleave, print_table, write
+from side_by_side import interleave, print_table, ratio, write
 
 from polycorner import simulate
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, capsule, compound, sphere
 from polycorner.spaces.manifold import Array
 
 ROUNDS = 5
-PLACEMENTS, FEW = 100_000, 1_000
+PAIRS, PLACEMENTS, FEW = 1_000_000, 100_000, 1_000
 LENGTH, BALL, ROD = 16.0, 3.0, 1.5
 DUMBBELL = compound(
     {
@@ -32,11 +40,9 @@ STEPS = 200
 
 
 def main() -> None:
+    million = beside_c()
     pair = Arrangement({"A": DUMBBELL, "B": DUMBBELL})
-    rng = np.random.default_rng(0)
-    places = rng.standard_normal((PLACEMENTS, pair.manifold.size))
-    places[:, [0, 1, 2, 6, 7, 8]] *= LENGTH
-    places = pair.manifold.wrap(places)
+    places = anywhere(pair, PLACEMENTS)
     some = places[:FEW]
     objects, found = [in_fcl(pair, q) for q in some], []
     tasks = {
@@ -44,7 +50,7 @@ def main() -> None:
         "with gradients": lambda: pair.polyhedron.evaluate(places, 1),
         "fcl": lambda: found.append([distances(*both) for both in objects]),
     }
-    times = interleave(tasks, ROUNDS)
+    times = interleave(tasks, ROUNDS, time.process_time)
     ours, ahead, other = (statistics.median(times[name]) for name in tasks)
     nanoseconds = {
         "polycorner": 1e9 * ours / PLACEMENTS,
@@ -64,8 +70,85 @@ def main() -> None:
     drums = {"rows": rows, "falling": falling, "heap": heap}
     rows = [(name, f"{value:.0f}") for name, value in drums.items()]
     print_table("Sixty dumbbells in a drum, steps of 1 ms", ["start", "steps a second"], rows)
-    found = {"ns": nanoseconds, "fcl over polycorner": factor, "steps a second": speeds}
+    found = {
+        "a million pairs": million,
+        "ns": nanoseconds,
+        "fcl over polycorner": factor,
+        "steps a second": speeds,
+    }
     write("bodies", {**found, "steps a second in the drum": drums})
+
+
+def anywhere(pair: Arrangement, count: int) -> Array:
+    """Return random placements of two dumbbells near each other, ``(count, n)``."""
+    places = np.random.default_rng(0).standard_normal((count, pair.manifold.size))
+    half = pair.manifold.size // 2
+    places[:, [0, 1, 2, half, half + 1, half + 2]] *= LENGTH
+    return pair.manifold.wrap(places)
+
+
+def beside_c() -> dict[str, Any]:
+    """Time the gaps of a million pairs, poses with quaternions, beside the same in C."""
+    pair = Arrangement({"A": DUMBBELL, "B": DUMBBELL}, orientations="all")
+    q, sizes = anywhere(pair, PAIRS), np.array([LENGTH, BALL, ROD])
+    values, slopes = pair.polyhedron.evaluate(q, 1)
+    first = pair.polyhedron.functions[0]
+    kernels, numbers = first.family.kernel, np.array(first.parameters)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        library = compiled_c("gaps_space.c", Path(folder))
+        if library is None:
+            return {}
+        figures: dict[str, Any] = {}
+        for order, (kind, name) in enumerate({"gaps": "values", "with gradients": "gaps"}.items()):
+            theirs = in_c(library, name, sizes, order)
+            kernel = kernels.compiled(order)
+
+            def ours(q: Array, *results: Array, kernel: Any = kernel) -> None:
+                kernel.fill(q, numbers.ctypes.data, results)
+
+            results = [np.zeros_like(values), np.zeros_like(slopes)][: order + 1]
+            theirs(q, *results)
+            for result, known in zip(results, (values, slopes), strict=False):
+                assert np.abs(result - known).max() <= AGREEMENT
+            figures[kind] = compared(q, results, ours, theirs)
+    rows = [(f"{kind}, {how}", *some) for kind, f in figures.items() for how, some in f.items()]
+    print_table(f"{PAIRS} pairs in space", ["", "ns a pair", "C", "time over C's"], rows)
+    return figures
+
+
+def in_c(library: ctypes.CDLL, name: str, sizes: Array, order: int) -> Callable[..., None]:
+    """Return a routine of the C file that fills arrays."""
+    function = getattr(library, name)
+    function.argtypes = [ctypes.c_int64, *[ctypes.c_void_p] * (3 + order)]
+    function.restype = None
+
+    def routine(q: Array, *results: Array) -> None:
+        function(len(q), q.ctypes.data, sizes.ctypes.data, *(r.ctypes.data for r in results))
+
+    return routine
+
+
+def compared(
+    q: Array, results: list[Array], ours: Callable[..., object], theirs: Callable[..., object]
+) -> dict[str, list[float]]:
+    """Return the times of both a pair, and their ratio: existing arrays, in cache, new arrays."""
+
+    def cached(routine: Callable[..., object]) -> None:
+        for start in range(0, len(q), BLOCK):
+            routine(q[start : start + BLOCK], *(r[:BLOCK] for r in results))
+
+    ways: dict[str, Callable[[Callable[..., object]], object]] = {
+        "existing arrays": lambda routine: routine(q, *results),
+        "in cache": cached,
+        "new arrays": lambda routine: routine(q, *map(np.empty_like, results)),
+    }
+    figures = {}
+    for name, way in ways.items():
+        tasks = {"ours": lambda way=way: way(ours), "theirs": lambda way=way: way(theirs)}
+        times = interleave(tasks, ROUNDS, time.process_time)
+        each = [round(1e9 * statistics.median(t) / len(q), 1) for t in times.values()]
+        figures[name] = [*each, round(ratio(times["ours"], times["theirs"]), 2)]
+    return figures
 
 
 def rows_of(count: int) -> Array:

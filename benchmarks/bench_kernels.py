@@ -1,7 +1,7 @@
 """Nine gaps and their 54 derivatives of random pairs: polycorner's kernels against plain C.
 
 The references are ``gaps.c``, written by hand with branches, and ``gaps_vector.c``, the same for
-eight pairs at once.  Both must agree with polycorner before they are timed.  One thread.
+several pairs at once.  Both must agree with polycorner before they are timed.  One thread.
 """
 
 import ctypes
@@ -42,8 +42,8 @@ def random_pairs(count: int, length: float, generator: np.random.Generator) -> n
     return q
 
 
-def compiled_c(source: str, parameters: np.ndarray, folder: Path) -> Routine | None:
-    """Return the routine of a C file, or None, with a message, if it cannot be compiled."""
+def compiled_c(source: str, folder: Path) -> ctypes.CDLL | None:
+    """Return the library of a C file, or None, with a message, if it cannot be compiled."""
     here = Path(__file__).parent
     library = folder / f"{source}.so"
     command = ["gcc", *FLAGS, str(here / source), "-o", str(library), "-lm"]
@@ -54,7 +54,12 @@ def compiled_c(source: str, parameters: np.ndarray, folder: Path) -> Routine | N
     if made.returncode:
         print(f"{source} is left out: gcc cannot compile it here.\n{made.stderr}")
         return None
-    gaps = ctypes.CDLL(str(library)).gaps
+    return ctypes.CDLL(str(library))
+
+
+def routine_of(library: ctypes.CDLL, parameters: np.ndarray) -> Routine:
+    """Return the function ``gaps`` of a library as a routine."""
+    gaps = library.gaps
     gaps.argtypes, gaps.restype = [ctypes.c_int64, *[ctypes.c_void_p] * 4], None
 
     def routine(q: np.ndarray, f: np.ndarray, J: np.ndarray) -> None:
@@ -149,8 +154,9 @@ def main() -> None:
     agreement = {}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         for name, source in SOURCES.items():
-            routine = compiled_c(source, parameters, Path(folder))
-            if routine is not None:
+            library = compiled_c(source, Path(folder))
+            if library is not None:
+                routine = routine_of(library, parameters)
                 agreement[name] = check(name, routine, pair, q)
                 routines[name] = routine
         for name, worst in agreement.items():

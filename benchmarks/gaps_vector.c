@@ -1,40 +1,11 @@
-/* The same nine gaps and 54 derivatives as gaps.c, eight pairs at a time in GCC's vector types:
+/* The same nine gaps and 54 derivatives as gaps.c, several pairs at a time in GCC's vector types:
  * selections instead of branches, sines by polynomials, results transposed in registers.
  */
-#include <math.h>
-#include <stdint.h>
-#include <string.h>
+#include "vectors.h"
 
-enum { A1B1, A1B2, A2B1, A2B2, A1b, A2b, aB1, aB2, ab, CONTACTS, LANES = 8, ROWS = 54 };
+enum { A1B1, A1B2, A2B1, A2B2, A1b, A2b, aB1, aB2, ab, CONTACTS, ROWS = 54 };
 
-typedef double real __attribute__((vector_size(8 * LANES)));
-typedef int64_t mask __attribute__((vector_size(8 * LANES)));
-typedef struct { real x, y, z; } vector;
 typedef struct { vector at; real sine, cosine, turn, slide; } ball;
-typedef struct { real distance, foot; vector normal; } contact;
-
-#define INLINE static inline __attribute__((always_inline))
-
-INLINE real splat(double a) { return (real){a, a, a, a, a, a, a, a}; }
-INLINE real choose(mask m, real a, real b) { return (real)((m & (mask)a) | (~m & (mask)b)); }
-
-INLINE real root(real a) {
-    real b;
-    for (int k = 0; k < LANES; k++) b[k] = sqrt(a[k]);
-    return b;
-}
-
-INLINE vector minus(vector p, vector q) { return (vector){p.x - q.x, p.y - q.y, p.z - q.z}; }
-INLINE vector times(real a, vector p) { return (vector){a * p.x, a * p.y, a * p.z}; }
-INLINE real dot(vector p, vector q) { return p.x * q.x + p.y * q.y + p.z * q.z; }
-
-INLINE vector cross(vector p, vector q) {
-    return (vector){p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
-}
-
-INLINE vector choose_vector(mask m, vector p, vector q) {
-    return (vector){choose(m, p.x, q.x), choose(m, p.y, q.y), choose(m, p.z, q.z)};
-}
 
 /* |x| below a million: reduction by pi/2 in three parts, then Taylor sums on [-pi/4, pi/4]. */
 INLINE void sine_cosine(real x, real *sine, real *cosine) {
@@ -97,20 +68,7 @@ INLINE void pull_rod(const ball *rod, vector n, real foot, double rho, real *row
     row[2] = start[2] + foot * (end[2] - start[2]);
 }
 
-INLINE contact apart(vector w, real foot) {
-    real d = root(dot(w, w));
-    return (contact){d, foot, times(1.0 / d, w)};
-}
-
-/* The nearest point of a rod along u: clamping the foot takes care of both ends. */
-INLINE contact to_rod(vector w, vector u, real inverse) {
-    real foot = dot(w, u) * inverse;
-    foot = choose(foot > 0.0, foot, splat(0.0));
-    foot = choose(foot < 1.0, foot, splat(1.0));
-    return apart((vector){w.x - foot * u.x, w.y - foot * u.y, w.z - foot * u.z}, foot);
-}
-
-INLINE void eight(const real *q, const double *p, real *f, real *J) {
+INLINE void several(const real *q, const double *p, real *f, real *J) {
     const double length = p[0], r = p[1], t = p[2], rho = p[3];
     ball A[2], B[2];
     place(q, length, rho, A);
@@ -167,57 +125,13 @@ INLINE void eight(const real *q, const double *p, real *f, real *J) {
     for (int k = 0; k < 6; k++) J[6 * ab + k] = choose(crossing, row[k], J[6 * ab + k]);
 }
 
-/* Exchange rows and columns of an 8 x 8 square. */
-INLINE void transpose(real *a) {
-    real b[8], c[8];
-#pragma GCC unroll 4
-    for (int k = 0; k < 8; k += 2) {
-        b[k] = __builtin_shufflevector(a[k], a[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-        b[k + 1] = __builtin_shufflevector(a[k], a[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
-    }
-#pragma GCC unroll 4
-    for (int n = 0; n < 4; n++) {
-        int k = n + (n & 2); /* 0, 1, 4, 5 */
-        c[k] = __builtin_shufflevector(b[k], b[k + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-        c[k + 2] = __builtin_shufflevector(b[k], b[k + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-#pragma GCC unroll 4
-    for (int k = 0; k < 4; k++) {
-        a[k] = __builtin_shufflevector(c[k], c[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        a[k + 4] = __builtin_shufflevector(c[k], c[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-}
-
-INLINE void load(const double *q, real *in) {
-    real square[LANES] = {0};
-#pragma GCC unroll 8
-    for (int lane = 0; lane < LANES; lane++) memcpy(&square[lane], q + 6 * lane, 6 * sizeof(double));
-    transpose(square);
-#pragma GCC unroll 6
-    for (int k = 0; k < 6; k++) in[k] = square[k];
-}
-
-INLINE void store(const real *a, int rows, double *to) {
-#pragma GCC unroll 8
-    for (int k = 0; k < rows; k += LANES) {
-        const int width = rows - k < LANES ? rows - k : LANES;
-        real square[LANES] = {0};
-#pragma GCC unroll 8
-        for (int n = 0; n < width; n++) square[n] = a[k + n];
-        transpose(square);
-#pragma GCC unroll 8
-        for (int lane = 0; lane < LANES; lane++)
-            memcpy(to + rows * lane + k, &square[lane], width * sizeof(double));
-    }
-}
-
 /* As in gaps.c; count must be a multiple of eight. */
 void gaps(int64_t count, const double *q, const double *p, double *f, double *J) {
     for (int64_t i = 0; i < count; i += LANES) {
         real in[6], F[CONTACTS], D[ROWS];
-        load(q + 6 * i, in);
-        eight(in, p, F, D);
-        store(F, CONTACTS, f + CONTACTS * i);
-        store(D, ROWS, J + ROWS * i);
+        load(q + 6 * i, 6, 6, in);
+        several(in, p, F, D);
+        store(F, CONTACTS, CONTACTS, f + CONTACTS * i);
+        store(D, ROWS, ROWS, J + ROWS * i);
     }
 }
