@@ -8,10 +8,14 @@ meridian towards growing azimuth.  In the drum the centres lie on a cylinder of 
 
 from collections.abc import Callable
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING
 
-from polycorner.formulas import cache, families
-from polycorner.spaces import distances as bodies
+from polycorner.bodies import frames, gaps
+from polycorner.bodies.frames import Frame
+from polycorner.formulas import cache, compositions, families
+from polycorner.formulas.compositions import Term, composition, stationary
+from polycorner.spaces import distances
 
 if TYPE_CHECKING:
     import sympy
@@ -20,9 +24,9 @@ if TYPE_CHECKING:
     Formulas = tuple[Expressions, Expressions]
 
 CONTACTS = ("A1B1", "A1B2", "A2B1", "A2B2", "A1b", "A2b", "aB1", "aB2", "ab")
-STATIONARY = (*(f"foot{contact}" for contact in CONTACTS[4:8]), *bodies.STATIONARY)
 DRUM = ("phi", "eta", "theta")
 PLANE = ("x", "y", "theta")
+FREE = Frame.FIXED, Frame.FIXED, 3  # points of space, put anywhere
 BALLS = (("A1", 1, -1), ("A2", 1, 1), ("B1", 2, -1), ("B2", 2, 1))
 
 
@@ -35,14 +39,14 @@ def variables(names: tuple[str, ...]) -> tuple[str, ...]:
 def drum_gaps() -> families.Family:
     """Return the nine gaps in the drum; parameters ``l r t rho``."""
     symbols = DRUM, ("l", "r", "t", "rho")
-    return _family(CONTACTS, *symbols, lambda: _gaps(_drum_centres()), held=STATIONARY)
+    return _family(CONTACTS, *symbols, lambda: _gaps(_drum_centres()), held=_stationary())
 
 
 @lru_cache(maxsize=1)
 def plane_gaps() -> families.Family:
     """Return the nine gaps in the developed plane; parameters ``l r t``."""
     symbols = PLANE, ("l", "r", "t")
-    return _family(CONTACTS, *symbols, lambda: _gaps(_plane_centres()), held=STATIONARY)
+    return _family(CONTACTS, *symbols, lambda: _gaps(_plane_centres()), held=_stationary())
 
 
 @lru_cache(maxsize=1)
@@ -85,7 +89,9 @@ def _family(
     unit: str = "mm",
     held: tuple[str, ...] = (),
 ) -> families.Family:
-    key = repr((cache.source_key(bodies.__name__, __name__), names, coordinates, parameters))
+    modules = distances, frames, gaps, compositions
+    sources = cache.source_key(*(module.__name__ for module in modules), __name__)
+    key = repr((sources, names, coordinates, parameters))
     symbols = variables(coordinates), parameters
     return families.Family(names, *symbols, formulas, key, unit, stationary=held)
 
@@ -130,42 +136,32 @@ def _plane_centres() -> "Expressions":
 
 
 def _gaps(centres: "Expressions") -> "Formulas":
-    """Ball-ball, ball-rod and rod-rod gaps from the centres of the four balls."""
-    definitions = dict(centres)
-    balls = {ball: tuple(_symbols(f"{ball}x {ball}y {ball}z")) for ball, _, _ in BALLS}
+    """Ball-ball, ball-rod and rod-rod gaps: those of points of space, where the centres are put."""
     r, t = _symbols("r t")
-    expressions: Expressions = {}
+    (a, b), found = (("A1", "A2"), ("B1", "B2")), {}
+    for ball, other in product(a, b):
+        found[f"{ball}{other}"] = _between(gaps.points(*FREE), 2 * r, p=ball, q=other)
+    for k, (ball, rod) in enumerate([*product(a, [b]), *product(b, [a])]):
+        ends = dict(zip("ab", rod, strict=True))
+        found[CONTACTS[4 + k]] = _between(gaps.segment(*FREE), r + t, p=ball, **ends)
+    ends = dict(zip("abgh", a + b, strict=True))
+    found["ab"] = _between(gaps.segments(*FREE[:2]), 2 * t, **ends)
+    definitions, expressions = composition(found)
+    return {**centres, **definitions}, expressions
 
-    def define(name: str, expression: "sympy.Expr") -> "sympy.Symbol":
-        definitions[name] = expression
-        return _symbols(name)[0]
 
-    apart = {
-        (a, b): define(f"d{a}{b}", bodies.norm(bodies.minus(balls[a], balls[b])))
-        for a in ("A1", "A2")
-        for b in ("B1", "B2")
-    }
-    for (a, b), distance in apart.items():
-        expressions[f"{a}{b}"] = distance - 2 * r
-    ends, per = [], {}
-    for rod in (("A1", "A2"), ("B1", "B2")):
-        along = bodies.minus(balls[rod[1]], balls[rod[0]])
-        per[rod] = define(f"per{rod[0][0]}", 1 / bodies.dot(along, along))
-    for ball, owner, _ in BALLS:
-        rod = ("B1", "B2") if owner == 1 else ("A1", "A2")
-        contact = f"{ball}b" if owner == 1 else f"a{ball}"
-        segment = (balls[rod[0]], balls[rod[1]])
-        line = define(f"line{contact}", bodies.foot(balls[ball], *segment, per[rod]))
-        at = define(f"foot{contact}", bodies.clamped(line))
-        distance = define(f"d{contact}", bodies.distance_from(balls[ball], *segment, at))
-        ends.append(distance)
-        expressions[contact] = distance - r - t
-    crossing, distance = bodies.segment_segment_distance(
-        (balls["A1"], balls["A2"]), (balls["B1"], balls["B2"]), ends
-    )
-    definitions |= crossing
-    expressions["ab"] = distance - 2 * t
-    return definitions, expressions
+def _between(family: families.Family, radii: "sympy.Expr", **balls: str) -> Term:
+    """Return the gap of a family for features with the centres of balls as their points."""
+    places = dict(zip(_symbols("s"), [radii], strict=True))
+    for letter, ball in balls.items():
+        local = _symbols(" ".join(gaps.numbers(letter, Frame.FIXED, 3)))
+        places |= dict(zip(local, _symbols(f"{ball}x {ball}y {ball}z"), strict=True))
+    return Term(family, "gap", places)
+
+
+def _stationary() -> tuple[str, ...]:
+    kinds = [gaps.points(*FREE)] * 4 + [gaps.segment(*FREE)] * 4 + [gaps.segments(*FREE[:2])]
+    return stationary(kinds)
 
 
 def _drum_heights() -> "Formulas":

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import pairs, placed_pairs
 
+from polycorner.bodies import Arrangement, capsule, compound, sphere
 from polycorner.dumbbells import DumbbellPair
 
 DRUM = DumbbellPair(16, 3, 1.5, 125, rod_weight=0.5)
@@ -37,6 +38,37 @@ def placed(pair, where):
 def worth(pair):
     """Return the accuracy of the rod-rod gap: rods within a millionth count as parallel."""
     return 2e-6 * pair.length
+
+
+# The contacts of two compounds in space, in the order of those of the pair.
+IN_SPACE = (
+    *("A.1-B.1", "A.1-B.2", "A.2-B.1", "A.2-B.2"),
+    *("A.1-B.rod", "A.2-B.rod", "B.1-A.rod", "B.2-A.rod", "A.rod-B.rod"),
+)
+
+
+def in_space(pair, q):
+    """Return the middles of both dumbbells and their axes, which end at the first ball."""
+    centres = pair.ball_centres(q).reshape(2, 2, 3)
+    axes = (centres[:, 0] - centres[:, 1]) / pair.length
+    return np.concatenate([centres.mean(axis=1), axes], axis=1).ravel()
+
+
+@BOTH
+@general
+def test_gaps_are_those_of_two_rigid_bodies_where_the_drum_puts_them(pair, where):
+    ends = [[0, 0, -pair.length / 2], [0, 0, pair.length / 2]]
+    balls = {str(k): sphere(pair.ball_radius, at=end) for k, end in enumerate(ends, 1)}
+    body = compound({**balls, "rod": capsule(*ends, pair.rod_radius)})
+    bodies = Arrangement({"A": body, "B": body})
+    q = placed(pair, where)
+    values, gradients = bodies.polyhedron.evaluate(in_space(pair, q), 1)
+    order = [bodies.polyhedron.names.index(name) for name in IN_SPACE]
+    np.testing.assert_allclose(pair.polyhedron.values(q), values[order], rtol=0, atol=1e-12)
+    steps = 1e-5 * np.eye(6)
+    moving = [(in_space(pair, q + h) - in_space(pair, q - h)) / 2e-5 for h in steps]
+    expected = gradients[order] @ np.transpose(moving)
+    np.testing.assert_allclose(pair.polyhedron.gradients(q), expected, rtol=0, atol=1e-6)
 
 
 class TestDefinition:
