@@ -9,7 +9,7 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from polycorner import minimise, skeleton
+from polycorner import minima, minimise, skeleton
 from polycorner.bodies import (
     Arrangement,
     Cylinder,
@@ -120,6 +120,19 @@ def test_a_disc_in_a_box_has_one_corner_modulo_the_box(size, edges):
     full = skeleton(a.polyhedron, [start], symmetry=a.full_symmetry)
     assert (len(plain.corners), len(plain.edges)) == (4, 4)
     assert (len(full.corners), len(full.edges)) == (1, edges)
+
+
+def test_minima_are_counted_modulo_the_box():
+    """Away from the middle of a square a disc has four places, all of a kind."""
+    a = Arrangement([disc(1)], box([0, 0], [4, 4]))
+    x, y = a.manifold.symbols
+    away = -((x - 2) ** 2) - (y - 2) ** 2
+    starts = [[x, y] for x in (1.4, 2.7) for y in (1.2, 2.9)]
+    counts = [
+        len(minima(a.polyhedron, away, starts=starts, symmetry=group))
+        for group in (a.symmetry, a.full_symmetry)
+    ]
+    assert counts == [4, 1]
 
 
 def test_two_discs_lie_in_a_corner_of_a_square_in_one_way():
