@@ -1,8 +1,9 @@
 """Jammed packings: time and memory against the number of bodies, and beside spheropack.
 
 Each size runs in a process of its own, on one core.  ``python benchmarks/bench_packings.py`` runs
-all sizes but the largest; ``--sizes discs:10000`` chooses others.  The results are added to
-``benchmarks/results/packings.json``.
+all sizes but the largest; ``--sizes discs:10000`` chooses others.  ``--exponents discs:256:20``
+jams twenty packings and estimates how small forces and gaps are distributed.  The results are added
+to ``benchmarks/results/packings.json``.
 """
 
 import argparse
@@ -13,21 +14,36 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from polycorner.models import PeriodicPacking
 
 RESULTS = Path(__file__).parent / "results" / "packings.json"
 SIZES = "discs:64 discs:256 discs:1024 spheres:64 spheres:256 spheres:1024"
 SEED = 1
+STRONGEST = 0.1  # forces, relative to the mean, that count as small
+WIDEST = 1e-2, 1e-3  # gaps, in mean diameters, that count as small
+TOUCHING = 1e-10  # gaps, in mean diameters, that are closed: implied by others in regular patches
+
+
+def bodies(kind: str, count: int) -> "PeriodicPacking":
+    """Return discs of two sizes, or equal spheres."""
+    from polycorner.models import PeriodicPacking
+
+    if kind == "discs":
+        return PeriodicPacking.bidisperse(count)
+    return PeriodicPacking.monodisperse(count, 3)
 
 
 def measured(kind: str, count: int) -> dict[str, float | int | str | bool]:
     """Jam one packing; return times, memory and residuals."""
     from polycorner.models import PeriodicPacking
 
-    discs = kind == "discs"
-    packing = PeriodicPacking.bidisperse(count) if discs else PeriodicPacking.monodisperse(count, 3)
-    PeriodicPacking.bidisperse(100, 2 if discs else 3).jam(0)  # compiles the kernel
+    packing = bodies(kind, count)
+    PeriodicPacking.bidisperse(100, packing.dimension).jam(0)  # compiles the kernel
     wall, begin = time.perf_counter(), time.process_time()
     start = packing.soft_start(SEED)
     middle = time.process_time()
@@ -73,17 +89,67 @@ def spheropack(count: int) -> dict[str, float | int | str]:
     return rows
 
 
+def small(values: np.ndarray, below: float) -> tuple[float, float]:
+    """Return ``a`` of ``P(X < x) ~ x**a`` for ``x < below``: maximum likelihood, and its error."""
+    least = values[values < below]
+    found = len(least) / np.log(below / least).sum()
+    return float(found), float(found / np.sqrt(len(least)))
+
+
+def distributions(kind: str, count: int, seeds: int) -> dict[str, float | int | str]:
+    """Return the exponents of densities ``f**theta`` of small forces, ``h**-gamma`` of small gaps.
+
+    Bodies with the least possible number of contacts, ``d + 1``, may buckle, and forces on them are
+    distributed otherwise than those on all others.  Forces are relative to the mean, gaps to the
+    mean diameter.
+    """
+    packing = bodies(kind, count)
+    forces: dict[str, list[np.ndarray]] = {"buckling": [], "extended": []}
+    gaps = []
+    for seed in range(seeds):
+        jammed = packing.jam(seed)
+        least = (jammed.degrees == packing.dimension + 1)[jammed.pairs].any(axis=1)
+        relative = jammed.forces / jammed.forces.mean()
+        forces["buckling"].append(relative[least])
+        forces["extended"].append(relative[~least])
+        gaps.append(jammed.near_gaps(max(WIDEST))[1])
+    row: dict[str, float | int | str] = {"kind": kind, "count": count, "packings": seeds}
+    for name, parts in forces.items():
+        found, error = small(np.concatenate(parts), STRONGEST)
+        row |= {f"theta, {name}": found - 1, f"error of theta, {name}": error}
+    all_gaps = np.concatenate(gaps)
+    closed = all_gaps < TOUCHING
+    for below in WIDEST:
+        found, error = small(all_gaps[~closed], below)
+        row |= {f"gamma, below {below:g}": 1 - found, f"error of gamma, below {below:g}": error}
+    return row | {"closed without force": int(closed.sum())}
+
+
 def exponent(rows: list[dict[str, float]]) -> float:
     """Return the slope of the logarithm of the time against that of the number of bodies."""
     counts, seconds = (np.log([row[key] for row in rows]) for key in ("count", "seconds"))
     return float(np.polyfit(counts, seconds, 1)[0])
 
 
+def keep_distributions(row: dict[str, float | int | str]) -> None:
+    """Print exponents and add them to the results."""
+    print(row)
+    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {"runs": []}
+    same = (row["kind"], row["count"])
+    others = [r for r in kept.get("small", []) if (r["kind"], r["count"]) != same]
+    RESULTS.write_text(json.dumps(kept | {"small": [*others, row]}, indent=1) + "\n")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", default=SIZES)
+    parser.add_argument("--exponents", help="kind:bodies:packings, for small forces and gaps")
     parser.add_argument("--one", help="run this size here and print it as JSON")
     chosen = parser.parse_args()
+    if chosen.exponents:
+        kind, count, seeds = chosen.exponents.split(":")
+        keep_distributions(distributions(kind, int(count), int(seeds)))
+        return
     if chosen.one:
         kind, count = chosen.one.split(":")
         found = spheropack(int(count)) if kind == "spheropack" else measured(kind, int(count))

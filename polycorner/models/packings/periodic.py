@@ -105,20 +105,20 @@ class PeriodicPacking(Value):
         self,
         rng: "np.random.Generator | int | None" = None,
         *,
-        iterations: int = 1500,
+        iterations: int = 20_000,
         overlap: float = 1e-5,
     ) -> Array:
         """Return centres ``(N, d)`` of soft bodies that push each other apart, nearly jammed.
 
-        From scattered centres they are pushed apart by L-BFGS and deflated in turn.  This saves
-        most of the linear programmes.
+        From scattered centres they are pushed apart by L-BFGS until the forces balance, and
+        deflated, in turn.  This saves most of the linear programmes.
 
         Parameters
         ----------
         rng : random generator or seed, optional
             For the scattered centres.
         iterations : int, optional
-            Limit on the iterations after each deflation.
+            Limit on the iterations after each deflation; most end earlier, in equilibrium.
         overlap : float, optional
             Mean overlap, relative to the sum of radii, at which the deflations end.
         """

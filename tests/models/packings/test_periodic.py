@@ -15,7 +15,7 @@ from polycorner.models import PeriodicPacking
         (PeriodicPacking.bidisperse(64), 1),
         (PeriodicPacking.bidisperse(200, box=3.0), 2),
         (PeriodicPacking.monodisperse(64), 3),
-        (PeriodicPacking(np.random.default_rng(0).uniform(0.7, 1.3, 100)), 4),
+        (PeriodicPacking(np.random.default_rng(0).uniform(0.7, 1.3, 130)), 4),
     ],
     ids=["discs", "box", "spheres", "polydisperse"],
 )
