@@ -268,8 +268,12 @@ class Explorer(Prober):
         return self._beside[k]
 
     def _vantage(self, curve: Curve) -> EvaluatedPoint:
-        """Return the point of a curve nearest to its middle where gradients have a direction."""
-        middle = len(curve.points) // 2
+        """Return a point of a curve near its middle where gradients have a direction.
+
+        Not the middle itself, from where straight ways across symmetric faces go through points
+        where others touch.
+        """
+        middle = 3 * len(curve.points) // 7
         for k in sorted(range(len(curve.points)), key=lambda k: abs(k - middle)):
             point = self.quotient.at(curve.points[k])
             if not self._undirected(point, curve.active):
