@@ -26,6 +26,10 @@ class SolverError(PolycornerError):
     state: Any = None
 
 
+class WorkersError(PolycornerError):
+    """Workers that cannot be started, do not answer, or die again and again."""
+
+
 class NonsmoothWarning(UserWarning):
     """A formula was given whose derivatives may jump: across a kink nothing is certified."""
 

@@ -52,10 +52,14 @@ resume_option = option(
 
 
 def search_options(function: Command) -> Command:
-    """Add ``--seed``, ``--budget``, ``--resume`` and the options of every answer."""
+    """Add ``--seed``, ``--budget``, ``--workers``, ``--resume`` and the options of every answer."""
     for add in (
         output_options,
         resume_option,
+        option(
+            "--workers", type=click.IntRange(min=1), group="Search",
+            help="Processes that walk along edges. [this one]",
+        ),
         option(
             "--budget", type=click.IntRange(min=1), default=100_000, group="Search",
             help="Most edges to trace.",
@@ -74,8 +78,9 @@ def _epilog(*lines: str) -> str:
 @option("--count", type=click.IntRange(min=2), default=6, group="Model", help="Number of spheres.")
 @search_options
 def spheres(
-    count: int, as_json: bool, out: Path | None, seed: int, budget: int, resume: bool
-) -> None:
+    count: int, as_json: bool, out: Path | None, seed: int, budget: int, workers: int | None,
+    resume: bool,
+) -> None:  # fmt: skip
     """List rigid clusters of sticky unit spheres.
 
     Clusters are counted up to congruence and relabelling; edges are motions with one degree of
@@ -84,7 +89,7 @@ def spheres(
     from polycorner.models.spheres import SphereCluster
 
     model = SphereCluster(count)
-    search = Search("spheres", {"count": count}, out, seed, budget)
+    search = Search("spheres", {"count": count}, out, seed, budget, workers)
     found = search.run(model.polyhedron, lambda _: model.starts(), model.symmetry, resume=resume)
     special = [k for k, corner in enumerate(found.corners) if corner.singular]
     extra = {
@@ -108,20 +113,24 @@ def spheres(
 
 @atlas.command(epilog=_epilog("tutorial", "tutorial --out out"))
 @search_options
-def tutorial(as_json: bool, out: Path | None, seed: int, budget: int, resume: bool) -> None:
+def tutorial(
+    as_json: bool, out: Path | None, seed: int, budget: int, workers: int | None, resume: bool
+) -> None:
     """List the sides of a planar region with seven corners."""
     from polycorner.models.tutorial import Tutorial
 
-    _planar("tutorial", Tutorial(), as_json, out, seed, budget, resume)
+    _planar("tutorial", Tutorial(), as_json, out, seed, budget, workers, resume)
 
 
 @atlas.command(epilog=_epilog("pinball --seed 1 --json"))
 @search_options
-def pinball(as_json: bool, out: Path | None, seed: int, budget: int, resume: bool) -> None:
+def pinball(
+    as_json: bool, out: Path | None, seed: int, budget: int, workers: int | None, resume: bool
+) -> None:
     """List the walls of a pinball board with pins, wedges and cups."""
     from polycorner.models.pinball import Pinball
 
-    _planar("pinball", Pinball(), as_json, out, seed, budget, resume)
+    _planar("pinball", Pinball(), as_json, out, seed, budget, workers, resume)
 
 
 @atlas.command(
@@ -177,9 +186,10 @@ def _planar(
     out: Path | None,
     seed: int,
     budget: int,
+    workers: int | None,
     resume: bool,
 ) -> None:
-    search = Search(name, {}, out, seed, budget)
+    search = Search(name, {}, out, seed, budget, workers)
     found = search.run(model.polyhedron, lambda rng: model.starts(rng, STARTS), None, resume=resume)
 
     def draw(folder: Path) -> list[Path]:

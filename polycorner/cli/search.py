@@ -2,8 +2,10 @@
 
 import hashlib
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -28,8 +30,10 @@ if TYPE_CHECKING:
     from polycorner.polyhedra.symmetry import Symmetry
     from polycorner.printing import Sheet
     from polycorner.skeletons.elements import Skeleton
+    from polycorner.workers import Workers
 
 SAVED_EVERY = 10.0  # seconds between two savings of a long search
+SEARCHING = 10.0  # seconds of search, at least, for each second that savings take
 
 
 class Kept:
@@ -128,13 +132,17 @@ class Search(Kept):
     ----------
     budget : int
         The most edges to trace.
+    workers : int, optional
+        Processes that walk along edges; default this one.
     """
 
     def __init__(
-        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int
-    ) -> None:
+        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int,
+        workers: int | None = None,
+    ) -> None:  # fmt: skip
         super().__init__(model, chosen, out, seed)
-        self.budget = budget
+        self.budget, self.workers = budget, workers
+        self._seconds = SAVED_EVERY
 
     def run(
         self,
@@ -152,7 +160,11 @@ class Search(Kept):
         from polycorner.skeletons.parts import Completeness
 
         known = 0
-        with working(f"searching {self.model}", "edges") as progress:
+        with (
+            self._opened() as executor,
+            working(f"searching {self.model}", "edges") as progress,
+        ):
+            begun = monotonic()
             if resume:
                 found = self._load(polyhedron, symmetry)
                 known = len(found.edges)
@@ -162,23 +174,35 @@ class Search(Kept):
                     polyhedron,
                     starts(rng),
                     symmetry=symmetry,
-                    budget=Budget(self.budget, SAVED_EVERY),
+                    budget=Budget(self.budget, self._seconds),
+                    executor=executor,
                     progress=progress,
                     rng=rng,
                 )
             while resume or found.complete is Completeness.BUDGET:
                 resume = False
                 self._save(found)
+                self._seconds = max(SAVED_EVERY, self._longer(monotonic() - begun))
                 left = self.budget - (len(found.edges) - known)
                 if left < 1:
                     break
-                found = resumed(found, budget=Budget(left, SAVED_EVERY), progress=progress)
+                limits, begun = Budget(left, self._seconds), monotonic()
+                found = resumed(found, budget=limits, executor=executor, progress=progress)
         interrupted = found.complete is Completeness.INTERRUPTED
         unfinished = interrupted or found.complete is Completeness.BUDGET
         if unfinished:
             self._save(found)
         self.end(finished=not unfinished, interrupted=interrupted)
         return found
+
+    def _opened(self) -> "AbstractContextManager[Workers | None]":
+        from polycorner.workers import opened
+
+        return nullcontext() if self.workers is None else opened(self.workers)
+
+    def _longer(self, taken: float) -> float:
+        """Return the time to search for after a search, its assembly and saving took some time."""
+        return SEARCHING * max(0.0, taken - self._seconds)
 
     def _save(self, found: "Skeleton") -> None:
         from polycorner.files import save_skeleton

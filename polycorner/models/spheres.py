@@ -135,15 +135,23 @@ class SphereCluster(Value):
 
     def _motions(self, q: Array) -> Array:
         """Return the velocities of three translations and three rotations about the centroid."""
-        centres = q.reshape(self.count, 3)
-        away = centres - centres.mean(axis=0)
-        motions = np.zeros((6, self.count, 3))
+        motions = (self._rotations @ q).reshape(6, -1)
+        motions[:3] = self._translations
+        return motions
+
+    @cached_property
+    def _translations(self) -> Array:
+        return np.tile(np.eye(3), self.count)
+
+    @cached_property
+    def _rotations(self) -> Array:
+        """The matrices of the six motions, stacked, those of the translations zero."""
+        motions = np.zeros((6, 3, 3))
         for axis in range(3):
-            motions[axis, :, axis] = 1.0
             after, before = (axis + 1) % 3, (axis + 2) % 3
-            motions[3 + axis, :, before] = away[:, after]
-            motions[3 + axis, :, after] = -away[:, before]
-        return motions.reshape(6, -1)
+            motions[3 + axis, before, after], motions[3 + axis, after, before] = 1.0, -1.0
+        centred = np.eye(self.count) - 1 / self.count
+        return np.concatenate([np.kron(centred, motion) for motion in motions])
 
     def _matrix(self, q: Array) -> Array:
         matrix = np.zeros((self.count, self.count))

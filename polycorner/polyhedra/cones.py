@@ -49,6 +49,11 @@ class Rows:
         """Orthonormal basis, as columns ``(k, k - rank)``, of the rows' linear relations."""
         return np.asarray(self._left[:, self.rank :])
 
+    def opening(self, k: int) -> Array:
+        """Return the shortest vector with slope 1 along unit row ``k`` and 0 along the others."""
+        r = self.rank
+        return np.asarray(self._right[:r].T @ (self._left[k, :r] / self._singular[:r]))
+
     def weights(self, vector: Array) -> Array:
         """Return the shortest least-squares weights of the unit rows that sum to ``vector``."""
         r = self.rank

@@ -155,6 +155,30 @@ def renamed(names: frozenset[str], relabelling: Relabelling) -> frozenset[str]:
     return frozenset(relabelling.get(name, name) for name in names)
 
 
+def generators(group: Sequence[Relabelling]) -> list[Relabelling]:
+    """Return relabellings that generate a finite group of them, the identity never.
+
+    Examples
+    --------
+    >>> turn = {"a": "b", "b": "c", "c": "a"}
+    >>> back = {"a": "c", "b": "a", "c": "b"}
+    >>> generators([{"a": "a", "b": "b", "c": "c"}, turn, back]) == [turn]
+    True
+    """
+    names = sorted({name for p in group for name in p})
+    known, found = {tuple(names)}, []
+    for p in group:
+        if tuple(p.get(name, name) for name in names) in known:
+            continue
+        found.append(p)
+        fresh = list(known)
+        while fresh:
+            images = [tuple(g.get(name, name) for name in image) for image in fresh for g in found]
+            fresh = [image for image in dict.fromkeys(images) if image not in known]
+            known.update(fresh)
+    return found
+
+
 def vector_field(manifold: Manifold, components: Any) -> "tuple[SmoothFunction, ...]":
     """Return the components of a vector field as functions.
 

@@ -2,25 +2,23 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from itertools import pairwise
 
 import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
-from polycorner.polyhedra.symmetry import renamed
+from polycorner.polyhedra.symmetry import generators, renamed
 from polycorner.skeletons.borders import Border, seeds_of
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Flag
+from polycorner.skeletons.partitions import Partition
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import CornerRecord
-from polycorner.skeletons.vertex_figures import Ray
+from polycorner.skeletons.vertex_figures import Ray, Sector
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from networkx.utils import UnionFind
 
 
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
@@ -88,22 +86,20 @@ def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
 
 def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
     """Assemble faces: flags that meet at corners and along edges, then crossings."""
-    from networkx.utils import UnionFind
-
     flags = dict.fromkeys(_flags(explorer))
-    boundary, surface = UnionFind(flags), UnionFind(flags)
+    boundary, surface = Partition(flags), Partition(flags)
     broken: list[Flag] = []
     for one, other in _joins(explorer):
         if one in flags and other in flags:
-            boundary.union(one, other)
-            surface.union(one, other)
+            boundary.join(one, other)
+            surface.join(one, other)
         elif one in flags:
             broken.append(one)
     for crossing in explorer.crossings:
-        surface.union(crossing.start, crossing.stop)
+        surface.join(crossing.start, crossing.stop)
     patches = _patches(explorer, flags)
     for flag, k in patches.items():
-        surface.union(flag, next(other for other, j in patches.items() if j == k))
+        surface.join(flag, next(other for other, j in patches.items() if j == k))
     loose = {boundary[flag] for flag in [*broken, *_ends(explorer, flags)]}
     faces = []
     for group in _groups(surface, flags):
@@ -201,9 +197,9 @@ def _contacts(
     return found
 
 
-def _groups(sets: "UnionFind", flags: Iterable[Flag]) -> list[list[Flag]]:
-    """Return flags by set, in the order they come."""
-    found: dict[Flag, list[Flag]] = {}
+def _groups(sets: Partition, flags: Iterable[Flag]) -> list[list[Flag]]:
+    """Return flags by class, in the order they come."""
+    found: dict[int, list[Flag]] = {}
     for flag in flags:
         found.setdefault(sets[flag], []).append(flag)
     return list(found.values())
@@ -227,14 +223,21 @@ def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
     """Yield flags that belong to one boundary curve of one face."""
     for k, record in enumerate(explorer.records):
         yield from _joins_at(explorer, k, record)
+    beside = [_sectors_by_ray(record) for record in explorer.records]
     for curve in explorer.curves:
         if curve.start is not None:
-            record = explorer.records[curve.start[0]]
-            for sector in record.figure.sectors:
-                if curve.start[1] in sector.rays:
-                    face = explorer.registry.names(sector.active)
-                    stop: Flag = ("half", curve.stop, renamed(face, curve.relabelled))
-                    yield ("half", curve.start, face), stop
+            for sector in beside[curve.start[0]].get(curve.start[1], ()):
+                face = explorer.registry.names(sector.active)
+                stop: Flag = ("half", curve.stop, renamed(face, curve.relabelled))
+                yield ("half", curve.start, face), stop
+
+
+def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
+    found: dict[int, list[Sector]] = {}
+    for sector in record.figure.sectors:
+        for ray in dict.fromkeys(sector.rays):
+            found.setdefault(ray, []).append(sector)
+    return found
 
 
 def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tuple[Flag, Flag]]:
@@ -243,8 +246,8 @@ def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tupl
     alike: dict[frozenset[str], list[int]] = {}
     for i, names in enumerate(active):
         alike.setdefault(names, []).append(i)
-    # A relabelling that changes no name joins nothing.
-    changes = [p for p in record.stabiliser if any(a != b for a, b in p.items())]
+    # What generators join, all products of them join as well.
+    changes = generators(record.stabiliser)
     images = [[alike.get(renamed(names, p), []) for names in active] for p in changes]
     for sector in record.figure.sectors:
         if not sector.rays:
@@ -283,12 +286,10 @@ def _edge_of(explorer: Explorer, flag: Flag) -> int:
 def _components(
     explorer: Explorer,
     flags: Iterable[Flag],
-    surface: "UnionFind",
+    surface: Partition,
     patches: Mapping[Flag, int],
     faces: int,
 ) -> dict[int, int]:
-    from networkx.utils import UnionFind
-
     points = [record.point.q for record in explorer.records[:1]]
     points += [curve.points[0] for curve in explorer.curves[:1]]
     points += [patch.point for patch in explorer.patches[:1]]
@@ -301,16 +302,19 @@ def _components(
     if free >= 2:
         counts[fixed + 2] = faces
     if free == 3 and not explorer.polyhedron.is_union and not explorer.symmetry.relabels:
-        inside = UnionFind([("patch", k) for k in range(len(explorer.patches))])
+        patch_places = [("patch", k) for k in range(len(explorer.patches))]
+        inside = Partition([*patch_places, *(("surface", surface[flag]) for flag in flags)])
         for flag in flags:
             if flag[0] != "apex":
-                inside.union(("edge", _edge_of(explorer, flag)), surface[flag])
+                inside.join(("edge", _edge_of(explorer, flag)), ("surface", surface[flag]))
         for flag, k in patches.items():
-            inside.union(("patch", k), surface[flag])
+            inside.join(("patch", k), ("surface", surface[flag]))
         for link in explorer.links:
-            inside.union(*(place for anchor in link for place in _places(explorer, anchor)))
-        every = [("patch", k) for k in range(len(explorer.patches))]
-        counts[fixed + 3] = len({inside[x] for x in [*every, *(surface[f] for f in flags)]})
+            places = [place for anchor in link for place in _places(explorer, anchor)]
+            for one, other in pairwise(places):
+                inside.join(one, other)
+        surfaces = {("surface", surface[flag]) for flag in flags}
+        counts[fixed + 3] = len({inside[x] for x in [*patch_places, *surfaces]})
     return counts
 
 

@@ -9,18 +9,21 @@ from time import monotonic
 
 import numpy as np
 
+from polycorner.lookahead import Lookahead
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.links import Link, singular_figure
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
+from polycorner.skeletons.remote_walks import walked
 from polycorner.skeletons.singularities import singular_point, singular_points
 from polycorner.skeletons.states import Budget, SearchState, copied
 from polycorner.skeletons.tracing import Curve, EdgeEnd
 from polycorner.skeletons.vertex_figures import Ray, faces_beside
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
+from polycorner.workers import Workers
 
 # Random directions of a descent.
 DIRECTIONS = 6
@@ -89,11 +92,24 @@ class Explorer(Prober):
 
     # --------------------------------------------------------------------------- order of the work
 
-    def run(self, budget: Budget, progress: Progress) -> Completeness:
+    def run(
+        self, budget: Budget, progress: Progress, workers: Workers | None = None
+    ) -> Completeness:
         """Work until nothing is left, budget or time is used up, or Ctrl-C.
 
-        At least one edge, descent or crossing is done, however short the time.
+        At least one edge, descent or crossing is done, however short the time.  Workers walk along
+        the edges that are pending; they are put together here, in the order in which they were
+        found, so that the result is the same for any workers.
         """
+        self.lookahead = None if workers is None else Lookahead(workers, walked)
+        try:
+            return self._worked(budget, progress)
+        finally:
+            if self.lookahead is not None:
+                self.lookahead.close()
+            self.lookahead = None
+
+    def _worked(self, budget: Budget, progress: Progress) -> Completeness:
         deadline, first = monotonic() + budget.seconds, True
         try:
             for allowed, work in self._work(budget.edges):
@@ -119,7 +135,9 @@ class Explorer(Prober):
             if self.pending:
                 if not self._is_traced(self.pending[0]):
                     yield len(self.curves) < edges, partial(self._trace, self.pending[0])
-                self.pending.popleft()
+                done = self.pending.popleft()
+                if self.lookahead is not None and done in self.lookahead:
+                    self.lookahead.drop(done)
             elif self.starts:
                 allowed = len(self.curves) < edges and descents > 0
                 yield allowed, partial(self._descend, *self.starts[0])
@@ -268,8 +286,12 @@ class Explorer(Prober):
         return self._beside[k]
 
     def _vantage(self, curve: Curve) -> EvaluatedPoint:
-        """Return the point of a curve nearest to its middle where gradients have a direction."""
-        middle = len(curve.points) // 2
+        """Return a point of a curve near its middle where gradients have a direction.
+
+        Not the middle itself, from where straight ways across symmetric faces go through points
+        where others touch.
+        """
+        middle = 3 * len(curve.points) // 7
         for k in sorted(range(len(curve.points)), key=lambda k: abs(k - middle)):
             point = self.quotient.at(curve.points[k])
             if not self._undirected(point, curve.active):

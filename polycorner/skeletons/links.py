@@ -5,6 +5,7 @@ small enough ([Mil] sec. 2): the corners of the link are the edges at the point,
 two-dimensional faces there, and a closed edge without a corner is a face around an apex.
 The link is a polyhedron of one dimension less, so its own skeleton is searched for; two radii must
 agree.  This holds whatever the order of contact: for crossings, cusps and apexes alike.
+At folds the link is known from first and second derivatives and not searched.
 """
 
 from collections import Counter
@@ -18,6 +19,7 @@ from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.tracing import EdgeTracer
 from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure, singular_rays
@@ -104,6 +106,9 @@ def singular_figure(
     """
     frame = null_space(point.matrix([]), RANK_TOLERANCE)
     full = int(frame.shape[1])
+    folded = fold_figure(point, active, rank, full)
+    if folded is not None:
+        return folded
     before = None
     for radius in RADII:
         notes: list[str] = []

@@ -8,9 +8,10 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dgeqrf, dorgqr, dtrtrs
+from scipy.linalg.lapack import dgeqrf, dorgqr, dormqr, dtrtrs
 
 from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
 from polycorner.polyhedra.equations import independent_equations
@@ -25,6 +26,7 @@ LAST = 1e-8
 # Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
 SINGULAR = 1e-14
 NEWTON = 8
+WORK = 64  # floats that LAPACK may use to apply reflections to one vector
 # Tolerances within which a gradient must keep its direction.
 VICINITY = 10.0
 # Smallest diagonal entry of the triangular factor for which orbits count as independent.
@@ -86,9 +88,18 @@ class Quotient:
 class EvaluatedPoint:
     """A point with values and scaled gradients of all functions, and the orbit through it."""
 
-    def __init__(self, quotient: Quotient, q: Array, values: Array, gradients: Array) -> None:
+    def __init__(
+        self,
+        quotient: Quotient,
+        q: Array,
+        values: Array,
+        gradients: Array,
+        orbit: Array | None = None,
+    ) -> None:
         self.quotient, self.q, self.values, self.gradients = quotient, q, values, gradients
-        self.orbit = quotient.symmetry.directions(quotient.polyhedron.manifold, q)
+        if orbit is None:
+            orbit = quotient.symmetry.directions(quotient.polyhedron.manifold, q)
+        self.orbit = orbit
 
     @cached_property
     def distances(self) -> Array:
@@ -153,11 +164,12 @@ class HeldPoint(EvaluatedPoint):
         Volume of the parallelepiped of the held gradients and the orbit.
     """
 
-    def __init__(self, quotient: Quotient, q: Array, kept: Sequence[int]) -> None:
+    def __init__(
+        self, quotient: Quotient, q: Array, kept: Sequence[int], orbit: Array | None = None
+    ) -> None:
         values, gradients = evaluated(quotient.polyhedron, q)
-        super().__init__(quotient, q, values, gradients)
+        super().__init__(quotient, q, values, gradients, orbit)
         self.kept = list(kept)
-        self._target = np.zeros(0)
         self._factorise()
         if len(self.orbit) and not self.condition > DEPENDENT:
             # Orbits are smaller at some points: motions about a line do not move what lies on it.
@@ -170,16 +182,24 @@ class HeldPoint(EvaluatedPoint):
         rows = np.concatenate([rows, self.orbit]) if len(self.orbit) else rows
         sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
         total = float(self.values.sum() + sizes.sum())
-        self.finite, self.condition = math.isfinite(total) and bool((sizes > 0).all()), 0.0
-        self.volume = 0.0
+        self.finite = math.isfinite(total) and float(sizes.min(initial=1.0)) > 0
+        self.condition, self.volume = 0.0, 0.0
+        self._target = np.zeros(len(rows) if self.finite else 0)
         if self.finite:
-            self._target = np.zeros(len(rows))
             self._target[: len(held)] = -self.values[held] / sizes[: len(held)]
-            self._factor, pivots, *_ = dgeqrf((rows / sizes[:, None]).T)
-            self._normal, *_ = dorgqr(self._factor[:, : len(pivots)], pivots)
-            diagonal = abs(np.diagonal(self._factor))
+            self._factor, self._reflectors, *_ = dgeqrf((rows / sizes[:, None]).T, overwrite_a=True)
+            diagonal = abs(self._factor.diagonal())
             self.condition = float(diagonal.min(initial=1.0))
             self.volume = float(diagonal.prod() * sizes.prod())
+
+    @cached_property
+    def _normal(self) -> Array:
+        """Orthonormal columns that span the held gradients and the orbit."""
+        count = len(self._reflectors)
+        return np.asarray(dorgqr(self._factor[:, :count], self._reflectors)[0])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_normal"}
 
     def tangent(self, v: Array) -> Array:
         """Return the unit vector nearest to ``v`` along which the held functions stay zero."""
@@ -188,11 +208,16 @@ class HeldPoint(EvaluatedPoint):
 
     def correction(self) -> Array:
         """Return the shortest scaled step to the zeros of the linearised held functions."""
-        found, info = dtrtrs(self._factor, self._target, trans=1)
-        if info:
-            msg = "the gradients of the held functions are dependent"
-            raise np.linalg.LinAlgError(msg)
-        return np.asarray(self._normal @ found)
+        count = len(self._reflectors)
+        step = np.zeros((len(self.q), 1))
+        if count:
+            found, info = dtrtrs(self._factor, self._target, trans=1)
+            if info:
+                msg = "the gradients of the held functions are dependent"
+                raise np.linalg.LinAlgError(msg)
+            step[:count, 0] = found[:count]
+            step = dormqr("L", "N", self._factor[:, :count], self._reflectors, step, WORK)[0]
+        return np.asarray(step[:, 0])
 
     @property
     def is_curve(self) -> bool:
@@ -214,12 +239,13 @@ def projected(
 
     None if Newton's method does not converge within ``reach`` scale units of ``q``, or meets
     values that are not finite.  A step shorter than the square root of the rounding error is
-    the last: convergence is quadratic.
+    the last: convergence is quadratic.  All steps are orthogonal to the orbit through the guess.
     """
     scales = quotient.polyhedron.manifold.scale_array
-    moved, last = 0.0, math.inf
+    moved, last, orbit = 0.0, math.inf, None
     for _ in range(steps):
-        frame = HeldPoint(quotient, q, kept)
+        frame = HeldPoint(quotient, q, kept, orbit)
+        orbit = frame.orbit
         if not frame.finite or frame.condition < SINGULAR:
             return None
         step = frame.correction()
@@ -228,9 +254,9 @@ def projected(
         if moved > reach:
             return None
         if size <= EXACT or (size < LAST and size > last / 2):
-            return frame
+            return frame if last == math.inf else HeldPoint(quotient, q, kept)
         q, last = q + scales * step, size
         if size < LAST * min(1.0, frame.condition):
             frame = HeldPoint(quotient, q, kept)
             return frame if frame.finite else None
-    return frame if size <= 1e-9 else None
+    return HeldPoint(quotient, frame.q, kept) if size <= 1e-9 else None

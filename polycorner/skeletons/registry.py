@@ -12,7 +12,7 @@ import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.points import EvaluatedPoint, Quotient, projected
-from polycorner.skeletons.singularities import SingularPoint
+from polycorner.skeletons.singularities import SingularPoint, refined
 from polycorner.skeletons.vertex_figures import Ray, VertexFigure, corner_rank, vertex_figure
 from polycorner.spaces.manifold import Array
 
@@ -54,6 +54,8 @@ class CornerRegistry:
         self.notes: dict[str, None] = {}
         self.lost = False
         self._named: dict[frozenset[int], Names] = {}
+        self._keys: Array = np.empty((0, 0))
+        self._filled = 0
 
     def names(self, rows: Iterable[int]) -> Names:
         """Return the names of functions."""
@@ -81,9 +83,9 @@ class CornerRegistry:
             self.note(f"a walk ended outside the polyhedron at {written_point(point.q)}", lost=True)
             return None
         point = self._polished(point, active)
-        if self.polyhedron.is_union:
-            # Functions that vanish to rounding now may have been out of tolerance before.
-            active = point.active() or active
+        # Functions that vanish to rounding now may have been out of tolerance before.
+        here = point.active() or active
+        active = here if self.polyhedron.is_union or here > active else active
         key = self._key(point.q)
         for k in self._alike(point.q, key):
             record = self.records[k]
@@ -103,16 +105,26 @@ class CornerRegistry:
         """Return the positions of the corners that a point may be."""
         if not self.records:
             return []
-        keys = np.array([record.key for record in self.records])
-        alike = np.flatnonzero(abs(keys - key).max(axis=1) <= NEAR)
+        alike = np.flatnonzero(abs(self._known_keys() - key).max(axis=1) <= NEAR)
         points = np.array([self.records[k].point.q for k in alike]).reshape(-1, len(q))
         found: list[int] = alike[self.symmetry.possible(self.manifold, q, points, SAME)].tolist()
         return found
 
+    def _known_keys(self) -> Array:
+        """Return the keys of all corners, ``(k, m)``, in an array that doubles as it fills."""
+        count = len(self.records)
+        if count > len(self._keys):
+            self._keys = np.array([record.key for record in self.records for _ in range(2)])
+            self._filled = 0
+        for k in range(self._filled, count):
+            self._keys[k] = self.records[k].key
+        self._filled = count
+        return self._keys[:count]
+
     def _polished(self, point: EvaluatedPoint, active: frozenset[int]) -> EvaluatedPoint:
         basis = point.basis(active)
         if len(basis) + len(point.matrix([])) < len(point.q):
-            return point
+            return refined(point, active, NEAR)
         exact = projected(self.quotient, point.q, basis, NEAR)
         if exact is None:
             return point

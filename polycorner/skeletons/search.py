@@ -1,5 +1,7 @@
 """Search for the skeleton of a polyhedron, from the start or resumed."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,6 +17,7 @@ from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
 from polycorner.spaces.arguments import reals
+from polycorner.workers import opened
 
 EXTENT = 1000.0
 BUDGET = 100_000
@@ -26,6 +29,7 @@ def skeleton(
     *,
     symmetry: Symmetry | None = None,
     budget: int | Budget = BUDGET,
+    executor: Any = None,
     progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
     tolerance: float = TOLERANCE,
@@ -53,6 +57,11 @@ def skeleton(
     budget : int or Budget, optional
         Most edges to trace; as many starts may be descended from, and as many faces crossed.
         A :class:`Budget` bounds the time as well.
+    executor : optional
+        Who walks along the edges, as in :func:`~polycorner.sweeps.execution.sweep`: None (default)
+        this process; a number starts that many processes, which are replaced when they die;
+        otherwise a ``concurrent.futures.Executor`` or a ``distributed.Client``, which stays open.
+        The skeleton is the same, in content and order, for all of them.
     progress : callable, optional
         Called as ``progress(edges, edges + pending, note)`` after every edge, descent and crossing;
         ``pending`` counts the ends of edges to trace; see :class:`~polycorner.progress.Progress`.
@@ -74,6 +83,8 @@ def skeleton(
     TypeError, ValueError
         For arguments of a wrong kind or shape.  A start outside the polyhedron is no error:
         ``Skeleton.notes`` tell what it violates and where it was moved.
+    WorkersError
+        If the workers do not answer, or die again and again.
 
     Examples
     --------
@@ -96,13 +107,14 @@ def skeleton(
     points = polyhedron.manifold.placed(points, "starts")
     quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerance, float(extent), points)
     explorer = Explorer(quotient, points, checks.generator("rng", rng))
-    return _run(explorer, budget, progress)
+    return _run(explorer, budget, executor, progress)
 
 
 def resume(
     skeleton: Skeleton,
     *,
     budget: int | Budget = BUDGET,
+    executor: Any = None,
     progress: Progress | None = None,
 ) -> Skeleton:
     """Resume a search that was interrupted or ran out of budget or time.
@@ -111,7 +123,7 @@ def resume(
     ----------
     skeleton : Skeleton
         What was found so far, also from a pickle; it stays as it is.
-    budget, progress
+    budget, executor, progress
         As for :func:`skeleton`.
 
     Returns
@@ -121,14 +133,20 @@ def resume(
     """
     state = checks.instance("skeleton", skeleton, Skeleton, "polycorner.skeleton").state
     checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
-    return _run(Explorer.resumed(state), budget, progress)
+    return _run(Explorer.resumed(state), budget, executor, progress)
 
 
-def _run(explorer: Explorer, budget: int | Budget, progress: Progress | None) -> Skeleton:
+def _run(
+    explorer: Explorer, budget: int | Budget, executor: Any, progress: Progress | None
+) -> Skeleton:
     limits = budget if isinstance(budget, Budget) else Budget(budget)
     if progress is not None and not callable(progress):
         checks.refuse("progress", "a callable or None", progress, TypeError)
-    complete = explorer.run(limits, progress or silent)
+    if executor is None:
+        complete = explorer.run(limits, progress or silent)
+    else:
+        with opened(executor) as workers:
+            complete = explorer.run(limits, progress or silent, workers)
     try:
         return assembled(explorer, complete)
     except KeyboardInterrupt:

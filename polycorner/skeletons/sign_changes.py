@@ -39,9 +39,15 @@ def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
 
 
 def sign_change(
-    value: Callable[[float], tuple[float, Point]], far: float = 1.0
+    value: Callable[[float], tuple[float, Point]],
+    far: float = 1.0,
+    enough: Callable[[Point, float, float], bool] | None = None,
 ) -> tuple[float, Point]:
-    """Return where a function changes sign on ``[0, far]``, by the Illinois method."""
+    """Return where a function changes sign on ``[0, far]``, by the Illinois method.
+
+    ``enough``, of a point, the value there and the length of the interval that is left, may end
+    the search before.
+    """
     a, b = 0.0, far
     (fa, _), (fb, at) = value(a), value(b)
     small = 1e-15 * max(abs(fa), abs(fb))
@@ -61,6 +67,6 @@ def sign_change(
         else:
             a, fa = s, f
             fb, side = (fb / 2 if side == -1 else fb), -1
-        if b - a < 1e-14:
+        if b - a < 1e-14 or (enough is not None and enough(at, f, b - a)):
             break
     return s, at

@@ -94,6 +94,17 @@ def singular_point(
     return SingularPoint(quotient, at, kept)
 
 
+def refined(point: EvaluatedPoint, active: frozenset[int], reach: float) -> EvaluatedPoint:
+    """Return a corner with dependent gradients to rounding: the point itself if it is not found.
+
+    Where the set folds, functions that vanish to rounding place a point only to its square root.
+    """
+    if isinstance(point, SingularPoint) or point.vanishing(active):
+        return point
+    found = _solved(point.quotient, point.q, point.quotient.held(sorted(active)), reach)
+    return point if found is None else point.quotient.at(found[0])
+
+
 def _solved(
     quotient: Quotient, q: Array, held: list[int], reach: float
 ) -> tuple[Array, Array] | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polycorner.lookahead import Lookahead
 from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
@@ -20,11 +21,13 @@ from polycorner.skeletons.registry import (
     SingularFigure,
     written_point,
 )
+from polycorner.skeletons.remote_walks import Beginning, Report
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.vertex_figures import Ray
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
+from polycorner.workers import Shared
 
 # Most steps along an edge to a point near its end.
 INWARD = 60
@@ -69,6 +72,8 @@ class EdgeTracer:
         self.registry = CornerRegistry(quotient, singular)
         self.curves: list[Curve] = []
         self.pending: deque[EdgeEnd] = deque()
+        self.lookahead: Lookahead | None = None  # where others than this process walk
+        self._sent = Shared(quotient)
 
     def corner(self, point: EvaluatedPoint) -> tuple[int, list[Relabelling]] | None:
         """Return the corner at a point; the edges of a new one are pending.
@@ -100,7 +105,7 @@ class EdgeTracer:
         k, i = end
         record = self.records[k]
         ray = record.figure.rays[i]
-        walk = follow(ray.sample, ray.direction, passive=ray.active)
+        walk = self._walk(end)
         points = np.vstack([record.point.q, walk.points])
         stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
         curve = Curve(points, ray.active, (End.CORNER, walk.end), end, stop, carried)
@@ -111,6 +116,22 @@ class EdgeTracer:
             there = self.records[stop[0]]
             there.edges[there.orbit[stop[1]]] = number
         self._remark(curve)
+
+    def _walk(self, end: EdgeEnd) -> Walk:
+        """Return the walk along an edge; others that are pending begin in the meantime."""
+        if self.lookahead is None:
+            ray = self._ray(end)
+            return follow(ray.sample, ray.direction, passive=ray.active)
+        for other in self.pending:
+            if not self.lookahead.has_room:
+                break
+            if other not in self.lookahead and not self._is_traced(other):
+                self.lookahead.start(other, self._sent, Beginning.of(self._ray(other)))
+        report: Report = self.lookahead.result(end)
+        return report.walk(self.quotient)
+
+    def _ray(self, end: EdgeEnd) -> Ray:
+        return self.records[end[0]].figure.rays[end[1]]
 
     def _remark(self, curve: Curve) -> None:
         label = self.registry.written(curve.active)

@@ -213,15 +213,23 @@ def _names(point: EvaluatedPoint, rows: list[int]) -> str:
     return ", ".join(point.quotient.polyhedron.names[i] for i in rows)
 
 
-def _curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
-    """Return the weighted sum of the Hessians of unit-slope functions on a subspace."""
-    polyhedron = point.quotient.polyhedron
+def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
+    """Return the weighted sum of the Hessians of unit-slope functions on a subspace.
+
+    Equations count with the multipliers that cancel what is left of the weighted gradients.
+    """
+    quotient = point.quotient
+    polyhedron, solved = quotient.polyhedron, list(quotient.equations)
     scales = polyhedron.manifold.scale_array
     frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
-    hessians = polyhedron.hessians(point.q)[rows] * np.outer(scales, scales)
     sizes = np.linalg.norm(point.gradients[rows], axis=1)
     sizes[sizes == 0] = 1.0  # a vanishing gradient is a relation by itself
-    return np.asarray(frame.T @ np.einsum("i,ijk->jk", weights / sizes, hessians) @ frame)
+    factors = weights / sizes
+    left = factors @ point.gradients[rows]
+    multipliers = np.linalg.lstsq(point.gradients[solved].T, -left, rcond=None)[0]
+    hessians = polyhedron.bundle.evaluate(point.q, 2)[2] * np.outer(scales, scales)
+    total = np.einsum("i,ijk->jk", [*factors, *multipliers], hessians[[*rows, *solved]])
+    return np.asarray(frame.T @ total @ frame)
 
 
 def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
@@ -234,7 +242,7 @@ def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
     """
     held = Rows(slopes, RANK_TOLERANCE)
     for weights in held.relations.T:
-        values = np.linalg.eigvalsh(_curvature(point, rows, weights, held.null_space))
+        values = np.linalg.eigvalsh(curvature(point, rows, weights, held.null_space))
         if values[0] > RANK_TOLERANCE or values[-1] < -RANK_TOLERANCE:
             return True
     return False
@@ -244,7 +252,7 @@ def _null_lines(
     point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array
 ) -> list[Array]:
     """Return the directions in a plane along which a weighted sum of Hessians vanishes."""
-    values, axes = np.linalg.eigh(_curvature(point, rows, weights, plane))
+    values, axes = np.linalg.eigh(curvature(point, rows, weights, plane))
     if values[0] * values[1] >= 0:
         return []
     low, high = math.sqrt(-values[0]), math.sqrt(values[1])
@@ -301,7 +309,12 @@ def _sectors(
             if known == n - 2:
                 flats.setdefault(shared, set()).update((i, j))
     sectors = []
-    for members in flats.values():
+    for shared, members in flats.items():
+        if len(members) == 2 and not point.quotient.polyhedron.is_union:
+            # Of a convex cone two extreme rays bound the sector, and both are tight on it.
+            i, j = sorted(members)
+            sectors.append(Sector((i, j), frozenset(rows[k] for k in shared)))
+            continue
         for i, j, middle in _arcs(rays, sorted(members)):
             active = _active_along(point, rows, slopes @ middle)
             if active is None:

@@ -35,6 +35,8 @@ STRAY = 0.01
 FLIP = 1e-3
 # Ratio of the volumes of the held gradients at two points that lets one look for a singular point.
 COLLAPSE = 0.5
+# Part of a step within which the slope of a function bounds how far it may fall.
+NARROW = 1e-3
 # Distance in scale units of a tip from where a walk stops.
 TIP = 1e-2
 # Distance in scale units from zero at which a passive function shows that the curve is lost.
@@ -106,18 +108,13 @@ class _Follower:
     """The state of one walk."""
 
     def __init__(
-        self,
-        start: HeldPoint,
-        direction: Array,
-        passive: frozenset[int],
-        *,
-        home: bool,
-        extent: float | None,
-    ) -> None:
+        self, start: HeldPoint, direction: Array, passive: frozenset[int],
+        *, home: bool, extent: float | None,
+    ) -> None:  # fmt: skip
         self.quotient = quotient = start.quotient
         self.scales = quotient.polyhedron.manifold.scale_array
         self.point, self.t = start, start.tangent(direction)
-        self.out = self.t
+        self.out, self.bend = self.t, np.zeros(len(self.t))
         self.start, self.home = start, home
         self.extent = quotient.extent if extent is None else extent
         held = passive.union(start.kept)
@@ -127,8 +124,7 @@ class _Follower:
         self.union = quotient.polyhedron.is_union
         negative = self.union & (start.values[self.watched] < 0)
         self.signs = np.where(negative, -1.0, 1.0)
-        self.points, self.length = [start.q], 0.0
-        self.side = start.orientation(self.t)
+        self.points, self.length, self.side = [start.q], 0.0, start.orientation(self.t)
         self.expected: SingularPoint | None = None
 
     def run(self) -> Walk:
@@ -157,23 +153,22 @@ class _Follower:
             h = min(1.6 * h, self._longest())
 
     def _longest(self) -> float:
-        """Return the longest step: longer far out, where no other function is near.
-
-        On circles a step is a small part of the circumference.
-        """
+        """Return the longest step: longer far out, short on small circles and where it turns."""
         away = abs(self.point.distances[self.watched])
         room = float(away.min(initial=self.extent))
         manifold = self.quotient.polyhedron.manifold
         turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
         circle = 0.05 / turning if turning > 0 else math.inf
         far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), circle)
-        return max(LONGEST_STEP, far)
+        return min(max(LONGEST_STEP, far), 0.8 * TURN / max(float(np.linalg.norm(self.bend)), 1e-3))
 
     def _walk(self, end: End) -> Walk:
         return Walk(np.array(self.points), self.point, self.t, end, self.length)
 
     def _move(self, point: HeldPoint, t: Array) -> None:
-        self.length += float(np.linalg.norm((point.q - self.point.q) / self.scales))
+        chord = self._chord(point)
+        self.length += chord
+        self.bend = (t - self.t) / chord if point.is_curve and chord > 0 else self.bend
         self.point, self.t = point, t
         self.side = point.orientation(t)
         self.points.append(point.q)
@@ -182,7 +177,7 @@ class _Follower:
         """Return the next point, the tangent there and the step that was accepted."""
         blocked = False
         while h > SHORTEST_STEP:
-            ahead = self.point.q + h * self.scales * self.t
+            ahead = self.point.q + h * self.scales * (self.t + h / 2 * self.bend)
             point = projected(self.quotient, ahead, self.point.kept, 0.3 * h)
             if point is None:
                 blocked |= not HeldPoint(self.quotient, ahead, self.point.kept).finite
@@ -300,7 +295,12 @@ class _Follower:
                 at = self._between(point, s)
                 return sign * float(at.gradients[j] @ at.tangent(self.t)), at
 
-            far, end = sign_change(slope)
+            def is_clear(at: HeldPoint, rate: float, part: float) -> bool:
+                fall = 2 * abs(rate) * part * self._chord(point)
+                size = self.quotient.tolerance * at.sizes[j]
+                return part < NARROW and bool(sign * at.values[j] - fall > size)
+
+            far, end = sign_change(slope, enough=is_clear if self.point.is_curve else None)
             distance = sign * end.distances[j]
             if distance > self.quotient.tolerance:
                 return None

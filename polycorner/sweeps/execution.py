@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.checks import names, whole
+from polycorner.errors import WorkersError
 from polycorner.interrupts import first_interrupt
 from polycorner.progress import Progress, silent
 from polycorner.sweeps.grid import Grid
@@ -19,7 +20,7 @@ from polycorner.sweeps.scheduling import Scheduler
 from polycorner.sweeps.store import Store
 from polycorner.sweeps.study import Study, SweepError, canonical
 from polycorner.sweeps.tables import Table
-from polycorner.sweeps.workers import workers_of
+from polycorner.workers import workers_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,7 +107,7 @@ def sweep(
     try:
         finished = _compute(table, Job(function, constants, study.seed), executor, retry, progress)
         table.close(complete="finished" if finished else "interrupted")
-    except SweepError as error:
+    except (SweepError, WorkersError) as error:
         _close(table)
         msg = f"{error}; {_kept(table)}"
         raise SweepError(msg, results=table.dataset()) from error

@@ -1,10 +1,8 @@
 """Evaluation of single points in a worker: the values, or the reason for a failure."""
 
-import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +10,7 @@ import numpy as np
 from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
 from polycorner.sweeps.grid import RESERVED
+from polycorner.workers import Shared
 
 EXACT = 2**53  # whole numbers up to here are exact as floats
 LONGEST = 1000  # characters of a message
@@ -56,10 +55,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Job:
-    """The computation at every point; it travels to other processes with all that it refers to.
-
-    Functions are pickled by cloudpickle, so lambdas, closures and functions of a notebook can be
-    sent.  A worker unpickles a job once, not once a batch.
+    """The computation at every point.
 
     Attributes
     ----------
@@ -74,21 +70,6 @@ class Job:
     fixed: Mapping[str, Any]
     seed: int | None
 
-    @cached_property
-    def _content(self) -> bytes:
-        import cloudpickle
-
-        content: bytes = cloudpickle.dumps((self.function, self.fixed, self.seed))
-        return content
-
-    def __reduce__(self) -> tuple[Callable[[bytes], "Job"], tuple[bytes]]:
-        return _unpickled, (self._content,)
-
-
-@lru_cache(maxsize=4)
-def _unpickled(content: bytes) -> Job:
-    return Job(*pickle.loads(content))
-
 
 def stream(seed: int, number: int) -> np.random.Generator:
     """Return the random generator of a point, independent of all others of the seed."""
@@ -96,11 +77,12 @@ def stream(seed: int, number: int) -> np.random.Generator:
 
 
 def evaluate(
-    job: Job, numbers: Sequence[int], points: Sequence[Mapping[str, Any]], budget: float
+    job: Shared, numbers: Sequence[int], points: Sequence[Mapping[str, Any]], budget: float
 ) -> list[Outcome]:
     """Return the outcomes of the first points, as many as can be started within ``budget`` seconds.
 
-    At least one point is evaluated.  After Ctrl-C in the worker the finished ones are returned.
+    ``job`` is a :class:`Job`.  At least one point is evaluated.  After Ctrl-C in the worker the
+    finished ones are returned.
     """
     found: list[Outcome] = []
     start = time.perf_counter()
@@ -108,7 +90,7 @@ def evaluate(
         for number, point in zip(numbers, points, strict=True):
             if found and time.perf_counter() - start > budget:
                 break
-            found.append(_outcome(job, number, point))
+            found.append(_outcome(job.value, number, point))
     except KeyboardInterrupt:
         if not found:
             raise

@@ -10,7 +10,7 @@ from typing import Any
 from polycorner.sweeps.grid import Grid
 from polycorner.sweeps.points import Job, Outcome, evaluate, one_line
 from polycorner.sweeps.study import SweepError
-from polycorner.sweeps.workers import LARGEST, Workers, is_broken, killed_workers
+from polycorner.workers import LARGEST, Shared, Workers, is_broken, killed_workers
 
 TARGET = 0.1  # s that a batch should take
 BUDGET = 1.0  # s after which a worker returns the rest of a batch
@@ -42,6 +42,7 @@ class Scheduler:
         record: Callable[[list[Outcome]], None], stopped: Callable[[], bool],
     ) -> None:  # fmt: skip
         self.workers, self.job, self.grid = workers, job, grid
+        self._sent = Shared(job)
         self.todo, self.record, self.stopped = todo, record, stopped
         self.in_flight: dict[Future[Any], Batch] = {}
         self.returned: deque[int] = deque()  # by workers whose budget of time was spent
@@ -80,7 +81,7 @@ class Scheduler:
             return False
         points = [self.grid.point(number) for number in batch]
         try:
-            future = self.workers.executor.submit(evaluate, self.job, batch, points, BUDGET)
+            future = self.workers.executor.submit(evaluate, self._sent, batch, points, BUDGET)
         except (TypeError, AttributeError, PicklingError) as error:
             raise self._not_sent(error) from error
         except Exception as error:

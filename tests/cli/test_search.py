@@ -189,3 +189,14 @@ def test_what_a_killed_process_found_is_kept(tmp_path):
     code, out, _ = run(*search, "--resume", "--budget", "1")
     assert code == 0
     assert json.loads(out)["complete"] == "budget"
+
+
+def test_processes_that_walk_find_the_same():
+    search = ("spheres", "--count", "5", "--json")
+    assert run(*search, "--workers", "1")[:2] == run(*search)[:2]
+
+
+def test_a_number_of_processes_that_is_none_is_refused():
+    code, out, err = run("spheres", "--workers", "0")
+    assert (code, out) == (2, "")
+    assert "--workers" in err

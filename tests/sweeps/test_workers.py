@@ -10,7 +10,7 @@ import sweep_functions
 import xarray as xr
 
 from polycorner.sweeps import SweepError, scheduling, sweep
-from polycorner.sweeps.workers import AHEAD, Inline, Workers
+from polycorner.workers import AHEAD, Inline, Workers
 
 GRID = {"a": ([0, 1, 2], "mm"), "b": [1, 2, 3, 4]}
 

@@ -29,7 +29,7 @@ UNMATCHED = "relabelling leads to corners that are not in this section: not coun
 @search_options
 def dyad(
     plane: bool, heading: float, as_json: bool, out: Path | None, seed: int, budget: int,
-    resume: bool, **options: float,
+    workers: int | None, resume: bool, **options: float,
 ) -> None:  # fmt: skip
     """List corners and edges of the placements of two dumbbells.
 
@@ -46,7 +46,8 @@ def dyad(
 
     angle = math.radians(heading)
     polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
-    search = Search("dyad", parameters(pair) | {"heading_deg": heading}, out, seed, budget)
+    chosen = parameters(pair) | {"heading_deg": heading}
+    search = Search("dyad", chosen, out, seed, budget, workers)
     found = search.run(
         polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
     )

@@ -1,20 +1,52 @@
-"""Workers that compute points: this process, an executor, processes, a Dask cluster."""
+"""Workers: this process, an executor, processes that are started here, a Dask cluster.
+
+The argument ``executor`` of parameter studies and of searches stands for one of them.
+"""
 
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import cached_property, lru_cache
 from typing import Any
 
 from polycorner.checks import refuse, whole
-from polycorner.sweeps.study import SweepError
+from polycorner.errors import WorkersError
 
-AHEAD = 3  # batches in flight for each worker
+AHEAD = 3  # batches, or calls, in flight for each worker
 LARGEST = 200  # points in a batch
 REFRESH = 5.0  # s between two looks at the number of workers of a cluster
+
+
+class Shared:
+    """A value that travels to workers with many calls and is unpickled there once, not every time.
+
+    Functions are pickled by cloudpickle, so lambdas, closures and functions of a notebook can be
+    sent.
+    """
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    @cached_property
+    def _content(self) -> bytes:
+        import cloudpickle
+
+        content: bytes = cloudpickle.dumps(self.value)
+        return content
+
+    def __reduce__(self) -> "tuple[Callable[[bytes], Shared], tuple[bytes]]":
+        return _unpickled, (self._content,)
+
+
+@lru_cache(maxsize=4)
+def _unpickled(content: bytes) -> Shared:
+    return Shared(pickle.loads(content))
 
 
 class Inline(Executor):
@@ -31,7 +63,7 @@ class Inline(Executor):
 
 
 class Workers:
-    """An executor, and the number of points that it computes at a time.
+    """An executor, and how much it is given at a time.
 
     Parameters
     ----------
@@ -89,9 +121,9 @@ class Processes(Workers):
         except BrokenExecutor as error:
             msg = (
                 f"executor: expected {count} processes to start; got {error} (a script has to "
-                'call sweep under `if __name__ == "__main__":`)'
+                'start them under `if __name__ == "__main__":`)'
             )
-            raise SweepError(msg) from error
+            raise WorkersError(msg) from error
         return executor
 
     def replace(self) -> bool:
@@ -123,8 +155,22 @@ def _follow(parent: Any) -> None:
     os._exit(1)
 
 
+@contextmanager
+def opened(executor: Any) -> Iterator[Workers]:
+    """Yield the workers that an argument ``executor`` stands for; stop those started here."""
+    if isinstance(executor, Workers):
+        yield executor
+        return
+    workers, at_once = workers_of(executor), True
+    try:
+        yield workers
+        at_once = False
+    finally:
+        workers.close(at_once=at_once)
+
+
 def workers_of(executor: Any) -> Workers:
-    """Return the workers that the argument ``executor`` of a sweep stands for."""
+    """Return the workers that an argument ``executor`` stands for."""
     if executor is None:
         return Workers(Inline(), lambda: 1, largest=1, ahead=1)
     if isinstance(executor, int):
