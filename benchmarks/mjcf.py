@@ -3,10 +3,7 @@
 Units are mm, g and s; MuJoCo has no units, but some of its defaults are lengths, and those are set
 here.
 
-MuJoCo has no shape for the inside of a drum.  Here it is a ring of boxes whose inner faces are
-tangent to the drum: a body on a hinge, heavy and servo-driven, so that it turns evenly whatever
-rolls in it.  With ``n`` boxes the surface at a ball is at most ``R (sec(pi/n) - 1)`` too far out
-and ``pi/n`` too steep or too flat: a micrometre and a quarter of a degree with 720.
+The drum is a ring of boxes (:class:`~mjcf_ring.Ring`).
 """
 
 import math
@@ -15,16 +12,15 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from mjcf_ring import IMPEDANCE, Ring, contacts, text, tolerance_in_ring
 
 from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.spaces.manifold import Array
 
 GRAVITY = 9806.65  # mm/s^2
-TIMES_HEAVIER = 1e5  # inertia of the drum about its axis over that of its content
 SPINNING_FRICTION = 1e-4  # mm; spinning on the spot is free in the drum, but MuJoCo requires it > 0
 TOLERANCE = 1e-8  # of the solver, relative to the inertia of the dumbbells
-IMPEDANCE = "0.95 0.99 0.1"  # of contacts; the third number is a length
 
 
 @dataclass(frozen=True)
@@ -123,9 +119,7 @@ def mjcf(scene: DrumScene) -> str:
     afterwards.  Friction cones are elliptic.  On the drum they have six dimensions
     (``condim`` 6: normal force, sliding in two directions, spinning, rolling about two axes), or
     three if rolling resistance belongs to a joint; between dumbbells three.  The coefficient of
-    rolling is a length, ``mu_roll r``.  Contacts have a time constant of four steps, twice the
-    least that MuJoCo accepts: the friction cone of a convex model pushes sliding or rolling bodies
-    away from the surface, and stiffer contacts rattle.
+    rolling is a length, ``mu_roll r``.
 
     Parameters
     ----------
@@ -142,22 +136,20 @@ def mjcf(scene: DrumScene) -> str:
 {_drum(scene) if in_drum else '    <geom class="surface" type="plane" size="0 0 1"/>'}
 {bodies}
   </worldbody>
-  {_servo(scene) if in_drum else ""}
+  {_ring(scene).servo() if in_drum else ""}
 </mujoco>
 """
 
 
 def _option(scene: DrumScene) -> str:
-    """Return the solver's settings.
-
-    MuJoCo compares costs divided by the trace of the inertia matrix with the tolerance.  The drum
-    dominates that trace: without the factor Newton's method would stop before it starts.
-    """
+    """Return the solver's settings."""
     down = (0.0, -GRAVITY * math.sin(scene.tilt), -GRAVITY * math.cos(scene.tilt))
-    share = 1.0 if scene.pair.is_plane else _trace(scene) / _drum_inertia(scene)
+    tolerance = TOLERANCE
+    if not scene.pair.is_plane:
+        tolerance = tolerance_in_ring(TOLERANCE, _trace(scene), _ring(scene))
     return (
-        f'<option timestep="{_text(scene.dt)}" gravity="{_text(*down)}" integrator="implicitfast" '
-        f'cone="elliptic" impratio="{_text(scene.impratio)}" tolerance="{_text(TOLERANCE * share)}"'
+        f'<option timestep="{text(scene.dt)}" gravity="{text(*down)}" integrator="implicitfast" '
+        f'cone="elliptic" impratio="{text(scene.impratio)}" tolerance="{text(tolerance)}"'
         f' noslip_iterations="{scene.noslip_iterations}" noslip_tolerance="0"/>'
     )
 
@@ -167,11 +159,11 @@ def _default(scene: DrumScene) -> str:
 
     Fixed or turning surfaces (type 1) collide with dumbbells (type 2) only.
     """
-    friction = _text(scene.mu_slide, SPINNING_FRICTION, scene.mu_roll * scene.ball_radius)
+    friction = text(scene.mu_slide, SPINNING_FRICTION, scene.mu_roll * scene.ball_radius)
     condim = 6 if scene.rolling == "cone" else 3
     return f"""<default>
-    <geom solref="{_text(4 * scene.dt, 1)}" solimp="{IMPEDANCE}" contype="2" conaffinity="3"
-          condim="3" friction="{_text(scene.mu_contact, 0, 0)}"/>
+    <geom {contacts(scene.dt)} contype="2" conaffinity="3"
+          condim="3" friction="{text(scene.mu_contact, 0, 0)}"/>
     <default class="surface">
       <geom contype="1" conaffinity="0" priority="1" condim="{condim}" friction="{friction}"/>
     </default>
@@ -182,69 +174,52 @@ def _default(scene: DrumScene) -> str:
 
 
 def _drum(scene: DrumScene) -> str:
-    """Return the bottom, which has no friction, and the turning ring of boxes."""
-    step, thick, half = math.tau / scene.segments, scene.ball_radius, scene.drum_length / 2
-    wide = 1.01 * scene.drum_radius * math.tan(step / 2)  # faces overlap outside the ring
-    out = scene.drum_radius + thick
-    boxes = "\n".join(
-        f'      <geom class="surface" type="box" size="{_text(wide, half, thick)}" '
-        f'pos="{_text(out * math.sin(b), half, -out * math.cos(b))}" '
-        f'xyaxes="{_text(math.cos(b), 0, math.sin(b), 0, 1, 0)}"/>'
-        for b in step * np.arange(scene.segments)
-    )
-    return f"""    <geom class="bottom" type="plane" size="0 0 1" zaxis="0 1 0"/>
-    <body name="drum">
-      <inertial pos="0 0 0" mass="1" diaginertia="{_text(*3 * [_drum_inertia(scene)])}"/>
-      <joint name="spin" type="hinge" axis="0 -1 0"/>
-{boxes}
-    </body>"""
+    """Return the bottom, which has no friction, and the turning ring."""
+    bottom = '<geom class="bottom" type="plane" size="0 0 1" zaxis="0 1 0"/>'
+    return f"    {bottom}\n{_ring(scene).body()}"
 
 
-def _servo(scene: DrumScene) -> str:
-    """Return the drive, which restores the spin within a step against the load of the content."""
-    gain = _drum_inertia(scene) / scene.dt
-    return (
-        '<actuator><general joint="spin" gainprm="0" biastype="affine" '
-        f'biasprm="{_text(gain * scene.spin, 0, -gain)}"/></actuator>'
+def _ring(scene: DrumScene) -> Ring:
+    return Ring(
+        scene.drum_radius,
+        thickness=scene.ball_radius,
+        start=0.0,
+        length=scene.drum_length,
+        spin=scene.spin,
+        content=scene.count * 2 * scene.ball_mass,
+        dt=scene.dt,
+        segments=scene.segments,
     )
 
 
 def _dumbbell(scene: DrumScene, k: int) -> str:
-    half, ball = scene.length / 2, f'size="{_text(scene.ball_radius)}"'
-    mass = f'mass="{_text(scene.ball_mass)}"'
+    half, ball = scene.length / 2, f'size="{text(scene.ball_radius)}"'
+    mass = f'mass="{text(scene.ball_mass)}"'
     return f"""    <body name="dumbbell{k}">
       {"<freejoint/>" if scene.rolling == "cone" else _joints(scene)}
-      <geom type="sphere" {ball} pos="{_text(0, -half, 0)}" {mass}/>
-      <geom type="sphere" {ball} pos="{_text(0, half, 0)}" {mass}/>
-      <geom type="capsule" size="{_text(scene.rod_radius)}" mass="0"
-            fromto="{_text(0, -half, 0, 0, half, 0)}"/>
+      <geom type="sphere" {ball} pos="{text(0, -half, 0)}" {mass}/>
+      <geom type="sphere" {ball} pos="{text(0, half, 0)}" {mass}/>
+      <geom type="capsule" size="{text(scene.rod_radius)}" mass="0"
+            fromto="{text(0, -half, 0, 0, half, 0)}"/>
     </body>"""
 
 
 def _joints(scene: DrumScene) -> str:
     """Return slides along x, y, z, hinges about z, x and the own axis; the last has friction."""
     load = 2 * scene.ball_mass * GRAVITY * math.cos(scene.tilt)
-    loss = _text(scene.mu_roll * scene.ball_radius * load)
+    loss = text(scene.mu_roll * scene.ball_radius * load)
     x, y, z = "1 0 0", "0 1 0", "0 0 1"
     kinds = (("slide", x), ("slide", y), ("slide", z), ("hinge", z), ("hinge", x))
     return "".join(f'<joint type="{kind}" axis="{axis}"/>' for kind, axis in kinds) + (
         f'<joint type="hinge" axis="{y}" frictionloss="{loss}" '
-        f'solreffriction="{_text(4 * scene.dt, 1)}" solimpfriction="{IMPEDANCE}"/>'
+        f'solreffriction="{text(4 * scene.dt, 1)}" solimpfriction="{IMPEDANCE}"/>'
     )
-
-
-def _drum_inertia(scene: DrumScene) -> float:
-    return TIMES_HEAVIER * scene.count * 2 * scene.ball_mass * scene.drum_radius**2
 
 
 def _trace(scene: DrumScene) -> float:
     """Return the trace of the inertia matrix of all dumbbells."""
     ball = 0.4 * scene.ball_radius**2
     return scene.count * 2 * scene.ball_mass * (3 + 3 * ball + scene.length**2 / 2)
-
-
-def _text(*numbers: float) -> str:
-    return " ".join(repr(float(number)) for number in numbers)
 
 
 def _check(scene: DrumScene) -> None:
