@@ -39,22 +39,22 @@ class MujocoDrum:
     @cached_property
     def model(self) -> Any:
         """The ``mujoco.MjModel``."""
-        return _mujoco().MjModel.from_xml_string(mjcf(self.scene))
+        return load_mujoco().MjModel.from_xml_string(mjcf(self.scene))
 
     @cached_property
     def data(self) -> Any:
         """The ``mujoco.MjData``: time, positions, velocities and contacts now."""
-        data = _mujoco().MjData(self.model)
+        data = load_mujoco().MjData(self.model)
         _place(self.scene, data, self.scene.rows())
         return data
 
     def step(self, count: int = 1) -> None:
         """Advance by ``count`` time steps."""
-        _mujoco().mj_step(self.model, self.data, count)
+        load_mujoco().mj_step(self.model, self.data, count)
 
     def placements(self) -> Array:
         """Return the placements of the dumbbells, ``(count, 4)``; angles lie in ``[-pi, pi]``."""
-        _mujoco().mj_kinematics(self.model, self.data)  # poses are otherwise a step behind
+        load_mujoco().mj_kinematics(self.model, self.data)  # poses are otherwise a step behind
         middle = self.data.xpos[-self.scene.count :]
         turns = self.data.xmat[-self.scene.count :].reshape(-1, 3, 3)
         plane = self.scene.pair.is_plane
@@ -145,7 +145,8 @@ def _dot(u: Array, v: Array) -> Array:
     return product
 
 
-def _mujoco() -> Any:
+def load_mujoco() -> Any:
+    """Return MuJoCo's module, or raise ImportError naming the extra."""
     try:
         import mujoco
     except ImportError as exc:
