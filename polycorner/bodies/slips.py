@@ -35,26 +35,32 @@ def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, .
     NotImplementedError
         At the sides of polygons and polyhedra.
     """
-    if len(touch.second) > 2:
-        msg = (
-            "friction: expected contacts of discs, balls, capsules, edges and walls; got "
-            f"{touch.gap.name!r}, where the nearest point of a polygon or polyhedron is not covered"
-        )
-        raise NotImplementedError(msg)
-    p, normal = _place(touch)
+    p, normal = _place("friction", touch)
     return _slip(placements, touch.one, p, normal, touch.two)
 
 
 def rolling(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, ...]":
-    """Return the rolling velocity of two bodies, of as many components as the slip."""
-    _, normal = _place(touch)
+    """Return the rolling velocity of two bodies, of as many components as the slip.
+
+    Raises
+    ------
+    NotImplementedError
+        At the sides of polygons and polyhedra.
+    """
+    _, normal = _place("rolling", touch)
     r, s = touch.one.part.radius, touch.two.part.radius
     radius = r * s / (r + s) if r and s else 0.0
     return _rolling(placements, touch.one, normal, touch.two, radius)
 
 
-def _place(touch: Touch) -> "tuple[Point, Point]":
+def _place(argument: str, touch: Touch) -> "tuple[Point, Point]":
     """Return the nearest point of the first part, and the normal from the second to it."""
+    if len(touch.second) > 2:
+        msg = (
+            f"{argument}: expected contacts of discs, balls, capsules, edges and walls; got "
+            f"{touch.gap.name!r}, where the nearest point of a polygon or polyhedron is not covered"
+        )
+        raise NotImplementedError(msg)
     p, q = _nearest(
         [_at(touch.one, point) for point in touch.first],
         [_at(touch.two, point) for point in touch.second],

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from polycorner import simulate
-from polycorner.bodies import Arrangement, Cylinder, HalfSpace, capsule, disc, sphere
+from polycorner.bodies import Arrangement, Cylinder, HalfSpace, capsule, disc, polygon, sphere
 
 GROUND = {"ground": HalfSpace([0, 0, 1], [0, 0, 0])}
 LINE = {"ground": HalfSpace([0, 1], [0, 0])}
@@ -72,6 +72,14 @@ def test_velocities_are_derivatives_of_placements(dimension, orientations):
         for t, way in zip((0.0, dt), ways, strict=True)
     )
     assert a.velocity(q, moving) == pytest.approx((after - q) / dt, abs=1e-5)
+
+
+@pytest.mark.parametrize("argument", ["friction", "rolling"])
+def test_contacts_at_the_sides_of_polygons_are_refused(argument):
+    square = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    a = Arrangement({"A": disc(0.5)}, fixed={"B": square}, orientations="all")
+    with pytest.raises(NotImplementedError, match=f"^{argument}: expected .*; got 'A-B'"):
+        a.system(**{argument: 0.1})
 
 
 def test_bad_input():
