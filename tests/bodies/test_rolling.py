@@ -74,6 +74,45 @@ def test_velocities_are_derivatives_of_placements(dimension, orientations):
     assert a.velocity(q, moving) == pytest.approx((after - q) / dt, abs=1e-5)
 
 
+SHAFT = {
+    "floor": HalfSpace([0, 1], [0, 0]),
+    "left": HalfSpace([1, 0], [-0.5, 0]),
+    "right": HalfSpace([-1, 0], [0.5, 0]),
+}
+
+
+@pytest.mark.parametrize(("mu", "rolls"), [(0.0, 0.3), (0.03, 0.3), (0.15, 0.05), (0.15, 0.0)])
+def test_of_two_discs_in_a_shaft_sum_and_difference_of_spins_decrease_evenly(mu, rolls):
+    """One lies on the other, in a smooth shaft as wide as they are, so that the load is ``m g``.
+
+    Friction ``mu m g`` turns both against the sum of their spins, resistance ``rolls m g r / 2``
+    each against the difference; with the inertia ``m r^2 / 2`` they decrease by ``4 mu g / r`` and
+    ``2 rolls g / r``, independently of each other, until they are zero.
+    """
+    a, r, g = Arrangement({"D": disc(0.5)}, SHAFT, orientations="all"), 0.5, 10.0
+    one, two, dt, steps = 1.0, 4.0, 1e-3, 500
+    coefficients = {"friction": {"between": mu}, "rolling": {"between": rolls}}
+    system = a.system(gravity=[0, -g], count=2, **coefficients)
+    state = system.state([[0, r, 0], [0, 3 * r, 0]], [[0, 0, one], [0, 0, two]])
+    path = simulate(system, state, steps * dt, dt, every=20)
+    spins = path.v[..., 2]
+    sums = np.maximum(one + two - 4 * mu * g / r * path.times, 0)
+    differences = np.maximum(two - one - 2 * rolls * g / r * path.times, 0)
+    assert spins.sum(axis=1) == pytest.approx(sums, abs=1e-6)
+    assert spins[:, 1] - spins[:, 0] == pytest.approx(differences, abs=1e-6)
+
+
+def test_rolling_resistance_among_repeated_bodies_has_limits():
+    discs = Arrangement({"D": disc(0.5)}, LINE, orientations="all")
+    with pytest.raises(ValueError, match=r"^friction: expected one coefficient where"):
+        discs.system(friction=(0.3, 0.2), rolling=0.1, count=2)
+    with pytest.raises(ValueError, match=r"^rolling: expected one coefficient where"):
+        discs.system(friction=0.3, rolling={"between": (0.2, 0.1)}, count=2)
+    balls = Arrangement({"D": sphere(0.5)}, GROUND, orientations="all")
+    with pytest.raises(NotImplementedError, match=r"^rolling: expected none at 'between'"):
+        balls.system(rolling={"between": 0.1}, count=2)
+
+
 @pytest.mark.parametrize("argument", ["friction", "rolling"])
 def test_contacts_at_the_sides_of_polygons_are_refused(argument):
     square = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
