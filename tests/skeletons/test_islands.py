@@ -93,6 +93,13 @@ class TestIslandsInTheInterior:
         assert atlas.euler_characteristic == 2 + 2 * k
         assert atlas.components[3] == 1
 
+    def test_voids_that_a_start_meets_first_are_in_one_component_with_the_cube(self):
+        voids = [((-0.082, 0.31, 0.443), 0.157), ((0.231, -0.365, -0.254), 0.199)]
+        D = Polyhedron(space(3), AllOf(*box(3), *holes(voids)))
+        atlas = skeleton(D, [[0, 0, 0]], rng=20)
+        assert counts(atlas) == (8, 12, 8)
+        assert atlas.components[3] == 1
+
     @pytest.mark.parametrize("radius", [0.1, 0.01, 0.001])
     def test_a_small_void_is_found_by_minimising_its_function(self, radius):
         D = Polyhedron(space(3), AllOf(*box(3), ball((0.3, 0.2, 0.1), radius, "v", inside=False)))
