@@ -219,6 +219,11 @@ class TestTorus:
         assert len(atlas.faces) == 1
         assert atlas.euler_characteristic == grid_euler(grid, (True, True))
 
+    @pytest.mark.parametrize(("level", "number"), [(1.40625, -1), (-0.5780451025570352, 1)])
+    def test_edges_that_pass_close_to_a_critical_point_of_a_height(self, level, number):
+        D = Polyhedron(TORUS, {"f": sp.cos(p) + sp.cos(q) + sp.Float(level)})
+        assert skeleton(D, [[0.1, 0.2]], rng=1).euler_characteristic == number
+
     @pytest.mark.parametrize("constant", [3, 2.5])
     def test_the_whole_torus_is_one_face(self, constant):
         atlas = skeleton(Polyhedron(TORUS, {"f": sp.cos(p) + sp.cos(q) + constant}), [[1, 1]])
