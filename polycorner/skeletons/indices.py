@@ -221,8 +221,9 @@ def _along(
     total = 0
     falls = along < 0  # a height that is level at a point counts as rising there
     for k in np.flatnonzero(falls[:-1] != falls[1:]):
-        rise = across[k]
-        if rise * across[k + 1] <= 0:
+        rise, change = across[k], abs(along[k + 1] - along[k])
+        # Beside a critical point the slope across may change its sign twice from point to point.
+        if rise * across[k + 1] <= 0 or min(abs(across[k : k + 2])) < change:
             ends = points[inner][[k, k + 1]]
             rise = _rise(surface, height, active, ends, float(along[k]))
         if rise == 0:

@@ -154,13 +154,27 @@ class Prober(EdgeTracer):
         start = HeldPoint(self.quotient, point.q + INSIDE * self.scales * normal, [])
         if start.active():
             return
-        for k in range(WALKS):
-            way = self.rng.standard_normal(len(normal))
-            way = normal if k == 0 else way - min(0.0, 2 * way @ normal) * normal
+        for way in self._ways_inside(start, normal):
             walk = follow(start, way, extent=self.quotient.extent)
             there = walk.last.active() if walk.end is End.CORNER else None
             if there is not None:
                 yield walk.last, there
+
+    def _ways_inside(self, start: EvaluatedPoint, normal: Array) -> Iterator[Array]:
+        """Yield the normal of a facet, random ways inwards, and ways to boundary that is known.
+
+        Random ways alone may miss a small void; what is not joined counts as a component.
+        """
+        yield normal
+        for _ in range(WALKS - 1):
+            way = self.rng.standard_normal(len(normal))
+            yield way - 2 * min(0.0, float(way @ normal)) * normal
+        targets = [patch.point for patch in self.patches[:: 1 + len(self.patches) // WALKS]]
+        targets += [curve.middle for curve in self.curves[:: 1 + len(self.curves) // WALKS]]
+        for target in targets:
+            way = self.manifold.chord(target, start.q) / self.scales
+            if way @ normal > 0:
+                yield way
 
     # ---------------------------------------------------------------------------------- islands
 

@@ -93,6 +93,13 @@ class TestIslandsInTheInterior:
         assert atlas.euler_characteristic == 2 + 2 * k
         assert atlas.components[3] == 1
 
+    def test_voids_that_a_start_meets_first_are_in_one_component_with_the_cube(self):
+        voids = [((-0.082, 0.31, 0.443), 0.157), ((0.231, -0.365, -0.254), 0.199)]
+        D = Polyhedron(space(3), AllOf(*box(3), *holes(voids)))
+        atlas = skeleton(D, [[0, 0, 0]], rng=20)
+        assert counts(atlas) == (8, 12, 8)
+        assert atlas.components[3] == 1
+
     @pytest.mark.parametrize("radius", [0.1, 0.01, 0.001])
     def test_a_small_void_is_found_by_minimising_its_function(self, radius):
         D = Polyhedron(space(3), AllOf(*box(3), ball((0.3, 0.2, 0.1), radius, "v", inside=False)))
@@ -211,6 +218,11 @@ class TestTorus:
         grid = vertices(lambda u, v: np.cos(u) + np.cos(v) + level >= 0, [axis, axis])
         assert len(atlas.faces) == 1
         assert atlas.euler_characteristic == grid_euler(grid, (True, True))
+
+    @pytest.mark.parametrize(("level", "number"), [(1.40625, -1), (-0.5780451025570352, 1)])
+    def test_edges_that_pass_close_to_a_critical_point_of_a_height(self, level, number):
+        D = Polyhedron(TORUS, {"f": sp.cos(p) + sp.cos(q) + sp.Float(level)})
+        assert skeleton(D, [[0.1, 0.2]], rng=1).euler_characteristic == number
 
     @pytest.mark.parametrize("constant", [3, 2.5])
     def test_the_whole_torus_is_one_face(self, constant):
