@@ -19,6 +19,17 @@ SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = ra
 # Kinds of blocks: contacts with the surroundings, and contacts between bodies.
 OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
 
+# Stages of an island between the solutions of a step: nothing it depends on changes any more, it is
+# being solved, or it has to be solved again.
+SETTLED, SOLVED, CHANGED = range(3)
+
+# The velocity bound of a gap: as it is; so small an error that it may be left; raised where the gap
+# curves.
+PLAIN, SMALL, BENT = range(3)
+
+# What follows if an island is not solved: nothing; shorter steps; halves of this part of a step.
+LAST, DIVIDED, HALVED = range(3)
+
 # Why compiled code returns.
 DONE, CONTACTS_FULL, EVENTS_FULL, NOT_FINITE = range(4)
 
@@ -185,7 +196,7 @@ class Work(NamedTuple):
     joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
     near: Annotated[Any, real("1")]  # which of the two distances holds for the bodies at hand
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
-    may_divide: Annotated[Any, whole("1")]  # 1: not solved, shorter steps follow; 2: halved
+    remedy: Annotated[Any, whole("1")]  # for islands that are not solved: LAST, DIVIDED or HALVED
     awake: Annotated[Any, whole("N")]
     touched: Annotated[
         Any, whole("N")
@@ -194,6 +205,7 @@ class Work(NamedTuple):
     speed: Annotated[Any, real("N")]
     island_speed: Annotated[Any, real("N")]  # largest velocity in the body's island
     island_residual: Annotated[Any, real("N")]  # of the island that a body represents
+    stage: Annotated[Any, whole("N")]  # of the island that a body represents: SETTLED, ...
     curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
     parent: Annotated[Any, whole("N")]  # in the union-find forest
     v_old: Annotated[Any, real("N K")]  # velocities before the step
@@ -229,7 +241,7 @@ class Work(NamedTuple):
     block_set: Annotated[Any, whole("B")]  # set of admissible friction
     origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches
     block_load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
-    is_error: Annotated[Any, whole("B")]  # 1: a gap so small that it may be left as it is; 2: bent
+    bound: Annotated[Any, whole("B")]  # of a gap: PLAIN, SMALL or BENT
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
     before: Annotated[Any, real("B 2")]  # J v before the step
     free: Annotated[Any, real("B 2")]  # J v after forces alone
@@ -262,14 +274,20 @@ class Work(NamedTuple):
     sort_keys: Annotated[Any, whole("S")]
     members: Annotated[Any, whole("N")]  # bodies of an island
     number: Annotated[Any, whole("N")]  # number of a body in its island
-    first_side: Annotated[Any, whole("N")]  # first contact of a body, as 2 block + side
-    next_side: Annotated[Any, whole("B 2")]  # the one after it
+    listed: Annotated[Any, whole("N")]  # bodies of an island before they are ordered
+    degree: Annotated[Any, whole("N")]  # of each: how many neighbours are left
+    first_of_degree: Annotated[Any, whole("N")]  # one of those of each degree
+    queue: Annotated[Any, whole("N 2")]  # those before and after it
+    first_neighbour: Annotated[Any, whole("N")]  # link to a neighbour
+    link: Annotated[Any, whole("2*Q+1 2")]  # neighbour, next link
+    link_status: Annotated[Any, whole("2")]  # first link that is free, number of links used
+    mark: Annotated[Any, whole("N")]  # the vertex by which one was seen last
+    place: Annotated[Any, whole("N")]  # in the order of elimination
+    row_start: Annotated[Any, whole("N+1")]  # first entry of each row
+    columns: Annotated[Any, whole("Q+1")]  # of entries
+    entry: Annotated[Any, whole("B")]  # of a block's two bodies, or -1
     island_vector: Annotated[Any, real("N*K")]
-    row_begin: Annotated[Any, whole("N")]  # first body in a body's rows of the band matrix
-    row_end: Annotated[Any, whole("N")]  # the one after the last
-    line: Annotated[Any, whole("N")]  # where column 0 of its first row would stand
-    factors: Annotated[Any, real("16")]  # multiples of four rows that are subtracted from others
-    band: Annotated[Any, real("M")]  # the band matrix, row by row
+    matrix: Annotated[Any, real("M")]  # of an island, block by block
 
 
 class Log(NamedTuple):

@@ -3,7 +3,15 @@
 import numpy as np
 
 from polycorner.formulas.compilation import call_kernel, never_inline
-from polycorner.motion.engine.arrays import OWN_FRICTION, OWN_GAP, PAIR_FRICTION, PAIR_GAP
+from polycorner.motion.engine.arrays import (
+    OWN_FRICTION,
+    OWN_GAP,
+    PAIR_FRICTION,
+    PAIR_GAP,
+    PLAIN,
+    SETTLED,
+    SMALL,
+)
 from polycorner.motion.engine.bounds import (
     acts,
     curvature_change,
@@ -24,6 +32,7 @@ from polycorner.motion.engine.neighbours import (
     heap_sort,
     key_of,
 )
+from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import (
     apply_impulses,
     copy_lanes,
@@ -121,6 +130,12 @@ def new_block(work, b, first, second, rows):
 
 
 @compiled
+def kind_of_bound(model, closed, reached):
+    """Return whether the gap of a closed contact is so small an error that it may be left."""
+    return SMALL if closed and abs(reached) < TOUCHING * model.gap_unit else PLAIN
+
+
+@compiled
 def add_body_blocks(model, state, work, i, h, limit, count):
     """Append the blocks of a body's contacts with its surroundings; return the block count."""
     m, share = model.restitution.size, h / model.step
@@ -151,7 +166,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         if g >= model.unilateral:
             if h > STRAIGHT * model.step:
                 change = work.gap_next[i, g] - gap - h * before
-            work.is_error[b] = ZERO
+            work.bound[b] = PLAIN
             work.offset[b, 0] = equation_offset(model, gap, change, h)
             work.bilateral[b], work.bounces[b] = ONE, ZERO
         else:
@@ -162,7 +177,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
                 model, work, gap, closed, before, free, change, model.restitution[g], h
             )
             work.offset[b, 0] = -least
-            work.is_error[b] = closed and abs(gap + change) < TOUCHING * model.gap_unit
+            work.bound[b] = kind_of_bound(model, closed, gap + change)
         work.block_load[b] = -change
         work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = OWN_GAP, i, g
         work.impulse[b, 0] = state.normal[i, g] * share
@@ -218,7 +233,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     )
     work.offset[n, 0] = -least
     work.block_load[n] = -change
-    work.is_error[n] = closed and abs(gap + change) < TOUCHING * model.gap_unit
+    work.bound[n] = kind_of_bound(model, closed, gap + change)
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]
     finish_block(model, work, n)
@@ -285,8 +300,11 @@ def renew_blocks(model, state, work, blocks, h):
     """Start blocks that were solved from their impulses, with new velocities after forces alone.
 
     The least velocities that contacts allow follow, unless they were changed for other reasons.
+    Settled islands remain.
     """
     for b in range(blocks):
+        if work.stage[island_of(work, b)] == SETTLED:
+            continue
         i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
         if j >= 0:
             work.touched[i] = work.touched[j] = TOGETHER

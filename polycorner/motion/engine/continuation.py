@@ -7,7 +7,7 @@ contacts whose friction has a known load are a convex problem, with one solution
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import NEWTON_STEPS
+from polycorner.motion.engine.arrays import LAST, NEWTON_STEPS
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities, residual
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.multipliers import STEPS_OF_ROUND, approach
@@ -24,7 +24,6 @@ FIRST_YIELD, LEAST_YIELD, MOST_YIELD = 1e-1, 1e-7, 1e1  # softness of rounds of 
 HARDER, EASY_ROUND = 0.1, 10  # factor of the softness after a round of few Newton steps
 TRIED_YIELD, TRIED_ROUNDS = 1e-3, 3  # softness, and rounds, after which Newton's method is tried
 EXACT = 0.1  # share of the residual to which a round is solved
-HALVED = 2  # of ``work.may_divide``: a part of a step that is halved if it is not solved
 GRIP = 1e3  # speed of slip that first loads stop, over that of the island
 LEAST_CHANGE = 0.3  # share of the new loads that is taken over, at least
 
@@ -40,7 +39,7 @@ def continue_island(model, state, work, first, last, n, goal, softness):
     follow are given the first two attempts.
     """
     copy_impulses(work, first, last, work.impulse, work.rigid)
-    few = work.may_divide[0] and last - first > MANY
+    few = work.remedy[0] != LAST and last - first > MANY
     for attempt in range(2 if few else 4):
         if attempt in (0, 3):
             grip = GRIP * goal / model.tolerance if attempt == 3 else 0.0
@@ -101,7 +100,7 @@ def iterate_loads(model, state, work, first, last, n, goal, softness, grip):
     """
     share, former, best, idle, yielding = 1.0, np.inf, np.inf, 0, FIRST_YIELD
     worst, hard = residual(model, work, first, last, 0.0), 0
-    few = work.may_divide[0] and last - first > MANY
+    few = work.remedy[0] != LAST and last - first > MANY
     for _ in range(FEW_ROUNDS if few else LOAD_ROUNDS):
         detach_loads(work, first, last, share)
         if former == np.inf and grip > 0.0:

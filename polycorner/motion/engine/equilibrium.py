@@ -3,7 +3,8 @@
 import numpy as np
 
 from polycorner.motion.engine.arrays import NEWTON_STEPS
-from polycorner.motion.engine.band import (
+from polycorner.motion.engine.gauss_seidel import copy_impulses
+from polycorner.motion.engine.island_matrix import (
     add_block,
     add_columns,
     add_transposed,
@@ -11,9 +12,8 @@ from polycorner.motion.engine.band import (
     number_bodies,
     numbers_of,
     row_product,
-    solve_band,
+    solve_island_matrix,
 )
-from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import TOUCHING
 from polycorner.motion.engine.rest import REST_FACTOR
@@ -166,23 +166,23 @@ def assemble_interior(model, work, first, last, n, speed):
         if work.carries[b] == 0.0:
             continue
         if work.block_rows[b] > 0:
-            add_block(model, work, b)
+            add_block(model, work, n, b)
             g0, g1 = constant[b, 0], constant[b, 1]
             p0 = derivative[b, 4] * g0 + derivative[b, 5] * g1
             p1 = derivative[b, 7] * g0 + derivative[b, 8] * g1
             add_transposed(model, work, b, p0, p1, x)
         else:
-            add_schur_complement(model, work, b)
+            add_schur_complement(model, work, n, b)
 
 
 @compiled
-def add_schur_complement(model, work, b):
+def add_schur_complement(model, work, n, b):
     """Add a contact, its friction eliminated, to the matrix and the right-hand side."""
     K, rows, at = model.lanes, work.schur_row, b * 2 * model.lanes
     share, (x, y) = 1.0 / work.derivative[b, 0], numbers_of(work, b)
     add_row(model, rows, at, share * work.constant[b, 0], work.island_vector, x, y)
     for d in range(0 if x >= 0 else K, 2 * K if y >= 0 else K, WIDTH):
-        add_columns(model, work, x, y, d, rows, at, share * load(rows, at + d))
+        add_columns(model, work, n, b, d, rows, at, share * load(rows, at + d))
 
 
 @compiled
@@ -275,9 +275,7 @@ def interior_point_steps(model, state, work, first, last, n, speed, goal):
         if balanced_for > CENTRING_STEPS:
             return True
         assemble_interior(model, work, first, last, n, speed)
-        if not solve_band(
-            work.band, x, n, K, work.row_begin, work.row_end, work.line, work.factors
-        ):
+        if not solve_island_matrix(model, work, n):
             return balanced_for > 0
         state.counts[NEWTON_STEPS] += 1
         square = newton_direction(model, work, first, last)
@@ -315,7 +313,7 @@ def find_equilibrium(model, state, work, first, last, speed):
     Impulses far from the boundary can still balance when the loads change a little, so that the
     pile can sleep.
     """
-    n = number_bodies(model, state, work, first, last)
+    n = number_bodies(model, work, first, last)
     if n == 0:
         return False
     goal = model.tolerance * speed

@@ -3,18 +3,17 @@
 import numpy as np
 
 from polycorner.formulas.compilation import call_kernel, never_inline
+from polycorner.motion.engine.arrays import CHANGED, SETTLED
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
 from polycorner.motion.engine.random import gaussian, held_integral
 
-ALONE, TOGETHER = (
-    1,
-    2,
-)  # how a body is touched: by its surroundings only, or by other bodies as well
+# How a body is touched: by its surroundings only, or by other bodies as well.
+ALONE, TOGETHER = range(1, 3)
 
 # Change of a velocity, relative to the speed, below which forces that depend on it are settled: for
 # bodies that nothing touches; and over the tolerance, for those that touch no other, and that do.
-SETTLED, SETTLED_ALONE, SETTLED_TOGETHER = 1e-14, 1e-2, 1.0
+CHANGE_FREE, CHANGE_ALONE, CHANGE_TOGETHER = 1e-14, 1e-2, 1.0
 ON_EQUATIONS = 1e-10  # scaled distance up to which a body is on its equations
 MOST_APPROACHES = 8  # Newton steps onto them
 BENDING = 1e-8  # weight of the change of place, relative to the equations
@@ -134,21 +133,22 @@ def approach_equations(model, work, i):
 def settled(model, work, i):
     """Return the change of a velocity, relative to the speed, that is none."""
     if not work.touched[i]:
-        return SETTLED
-    share = SETTLED_TOGETHER if work.touched[i] == TOGETHER else SETTLED_ALONE
-    return max(SETTLED, share * model.tolerance)
+        return CHANGE_FREE
+    share = CHANGE_TOGETHER if work.touched[i] == TOGETHER else CHANGE_ALONE
+    return max(CHANGE_FREE, share * model.tolerance)
 
 
 @compiled
 def update_forces(model, state, work, h):
-    """Evaluate forces at the mean velocities of the step; return whether any changed.
+    """Evaluate forces at the mean velocities of the step; where one changed, so has its island.
 
     Those of a body that change nothing remain as they are, so that its motion does not depend on
     how often other bodies are evaluated.
     """
-    k, changed = model.dimension, False
+    k = model.dimension
     for i in range(model.bodies):
-        if not (state.alive[i] and work.awake[i]):
+        island = work.parent[i]
+        if not (state.alive[i] and work.awake[i]) or work.stage[island] == SETTLED:
             continue
         for c in range(k):
             work.v_mean[i, c] = 0.5 * (state.v[i, c] + work.v_new[i, c])
@@ -163,11 +163,10 @@ def update_forces(model, state, work, h):
             change = max(change, abs(value) * model.units[c])
             speed += (abs(work.v_new[i, c]) + abs(state.v[i, c])) * model.units[c]
         if change > settled(model, work, i) * speed:
-            changed = True
+            work.stage[island] = CHANGED
             continue
         for c in range(k):
             work.force[i, c] = work.former_force[i, c]
-    return changed
 
 
 @compiled

@@ -2,34 +2,37 @@
 
 import numpy as np
 
-from polycorner.formulas.compilation import never_inline
-from polycorner.motion.engine.arrays import ISLANDS, NEWTON_STEPS, OWN_FRICTION, OWN_GAP, SWEEPS
-from polycorner.motion.engine.band import number_bodies
-from polycorner.motion.engine.blocks import STRAIGHT
-from polycorner.motion.engine.bounds import equation_offset
+from polycorner.motion.engine.arrays import (
+    DIVIDED,
+    ISLANDS,
+    LAST,
+    NEWTON_STEPS,
+    OWN_FRICTION,
+    SETTLED,
+    SMALL,
+    SWEEPS,
+)
 from polycorner.motion.engine.continuation import MANY, continue_island
+from polycorner.motion.engine.curvature import correct_curvature
 from polycorner.motion.engine.equilibrium import find_equilibrium
-from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
 from polycorner.motion.engine.grip import keeps_grip
-from polycorner.motion.engine.jit import NONE, compiled
-from polycorner.motion.engine.neighbours import speed_of
+from polycorner.motion.engine.island_matrix import number_bodies
+from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.newton import newton_steps
-from polycorner.motion.engine.partition import island_of
-from polycorner.motion.engine.paths import CURVATURE_DEPTH
 from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
-from polycorner.motion.engine.rows import copy_velocity
+from polycorner.motion.engine.rows import copy_velocity, velocity_of
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; further rounds multiply this by powers of three
 CYCLE_ROUNDS = 3
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
-MISSED = 1e-12  # scaled gap up to which an equation holds
 FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
-SMALL = 8  # lanes of a small island
+FEW_LANES = 8  # of a small island
 FEW = 8  # blocks of a small island up to which sweeps, which may be exact, come first
+CROWD = 64  # blocks beyond which those that do not act are left out
+NEARLY_OPEN = 0.2  # share of a gap that has to be left for a contact not to act
 SPARE = 1e-2  # share of the tolerance to which small islands are solved if possible
-BENT = 2  # of a velocity bound: it was raised for the curvature of its gap
 SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
@@ -48,8 +51,8 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
     has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
-    n = number_bodies(model, state, work, first, last)
-    small = 0 < n * model.lanes <= SMALL
+    n = number_bodies(model, work, first, last)
+    small = 0 < n * model.lanes <= FEW_LANES
     direct = n > 0 and (again or (small and last - first > FEW))
     enough = SPARE * goal if small else goal
     worst = residual(model, work, first, last, 0.0)
@@ -75,10 +78,10 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             state.counts[NEWTON_STEPS] += steps
             if worst > goal and rounds == 1:
-                if work.may_divide[0] == 1 and last - first <= MANY:
+                if work.remedy[0] == DIVIDED and last - first <= MANY:
                     break
                 worst = continue_island(model, state, work, first, last, n, goal, hard)
-                if worst > goal and work.may_divide[0]:
+                if worst > goal and work.remedy[0] != LAST:
                     break
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:
@@ -90,11 +93,73 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
 
 
 @compiled
+def solve_acting(model, state, work, first, last, speed, again):
+    """Solve an island for the blocks that may act; return the residual.
+
+    In a heap most contacts remain open.  Those that do not press and will not have used up most of
+    their gaps are left out, and looked at afterwards: they are added, and the island solved again,
+    where they would be violated.
+    """
+    acting, goal = last, model.tolerance * speed
+    if last - first > CROWD:
+        acting = gather_acting(model, work, first, last)
+    while True:
+        worst, before = 0.0, acting
+        if acting > first:
+            worst = iterate(model, state, work, first, acting, speed, model.sweeps, again)
+        for s in range(before, last):
+            b = work.order[s]
+            velocity_of(model, work, b, work.v_new, work.after[b])
+            if work.block_rows[b] == 0:
+                worst = max(worst, -work.after[b, 0])
+                if work.after[b, 0] < -goal:
+                    acting = move_forward(work, s, acting)
+        if acting == before:
+            return worst
+        for s in range(acting, last):
+            b = work.order[s]
+            if work.block_rows[b] > 0 and work.carries[work.pressing[b]]:
+                acting = move_forward(work, s, acting)
+        again = True
+
+
+@compiled
+def gather_acting(model, work, first, last):
+    """Bring the blocks that may act to the front of an island; return where the others begin."""
+    for s in range(first, last):
+        b = work.order[s]
+        velocity_of(model, work, b, work.v_new, work.after[b])
+        work.carries[b] = 1.0
+        if work.block_rows[b] == 0 and not work.bilateral[b] and work.impulse[b, 0] == 0.0:
+            work.carries[b] = work.after[b, 0] < NEARLY_OPEN * max(0.0, work.offset[b, 0])
+    for s in range(first, last):
+        b = work.order[s]
+        if work.pressing[b] >= 0 and (work.impulse[b, 0] != 0.0 or work.impulse[b, 1] != 0.0):
+            work.carries[work.pressing[b]] = 1.0
+    acting = first
+    for s in range(first, last):
+        b = work.order[s]
+        pressing = work.pressing[b]
+        if work.carries[b] if pressing < 0 else work.carries[pressing]:
+            acting = move_forward(work, s, acting)
+    return acting
+
+
+@compiled
+def move_forward(work, s, acting):
+    """Move a block to the end of those that act; return their new end."""
+    b = work.order[s]
+    work.order[s], work.order[acting] = work.order[acting], b
+    work.carries[b] = 1.0
+    return acting + 1
+
+
+@compiled
 def leave_errors(work, first, last):
     """Let small errors of closed gaps be."""
     for s in range(first, last):
         b = work.order[s]
-        if work.block_rows[b] == 0 and work.is_error[b] == 1:
+        if work.block_rows[b] == 0 and work.bound[b] == SMALL:
             work.offset[b, 0] = 0.0
 
 
@@ -156,7 +221,7 @@ def solve_island(model, state, work, first, last, again):
     if at_rest and rests(model, state, work, first, last, speed):
         return residual(model, work, first, last, 0.0) / speed
     while True:
-        worst = iterate(model, state, work, first, last, speed, model.sweeps, again)
+        worst = solve_acting(model, state, work, first, last, speed, again)
         if worst > model.tolerance * speed or not switch_reversed_slips(
             model, state, work, first, last
         ):
@@ -203,134 +268,23 @@ def rests(model, state, work, first, last, speed):
 
 @compiled
 def solve_islands(model, state, work, blocks, h, again):
-    """Solve all islands, perhaps ``again``; those whose gaps would close by curvature, twice.
+    """Solve islands, perhaps ``again``; those whose gaps would close by curvature, twice.
 
-    Equations are solved for until they hold at the next midpoint, here if forces do not depend on
-    the velocity; if they do, see :func:`follow_curvature`.
+    Equations are solved for until they hold at the next midpoint.  If forces depend on the
+    velocity, that and curvature follow with them; see :func:`follow_curvature`.  Settled islands
+    remain.
     """
     starts = work.island_start
-    here = model.unilateral < model.restitution.size and not model.follows_velocity
-    most = MOST_CORRECTIONS if here else 2
+    most = 2 if model.unilateral == model.restitution.size else MOST_CORRECTIONS
+    if model.follows_velocity:
+        most = 1
     for attempt in range(most):
         for i in range(model.bodies):
-            if starts[i + 1] > starts[i] and (attempt == 0 or work.curves_shut[i]):
+            if starts[i + 1] == starts[i] or work.stage[i] == SETTLED:
+                continue
+            if attempt == 0 or work.curves_shut[i]:
                 work.island_residual[i] = solve_island(
                     model, state, work, starts[i], starts[i + 1], again or attempt > 0
                 )
-        if attempt == most - 1 or not correct_curvature(model, state, work, blocks, h):
+        if attempt < most - 1 and not correct_curvature(model, state, work, blocks, h):
             break
-
-
-@compiled
-def correct_curvature(model, state, work, blocks, h):
-    """Raise the velocity bounds of gaps that close by their curvature; return whether any does.
-
-    The linearised gap misses what curvature adds within the step.  The bound becomes that of
-    Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough.
-    """
-    k, found = model.dimension, False
-    for i in range(model.bodies):
-        work.curves_shut[i] = 0
-        for c in range(k):
-            work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
-        work.speed[i] = speed_of(model, work.v_new, i)
-    fast = np.sqrt(0.5 * CURVATURE_DEPTH) * model.gap_unit / h
-    first, second = NONE, NONE
-    for b in range(blocks):
-        if work.block_rows[b] > 0:
-            continue
-        i, g = work.block_bodies[b, 0], work.origin[b, 2]
-        if work.origin[b, 0] == OWN_GAP:
-            if i != first:
-                evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
-            first, second = i, NONE
-            gap, following = work.gap[i, g], work.gap_next[i, g]
-        else:
-            j = work.block_bodies[b, 1]
-            if work.speed[i] + work.speed[j] <= fast:
-                continue
-            if i != first or j != second:
-                evaluate_pair_gaps(model, work, i, j, work.q_next)
-            first, second = i, j
-            gap = work.contact_gap[work.origin[b, 1]]
-            following = work.scratch[model.pair_inputs + g]
-        if work.bilateral[b]:
-            if model.follows_velocity:
-                continue
-            if bend_equation(model, work, b, gap, following, h, model.tolerance):
-                work.curves_shut[island_of(work, b)] = 1
-                found = True
-            continue
-        target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
-        if following < target - CURVATURE_DEPTH * model.gap_unit:
-            work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
-            work.offset[b, 0] = (gap - work.block_load[b] - target) / h
-            work.is_error[b] = BENT
-            work.curves_shut[island_of(work, b)] = 1
-            found = True
-    return found
-
-
-@compiled
-def bend_equation(model, work, b, gap, following, h, share):
-    """Correct an equation that does not hold at the next midpoint; return whether it does not.
-
-    It does up to a share of what bodies travel.
-    """
-    never_inline()
-    if h <= STRAIGHT * model.step:
-        return False
-    speed = work.island_speed[work.block_bodies[b, 0]]
-    missed = abs(following - gap + h * gap / model.step)
-    if missed <= MISSED * model.gap_unit + share * h * speed:
-        return False
-    work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
-    work.offset[b, 0] = equation_offset(model, gap, -work.block_load[b], h)
-    return True
-
-
-@compiled
-def bend_bound(model, work, b, gap, following, h, share):
-    """Correct the bound of a contact whose gap curves otherwise; return whether it does."""
-    never_inline()
-    speed = work.island_speed[work.block_bodies[b, 0]]
-    closing = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
-    more = closing - work.block_load[b]
-    if abs(more) <= MISSED * model.gap_unit + share * h * speed:
-        return False
-    work.block_load[b] = closing
-    work.offset[b, 0] -= more / h
-    return True
-
-
-@compiled
-def follow_curvature(model, state, work, blocks, h):
-    """Correct equations and bounds that curve otherwise than they were solved for.
-
-    The bounds are those that :func:`correct_curvature` raised.  Return whether there are any.
-    """
-    k, found = model.dimension, False
-    for i in range(model.bodies):
-        for c in range(k):
-            work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
-    first, second = NONE, NONE
-    for b in range(blocks):
-        if work.block_rows[b] > 0 or not (work.bilateral[b] or work.is_error[b] == BENT):
-            continue
-        i, j, g = work.block_bodies[b, 0], work.block_bodies[b, 1], work.origin[b, 2]
-        share, away = settled(model, work, i), i != first or j != second
-        if j < 0:
-            if away:
-                evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
-            gap, following = work.gap[i, g], work.gap_next[i, g]
-        else:
-            if away:
-                evaluate_pair_gaps(model, work, i, j, work.q_next)
-            gap = work.contact_gap[work.origin[b, 1]]
-            following = work.scratch[model.pair_inputs + g]
-        first, second = i, j
-        if work.bilateral[b]:
-            found = bend_equation(model, work, b, gap, following, h, share) or found
-        else:
-            found = bend_bound(model, work, b, gap, following, h, share) or found
-    return found

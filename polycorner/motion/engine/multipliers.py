@@ -11,12 +11,12 @@ for ``C`` a cone; for other sets likewise.  The function is convex with a contin
 Newton steps with a line search lead to its minimum.
 """
 
-from polycorner.motion.engine.band import (
+from polycorner.motion.engine.island_matrix import (
     add_block,
     add_transposed,
     assemble_mass,
     row_product,
-    solve_band,
+    solve_island_matrix,
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.rows import load_on, velocity_of
@@ -106,11 +106,11 @@ def find_direction(model, work, first, last, n):
     for s in range(first, last):
         b = work.order[s]
         if work.derivative[b, 4] != 0.0 or work.derivative[b, 8] != 0.0:
-            add_block(model, work, b)
+            add_block(model, work, n, b)
         p, q = work.impulse[b, 0], work.impulse[b, 1]
         if p != 0.0 or q != 0.0:
             add_transposed(model, work, b, p, q, x)
-    return solve_band(work.band, x, n, K, work.row_begin, work.row_end, work.line, work.factors)
+    return solve_island_matrix(model, work, n)
 
 
 @compiled

@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from polycorner.motion.engine.band import (
-    add_block,
-    add_transposed,
-    assemble_mass,
-    row_product,
-    solve_band,
-)
 from polycorner.motion.engine.gauss_seidel import (
     copy_impulses,
     recompute_velocities,
     residual,
+)
+from polycorner.motion.engine.island_matrix import (
+    add_block,
+    add_transposed,
+    assemble_mass,
+    row_product,
+    solve_island_matrix,
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.linearisation import change_impulses, is_loaded, linearise_block
@@ -75,9 +75,9 @@ def take_step(model, work, first, last, n):
     for s in range(first, last):
         b = work.order[s]
         if is_loaded(work, b):
-            add_block(model, work, b)
+            add_block(model, work, n, b)
         add_transposed(model, work, b, work.constant[b, 0], work.constant[b, 1], x)
-    if not solve_band(work.band, x, n, K, work.row_begin, work.row_end, work.line, work.factors):
+    if not solve_island_matrix(model, work, n):
         return False
     for s in range(first, last):
         b = work.order[s]

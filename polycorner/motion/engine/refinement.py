@@ -11,8 +11,11 @@ import numpy as np
 
 from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.engine.arrays import (
+    DIVIDED,
     DONE,
     EVENTS_FULL,
+    HALVED,
+    LAST,
     OWN_GAP,
     PARTS,
     RESIDUAL,
@@ -21,7 +24,6 @@ from polycorner.motion.engine.arrays import (
     UNSOLVED,
 )
 from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
-from polycorner.motion.engine.continuation import HALVED
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
@@ -112,7 +114,7 @@ def refine(model, state, work, log, root, index, count):
         while True:
             if rest - h <= INSTANT * H:
                 h = rest
-            work.may_divide[0] = HALVED if exact and h > SHORTEST_SOLVED * H else 0
+            work.remedy[0] = HALVED if exact and h > SHORTEST_SOLVED * H else LAST
             why, blocks = solve_part(model, state, work, h, time, index)
             if why != DONE:
                 return why, count
@@ -181,7 +183,7 @@ def step(model, state, work, log, count):
         left = left or state.cluster[i] >= 0
     if not left:
         time = index * h
-        work.located[0], work.may_divide[0] = 0, model.refines
+        work.located[0], work.remedy[0] = 0, DIVIDED if model.refines else LAST
         for i in range(model.bodies):
             work.waits[i] = 0
         set_time(model, time + 0.5 * h)
@@ -197,7 +199,7 @@ def step(model, state, work, log, count):
             state.watched[i] = 0 if work.waits[i] else 1
         count = commit(model, state, work, log, blocks, h, time, index, any_awake, count)
     if left:
-        work.may_divide[0] = 0
+        work.remedy[0] = LAST
         for i in range(model.bodies):
             if state.cluster[i] == i:
                 why, count = refine(model, state, work, log, i, index, count)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from polycorner.motion.bodies import IdenticalBodies
 
 WIDTH = 4  # reals in a vector
-MAX_BAND = 48  # bodies of the widest band matrix that is solved, to either side
+MOST_ENTRIES = 48  # of a body above the diagonal of the matrix, on average, at most
 EVENTS = 4096  # events recorded, at least, before the engine returns
 
 
@@ -28,7 +28,8 @@ class Sizes(NamedTuple):
     E: int  # events
     S: int  # keys to be sorted
     W: int  # numbers that go in and come out of a kernel
-    M: int  # entries of the band matrix
+    Q: int  # entries of the matrix above the diagonal: pairs of bodies
+    M: int  # numbers in the matrix
 
     @classmethod
     def of(cls, bodies: IdenticalBodies, contacts: int) -> "Sizes":
@@ -43,6 +44,7 @@ class Sizes(NamedTuple):
         kernels = [m * (1 + k) + k for m, k in shapes]
         lanes = -(-k // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
+        entries = N * min(N - 1, MOST_ENTRIES)
         return cls(
             N=N,
             k=k,
@@ -60,5 +62,6 @@ class Sizes(NamedTuple):
             E=EVENTS + 4 * contacts,
             S=max(contacts, pairs, 1),
             W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
-            M=N * lanes * (2 * min(N - 1, MAX_BAND) + 1) * lanes,
+            Q=entries,
+            M=(N + 2 * entries) * lanes * lanes,
         )

@@ -165,10 +165,12 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
                 solved = work.island_residual[island_of(work, b)] <= model.tolerance
                 work.disturbed[i] |= 1 if solved else 2
                 for r in range(max(1, work.block_rows[b])):
+                    p = work.impulse[b, r]
+                    if p == 0.0:
+                        continue
                     for c in range(k):
-                        work.neighbour_impulse[i, c] += (
-                            work.jacobian[b, r, side * model.lanes + c] * work.impulse[b, r]
-                        )
+                        slope = work.jacobian[b, r, side * model.lanes + c]
+                        work.neighbour_impulse[i, c] += slope * p
     woken = False
     for i in range(N):
         if work.disturbed[i] and state.alive[i] and not (work.awake[i] or work.waits[i]):

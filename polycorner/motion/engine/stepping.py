@@ -23,6 +23,7 @@ import numpy as np
 
 from polycorner.motion.engine.arrays import (
     APPLIED_WORK,
+    CHANGED,
     CONTACTS,
     CONTACTS_FULL,
     DISSIPATED,
@@ -30,6 +31,8 @@ from polycorner.motion.engine.arrays import (
     NOISE_WORK,
     NOT_FINITE,
     PAIR_FRICTION,
+    SETTLED,
+    SOLVED,
     SUBSTRATE_WORK,
 )
 from polycorner.motion.engine.blocks import assemble_blocks, renew_blocks
@@ -43,8 +46,9 @@ from polycorner.motion.engine.contact_list import (
     store_sticking,
     takes_part,
 )
+from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
-from polycorner.motion.engine.island import follow_curvature, solve_islands
+from polycorner.motion.engine.island import solve_islands
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
 from polycorner.motion.engine.partition import find_islands
@@ -57,11 +61,12 @@ FORCE_ROUNDS = 30  # solutions of a step, at most, with forces at its mean veloc
 def start_bodies(model, state, work):
     """Set the free velocities, due to forces alone, of awake bodies, and measure all speeds.
 
-    Return whether these and the gaps are numbers.
+    Bodies of settled islands remain as they were solved.  Return whether velocities and gaps are
+    numbers.
     """
     k, finite = model.dimension, True
     for i in range(model.bodies):
-        if not state.alive[i]:
+        if not state.alive[i] or work.stage[work.parent[i]] == SETTLED:
             continue
         for c in range(k):
             value = state.v[i, c]
@@ -152,10 +157,29 @@ def solve(model, state, work, h, time, index, solved):
             model, state, work, blocks, h, time + 0.5 * h, index
         ):
             break
+        unsettle(model, work)
         start_bodies(model, state, work)
         solved = ZERO
     work.list_status[2] = contacts
     return True, blocks
+
+
+@compiled
+def unsettle(model, work):
+    """Let all islands be solved."""
+    for i in range(model.bodies):
+        work.stage[i] = SOLVED
+
+
+@compiled
+def next_round(model, work):
+    """Let the islands be solved again that have changed; return whether there are any."""
+    found = False
+    for i in range(model.bodies):
+        changed = work.stage[i] == CHANGED
+        work.stage[i] = SOLVED if changed else SETTLED
+        found = found or changed
+    return found
 
 
 @compiled
@@ -174,10 +198,11 @@ def attempt(model, state, work, h, time, index, any_awake):
     """Solve a step for the velocities of the bodies that are awake, which have been evaluated.
 
     Forces that depend on the velocity are those of its mean over the step, for which it is solved
-    several times.  A part of a step that is not solved is left at that.  Return why it cannot be
-    done, or DONE, and the number of blocks.
+    several times, except for islands that have settled.  A part of a step that is not solved is
+    left at that.  Return why it cannot be done, or DONE, and the number of blocks.
     """
     blocks = ZERO
+    unsettle(model, work)
     for _ in range(FORCE_ROUNDS):
         if not start_bodies(model, state, work):
             return NOT_FINITE, blocks
@@ -188,8 +213,9 @@ def attempt(model, state, work, h, time, index, any_awake):
             return CONTACTS_FULL, blocks
         if not model.follows_velocity or (work.located[0] and unsolved(model, work)):
             break
-        curved = follow_curvature(model, state, work, blocks, h)
-        if not update_forces(model, state, work, h) and not curved:
+        follow_curvature(model, state, work, blocks, h)
+        update_forces(model, state, work, h)
+        if not next_round(model, work):
             break
     for i in range(model.bodies):
         for c in range(model.dimension):
