@@ -98,7 +98,10 @@ def test_disks_have_the_known_radii(arguments):
         assert row["hits"] > 0
 
 
-@pytest.mark.parametrize("arguments", [("tutorial",), ("dyad", "--plane"), ("spheres",)])
+SLOW_DYAD = pytest.param(("dyad", "--plane"), marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("arguments", [("tutorial",), SLOW_DYAD, ("spheres",)])
 def test_the_seed_changes_nothing_but_the_order(arguments):
     one, other = (answer(*arguments, "--seed", seed) for seed in ("0", "5"))
     for key in ("components", "euler_characteristic", "complete"):

@@ -26,7 +26,7 @@ def own_cache(tmp_path_factory):
     [
         (("tutorial",), 3),
         (("spheres", "--count", "6"), 2),
-        (("dyad", "--plane"), 15),
+        pytest.param(("dyad", "--plane"), 15, marks=pytest.mark.slow),
         (("dyad", "--heading", "20", "--drum", "60", "--length", "20"), 20),
     ],
     ids=str,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
@@ -115,6 +115,7 @@ def test_grips(grip):
         np.testing.assert_allclose(balance, 0, atol=1e-9)
 
 
+@settings(max_examples=max(5, settings.default.max_examples // 2))
 @given(st.integers(0, 2**32 - 1), st.sampled_from([3, 4, 5]))
 def test_random_fingers_around_random_polygons(seed, count):
     rng = np.random.default_rng(seed)
