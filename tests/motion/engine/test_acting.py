@@ -1,0 +1,69 @@
+"""Contacts that are left out of large islands obey the inclusion like all others."""
+
+import numpy as np
+
+from polycorner.bodies import Arrangement, HalfSpace, disc
+from polycorner.motion.engine.island import CROWD
+from polycorner.motion.noise import Solver
+from polycorner.motion.simulation import start
+
+SIDE, MU, TOLERANCE = 8, 0.3, 1e-4
+
+
+def heap():
+    """Return the engine of discs above a tray."""
+    tray = {
+        "floor": HalfSpace([0, 1], [0, 0]),
+        "left": HalfSpace([1, 0.2], [0, 0]),
+        "right": HalfSpace([-1, 0.2], [2.2 * SIDE, 0]),
+    }
+    system = Arrangement({"D": disc(1.0)}, tray, orientations="all").system(
+        gravity=[0, -10.0], friction=MU, count=SIDE**2
+    )
+    rows, columns = np.divmod(np.arange(SIDE**2), SIDE)
+    places = np.stack([1.6 + 2.05 * columns + 0.5 * (rows % 2), 1.2 + 2.4 * rows], axis=-1)
+    state = system.state(np.column_stack([places, 0 * rows]))
+    return start(system, state, 1e-2, solver=Solver(tolerance=TOLERANCE, refine=False))
+
+
+def residuals(work, blocks):
+    """Return how far impulses are from the inclusion, as speeds, and velocities from impulses."""
+    v, bodies = work.v_free.copy(), work.block_bodies
+    K = v.shape[1]
+    for b in blocks:
+        for side, i in enumerate(bodies[b]):
+            if i >= 0:
+                v[i] += work.impulse[b] @ work.response[b][:, side * K : side * K + K]
+    found = []
+    for b in blocks:
+        p, norm, pressing = work.impulse[b, 0], work.delassus[b, 4], work.pressing[b]
+        u = work.offset[b, 0] + sum(
+            work.jacobian[b, 0, side * K : side * K + K] @ v[i]
+            for side, i in enumerate(bodies[b])
+            if i >= 0
+        )
+        most = np.inf if pressing < 0 else MU * work.impulse[pressing, 0]
+        least = 0.0 if pressing < 0 else -most
+        found.append(norm * abs(p - np.clip(p - u / norm, least, most)))
+    return np.array(found), v
+
+
+def test_all_contacts_of_a_large_island_obey_the_inclusion():
+    engine, large, left_out = heap(), 0, 0
+    for _ in range(100):
+        engine.advance(1)
+        work = engine.work
+        for root in np.flatnonzero(np.diff(work.island_start) > CROWD):
+            blocks = work.order[work.island_start[root] : work.island_start[root + 1]]
+            bodies = np.unique(work.block_bodies[blocks])
+            bodies = bodies[bodies >= 0]
+            if engine.motion.rests[bodies].any():
+                continue
+            far, v = residuals(work, blocks)
+            assert far.max() <= 1.001 * TOLERANCE * work.island_speed[root]
+            np.testing.assert_allclose(v[bodies], work.v_new[bodies], atol=1e-8)
+            normal = blocks[work.block_rows[blocks] == 0]
+            large, left_out = large + 1, left_out + int((work.impulse[normal, 0] == 0).sum())
+    assert engine.effort.unconverged == 0
+    assert large > 30
+    assert left_out > 100
