@@ -35,6 +35,7 @@ from examples import (
     ex24_tippe_top,
     ex25_rods_jam,
     ex26_drum_in_space,
+    ex27_hard_squares,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -260,6 +261,27 @@ def test_three_sliding_squares_have_two_components():
     assert not reached & exchanged
     assert reached == turned
     assert all(squares.polyhedron.contains(q, tolerance=1e-5) for q in exchanged)
+
+
+def test_hard_squares(tmp_path):
+    found = ex27_hard_squares.main(3)
+    assert found.critical == pytest.approx((1 / 2, 1 / 3), abs=1e-9)
+    assert [found.betti(size) for size in found.critical] == [(2, 2), (1, 3, 2)]
+    assert len(ex27_hard_squares.draw(3, found, tmp_path)) == 3
+    for row in (2, 3):
+        whole, point = ex27_hard_squares.balanced(3, row)
+        assert whole.polyhedron.contains(point, tolerance=1e-12)
+
+
+@pytest.mark.slow
+def test_four_hard_squares():
+    """24 points at first, and at last the Betti numbers of four points in the plane."""
+    found = ex27_hard_squares.main(4)
+    assert found.critical == pytest.approx((1 / 2, 1 / 3, 1 / 4), abs=1e-9)
+    assert len(found.heights) == 110_976
+    assert found.betti(found.critical[0]) == (24,)
+    assert found.betti(found.critical[2]) == (1, 6, 11, 6)
+    assert [found.euler_characteristic(size) for size in found.critical] == [24, 0, 0]
 
 
 def test_gripper(tmp_path):

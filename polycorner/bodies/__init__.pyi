@@ -1,7 +1,7 @@
 from .arrangement import Arrangement
 from .masses import Mass, mass_of
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
-from .thinning import thinned
+from .sizes import scaled, thinned
 from .walls import Cylinder, HalfSpace, box
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "mass_of",
     "polygon",
     "polytope",
+    "scaled",
     "sphere",
     "thinned",
 ]

@@ -50,6 +50,10 @@ PARALLEL = 1e-9
 # The conditions under which two edges span a face of the difference of two polyhedra.
 SUPPORTS = ("left1", "right1", "left2", "right2")
 CROSSING = ("gap", *SUPPORTS, "angle")
+# The parameters that are points of the bodies in roles 1 and 2, by their letters; ``a`` and ``b``
+# are those of the first only where ``g`` and ``h`` are of the second.
+POINTS = (("p", "first"), ("q", "g", "h", "v", "second"))
+ENDS = ("a", "b")
 
 
 def _family(
@@ -71,6 +75,22 @@ def _family(
 def numbers(name: str, frame: Frame, d: int) -> list[str]:
     """Return the names of the numbers of a point or vector of a body."""
     return [f"{name}{k}" for k in range(frame.count(d))]
+
+
+def points_of(family: Family, *, both: bool) -> list[str]:
+    """Return the parameters that are points of bodies that move, or of ``both``.
+
+    Directions may be among them, as lengths that do not matter.
+    """
+    first, second = map(set, POINTS)
+    (first if "g0" in family.parameters else second).update(ENDS)
+    letters = {
+        letter
+        for role, some in ((FIRST, first), (SECOND, second))
+        if both or any(name.endswith(role) for name in family.variables)
+        for letter in some
+    }
+    return [name for name in family.parameters if name.rstrip("0123456789_") in letters]
 
 
 def _at(name: str, role: str, frame: Frame, d: int) -> "Point":

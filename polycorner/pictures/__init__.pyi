@@ -1,4 +1,5 @@
 from .arrangements import draw_arrangement
+from .barcodes import draw_barcode
 from .clusters import draw_clusters, draw_motion
 from .disks import draw_critical
 from .packings import draw_packing
@@ -24,6 +25,7 @@ __all__ = [
     "View",
     "components_of_complement",
     "draw_arrangement",
+    "draw_barcode",
     "draw_cells",
     "draw_clusters",
     "draw_critical",

@@ -1,4 +1,6 @@
 from .groups import AllOf, AnyOf
+from .nerves import Nerve, nerve
+from .persistence import Bar
 from .polyhedron import Polyhedron
 from .strata import LocalType, Stratum, stratum_at
 from .symmetry import Element, Symmetry
@@ -6,10 +8,13 @@ from .symmetry import Element, Symmetry
 __all__ = [
     "AllOf",
     "AnyOf",
+    "Bar",
     "Element",
     "LocalType",
+    "Nerve",
     "Polyhedron",
     "Stratum",
     "Symmetry",
+    "nerve",
     "stratum_at",
 ]

@@ -185,6 +185,19 @@ class Polyhedron(Printed, Value):
             key=lambda piece: (len(piece), sorted(piece)),
         )
 
+    @property
+    def unions(self) -> tuple[Piece, list[list[Piece]]]:
+        """``D`` as an intersection: functions that always hold, and unions of pieces."""
+        always: set[int] = set()
+        unions = []
+        for part in _intersected(self.tree):
+            pieces = sorted(_pieces(part, [0] * len(self.functions)), key=sorted)
+            if len(pieces) == 1:
+                always |= pieces[0]
+            else:
+                unions.append(pieces)
+        return frozenset(always), unions
+
     def selections(self, values: Sequence[float], tolerance: float = 0.0) -> list[Piece]:
         """Return whole branches of the tree that hold at a point, the roomiest first.
 
@@ -203,6 +216,15 @@ class _Node:
 
     def __init__(self, *, union: bool, children: tuple[Tree, ...]) -> None:
         self.union, self.children = union, children
+
+
+def _intersected(tree: Tree) -> Iterator[Tree]:
+    """Yield the functions and unions that a tree is the intersection of."""
+    if isinstance(tree, int) or tree.union:
+        yield tree
+    else:
+        for child in tree.children:
+            yield from _intersected(child)
 
 
 def _words(tree: Tree, names: Sequence[str]) -> str:

@@ -1,7 +1,8 @@
-"""Bodies with smaller radii: the gaps of bodies that are made so, and where they jam."""
+"""Bodies with smaller radii and sizes: the gaps of bodies made so, and where they jam."""
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -15,6 +16,8 @@ from polycorner.bodies import (
     compound,
     disc,
     polygon,
+    polytope,
+    scaled,
     sphere,
     thinned,
 )
@@ -75,6 +78,71 @@ def test_a_ball_and_a_rod_in_a_pipe():
     assert 0.45 - jammed.point[-1] == pytest.approx(0.275, abs=1e-9)
 
 
+TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+
+
+def sized_plane(c):
+    """Bodies in the plane, ``c`` times as large as those for 1; the peg keeps its size."""
+    corners = c * np.array([[-0.5, -0.4], [0.9, 0], [0, 1]])
+    return Arrangement(
+        {
+            "A": capsule([-0.5 * c, 0], [0.6 * c, 0], 0.1 * c),
+            "B": compound([disc(0.2 * c), disc(0.1 * c, at=[0, 0.7 * c])]),
+            "C": polygon(corners, 0.1 * c),
+            "D": polygon(corners),
+        },
+        {"floor": HalfSpace([0, 1], [0, -2]), "drum": Cylinder(3.0, point=[0.0, 0.5])},
+        {"peg": disc(0.2, at=[0, 0.3]), "block": polygon([[2, 2], [3, 2], [2, 3]])},
+    )
+
+
+def sized_space(c):
+    rod = capsule([0, 0, -0.5 * c], [0, 0, 0.7 * c], 0.1 * c)
+    return Arrangement(
+        [rod, polytope(c * TETRAHEDRON), polytope(c * TETRAHEDRON + [0, 0, 0.2 * c])],
+        {"floor": HalfSpace([0, 0, 1], [0, 0, -2]), "drum": Cylinder(4.0, axis=[0, 0, 1])},
+        {"post": capsule([1, 1, -1], [1, 1, 1], 0.3)},
+    )
+
+
+def random_places(arrangement, rng):
+    turns = 3.0 * rng.uniform(-1, 1, len(arrangement.named))
+    if arrangement.dimension == 3:
+        turns = [Rotation.from_quat(rng.standard_normal(4)) for _ in turns]
+    return {
+        name: (rng.uniform(-2, 2, arrangement.dimension), turn)
+        for name, turn in zip(arrangement.named, turns, strict=True)
+    }
+
+
+@pytest.mark.parametrize("make", [sized_plane, sized_space])
+@given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.05, 1.0))
+def test_gaps_are_those_of_smaller_bodies(make, seed, size):
+    whole, smaller = make(1.0), make(size)
+    places = random_places(whole, np.random.default_rng(seed))
+    d = scaled(whole)
+    q = np.append(whole.point(places), size)
+    *found, full, small = d.values(q)
+    assert (full, small) == pytest.approx((1 - size, size - 0.01))
+    there = smaller.point(places)
+    expected = dict(zip(smaller.polyhedron.names, smaller.polyhedron.values(there), strict=True))
+    known = dict(zip(d.names[:-2], found, strict=True))
+    assert set(known) == set(expected)
+    lengths = {n for n in known if not n.endswith(("angle", "left1", "right1", "left2", "right2"))}
+    for name in lengths:  # others are products of lengths, of which the signs count
+        assert known[name] == pytest.approx(expected[name], abs=1e-9)
+    assert d.contains(q) == smaller.polyhedron.contains(there)
+
+
+def test_a_long_rod_and_its_own_image():
+    """A rod that is held along a periodic box is as long as the box at the size 1 / 1.2."""
+    a = Arrangement([capsule([-0.5, 0], [0.5, 0], 0.1)], period=[1.0, 3.0])
+    d = scaled(a)
+    *_, theta, size = d.manifold.symbols
+    best = minimise(d, -10 * sympy.cos(theta) - size, [0, 0, 0.05, 0.5])
+    assert best.point[-1] == pytest.approx(1 / 1.2, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("make", "kind", "said"),
     [
@@ -85,6 +153,12 @@ def test_a_ball_and_a_rod_in_a_pipe():
             "arrangement: expected rounded bodies, which have a radius; got '2'",
         ),
         (lambda: thinned(Arrangement([disc(1)] * 2), "2t"), ValueError, "names"),
+        (lambda: scaled(1), TypeError, "arrangement: expected an Arrangement"),
+        (
+            lambda: scaled(Arrangement([disc(1)] * 2), least=0.0),
+            ValueError,
+            "least: expected a number > 0 and < 1; got 0.0",
+        ),
     ],
 )
 def test_what_is_refused(make, kind, said):

@@ -1,0 +1,191 @@
+"""Nerves of unions of flat pieces: their homotopy type, and the heights at which it changes.
+
+A polyhedron of affine functions is an intersection of unions ``A_1, ..., A_m`` of convex pieces.
+To sets ``s_k`` of pieces, one of each union, belongs a cell, the product of the simplices with
+these vertices, if the pieces have a point in common.  The cells make a complex with the homotopy
+type of the polyhedron: the pairs of a point and of a place in the cell of all pieces around it
+project to both, with contractible fibres (the nerve theorem, [Hatcher] sec. 4.G).  So does the part
+of the polyhedron above a height; a cell appears at the largest height on the common part of its
+pieces, which is a linear programme.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.polyhedra.affine import Programmes
+from polycorner.polyhedra.persistence import Bar, bars
+from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    import sympy
+
+# Heights that differ by less, relative to the largest, are one height, of cells in any order.
+MERGED = 1e-7
+
+Cell = tuple[frozenset[int], ...]  # of every union, which of its pieces
+
+
+@dataclass(frozen=True, eq=False)
+class Nerve(Value):
+    """The cells of a union of flat pieces, and its homology above every height.
+
+    Attributes
+    ----------
+    dimensions : (k,) array of int
+        Of the cells.
+    heights : (k,) array
+        The largest height on the common part of the pieces of each cell, decreasing; ``inf`` where
+        there is none, and without a height.
+    bars : tuple of Bar
+        Classes of homology modulo 2, with the heights at which they begin and end.
+    """
+
+    dimensions: Array
+    heights: Array
+    bars: tuple[Bar, ...] = field(repr=False)
+
+    @cached_property
+    def critical(self) -> tuple[float, ...]:
+        """The heights at which homology changes, the largest first.
+
+        Between two heights of cells the homotopy type does not change.
+        """
+        ends = {h for bar in self.bars for h in (bar.birth, bar.death)}
+        return tuple(sorted((h for h in ends if np.isfinite(h)), reverse=True))
+
+    def betti(self, height: float = float("-inf")) -> tuple[int, ...]:
+        """Return the Betti numbers modulo 2 of the part above a height, that of components first.
+
+        Without a height, those of the whole.
+        """
+        alive = Counter(bar.dimension for bar in self.bars if bar.death < height <= bar.birth)
+        if height == float("-inf"):
+            alive = Counter(bar.dimension for bar in self.bars if bar.death == height)
+        return tuple(alive[d] for d in range(max(alive, default=-1) + 1))
+
+    def euler_characteristic(self, height: float = float("-inf")) -> int:
+        """Return the number of cells above a height, those of odd dimension counted negative."""
+        signs = 1 - 2 * (self.dimensions % 2)
+        return int(signs[self.heights >= height].sum())
+
+
+def nerve(
+    polyhedron: Polyhedron,
+    height: "SmoothFunction | sympy.Expr | None" = None,
+    *,
+    symmetry: Symmetry | None = None,
+) -> Nerve:
+    """Return the nerve of a union of flat pieces, with the heights at which its cells appear.
+
+    There are as many cells as common parts of pieces, which all are found: this is a proof, up to
+    the tolerance of the linear programmes (``1e-7``), and suits some hundred thousand of them.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        Of affine functions on lines.
+    height : SmoothFunction or SymPy expression, optional
+        An affine function; the part above ``s`` is where it is at least ``s``.
+    symmetry : Symmetry, optional
+        Of polyhedron and height, by which programmes are saved; its ``elements`` count.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+
+    Examples
+    --------
+    A passage around a pillar is 2 high, and 1 high on one side:
+
+    >>> from polycorner import AllOf, AnyOf, Manifold, Polyhedron
+    >>> M = Manifold.euclidean("x y z")
+    >>> x, y, z = M.symbols
+    >>> around = AnyOf(x - 1, y - 1, -1 - x, -1 - y)
+    >>> low = AnyOf(1 - z, -x, y)
+    >>> D = Polyhedron(M, AllOf(around, low, 2 - x, 2 + x, 2 - y, 2 + y, z, 2 - z))
+    >>> found = nerve(D, z)
+    >>> found.critical, found.betti(1.5), found.betti(1.0)
+    ((2.0, 1.0), (1,), (1, 1))
+    """
+    programmes = Programmes(polyhedron, height, symmetry)
+    cells = dict(_cells(programmes, frozenset()))
+    decreasing = sorted(cells, key=cells.__getitem__, reverse=True)
+    heights = _merged([cells[cell] for cell in decreasing])
+    by_dimension: dict[int, dict[Cell, float]] = {}
+    for cell, h in zip(decreasing, heights, strict=True):
+        by_dimension.setdefault(_dimension(cell), {})[cell] = h
+    return Nerve(
+        np.array([_dimension(cell) for cell in decreasing], dtype=np.intp),
+        np.array(heights),
+        tuple(bars(_boundaries(by_dimension), _heights(by_dimension))),
+    )
+
+
+def _boundaries(by_dimension: dict[int, dict[Cell, float]]) -> dict[int, list[list[int]]]:
+    """Return the faces of every cell, as positions among the cells of one dimension less."""
+    at = {d: {cell: k for k, cell in enumerate(some)} for d, some in by_dimension.items()}
+    return {d: [[at[d - 1][f] for f in _faces(cell)] for cell in some] for d, some in at.items()}
+
+
+def _heights(by_dimension: dict[int, dict[Cell, float]]) -> dict[int, list[float]]:
+    return {d: list(some.values()) for d, some in by_dimension.items()}
+
+
+def _cells(programmes: Programmes, functions: Piece, k: int = 0) -> Iterator[tuple[Cell, float]]:
+    """Yield the cells of all unions from the k-th on whose pieces meet where functions hold."""
+    if k == len(programmes.unions):
+        yield (), programmes.highest(functions)
+        return
+    for face, both in _meeting(programmes, programmes.unions[k], functions):
+        for rest, height in _cells(programmes, both, k + 1):
+            yield (face, *rest), height
+
+
+def _meeting(
+    programmes: Programmes, pieces: list[Piece], functions: Piece
+) -> Iterator[tuple[frozenset[int], Piece]]:
+    """Yield sets of pieces that have a point in common with each other and with functions."""
+    fresh = [
+        (frozenset([i]), functions | piece)
+        for i, piece in enumerate(pieces)
+        if programmes.meet(functions | piece)
+    ]
+    while fresh:
+        yield from fresh
+        fresh = [
+            (face | {i}, both | pieces[i])
+            for face, both in fresh
+            for i in range(max(face) + 1, len(pieces))
+            if programmes.meet(both | pieces[i])
+        ]
+
+
+def _dimension(cell: Cell) -> int:
+    return sum(len(face) - 1 for face in cell)
+
+
+def _faces(cell: Cell) -> Iterator[Cell]:
+    for k, face in enumerate(cell):
+        if len(face) > 1:
+            for i in face:
+                yield (*cell[:k], face - {i}, *cell[k + 1 :])
+
+
+def _merged(decreasing: list[float]) -> list[float]:
+    """Return decreasing heights with those that are equal up to rounding made equal."""
+    found: list[float] = []
+    size = max((abs(h) for h in decreasing if np.isfinite(h)), default=0.0)
+    for h in decreasing:
+        near = bool(found) and found[-1] - h <= MERGED * size
+        found.append(found[-1] if near else h)
+    return found
