@@ -221,7 +221,7 @@ class Arrangement(Value):
 
         Several bodies are one dense system of the engine, with states ``(N,)``.  A single one may
         be repeated: ``count`` bodies like it, with states ``(count, N)``, touch each other as well,
-        and near ones are found by the first two coordinates.
+        and near ones are found by the first two coordinates; not in a periodic box.
 
         Parameters
         ----------
@@ -248,8 +248,7 @@ class Arrangement(Value):
         Raises
         ------
         NotImplementedError
-            For two sharp polygons or polyhedra, for friction that is not covered, and in a periodic
-            box.
+            For two sharp polygons or polyhedra, and for friction that is not covered.
 
         Examples
         --------
@@ -264,12 +263,11 @@ class Arrangement(Value):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
-        if self.lattice.axes:
-            msg = "system: expected no period; a periodic box has placements, but no motion"
-            raise NotImplementedError(msg)
         pull = np.zeros(self.dimension) if gravity is None else gravity
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
+        if count > 1 and self.lattice.axes:
+            refuse("count", "1 in a periodic box, where each body is listed", count)
         known = masses_of(self.placements, density, masses or {})
         kinetic, potential = energies(self.placements, known, pull)
         polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))

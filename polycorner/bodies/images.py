@@ -115,9 +115,9 @@ def _nearest(
         (first, second), (p, q) = ((some[0][k], some[1][k]) for some in (origins, middles))
         away = first + p - second - q + shift
         if k in axes:
-            unit = symbols([f"period{k}"])[0] / (2 * sympy.pi)
-            turn = define(f"turn{k}", away / unit)
-            away = unit * sympy.atan2(sympy.sin(turn), sympy.cos(turn))
+            period = symbols([f"period{k}"])[0]
+            turn = define(f"turn{k}", away * 2 * sympy.pi / period)
+            away = wrapped(turn, period)
         near = define(f"near{k}", away)
         # The middle of the second is at zero if it moves, that of the first ``near`` from it.
         if one is Frame.FIXED:
@@ -128,6 +128,13 @@ def _nearest(
             places |= {first: near - p, second: -q}
     known, expressions = substituted(family.formulas(), places)
     return definitions | known, expressions
+
+
+def wrapped(turn: "sympy.Expr", period: "sympy.Expr | float") -> "sympy.Expr":
+    """Return the representative in ``(-T/2, T/2]`` of a displacement by an angle ``2 pi w / T``."""
+    import sympy
+
+    return period / (2 * sympy.pi) * sympy.atan2(sympy.sin(turn), sympy.cos(turn))
 
 
 @lru_cache(maxsize=256)

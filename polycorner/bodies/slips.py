@@ -5,7 +5,8 @@ part, and the unit normal ``n`` from ``q`` to ``p``, the bodies touch at ``p - r
 the difference of their velocities there along tangents: in the plane ``n`` turned left; in space a
 basis that depends on ``n`` without a singular direction ([Duff]).  The rolling velocity is the
 difference of the angular velocities along the same directions (in the plane, the difference itself)
-times ``r``, between bodies of radii ``r`` and ``s`` times ``r s / (r + s)``.
+times ``r``, between bodies of radii ``r`` and ``s`` times ``r s / (r + s)``.  In a periodic box the
+second body is displaced by whole periods to the image that touches.
 """
 
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.bodies.frames import Frame
+from polycorner.bodies.images import wrapped
 from polycorner.bodies.pairs import Member, Touch
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
@@ -36,7 +38,7 @@ def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, .
         At the sides of polygons and polyhedra.
     """
     p, normal = _place("friction", touch)
-    return _slip(placements, touch.one, p, normal, touch.two)
+    return _slip(placements, touch.one, p, normal, touch.two, displacement(touch))
 
 
 def rolling(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, ...]":
@@ -63,7 +65,7 @@ def _place(argument: str, touch: Touch) -> "tuple[Point, Point]":
         raise NotImplementedError(msg)
     p, q = _nearest(
         [_at(touch.one, point) for point in touch.first],
-        [_at(touch.two, point) for point in touch.second],
+        [_plus(_at(touch.two, point), displacement(touch)) for point in touch.second],
     )
     apart = minus(p, q)
     return p, _scaled(apart, 1 / norm(apart))
@@ -76,13 +78,37 @@ def _nearest(first: "list[Point]", second: "list[Point]") -> "tuple[Point, Point
         return p, q
     v = minus(q_end[0], q)
     if not p_end:
-        return p, _plus(q, v, _clamped(foot(p, q, q_end[0], 1 / dot(v, v))))
+        return p, _beyond(q, v, _clamped(foot(p, q, q_end[0], 1 / dot(v, v))))
     u, w = minus(p_end[0], p), minus(p, q)
     a, e, b, c, f = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
     normal = cross(u, v)
     s = _clamped((b * f - c * e) / (dot(normal, normal) + PARALLEL**2 * a * e))
     t = _clamped((b * s + f) / e)
-    return _plus(p, u, _clamped((b * t - c) / a)), _plus(q, v, t)
+    return _beyond(p, u, _clamped((b * t - c) / a)), _beyond(q, v, t)
+
+
+def displacement(touch: Touch) -> "Point":
+    """Return by how much the second body is displaced to the image that touches the first.
+
+    It is a whole number of periods: what is left of the displacement of the two bodies when the
+    nearest image of that is taken away.
+    """
+    import sympy
+
+    one, two, zero = touch.one, touch.two, sympy.S.Zero
+    image, sign = (one.image, -1.0) if one.image else (two.image, 1.0)
+    if image is None:
+        return (zero, zero, zero)
+    shift = _fixed(sign * image.shift)
+    if one.body == two.body:
+        return shift
+    away = minus(_at(one, one.middle), _at(two, two.middle))
+    found = [zero, zero, zero]
+    for k in image.axes:
+        period = float(image.periods[k])
+        turn = (away[k] - shift[k]) * 2 * sympy.pi / period
+        found[k] = away[k] - wrapped(turn, period)
+    return (found[0], found[1], found[2])
 
 
 def slip_at_wall(
@@ -90,7 +116,7 @@ def slip_at_wall(
 ) -> "tuple[sympy.Expr, ...]":
     """Return the slip of a point of a body at a wall, which may turn."""
     p = _at(member, point)
-    return _slip(placements, member, p, _inward(wall, p), wall)
+    return _slip(placements, member, p, _inward(wall, p), wall, _fixed(np.zeros(3)))
 
 
 def rolling_at_wall(
@@ -118,9 +144,11 @@ def _slip(
     p: "Point",
     normal: "Point",
     two: Member | Wall,
+    displaced: "Point",
 ) -> "tuple[sympy.Expr, ...]":
     place = minus(p, _scaled(normal, one.part.radius))
-    velocity = minus(_velocity(placements, one, place), _velocity(placements, two, place))
+    other = minus(place, displaced)
+    velocity = minus(_velocity(placements, one, place), _velocity(placements, two, other))
     if one.part.dimension == 2:
         return (normal[0] * velocity[1] - normal[1] * velocity[0],)
     return tuple(dot(tangent, velocity) for tangent in _tangents(normal))
@@ -185,8 +213,12 @@ def _tangents(n: "Point") -> "tuple[Point, Point]":
     return (1 + side * x**2 * a, side * b, -side * x), (b, side + y**2 * a, -y)
 
 
-def _plus(p: "Point", u: "Point", at: "sympy.Expr") -> "Point":
-    return (p[0] + at * u[0], p[1] + at * u[1], p[2] + at * u[2])
+def _plus(p: "Point", u: "Point") -> "Point":
+    return (p[0] + u[0], p[1] + u[1], p[2] + u[2])
+
+
+def _beyond(p: "Point", u: "Point", at: "sympy.Expr") -> "Point":
+    return _plus(p, _scaled(u, at))
 
 
 def _clamped(at: "sympy.Expr") -> "sympy.Expr":

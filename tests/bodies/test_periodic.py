@@ -308,11 +308,6 @@ def test_without_a_period_nothing_changes():
             ValueError,
             "bodies: expected several",
         ),
-        (
-            lambda: Arrangement([ROD, ROD], period=[3, 3]).system(),
-            NotImplementedError,
-            "system: expected no period",
-        ),
     ],
 )
 def test_what_is_refused(make, kind, said):
