@@ -307,6 +307,7 @@ class Arrangement(Value):
 
         Among them are mirror images, where every body is equal to its own, and the symmetries of a
         box, walls or periods, whose sides are parallel to the axes.  The same limit holds.
+        :func:`~polycorner.prove` needs the motions alone, which both groups have.
         """
         return self._congruences.symmetry(self.polyhedron, full=True)
 

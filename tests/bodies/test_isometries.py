@@ -4,12 +4,12 @@ The oracle knows no walls, frames or names: an isometry that is written out carr
 placement, and it is looked up which element of the group gives the same bodies.
 """
 
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
 import pytest
 
-from polycorner import minima, minimise, skeleton
+from polycorner import minima, minimise, prove, skeleton
 from polycorner.bodies import (
     Arrangement,
     Cylinder,
@@ -133,6 +133,23 @@ def test_minima_are_counted_modulo_the_box():
         for group in (a.symmetry, a.full_symmetry)
     ]
     assert counts == [4, 1]
+
+
+@pytest.mark.parametrize(("body", "count"), [(disc(0.5), 2), (sphere(0.5), 3)])
+def test_a_proof_modulo_the_full_group_is_that_modulo_motions(body, count):
+    """Equal bodies as near to each other as they can be: a minimum up to motions alone."""
+    a = Arrangement([body] * count)
+    d = a.dimension
+    places = np.array(a.manifold.symbols).reshape(count, d)
+    pairs = combinations(places, 2)
+    energy = sum(x**2 for p, q in pairs for x in p - q)
+    start = np.array([[0, 0, 0], [1.5, 0.1, 0.3], [0.2, 1.4, -0.3]])[:count, :d]
+    found = minimise(a.polyhedron, energy, start.ravel())
+    motions, full = (prove(found, symmetry=group) for group in (a.symmetry, a.full_symmetry))
+    assert full.proved
+    assert len(full.symmetry) == d * (d + 1) / 2
+    assert (full.symmetry, full.enclosures) == (motions.symmetry, motions.enclosures)
+    assert not prove(found).proved  # translations alone are found without being declared
 
 
 def test_two_discs_lie_in_a_corner_of_a_square_in_one_way():
