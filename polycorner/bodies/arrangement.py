@@ -233,11 +233,12 @@ class Arrangement(Value):
         friction : float, (float, float), or mapping from str to these, optional
             Coulomb's coefficient, or a static and a dynamic one, for all contacts or by name; needs
             ``orientations="all"``.  The name of the contacts among repeated bodies is
-            ``"between"``.  Not covered: polygons and polyhedra that touch bodies.
+            ``"between"``.  It takes a minute to compile for a polyhedron on another.
         rolling : the same, optional
             Coefficients of rolling resistance: the torque across the normal is at most
             ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
-            (r + s)`` for two rounded parts.  Among repeated bodies in the plane only.
+            (r + s)`` for two rounded parts.  Among repeated bodies in the plane only; none at the
+            sides of polygons and polyhedra.
         restitution : float or mapping from str to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
         exits : mapping from str to float, optional
@@ -248,7 +249,7 @@ class Arrangement(Value):
         Raises
         ------
         NotImplementedError
-            For two sharp polygons or polyhedra, and for friction that is not covered.
+            For two sharp polygons or polyhedra, and for rolling that is not covered.
 
         Examples
         --------

@@ -9,10 +9,12 @@ times ``r``, between bodies of radii ``r`` and ``s`` times ``r s / (r + s)``.  I
 second body is displaced by whole periods to the image that touches.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.bodies.facets import Facets
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.images import wrapped
 from polycorner.bodies.pairs import Member, Touch
@@ -30,15 +32,20 @@ if TYPE_CHECKING:
 
 
 def slip(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, ...]":
-    """Return one component of the slip of two bodies in the plane, two in space.
+    """Return one component of the slip of two bodies in the plane, two in space."""
+    import sympy
 
-    Raises
-    ------
-    NotImplementedError
-        At the sides of polygons and polyhedra.
-    """
-    p, normal = _place("friction", touch)
-    return _slip(placements, touch.one, p, normal, touch.two, displacement(touch))
+    displaced = displacement(touch)
+    cases = [
+        (_slip(placements, touch.one, p, normal, touch.two, displaced), holds)
+        for p, normal, holds in _places(touch)
+    ]
+    if len(cases) == 1:
+        return cases[0][0]
+    whole = range(len(cases[0][0]))
+    return tuple(
+        sympy.Piecewise(*((rows[i], holds) for rows, holds in cases), evaluate=False) for i in whole
+    )
 
 
 def rolling(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr, ...]":
@@ -47,28 +54,64 @@ def rolling(placements: dict[str, Placement], touch: Touch) -> "tuple[sympy.Expr
     Raises
     ------
     NotImplementedError
-        At the sides of polygons and polyhedra.
+        At the sides of polygons and polyhedra, where the radius of what is touched jumps between a
+        side and a vertex.
     """
-    _, normal = _place("rolling", touch)
+    if len(touch.second) > 2:
+        msg = (
+            f"rolling: expected contacts of discs, balls, capsules, edges and walls; got "
+            f"{touch.gap.name!r}, at a polygon or polyhedron"
+        )
+        raise NotImplementedError(msg)
+    ((_, normal, _),) = _places(touch)
     r, s = touch.one.part.radius, touch.two.part.radius
     radius = r * s / (r + s) if r and s else 0.0
     return _rolling(placements, touch.one, normal, touch.two, radius)
 
 
-def _place(argument: str, touch: Touch) -> "tuple[Point, Point]":
-    """Return the nearest point of the first part, and the normal from the second to it."""
-    if len(touch.second) > 2:
-        msg = (
-            f"{argument}: expected contacts of discs, balls, capsules, edges and walls; got "
-            f"{touch.gap.name!r}, where the nearest point of a polygon or polyhedron is not covered"
-        )
-        raise NotImplementedError(msg)
-    p, q = _nearest(
-        [_at(touch.one, point) for point in touch.first],
-        [_plus(_at(touch.two, point), displacement(touch)) for point in touch.second],
-    )
-    apart = minus(p, q)
-    return p, _scaled(apart, 1 / norm(apart))
+def _places(touch: Touch) -> "Iterator[tuple[Point, Point, Any]]":
+    """Yield the nearest point of the first part, and the normal from the second to it.
+
+    There are several cases, of which the first that holds counts, at a polygon or polyhedron: its
+    faces, over which the point is, and its edges, of which one is nearest.
+    """
+    import sympy
+
+    first = [_at(touch.one, point) for point in touch.first]
+    second = [_plus(_at(touch.two, point), displacement(touch)) for point in touch.second]
+    if len(second) <= 2:
+        p, q = _nearest(first, second)
+        apart = minus(p, q)
+        yield p, _scaled(apart, 1 / norm(apart)), sympy.true
+        return
+    (p,), hull = first, touch.two.part.facets
+    assert hull is not None, touch.two.name
+    if touch.two.part.dimension == 3:
+        yield from _over_faces(touch.two, p, second, hull)
+    edges = [(i, j) for i, j, *_ in hull.edges or hull.faces]
+    away = [minus(p, _nearest([p], [second[i], second[j]])[1]) for i, j in edges]
+    squares = [dot(w, w) for w in away]
+    for k, w in enumerate(away):
+        later = squares[k + 1 :]
+        nearest = _at_most(squares[k], sympy.Min(*later, evaluate=False)) if later else sympy.true
+        yield p, _scaled(w, 1 / sympy.sqrt(squares[k])), nearest
+
+
+def _over_faces(
+    member: Member, p: "Point", vertices: "list[Point]", hull: Facets
+) -> "Iterator[tuple[Point, Point, Any]]":
+    """Yield the faces of a polyhedron with their normals, and the condition that ``p`` is over."""
+    import sympy
+
+    for face, local in zip(hull.faces, hull.normals, strict=True):
+        normal = member.frame.vector(member.body, local.tolist(), 3)
+        corners = [vertices[i] for i in face]
+        sides = [
+            _at_most(dot(minus(p, a), cross(minus(b, a), normal)), 0)
+            for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
+        ]
+        above = _at_most(0, dot(normal, minus(p, corners[0])))
+        yield p, normal, sympy.And(above, *sides, evaluate=False)
 
 
 def _nearest(first: "list[Point]", second: "list[Point]") -> "tuple[Point, Point]":
@@ -206,8 +249,8 @@ def _tangents(n: "Point") -> "tuple[Point, Point]":
     """Return two unit vectors orthogonal to a unit vector and to each other."""
     import sympy
 
-    x, y, z = n
-    side = sympy.Piecewise((1, z >= 0), (-1, True))
+    x, y, z = map(sympy.sympify, n)
+    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=not z.free_symbols)
     a = -1 / (side + z)
     b = x * y * a
     return (1 + side * x**2 * a, side * b, -side * x), (b, side + y**2 * a, -y)
@@ -226,6 +269,14 @@ def _clamped(at: "sympy.Expr") -> "sympy.Expr":
     import sympy
 
     return sympy.Min(sympy.Max(at, 0, evaluate=False), 1, evaluate=False)
+
+
+def _at_most(a: "sympy.Expr | int", b: "sympy.Expr | int") -> Any:
+    """Return the condition ``a <= b``; of formulas SymPy is not asked, which takes long."""
+    import sympy
+
+    formulas = sympy.sympify(a).free_symbols | sympy.sympify(b).free_symbols
+    return sympy.Le(a, b, evaluate=not formulas)
 
 
 def _at(member: Member, point: Array) -> "Point":

@@ -255,13 +255,6 @@ def masses(mass, centre, inertia):
         (masses(1, [0, 0, 0], [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]), ValueError, "inertia"),
         (masses(1, [0], 1), ValueError, "centre"),
         (lambda: mass_of(polytope(SIMPLEX, 0.1)), NotImplementedError, "Mass"),
-        (
-            lambda: Arrangement([polygon(TRIANGLE, 0.1), disc(1)], orientations="all").system(
-                friction=0.2
-            ),
-            NotImplementedError,
-            "friction",
-        ),
     ],
 )
 def test_what_is_not_covered_is_refused(make, kind, said):
