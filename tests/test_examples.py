@@ -261,6 +261,7 @@ def test_three_sliding_squares_have_two_components():
     assert not reached & exchanged
     assert reached == turned
     assert all(squares.polyhedron.contains(q, tolerance=1e-5) for q in exchanged)
+    assert ex27_hard_squares.main(3).betti(1 / 2.3)[0] == 2  # squares of size 1 in a box of 2.3
 
 
 def test_hard_squares(tmp_path):
