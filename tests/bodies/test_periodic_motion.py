@@ -192,3 +192,16 @@ def test_what_is_refused():
         Arrangement([disc(0.1)], period=[1, 1]).system(count=2)
     with pytest.raises(NotImplementedError, match="expected rounded bodies"):
         Arrangement([polygon([[0, 0], [0.1, 0], [0, 0.1]])] * 2, period=[1, 1]).system()
+
+
+def test_a_rod_turns_until_it_meets_its_own_image():
+    """The force of its image is a torque: it bounces back and keeps its speed and momentum."""
+    a = Arrangement([LONG], period=[0.95, 1.2])
+    system = a.system(restitution=1.0)
+    v = np.array([0.3, -0.2, 1.0])
+    path = simulate(system, system.state([0.0, 0.0, np.pi / 4], v), 3.0, 1e-2)
+    turns = path.v[:, 0, 2]
+    np.testing.assert_allclose(abs(turns), 1.0, atol=1e-12)
+    assert turns.min() < 0
+    np.testing.assert_allclose(path.v[:, 0, :2], np.tile(v[:2], (len(turns), 1)), atol=1e-12)
+    assert all(a.polyhedron.contains(q, tolerance=1e-9) for q in path.q[:, 0])
