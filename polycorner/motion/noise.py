@@ -25,10 +25,9 @@ class Solver(Value):
     crowd_sweeps : int, optional
         For thousands of bodies: sweeps over an island of more than 1,024 unilateral and friction
         contacts, after which its step is taken as it is.  It is counted in ``Effort.unconverged``,
-        and ``Effort.residual`` says how much is missing.  Forces spread only so far in a step: heaps
-        are a little soft, friction creeps, and nothing in them comes to rest exactly.  Bodies that
-        overlap by more than 0.1 % of their size are moved apart.  Default 0: islands are solved,
-        whatever their size.
+        and ``Effort.residual`` says how much is missing.  Forces spread only so far in a step, so
+        that heaps are a little soft and friction creeps.  Bodies that overlap by more than 0.1 % of
+        their size are moved apart.  Default 0: islands are solved, whatever their size.
     threads : int, optional
         How many threads do a step together; default 1.  Results are the same, bit for bit, for any
         number.  It pays for islands of many bodies, or many islands, and on idle processors.

@@ -301,7 +301,7 @@ class Work(NamedTuple):
     signals: Annotated[Any, whole("32")]  # TICKET, ...
     told: Annotated[Any, whole("8")]  # KIND, ...
     told_times: Annotated[Any, real("2")]  # length of the step, time
-    to_solve: Annotated[Any, whole("N")]  # bodies that represent islands to be solved
+    to_solve: Annotated[Any, whole("N")]  # bodies that represent islands
 
 
 class Log(NamedTuple):

@@ -6,10 +6,10 @@ next one only: strips of even number, and those of odd number, can be swept side
 comes out depends on the strips, and not on how many threads there are.
 
 A sweep solves block after block with all others fixed (Gauss-Seidel), the strips of even number
-first; every other sweep goes backwards.  After few of them a step is not solved.  The method is
-that of contact dynamics with a fixed number of iterations ([Unger]): as loads spread over a few
-contacts in each sweep, a heap is a little soft, and it is the softer the deeper it is.  Overlaps
-that result are taken away little by little, by changes of place.
+first; every other sweep goes backwards, and the last one forward.  After few of them a step is not
+solved.  The method is that of contact dynamics with a fixed number of iterations ([Unger]): as
+loads spread over a few contacts in each sweep, a heap is a little soft, and it is the softer the
+deeper it is.  Overlaps that result are taken away little by little, by changes of place.
 """
 
 import numpy as np

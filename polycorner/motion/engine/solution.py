@@ -87,14 +87,18 @@ def solve_islands(model, state, work, blocks, h, again):
 
 @compiled
 def sweep_crowd(model, state, work, i, h):
-    """Sweep over the blocks of a crowd, which is not solved, as often as asked."""
+    """Sweep over the blocks of a crowd, which is not solved, as often as asked.
+
+    The last sweep goes forward, so that friction follows the contact that presses on it and is in
+    its set.
+    """
     first, last = work.island_start[i], work.island_start[i + 1]
     speed, _ = begin_island(state, work, first, last)
     strips = work.strips[0]
     divide_blocks(work, first, last)
-    for sweep in range(model.crowd_sweeps):
-        work.told[BACKWARDS] = sweep % 2
-        share_strips(model, state, work, SWEEP, strips, sweep % 2)
+    for left in range(model.crowd_sweeps - 1, -1, -1):
+        work.told[BACKWARDS] = left % 2
+        share_strips(model, state, work, SWEEP, strips, left % 2)
     share_strips(model, state, work, SEPARATE, strips, ZERO)
     increase(state.counts, SWEEPS, model.crowd_sweeps)
     share_out(model, state, work, JUDGE, strips)
