@@ -19,12 +19,10 @@ SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = ra
 # Kinds of blocks: contacts with the surroundings, and contacts between bodies.
 OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
 
-# Stages of an island between the solutions of a step: nothing it depends on changes any more, it is
-# being solved, or it has to be solved again.
+# Stages of an island between solutions of a step: it has settled, is solved, or has to be again.
 SETTLED, SOLVED, CHANGED = range(3)
 
-# The velocity bound of a gap: as it is; so small an error that it may be left; raised where the gap
-# curves.
+# The velocity bound of a gap: as it is; an error so small that it may be left; raised by curvature.
 PLAIN, SMALL, BENT = range(3)
 
 # What follows if an island is not solved: nothing; shorter steps; halves of this part of a step.
