@@ -250,6 +250,7 @@ def _parameters(
         "solver.tolerance": float(solver.tolerance),
         "solver.sweeps": int(solver.sweeps),
         "solver.refine": solver.refine,
+        "solver.crowd_sweeps": int(solver.crowd_sweeps),
         "state.time": float(state.time),
         "state.q": fingerprint(state.q),
         "state.v": fingerprint(state.v),

@@ -231,6 +231,8 @@ WRONG = [
     (lambda: Noise(seed=1.0), TypeError, "seed"),
     (lambda: Solver(tolerance=0.0), ValueError, "tolerance"),
     (lambda: Solver(sweeps=0), ValueError, "sweeps"),
+    (lambda: Solver(crowd_sweeps=-1), ValueError, "crowd_sweeps"),
+    (lambda: Solver(threads=0), ValueError, "threads"),
 ]
 
 

@@ -19,12 +19,10 @@ SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = ra
 # Kinds of blocks: contacts with the surroundings, and contacts between bodies.
 OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
 
-# Stages of an island between the solutions of a step: nothing it depends on changes any more, it is
-# being solved, or it has to be solved again.
+# Stages of an island between solutions of a step: it has settled, is solved, or has to be again.
 SETTLED, SOLVED, CHANGED = range(3)
 
-# The velocity bound of a gap: as it is; so small an error that it may be left; raised where the gap
-# curves.
+# The velocity bound of a gap: as it is; an error so small that it may be left; raised by curvature.
 PLAIN, SMALL, BENT = range(3)
 
 # What follows if an island is not solved: nothing; shorter steps; halves of this part of a step.
@@ -93,9 +91,7 @@ class Model(NamedTuple):
     first_vertex: Annotated[Any, whole("*")]  # of each set, and one more
     vertices: Annotated[Any, real("* 2")]  # of polygons
     gap_kernels: Annotated[Any, whole()]  # kernels of a body's gaps
-    gap_calls: Annotated[
-        Any, whole("* 6")
-    ]  # address, variables, outputs; first read, row, parameter
+    gap_calls: Annotated[Any, whole("* 6")]  # address, sizes in and out; first read, row, parameter
     gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call
     gap_rows: Annotated[Any, whole("*")]  # gap of each output, or -1
     restitution: Annotated[Any, real("m")]  # of a body's contacts with its surroundings
@@ -136,6 +132,9 @@ class Model(NamedTuple):
     follows_time: Annotated[Any, whole()]  # whether forces may change much from step to step
     start: Annotated[Any, real()]  # time of the first state
     step: Annotated[Any, real()]  # length of a whole step
+    crowd_sweeps: Annotated[Any, whole()]  # sweeps over very large islands; 0: these are solved
+    threads: Annotated[Any, whole()]
+    give_way: Annotated[Any, whole()]  # address: lets other threads run; 0: nothing does
 
 
 class State(NamedTuple):
@@ -198,9 +197,7 @@ class Work(NamedTuple):
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
     remedy: Annotated[Any, whole("1")]  # for islands that are not solved: LAST, DIVIDED or HALVED
     awake: Annotated[Any, whole("N")]
-    touched: Annotated[
-        Any, whole("N")
-    ]  # 0: by nothing; 1: by surroundings only; 2: by other bodies
+    touched: Annotated[Any, whole("N")]  # 0: by nothing; 1: by surroundings only; 2: by bodies
     evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
     speed: Annotated[Any, real("N")]
     island_speed: Annotated[Any, real("N")]  # largest velocity in the body's island
@@ -288,6 +285,21 @@ class Work(NamedTuple):
     entry: Annotated[Any, whole("B")]  # of a block's two bodies, or -1
     island_vector: Annotated[Any, real("N*K")]
     matrix: Annotated[Any, real("M")]  # of an island, block by block
+    ranked: Annotated[Any, whole("C")]  # contacts between bodies by key
+    assembled: Annotated[Any, whole("C")]  # the same, in the order of their blocks
+    block_of: Annotated[Any, whole("C")]  # block of each, or -1
+    shift: Annotated[Any, real("N K")]  # by which bodies of crowds move apart
+    strips: Annotated[Any, whole("1")]  # their number
+    body_strip: Annotated[Any, whole("N")]  # strip of a body
+    strip: Annotated[Any, whole("B")]  # of what is sorted
+    unsorted: Annotated[Any, whole("B")]  # what is to be ordered by strips
+    strip_start: Annotated[Any, whole("Z+1")]  # in `order`
+    strip_cursor: Annotated[Any, whole("Z")]
+    worst: Annotated[Any, real("Z")]  # residuals of parts of an island
+    signals: Annotated[Any, whole("32")]  # TICKET, ...
+    told: Annotated[Any, whole("8")]  # KIND, ...
+    told_times: Annotated[Any, real("2")]  # length of the step, time
+    to_solve: Annotated[Any, whole("N")]  # bodies that represent islands
 
 
 class Log(NamedTuple):
@@ -309,11 +321,16 @@ def declarations(record: Any) -> Mapping[str, Declaration]:
 def allocate(record: type[Record], sizes: Sizes) -> Record:
     """Return new arrays with their initial values."""
     return record(
-        **{
-            name: np.full(declared.extents(sizes), declared.initial, dtype=declared.kind)
-            for name, declared in declarations(record).items()
-        }
+        **{name: initial_array(declared, sizes) for name, declared in declarations(record).items()}
     )
+
+
+def initial_array(declared: Declaration, sizes: Sizes) -> Any:
+    """Return a new array with its initial values; of zeros, memory is used as it is written."""
+    extents = declared.extents(sizes)
+    if declared.initial == 0:
+        return np.zeros(extents, dtype=declared.kind)
+    return np.full(extents, declared.initial, dtype=declared.kind)
 
 
 def filled(record: type[Record], sizes: Sizes, values: Mapping[str, Any]) -> Record:

@@ -49,7 +49,7 @@ STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothi
 
 @compiled
 def finish_block(model, work, b):
-    """Compute ``M^-1 J'``, the Delassus matrix and ``J v``, and apply the initial impulse."""
+    """Compute ``M^-1 J'``, the Delassus matrix and ``J v``."""
     rows, J, responses = max(1, work.block_rows[b]), work.jacobian, work.response
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
     for r in range(rows):
@@ -59,7 +59,6 @@ def finish_block(model, work, b):
         respond(model, work, at, ZERO, i)
         if j >= 0:
             respond(model, work, at, model.lanes, j)
-    apply_impulses(model, work, b, work.impulse[b, 0], work.impulse[b, 1])
     one, other = row_at(model, b, ZERO), row_at(model, b, ONE)
     sides = ONE if j < 0 else TWO
     top = d00 = rows_product(model, J, one, responses, one, sides)
@@ -269,8 +268,8 @@ def add_pair_blocks(model, state, work, contact, h, count):
 
 
 @compiled
-def assemble_blocks(model, state, work, h, contacts):
-    """Assemble the blocks of all awake bodies and of all contacts detected; return their number."""
+def assemble_body_blocks(model, state, work, h):
+    """Assemble the blocks of all awake bodies and their surroundings; return their number."""
     blocks = ZERO
     for i in range(model.bodies):
         for c in range(model.dimension):
@@ -279,13 +278,28 @@ def assemble_blocks(model, state, work, h, contacts):
     for i in range(model.bodies):
         if state.alive[i] and work.awake[i]:
             blocks = add_body_blocks(model, state, work, i, h, limit, blocks)
-    keys = work.sort_keys
-    for s in range(contacts):  # by key, whatever the order of detection
-        keys[s] = key_of(model, work, s) * contacts + s
-    heap_sort(keys, contacts)
-    first, second = NONE, NONE
+    return blocks
+
+
+@compiled
+def order_contacts(model, work, contacts):
+    """Order contacts by key, whatever the order of detection."""
+    keys, ascending = work.sort_keys, True
     for s in range(contacts):
-        contact = keys[s] % contacts
+        keys[s] = key_of(model, work, s) * contacts + s
+        ascending = ascending and (s == 0 or keys[s] > keys[s - 1])
+    if not ascending:
+        heap_sort(keys, contacts)
+    for s in range(contacts):
+        work.ranked[s] = work.assembled[s] = keys[s] % contacts
+
+
+@compiled
+def assemble_contacts(model, state, work, h, begin, end, blocks):
+    """Assemble the blocks of a range of contacts in their order; return the block count."""
+    first, second = NONE, NONE
+    for s in range(begin, end):
+        contact = work.assembled[s]
         if work.contact[contact, 0] != first or work.contact[contact, 1] != second:
             first, second = work.contact[contact, 0], work.contact[contact, 1]
             evaluate_pair_gaps(model, work, first, second, work.q_next)

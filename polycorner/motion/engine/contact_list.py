@@ -22,8 +22,8 @@ def takes_part(work, b):
 
 
 @compiled
-def store_impulses(model, state, work, blocks, h):
-    """Store the impulses: for the next step, or as the start of another round of this one.
+def store_impulses(model, state, work, begin, end, h):
+    """Store the impulses of blocks: for the next step, or as the start of another round of it.
 
     Those of a shorter step are stored as what they would be in a whole one, those of an instant
     not at all.
@@ -31,7 +31,7 @@ def store_impulses(model, state, work, blocks, h):
     share = h / model.step
     if share <= INSTANT:
         return
-    for b in range(blocks):
+    for b in range(begin, end):
         kind, i, f = work.origin[b, 0], work.origin[b, 1], work.origin[b, 2]
         if kind == OWN_GAP:
             state.normal[i, f] = work.impulse[b, 0] / share
@@ -80,8 +80,10 @@ def classify(work, b, was, gap, h, time, scale, out):
 
 @compiled
 def record_contacts(model, state, work, log, blocks, h, time, count):
-    """Record contacts made, lost and bounced; update the list of contacts between bodies."""
-    out, C, share = work.image, 0, h / model.step
+    """Record contacts made, lost and bounced; return the number of events."""
+    out, share, contacts = work.image, h / model.step, work.list_status[2]
+    for s in range(contacts):
+        work.block_of[s] = NONE
     for b in range(blocks):
         kind = work.origin[b, 0]
         if work.block_rows[b] > 0 or work.bilateral[b] or not takes_part(work, b):
@@ -92,8 +94,7 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
             gap, was = work.gap[i, g], state.touches[i, g]
             j, pressed, release = NONE, state.pressed[i, g], state.release[i, g]
         else:
-            work.sort_keys[C] = b
-            C += 1
+            work.block_of[i] = b
             gap = work.contact_gap[i]
             j, index = work.contact[i, 1], work.contact_before[i]
             was = index >= 0 and state.pair_flags[index, 1]
@@ -122,11 +123,19 @@ def record_contacts(model, state, work, log, blocks, h, time, count):
         else:
             work.origin[b, 3] = 1 if out[0] > 0.0 else 0
             work.release[b] = release
-    if model.pair_kernel != 0:
-        size, count = keep_contacts(model, state, work, log, C, h, time, count)
-        add_contacts(model, state, work, C, size, share)
-        sort_contacts(model, state, state.counts[CONTACTS])
     return count
+
+
+@compiled
+def list_blocks(work, contacts):
+    """List the blocks of this step's contacts by key; return their number."""
+    size = 0
+    for s in range(contacts):
+        b = work.block_of[work.ranked[s]]
+        if b >= 0:
+            work.sort_keys[size] = b
+            size += 1
+    return size
 
 
 @compiled
@@ -153,11 +162,11 @@ def keep_contacts(model, state, work, log, C, h, time, count):
 
 
 @compiled
-def add_contacts(model, state, work, C, size, share):
-    """Append this step's contacts to the list, with their impulses."""
+def add_contacts(model, state, work, begin, end, kept, share):
+    """Add some of this step's contacts to the list, with their impulses, after those kept."""
     k, K = model.dimension, model.lanes
-    for s in range(C):
-        b = work.sort_keys[s]
+    for s in range(begin, end):
+        b, size = work.sort_keys[s], kept + s
         state.keys[size] = key_of(model, work, work.origin[b, 1])
         state.pair_release[size] = work.release[b]
         lasting = 1.0 / share if share > INSTANT else 0.0
@@ -181,8 +190,6 @@ def add_contacts(model, state, work, C, size, share):
                     state.pair_action[size, a] += work.jacobian[f, r, one + a] * p
                     state.pair_action[size, k + a] += work.jacobian[f, r, two + a] * p
         state.pair_flags[size, 1] = work.origin[b, 3]
-        size += 1
-    state.counts[CONTACTS] = size
 
 
 @compiled

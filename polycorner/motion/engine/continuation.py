@@ -13,6 +13,7 @@ from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.multipliers import STEPS_OF_ROUND, approach
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.rows import load_on
+from polycorner.motion.engine.signals import increase
 
 FIRST_COMPLIANCE, RIGID = 1e-2, 1e-10  # compliance at the start of a path, and at its end
 FIRST_FACTOR, MOST_FACTOR, LEAST_FACTOR = 0.1, 0.03, 0.9  # of the compliance in a step of the path
@@ -71,7 +72,7 @@ def follow(model, state, work, first, last, n, goal, compliance):
     while factor < LEAST_FACTOR:
         worst = residual(model, work, first, last, trial)
         steps, worst = newton_steps(model, work, first, last, n, goal, trial, trial, worst)
-        state.counts[NEWTON_STEPS] += steps
+        increase(state.counts, NEWTON_STEPS, steps)
         if worst <= goal:
             reached = trial
             copy_impulses(work, first, last, work.impulse, work.initial)
@@ -108,7 +109,7 @@ def iterate_loads(model, state, work, first, last, n, goal, softness, grip):
         copy_impulses(work, first, last, work.impulse, work.initial)
         enough = EXACT * max(goal, min(worst, goal / model.tolerance))
         steps = approach(model, work, first, last, n, yielding, enough)
-        state.counts[NEWTON_STEPS] += steps
+        increase(state.counts, NEWTON_STEPS, steps)
         attach_loads(work, first, last)
         if steps == STEPS_OF_ROUND:
             copy_impulses(work, first, last, work.initial, work.impulse)
@@ -139,7 +140,7 @@ def try_newton(model, state, work, first, last, n, goal, softness, worst):
     """Try Newton's method from impulses, which remain if it fails; return the residual."""
     copy_impulses(work, first, last, work.impulse, work.loaded)
     steps, least = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
-    state.counts[NEWTON_STEPS] += steps
+    increase(state.counts, NEWTON_STEPS, steps)
     if least <= goal:
         return least
     copy_impulses(work, first, last, work.loaded, work.impulse)

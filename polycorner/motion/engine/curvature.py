@@ -6,6 +6,7 @@ from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import BENT, CHANGED, OWN_GAP, SETTLED
 from polycorner.motion.engine.blocks import STRAIGHT
 from polycorner.motion.engine.bounds import equation_offset
+from polycorner.motion.engine.crowds import of_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import speed_of
@@ -20,7 +21,8 @@ def correct_curvature(model, state, work, blocks, h):
     """Raise the velocity bounds of gaps that close by their curvature; return whether any does.
 
     The linearised gap misses what curvature adds within the step.  The bound becomes that of
-    Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough.
+    Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough,
+    and crowds are left as they are.
     """
     k, found = model.dimension, False
     for i in range(model.bodies):
@@ -33,7 +35,7 @@ def correct_curvature(model, state, work, blocks, h):
     for b in range(blocks):
         if work.block_rows[b] > 0 or work.stage[island_of(work, b)] == SETTLED:
             continue
-        if model.follows_velocity and work.bound[b] == BENT:
+        if (model.follows_velocity and work.bound[b] == BENT) or of_crowd(model, work, b):
             continue
         i, g = work.block_bodies[b, 0], work.origin[b, 2]
         if work.origin[b, 0] == OWN_GAP:

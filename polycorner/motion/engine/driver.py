@@ -29,6 +29,7 @@ from polycorner.motion.engine.arrays import (
 from polycorner.motion.engine.intermediate import compiled_advance
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.engine.sizes import Sizes
+from polycorner.motion.engine.threads import assisted, copies
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
@@ -110,9 +111,12 @@ class Engine:
         self.model = self.model._replace(
             contact_room=sizes.C, neighbour_room=sizes.P, event_room=sizes.E
         )
-        records = self.model, self.motion, self.work, self.log
-        self._tables = [table_of(record) for record in records]
-        self._addresses = np.array([table.ctypes.data for table in self._tables])
+        self._works = [self.work, *copies(self.work, sizes, self.model.threads)]
+        shared = [table_of(record) for record in (self.model, self.motion, self.log)]
+        own = [table_of(work) for work in self._works]
+        self._tables = shared + own  # kept as long as they are used
+        model, motion, log = (table.ctypes.data for table in shared)
+        self._addresses = [np.array([model, motion, work.ctypes.data, log]) for work in own]
 
     @property
     def time(self) -> float:
@@ -144,7 +148,9 @@ class Engine:
         advance = compiled_advance(self.bodies.dimension)
         events: list[Event] = []
         while steps > 0:
-            why, done, count = advance(self._addresses, steps)
+            first, *others = self._addresses
+            with assisted(advance, self.work, others):
+                why, done, count = advance(first, steps)
             events += self._read(count)
             steps -= done
             if why == CONTACTS_FULL:

@@ -7,9 +7,12 @@ from numba import types
 from polycorner.formulas.linking import whole_module
 from polycorner.formulas.machine_code import portable_code
 from polycorner.motion.engine.arrays import DONE, EVENTS_FULL, STEPS
-from polycorner.motion.engine.jit import ZERO, compiled
+from polycorner.motion.engine.codes import STOP
+from polycorner.motion.engine.jit import ONE, ZERO, compiled
+from polycorner.motion.engine.phases import assist
 from polycorner.motion.engine.records import readers
 from polycorner.motion.engine.refinement import step
+from polycorner.motion.engine.signals import write
 from polycorner.motion.engine.sleep import stays_asleep
 
 NEW = r" (captures|range)\([^)]*\)"  # properties of arguments that older versions do not know
@@ -37,7 +40,8 @@ def advance(model, state, work, log, steps):
 def intermediate_code(entry: str, dimension: int) -> str:
     """Return the engine as intermediate code for any processor, all stages linked into one.
 
-    It is for bodies of ``dimension`` coordinates, or of any number if that is 0.
+    It is for bodies of ``dimension`` coordinates, or of any number if that is 0.  Called for less
+    than zero steps, it assists the thread that advances.
 
     Words that only one version of LLVM knows are left out: once code is optimised, they matter
     little.
@@ -46,7 +50,12 @@ def intermediate_code(entry: str, dimension: int) -> str:
 
     @compiled
     def enter(model, state, work, log, steps):
-        return advance(model_at(model), state_at(state), work_at(work), log_at(log), steps)
+        if steps < 0:
+            assist(model_at(model), state_at(state), work_at(work))
+            return DONE, ZERO, ZERO
+        done = advance(model_at(model), state_at(state), work_at(work), log_at(log), steps)
+        write(work_at(work).signals, STOP, ONE)
+        return done
 
     module, name = whole_module(enter, (types.int64,) * 5)
     text = portable_code(str(module).replace(name, entry))

@@ -25,6 +25,7 @@ from polycorner.motion.engine.rows import (
     velocity_of,
 )
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
+from polycorner.motion.engine.signals import increase
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import load
 
@@ -277,7 +278,7 @@ def interior_point_steps(model, state, work, first, last, n, speed, goal):
         assemble_interior(model, work, first, last, n, speed)
         if not solve_island_matrix(model, work, n):
             return balanced_for > 0
-        state.counts[NEWTON_STEPS] += 1
+        increase(state.counts, NEWTON_STEPS, ONE)
         square = newton_direction(model, work, first, last)
         share, least = 1.0, 0.0
         if balanced_for > 0:

@@ -1,4 +1,4 @@
-"""Solution of the islands of a step."""
+"""Solution of an island of touching bodies."""
 
 import numpy as np
 
@@ -8,25 +8,23 @@ from polycorner.motion.engine.arrays import (
     LAST,
     NEWTON_STEPS,
     OWN_FRICTION,
-    SETTLED,
     SMALL,
     SWEEPS,
 )
 from polycorner.motion.engine.continuation import MANY, continue_island
-from polycorner.motion.engine.curvature import correct_curvature
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
 from polycorner.motion.engine.grip import keeps_grip
 from polycorner.motion.engine.island_matrix import number_bodies
-from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.jit import ONE, compiled
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
 from polycorner.motion.engine.rows import copy_velocity, velocity_of
+from polycorner.motion.engine.signals import increase
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
 MAX_SOFTNESS = 1e-2  # its largest value; further rounds multiply this by powers of three
 CYCLE_ROUNDS = 3
-MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 FIRST_SWEEPS, ROUND_SWEEPS = 2, 10  # in the first round, and in others
 FEW_LANES = 8  # of a small island
 FEW = 8  # blocks of a small island up to which sweeps, which may be exact, come first
@@ -76,7 +74,7 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
             phase = rounds % CYCLE_ROUNDS
             softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
-            state.counts[NEWTON_STEPS] += steps
+            increase(state.counts, NEWTON_STEPS, steps)
             if worst > goal and rounds == 1:
                 if work.remedy[0] == DIVIDED and last - first <= MANY:
                     break
@@ -88,7 +86,7 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
                     break
                 former = worst
         rounds += 1
-    state.counts[SWEEPS] += done
+    increase(state.counts, SWEEPS, done)
     return worst
 
 
@@ -189,11 +187,8 @@ def switch_reversed_slips(model, state, work, first, last):
 
 
 @compiled
-def solve_island(model, state, work, first, last, again):
-    """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
-
-    For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
-    """
+def begin_island(state, work, first, last):
+    """Return the speed of an island after forces alone, and whether all its bodies are at rest."""
     speed, at_rest = 0.0, True
     for s in range(first, last):
         b = work.order[s]
@@ -207,7 +202,17 @@ def solve_island(model, state, work, first, last, again):
                 work.island_speed[i] = max(work.island_speed[i], speed)
                 if work.awake[i] and not state.rests[i]:
                     at_rest = False
-    state.counts[ISLANDS] += 1
+    increase(state.counts, ISLANDS, ONE)
+    return speed, at_rest
+
+
+@compiled
+def solve_island(model, state, work, first, last, again):
+    """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
+
+    For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
+    """
+    speed, at_rest = begin_island(state, work, first, last)
     if speed == 0.0:  # no motion and no force
         for s in range(first, last):
             for r in range(2):
@@ -264,27 +269,3 @@ def rests(model, state, work, first, last, speed):
                     return False
                 v[i, c] = rest[c]
     return find_equilibrium(model, state, work, first, last, speed)
-
-
-@compiled
-def solve_islands(model, state, work, blocks, h, again):
-    """Solve islands, perhaps ``again``; those whose gaps would close by curvature, twice.
-
-    Equations are solved for until they hold at the next midpoint.  If forces depend on the
-    velocity, that and curvature follow with them; see :func:`follow_curvature`.  Settled islands
-    remain.
-    """
-    starts = work.island_start
-    most = 2 if model.unilateral == model.restitution.size else MOST_CORRECTIONS
-    if model.follows_velocity:
-        most = 1
-    for attempt in range(most):
-        for i in range(model.bodies):
-            if starts[i + 1] == starts[i] or work.stage[i] == SETTLED:
-                continue
-            if attempt == 0 or work.curves_shut[i]:
-                work.island_residual[i] = solve_island(
-                    model, state, work, starts[i], starts[i + 1], again or attempt > 0
-                )
-        if attempt < most - 1 and not correct_curvature(model, state, work, blocks, h):
-            break

@@ -10,6 +10,7 @@ from polycorner.motion.bodies import RUBBING, Body, IdenticalBodies
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.arrays import Model, filled
 from polycorner.motion.engine.sizes import Sizes
+from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 
@@ -53,6 +54,9 @@ def model_of(
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,
         "refines": solver.refine,
+        "crowd_sweeps": solver.crowd_sweeps,
+        "threads": solver.threads,
+        "give_way": address_of_yield(),
         **_near(bodies, noise),
         "start": start,
         "step": step,

@@ -8,11 +8,12 @@ These are islands
 
 Islands of more than ``LARGE`` blocks are left out only if they are not solved: in a dense heap
 there is always an impact, and the parts of a step, each solved for the whole heap, would cost more
-than shorter steps for all.
+than shorter steps for all.  Crowds, whose steps need not be solved, are not left out.
 """
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_GAP
 from polycorner.motion.engine.bounds import is_slow
+from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import ZERO_GAP, speed_of, travel
@@ -46,7 +47,8 @@ def leave_out(model, state, work, blocks, h):
     found = False
     for i in range(N):
         left[i] = 0
-        if work.island_start[i + 1] > work.island_start[i]:
+        first, last = work.island_start[i], work.island_start[i + 1]
+        if last > first and not is_crowd(model, first, last):
             left[i] = 2 if work.island_residual[i] > model.tolerance else 0
         work.members[i] = 0
     for i in range(N):

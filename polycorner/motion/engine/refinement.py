@@ -24,12 +24,14 @@ from polycorner.motion.engine.arrays import (
     UNSOLVED,
 )
 from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
+from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.left_out import leave_out, slow_travel
 from polycorner.motion.engine.paths import acceptable_length
 from polycorner.motion.engine.sleep import stays_asleep, wake
+from polycorner.motion.engine.solution import evaluate_bodies
 from polycorner.motion.engine.stepping import attempt, commit
 
 SHORTEST_SOLVED = 1.0 / 16.0  # of a step, to which parts are halved to be solved
@@ -150,12 +152,17 @@ def refine(model, state, work, log, root, index, count):
 
 @compiled
 def count_residuals(model, state, work, log, time, count):
-    """Note the residuals of the islands of a whole step, and record which are not solved."""
+    """Note the residuals of the islands of a whole step, and record which are not solved.
+
+    Crowds, of which this is known, are counted only.
+    """
     for i in range(model.bodies):
         if work.island_start[i + 1] > work.island_start[i] and not work.waits[i]:
             state.sums[RESIDUAL] = max(state.sums[RESIDUAL], work.island_residual[i])
             if work.island_residual[i] > model.tolerance:
                 state.counts[UNSOLVED] += 1
+                if is_crowd(model, work.island_start[i], work.island_start[i + 1]):
+                    continue
                 count = record_failure(model, work, log, np.int64(i), time, count)
     return count
 
@@ -187,6 +194,7 @@ def step(model, state, work, log, count):
         for i in range(model.bodies):
             work.waits[i] = 0
         set_time(model, time + 0.5 * h)
+        evaluate_bodies(model, state, work, h, time + 0.5 * h, index)
         any_awake = wake(model, state, work, h, time + 0.5 * h, index)
         why, blocks = attempt(model, state, work, h, time, index, any_awake)
         if why != DONE:

@@ -6,6 +6,7 @@ from polycorner.motion.bodies import IdenticalBodies
 
 WIDTH = 4  # reals in a vector
 MOST_ENTRIES = 48  # of a body above the diagonal of the matrix, on average, at most
+STRIPS = 64  # into which a crowd is divided, at most
 EVENTS = 4096  # events recorded, at least, before the engine returns
 
 
@@ -30,6 +31,7 @@ class Sizes(NamedTuple):
     W: int  # numbers that go in and come out of a kernel
     Q: int  # entries of the matrix above the diagonal: pairs of bodies
     M: int  # numbers in the matrix
+    Z: int  # strips
 
     @classmethod
     def of(cls, bodies: IdenticalBodies, contacts: int) -> "Sizes":
@@ -64,4 +66,5 @@ class Sizes(NamedTuple):
             W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
             Q=entries,
             M=(N + 2 * entries) * lanes * lanes,
+            Z=STRIPS,
         )

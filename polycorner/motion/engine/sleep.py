@@ -29,6 +29,8 @@ LONGEST_SLEEP = np.int64(50)  # most steps between two checks of a sleeper
 def wake(model, state, work, h, time, index):
     """Wake the sleepers whose forces no longer balance; return whether any body is awake.
 
+    Bodies that are not asleep have been evaluated.
+
     A sleeper with friction to spare is not checked until the reserve could be used up, at the rate
     at which its forces changed before the last check.
     """
@@ -41,7 +43,9 @@ def wake(model, state, work, h, time, index):
             for c in range(model.dimension):
                 work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
             continue
-        if not stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index):
+        if not state.asleep[i]:
+            work.evaluated[i], work.awake[i], any_awake = 1, 1, True
+        elif not stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index):
             work.awake[i], any_awake = 1, True
     if any_awake and model.pair_kernel != 0:
         wake_piles(model, state, work, h, time, index)

@@ -35,24 +35,29 @@ from polycorner.motion.engine.arrays import (
     SOLVED,
     SUBSTRATE_WORK,
 )
-from polycorner.motion.engine.blocks import assemble_blocks, renew_blocks
+from polycorner.motion.engine.blocks import renew_blocks
 from polycorner.motion.engine.contact_list import (
     EXIT,
     MOTION,
     REST,
     record,
     record_contacts,
-    store_impulses,
     store_sticking,
     takes_part,
 )
+from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
-from polycorner.motion.engine.island import solve_islands
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
 from polycorner.motion.engine.partition import find_islands
 from polycorner.motion.engine.sleep import settle, wake_neighbours
+from polycorner.motion.engine.solution import (
+    assemble_blocks,
+    list_contacts,
+    solve_islands,
+    store_all_impulses,
+)
 
 FORCE_ROUNDS = 30  # solutions of a step, at most, with forces at its mean velocity
 
@@ -152,7 +157,7 @@ def solve(model, state, work, h, time, index, solved):
             blocks = assemble_blocks(model, state, work, h, contacts)
             find_islands(model, work, blocks)
         solve_islands(model, state, work, blocks, h, solved > 0)
-        store_impulses(model, state, work, blocks, h)
+        store_all_impulses(model, state, work, blocks, h)
         if model.pair_kernel == 0 or not wake_neighbours(
             model, state, work, blocks, h, time + 0.5 * h, index
         ):
@@ -173,10 +178,14 @@ def unsettle(model, work):
 
 @compiled
 def next_round(model, work):
-    """Let the islands be solved again that have changed; return whether there are any."""
+    """Let the islands be solved again that have changed; return whether there are any.
+
+    Crowds are left as they are.
+    """
     found = False
     for i in range(model.bodies):
-        changed = work.stage[i] == CHANGED
+        crowd = is_crowd(model, work.island_start[i], work.island_start[i + 1])
+        changed = work.stage[i] == CHANGED and not crowd
         work.stage[i] = SOLVED if changed else SETTLED
         found = found or changed
     return found
@@ -231,6 +240,8 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
     book_work(model, state, work, blocks, h)
     if any_awake:
         count = record_contacts(model, state, work, log, blocks, h, time, count)
+        if model.pair_kernel != 0:
+            count = list_contacts(model, state, work, log, h, time, count)
     store_sticking(model, state, work, blocks)
     for i in range(N):
         work.rested[i] = state.rests[i]
@@ -246,6 +257,8 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
             if work.awake[i]:
                 state.v[i, c] = work.v_new[i, c]
             state.q[i, c] = work.q_mid[i, c] + 0.5 * h * state.v[i, c]
+            if model.crowd_sweeps > 0 and work.awake[i]:
+                state.q[i, c] += work.shift[i, c]
         if model.exit_coordinate >= 0 and state.q[i, model.exit_coordinate] > model.exit_limit:
             state.alive[i] = 0
             count = record(log, count, EXIT, i, NONE, NONE, time + h, 0.0)

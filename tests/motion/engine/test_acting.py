@@ -6,6 +6,7 @@ from polycorner.bodies import Arrangement, HalfSpace, disc
 from polycorner.motion.engine.island import CROWD
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import start
+from tests.motion.engine.inclusion import residuals
 
 SIDE, MU, TOLERANCE = 8, 0.3, 1e-4
 
@@ -26,28 +27,6 @@ def heap():
     return start(system, state, 1e-2, solver=Solver(tolerance=TOLERANCE, refine=False))
 
 
-def residuals(work, blocks):
-    """Return how far impulses are from the inclusion, as speeds, and velocities from impulses."""
-    v, bodies = work.v_free.copy(), work.block_bodies
-    K = v.shape[1]
-    for b in blocks:
-        for side, i in enumerate(bodies[b]):
-            if i >= 0:
-                v[i] += work.impulse[b] @ work.response[b][:, side * K : side * K + K]
-    found = []
-    for b in blocks:
-        p, norm, pressing = work.impulse[b, 0], work.delassus[b, 4], work.pressing[b]
-        u = work.offset[b, 0] + sum(
-            work.jacobian[b, 0, side * K : side * K + K] @ v[i]
-            for side, i in enumerate(bodies[b])
-            if i >= 0
-        )
-        most = np.inf if pressing < 0 else MU * work.impulse[pressing, 0]
-        least = 0.0 if pressing < 0 else -most
-        found.append(norm * abs(p - np.clip(p - u / norm, least, most)))
-    return np.array(found), v
-
-
 def test_all_contacts_of_a_large_island_obey_the_inclusion():
     engine, large, left_out = heap(), 0, 0
     for _ in range(100):
@@ -59,7 +38,7 @@ def test_all_contacts_of_a_large_island_obey_the_inclusion():
             bodies = bodies[bodies >= 0]
             if engine.motion.rests[bodies].any():
                 continue
-            far, v = residuals(work, blocks)
+            far, v = residuals(work, blocks, MU)
             assert far.max() <= 1.001 * TOLERANCE * work.island_speed[root]
             np.testing.assert_allclose(v[bodies], work.v_new[bodies], atol=1e-8)
             normal = blocks[work.block_rows[blocks] == 0]

@@ -1,0 +1,168 @@
+"""Islands of very many blocks, whose steps need not be solved: sweeps over strips of bodies.
+
+The blocks of such an island are divided among parallel strips, at least as wide as bodies reach.
+A block belongs to the first strip of its bodies, so that it acts on bodies of this strip and the
+next one only: strips of even number, and those of odd number, can be swept side by side.  What
+comes out depends on the strips, and not on how many threads there are.
+
+A sweep solves block after block with all others fixed (Gauss-Seidel), the strips of even number
+first; every other sweep goes backwards, and the last one forward.  After few of them a step is not
+solved.  The method is that of contact dynamics with a fixed number of iterations ([Unger]): as
+loads spread over a few contacts in each sweep, a heap is a little soft, and it is the softer the
+deeper it is.  Overlaps that result are taken away little by little, by changes of place.
+"""
+
+import numpy as np
+
+from polycorner.motion.engine.gauss_seidel import relax_block
+from polycorner.motion.engine.jit import ONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import detection_distance
+from polycorner.motion.engine.partition import island_of
+from polycorner.motion.engine.rows import add_row, row_at, row_times
+from polycorner.motion.engine.sizes import STRIPS
+
+CROWD = 1024  # blocks beyond which an island is a crowd
+TOLERATED = 1e-3  # scaled overlap that is left as it is
+SEPARATED = 0.2  # share of what is too much that one contact takes away
+
+
+@compiled
+def is_crowd(model, first, last):
+    """Return whether so many blocks are swept a few times only."""
+    return model.crowd_sweeps > 0 and last - first > CROWD
+
+
+@compiled
+def of_crowd(model, work, b):
+    """Return whether a block belongs to a crowd."""
+    i = island_of(work, b)
+    return is_crowd(model, work.island_start[i], work.island_start[i + 1])
+
+
+@compiled
+def place_of(model, work, i, axis):
+    """Return a component of a body's position, as a length; zero if there is only the other."""
+    c = model.position[axis]
+    if axis == 0 and model.position[1] == c:
+        return 0.0
+    return work.q_mid[i, c] * model.units[c]
+
+
+@compiled
+def extent_of(model, state, work, axis):
+    """Return the least component of all positions, and by how much the largest exceeds it."""
+    least, largest = np.inf, -np.inf
+    for i in range(model.bodies):
+        if state.alive[i]:
+            x = place_of(model, work, i, axis)
+            least, largest = min(least, x), max(largest, x)
+    return least, largest - least
+
+
+@compiled
+def divide_bodies(model, state, work, h):
+    """Divide bodies among strips across the longer extent; return how many there are."""
+    axis, least, extent = 0, 0.0, 0.0
+    for a in range(2):
+        low, length = extent_of(model, state, work, a)
+        if length > extent:
+            axis, least, extent = a, low, length
+    reach = model.reach + detection_distance(model, work, h)
+    strips = ONE
+    if 0.0 < extent < np.inf:
+        strips = max(ONE, min(np.int64(STRIPS), np.int64(extent / reach)))
+    for i in range(model.bodies):
+        work.body_strip[i] = 0
+        if state.alive[i] and strips > 1:
+            t = np.int64((place_of(model, work, i, axis) - least) / extent * strips)
+            work.body_strip[i] = min(strips - 1, t)
+    return strips
+
+
+@compiled
+def divide_contacts(model, state, work, h, contacts):
+    """Order contacts by strips, and by key within these, so that a strip is in one place in memory.
+
+    Where bodies touch that are not near each other, there is a single strip.
+    """
+    work.strips[0] = 1
+    if model.crowd_sweeps == 0:
+        return
+    for i in range(model.bodies):
+        for c in range(model.dimension):
+            work.shift[i, c] = 0.0
+    strips = divide_bodies(model, state, work, h)
+    for s in range(contacts):
+        contact = work.ranked[s]
+        i, j = work.contact[contact, 0], work.contact[contact, 1]
+        if abs(work.body_strip[i] - work.body_strip[j]) > 1:
+            return
+        work.unsorted[s], work.strip[s] = contact, strip_of(work, i, j)
+    work.strips[0] = strips
+    sort_by_strip(work, ZERO, contacts, strips, work.assembled)
+
+
+@compiled
+def strip_of(work, i, j):
+    """Return the strip of a block that acts on these bodies (-1: none)."""
+    return work.body_strip[i] if j < 0 else min(work.body_strip[i], work.body_strip[j])
+
+
+@compiled
+def sort_by_strip(work, first, last, strips, target):
+    """Bring ``work.unsorted[first:last]`` in the order of ``work.strip`` to a target."""
+    starts, cursor = work.strip_start, work.strip_cursor
+    for t in range(strips + 1):
+        starts[t] = 0
+    for s in range(first, last):
+        starts[work.strip[s] + 1] += 1
+    starts[0] = first
+    for t in range(strips):
+        starts[t + 1] += starts[t]
+        cursor[t] = starts[t]
+    for s in range(first, last):
+        t = work.strip[s]
+        target[cursor[t]] = work.unsorted[s]
+        cursor[t] += 1
+
+
+@compiled
+def divide_blocks(work, first, last):
+    """Order the blocks of an island by strips, which start at ``work.strip_start``."""
+    for s in range(first, last):
+        b = work.order[s]
+        work.unsorted[s], work.strip[s] = b, ZERO
+        if work.strips[0] > 1:
+            work.strip[s] = strip_of(work, work.block_bodies[b, 0], work.block_bodies[b, 1])
+    sort_by_strip(work, first, last, work.strips[0], work.order)
+
+
+@compiled
+def sweep_strip(model, work, t, backwards):
+    """Solve the blocks of a strip one after the other."""
+    first, last = work.strip_start[t], work.strip_start[t + 1]
+    for s in range(first, last):
+        relax_block(model, work, work.order[first + last - 1 - s if backwards else s])
+
+
+@compiled
+def separate_strip(model, work, t):
+    """Move bodies apart that overlap in a strip, by a share of what is too much.
+
+    The changes of place, in ``work.shift``, are as impulses would make them, but leave velocities
+    as they are.
+    """
+    shift, responses = work.shift, work.response
+    for s in range(work.strip_start[t], work.strip_start[t + 1]):
+        b = work.order[s]
+        if work.block_rows[b] > 0 or work.bilateral[b]:
+            continue
+        i, j, g = work.block_bodies[b, 0], work.block_bodies[b, 1], work.origin[b, 2]
+        gap = work.gap[i, g] if j < 0 else work.contact_gap[work.origin[b, 1]]
+        at = row_at(model, b, ZERO)
+        excess = -gap - TOLERATED * model.gap_unit
+        if excess > 0.0:
+            excess -= row_times(model, work.jacobian, at, shift, i, j)
+        if excess > 0.0:
+            p = SEPARATED * excess * work.delassus[b, 3]
+            add_row(model, responses, at, p, shift, i, j)

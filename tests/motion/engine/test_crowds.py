@@ -1,0 +1,135 @@
+"""Islands of thousands of bodies: a few sweeps, by any number of threads."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from polycorner.bodies import Arrangement, HalfSpace, disc
+from polycorner.motion.checkpoints import Checkpoint
+from polycorner.motion.engine.crowds import CROWD, TOLERATED
+from polycorner.motion.noise import Solver
+from polycorner.motion.simulation import simulate, start
+from tests.motion.engine.inclusion import residuals
+
+SIDE, MU, DT = 22, 0.3, 5e-3
+TRAY = {
+    "floor": HalfSpace([0, 1], [0, 0]),
+    "left": HalfSpace([1, 0.2], [0, 0]),
+    "right": HalfSpace([-1, 0.2], [2.2 * SIDE, 0]),
+}
+
+
+@cache
+def discs(gravity, friction, count):
+    """Return the system of discs in a tray."""
+    arrangement = Arrangement({"D": disc(1.0)}, TRAY, orientations="all")
+    return arrangement.system(gravity=[0, -gravity], friction=friction, count=count)
+
+
+def heap(friction=MU, **settings):
+    """Return the engine of discs that fall on each other."""
+    system = discs(10.0, friction, SIDE**2)
+    rows, columns = np.divmod(np.arange(SIDE**2), SIDE)
+    places = np.stack([1.6 + 2.01 * columns + rows % 2, 1.01 + 1.75 * rows], axis=-1)
+    state = system.state(np.column_stack([places, 0 * rows]))
+    return start(system, state, DT, solver=Solver(tolerance=1e-4, **settings))
+
+
+def crowds(engine):
+    """Return the blocks of every crowd of the last step."""
+    starts = engine.work.island_start
+    roots = np.flatnonzero(np.diff(starts) > CROWD)
+    return [engine.work.order[starts[i] : starts[i + 1]] for i in roots]
+
+
+@pytest.mark.parametrize("sweeps", [0, 6])
+def test_any_number_of_threads_makes_the_same_motion(sweeps):
+    steps = 60 if sweeps else 10  # before there is a single island
+    single, several = (heap(crowd_sweeps=sweeps, threads=n) for n in (1, 3))
+    for engine in (single, several):
+        engine.advance(steps)
+    if sweeps:
+        assert crowds(single)
+        assert single.work.strips[0] > 4
+    else:
+        assert (np.diff(single.work.island_start) > 0).sum() > 4
+    for name, array in single.save().items():
+        np.testing.assert_array_equal(several.save()[name], array, err_msg=name)
+
+
+def test_a_run_goes_on_with_another_number_of_threads(tmp_path):
+    system, state = discs(10.0, MU, 9), np.zeros((9, 3))
+    state[:, 0], state[:, 1] = 2.0 + 2.5 * np.arange(9), 1.5
+    begun = system.state(state)
+
+    def stop(done, _total, _note):
+        if done > 0.2:
+            raise KeyboardInterrupt
+
+    whole = simulate(system, begun, 0.5, 1e-2, solver=Solver(threads=2))
+    with pytest.raises(KeyboardInterrupt):
+        simulate(system, begun, 0.5, 1e-2, checkpoint=Checkpoint(tmp_path), progress=stop, every=1)
+    rest = simulate(
+        system, begun, 0.5, 1e-2, solver=Solver(threads=2), checkpoint=Checkpoint(tmp_path), every=1
+    )
+    np.testing.assert_array_equal(rest.q[-1], whole.q[-1])
+
+
+def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told():
+    engine, met = heap(crowd_sweeps=6), 0
+    for _ in range(80):
+        engine.motion.sums[4] = 0.0  # the residual, of all steps before
+        engine.advance(1)
+        work, blocks = engine.work, crowds(engine)
+        if len(blocks) != 1:
+            continue
+        (blocks,) = blocks
+        found, v = residuals(work, blocks, MU)
+        bodies = np.unique(work.block_bodies[blocks])
+        moved = bodies[(bodies >= 0) & ~engine.motion.rests[bodies].astype(bool)]
+        np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-9 * abs(v).max())
+        normal, rubs = work.impulse[blocks, 0], work.pressing[blocks] >= 0
+        limit = MU * work.impulse[work.pressing[blocks[rubs]], 0]
+        assert (normal[~rubs] >= 0).all()
+        assert (abs(normal[rubs]) <= limit * (1 + 1e-12)).all()
+        speed = abs(work.free[blocks] + work.offset[blocks])
+        speed[work.block_rows[blocks] < 2, 1] = 0.0
+        assert engine.effort.residual == pytest.approx(found.max() / speed.max(), rel=1e-6)
+        met += 1
+    assert met > 20
+
+
+def test_more_sweeps_come_nearer_to_the_solution():
+    """Without friction a step is a convex problem, to which sweeps converge."""
+    begun = heap(friction=0.0, crowd_sweeps=20)
+    begun.advance(60)
+    left = []
+    for sweeps in (10, 1000, 10000):
+        engine = heap(friction=0.0, crowd_sweeps=sweeps)
+        engine.load({name: array.copy() for name, array in begun.save().items()})
+        engine.motion.sums[4] = 0.0
+        engine.advance(1)
+        assert crowds(engine)
+        left.append(engine.effort.residual)
+    assert left[1] < 0.1 * left[0]
+    assert left[2] < 1e-10
+
+
+def test_discs_that_overlap_are_moved_apart_and_keep_their_velocities():
+    """A lattice that flies, pressed together across: nothing acts on it but the correction."""
+    count, width = 800, 4
+    system = discs(0.0, 0.0, count)
+    rows, columns = np.divmod(np.arange(count), width)
+    places = np.column_stack([10 + 2.0 * columns, 10 + 2.0 * rows, 0 * rows])
+    velocity = np.broadcast_to([0.5, 0.0, 0.0], places.shape)
+    engine = start(system, system.state(places, velocity), DT, solver=Solver(crowd_sweeps=3))
+    engine.motion.q[:, 0] = 10 + 0.99 * (places[:, 0] - 10)
+    engine.advance(1)
+    assert crowds(engine)
+    engine.advance(300)
+    near = cKDTree(engine.motion.q[:, :2]).query_pairs(2.0, output_type="ndarray")
+    apart = np.linalg.norm(np.diff(engine.motion.q[near, :2], axis=1)[:, 0], axis=1)
+    assert 2.0 - apart.min() < 1.1 * TOLERATED * engine.model.gap_unit
+    np.testing.assert_array_equal(engine.motion.v, velocity)
