@@ -1,12 +1,12 @@
 """Rigid dumbbells in space in motion: sixty in a turning drum beside MuJoCo, several on a floor.
 
-In the drum, steps of a millisecond of three kinds of motion: *rows* side by side that the drum
-carries, *falling* into it, and in the *heap* they then are.  Every round repeats the same steps
-from the same state, which each engine has reached by itself.  Overlaps are those of the exact
-shapes at the ends of steps, also for MuJoCo's drum of boxes.  MuJoCo's cost is also given for a
-drum of half as many boxes (faster, coarser), and for friction that is as soft as MuJoCo's default
-(faster, bodies at rest creep).  The clock is that of the processor; each engine has one thread.
-``--scenes`` and ``--rounds`` make shorter runs.
+In the drum, steps of a millisecond of four kinds of motion: *rows* side by side that the drum
+carries, *falling* into it, in the *heap* they then are, and in a *bunch* on its bottom.  Every
+round repeats the same steps from the same state, which each engine has reached by itself.  Overlaps
+are those of the exact shapes at the ends of steps, also for MuJoCo's drum of boxes.  MuJoCo's cost
+is also given for a drum of half as many boxes (faster, coarser), and for friction that is as soft
+as MuJoCo's default (faster, bodies at rest creep).  The clock is that of the processor; each engine
+has one thread.  ``--scenes`` and ``--rounds`` make shorter runs.
 """
 
 import argparse
@@ -26,6 +26,7 @@ from bodies_in_drum import (
     TOLERANCE,
     Motion,
     PolycornerMotion,
+    bunch_of,
     deepest_overlap,
     dumbbell,
     heap_of,
@@ -63,6 +64,7 @@ SCENES = {
     "rows": Scene(rows_of, 0, 500),
     "falling": Scene(heap_of, 0, 100),
     "heap": Scene(heap_of, 100, 200),
+    "bunch": Scene(bunch_of, 500, 700),
 }
 
 

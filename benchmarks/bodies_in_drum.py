@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from polycorner import System
 from polycorner.bodies import Arrangement, Body, Cylinder, capsule, compound, sphere
+from polycorner.dumbbells import DumbbellDrum, RigidDumbbells
+from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import start as started
 from polycorner.spaces.manifold import Array
@@ -73,6 +75,12 @@ def heap_of(count: int) -> Array:
     places = np.stack([23.0 * (x - 2), 23.0 * (y - 1), 23.0 * layer - 100], axis=-1)
     turns = Rotation.random(count, random_state=rng)
     return np.array([drum().point({"D": at}) for at in zip(places, turns, strict=True)])
+
+
+def bunch_of(count: int) -> Array:
+    """Return dumbbells scattered at the bottom, both balls of each on the drum, ``(count, 7)``."""
+    lying = DumbbellDrum(LENGTH, BALL, ROD, RADIUS, count=count)
+    return RigidDumbbells(lying).state(bunch(lying, np.random.default_rng(0))).q
 
 
 def deepest_overlap(placements: Array) -> float:

@@ -31,7 +31,6 @@ from polycorner.formulas.bundles import Call
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.mechanics import MechanicalSystem, State
-from polycorner.motion.noise import Solver
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
 
 GRAVITY = 9806.65  # mm/s^2
 FREE_FALL = 0.1  # part of the rod radius by which a ball may fall within one step
-PILES = Solver(tolerance=1e-4, sweeps=62)  # default for more than two dumbbells
 RESOLVED = 0.1  # part of the shortest period of shaking that a step may last
 OVERLAP = 1e-6  # mm up to which a start counts as touching
 
@@ -205,15 +203,6 @@ class DumbbellDrum(MechanicalSystem):
             float(self.restitution),
             reach,
         )
-
-    @property
-    def solver(self) -> Solver:
-        """How exactly steps are solved by default.
-
-        To 1e-8 of the speeds, and to 1e-4 with at most 62 sweeps for more than two dumbbells: in
-        a heap a slip of 1e-4 of the drum's speed is 2 mm in four hours.
-        """
-        return Solver() if self.count <= 2 else PILES
 
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return the time in which gravity moves a ball by a tenth of the rod radius.

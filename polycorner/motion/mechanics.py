@@ -12,6 +12,7 @@ from polycorner.motion.noise import Solver
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
+PILES = Solver(tolerance=1e-4, sweeps=62)  # default for more than two bodies
 OVERLAP = 1e-4  # scaled depth up to which a start counts as touching: what a step may leave
 
 
@@ -79,5 +80,10 @@ class MechanicalSystem(Value, ABC):
 
     @property
     def solver(self) -> Solver:
-        """How exactly steps are solved unless something else is asked for."""
-        return Solver()
+        """How exactly steps are solved unless something else is asked for.
+
+        To 1e-8 of the speeds, and to 1e-4 with at most 62 sweeps for more than two bodies: errors
+        of a step are errors of its velocities, not of what holds a pile, and a slip of 1e-4 of the
+        speed of a drum's wall is 2 mm in four hours.
+        """
+        return Solver() if self.bodies.count <= 2 else PILES

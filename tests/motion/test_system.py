@@ -319,3 +319,10 @@ def test_the_callers_arrays_stay_their_own():
     q[:] = 0
     np.testing.assert_array_equal(state.q, START)
     assert SPINNING.dimension == 3
+
+
+@pytest.mark.parametrize(("count", "tolerance"), [(1, 1e-8), (2, 1e-8), (3, 1e-4)])
+def test_piles_are_solved_to_four_digits_unless_asked_for_more(count, tolerance):
+    """Both a system of SymPy formulas and one with formulas of its own."""
+    discs = replace(rubbing_discs(Interval(0.5)), count=count)
+    assert discs.solver.tolerance == DumbbellDrum(count=count).solver.tolerance == tolerance

@@ -195,7 +195,7 @@ def run_film(
     shots = [_Shot.of(run, k, balls) for k, balls in zip(chosen, centres, strict=True)]
     return Film(
         title,
-        _described(drum),
+        described(drum),
         drum.pair,
         np.asarray(path.times[chosen]),
         "s",
@@ -212,7 +212,8 @@ def run_film(
     )
 
 
-def _described(drum: DumbbellDrum) -> str:
+def described(drum: DumbbellDrum) -> str:
+    """Return a sentence on a drum and what is in it."""
     r, t = drum.ball_radius, drum.rod_radius
     return (
         f"{drum.count} of l = {drum.length:g}, r = {r:g}, t = {t:g} mm in a drum of radius "

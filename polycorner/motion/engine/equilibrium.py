@@ -15,90 +15,25 @@ from polycorner.motion.engine.island_matrix import (
     solve_island_matrix,
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import TOUCHING
-from polycorner.motion.engine.rest import REST_FACTOR
-from polycorner.motion.engine.rows import (
-    add_row,
-    copy_velocity,
-    load_on,
-    row_times,
-    velocity_of,
+from polycorner.motion.engine.resting_start import (
+    BALANCE_TOLERANCE,
+    TARGET_PRESSURE,
+    contacts_remain,
+    find_interior_start,
+    imbalance,
+    still_balance,
 )
+from polycorner.motion.engine.rows import add_row, copy_velocity, load_on, row_times
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
 from polycorner.motion.engine.signals import increase
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import load
 
-TARGET_PRESSURE = 0.2  # n_0, as a share of the impulse that would stop a body
-START_MARGIN = 0.1  # relative distance from the boundary of the sets at the start
 INTERIOR_MARGIN = 1e-9  # relative distance from the boundary kept by all iterates
-BALANCE_TOLERANCE = 1e-1  # of the solver's tolerance, to which forces balance
 MAX_INTERIOR_STEPS = 25
-CENTRING_STEPS = 2  # steps taken once forces balance
+CENTRING_STEPS = 2  # steps taken once forces balance, unless they nearly did at the start:
+NEARLY_BALANCED = 10.0  # times the solver's tolerance
 REGULARISATION = 1e-13  # weight of the mass matrix, relative to the stiffest block
-
-
-@compiled
-def find_interior_start(model, work, first, last, speed, goal):
-    """Find impulses in the interior of their sets; return whether rest is possible.
-
-    ``work.carries`` gets which blocks can carry load at rest: those of contacts that neither open
-    nor close, where gaps below ``TOUCHING`` count as zero.  None may slip or have to open.  Bounds
-    close to what rest requires are moved there, whatever the outcome: otherwise piles missed the
-    tolerance a third more often, and one jam twitched for seconds.
-    """
-    u, out = work.slip, work.image
-    for s in range(first, last):
-        b = work.order[s]
-        pressing, shape = work.pressing[b], work.block_set[b]
-        velocity_of(model, work, b, work.v_rest, u)
-        if work.block_rows[b] == 0:
-            near = REST_FACTOR * goal
-            if not work.bilateral[b]:
-                near = max(near, TOUCHING * model.gap_unit / model.step)
-            if u[0] < -near:
-                return False
-            work.carries[b] = 0.0
-            if u[0] <= near:  # closed
-                work.carries[b] = 1.0
-                work.offset[b, 0] -= u[0]
-            least = TARGET_PRESSURE * work.delassus[b, 3] * speed
-            if work.bilateral[b]:
-                if u[0] > REST_FACTOR * goal:
-                    return False
-                work.impulse[b, 0] = np.copysign(
-                    max(abs(work.impulse[b, 0]), least), work.impulse[b, 0]
-                )
-                continue
-            work.impulse[b, 0] = max(work.impulse[b, 0], least) * work.carries[b]
-            continue
-        work.carries[b] = 1.0
-        if pressing >= 0:
-            work.carries[b] = work.carries[pressing]
-        if work.carries[b] == 0.0:
-            work.impulse[b, 0], work.impulse[b, 1] = 0.0, 0.0
-            continue
-        if abs(u[0]) > REST_FACTOR * goal or (
-            work.block_rows[b] == 2 and abs(u[1]) > REST_FACTOR * goal
-        ):
-            return False
-        load = load_on(work, b)
-        if model.set_kinds[shape] == INTERVAL or work.block_rows[b] == 1:
-            work.impulse[b, 1] = 0.0
-        tries = 0
-        while not contains(
-            model, shape, work.impulse[b, 0], work.impulse[b, 1], load, -START_MARGIN
-        ):
-            tries += 1
-            share = 0.8 if tries < 20 else 0.0
-            work.impulse[b, 0] *= share
-            work.impulse[b, 1] *= share
-            if tries > 20:
-                return False
-        barrier(model, shape, load, work.impulse[b, 0], work.impulse[b, 1], out)
-        if not (load > 0.0 and out[6] < np.inf):  # no interior
-            return False
-    return True
 
 
 @compiled
@@ -247,33 +182,15 @@ def in_interior(model, work, first, last, share):
 @compiled
 def interior_point_steps(model, state, work, first, last, n, speed, goal):
     """Take interior-point steps to balance and centrality; return whether forces balance."""
-    k, K = model.dimension, model.lanes
-    x, p, best = work.island_vector, work.impulse, work.best
-    balanced_for, stuck = 0, 0
-    for _ in range(MAX_INTERIOR_STEPS):
-        far = 0.0
-        for at in range(n):
-            i = work.members[at]
-            for c in range(k):
-                value = 0.0
-                for a in range(k):
-                    value += work.mass[i, c, a] * (work.v_rest[i, a] - work.v_free[i, a])
-                x[at * K + c] = value
-            for c in range(k, K):
-                x[at * K + c] = 0.0
-        for s in range(first, last):
-            b = work.order[s]
-            add_transposed(model, work, b, -p[b, 0], -p[b, 1], x)
-        for at in range(n):
-            i = work.members[at]
-            for c in range(k):
-                value = 0.0
-                for a in range(k):
-                    value += work.inverse_mass[i, c, a] * x[at * K + a]
-                far = max(far, abs(value) * model.units[c])
+    p, best = work.impulse, work.best
+    balanced_for, stuck, more = 0, 0, CENTRING_STEPS
+    for trial in range(MAX_INTERIOR_STEPS):
+        far = imbalance(model, work, first, last, n)
+        if trial == 0 and far <= NEARLY_BALANCED * goal:
+            more = 0
         if far <= BALANCE_TOLERANCE * goal:
             balanced_for += 1
-        if balanced_for > CENTRING_STEPS:
+        if balanced_for > more:
             return True
         assemble_interior(model, work, first, last, n, speed)
         if not solve_island_matrix(model, work, n):
@@ -320,8 +237,10 @@ def find_equilibrium(model, state, work, first, last, speed):
     goal = model.tolerance * speed
     copy_impulses(work, first, last, work.impulse, work.initial)
     proved = False
-    if find_interior_start(model, work, first, last, speed, goal):
-        proved = interior_point_steps(model, state, work, first, last, n, speed, goal)
+    if contacts_remain(model, work, first, last, goal):
+        proved = still_balance(model, work, first, last, n, goal)
+        if not proved and find_interior_start(model, work, first, last, speed):
+            proved = interior_point_steps(model, state, work, first, last, n, speed, goal)
     if not proved:
         copy_impulses(work, first, last, work.initial, work.impulse)
         return False

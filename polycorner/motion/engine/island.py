@@ -35,7 +35,7 @@ SLOW = 1e-4  # of the speeds that forces give: bodies that may be at rest
 
 
 @compiled
-def iterate(model, state, work, first, last, speed, sweeps, again):
+def iterate(model, state, work, first, last, speed, again, may_rest):
     """Solve an island by rounds of Gauss-Seidel sweeps and Newton steps; return the residual.
 
     Small islands, which cost little, are solved more exactly than asked, and begin with Newton
@@ -44,9 +44,9 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
     closed gaps are left as they are: contacts that stick in closed loops cannot correct all of
     them, and would jam.  Where the next does not do either, the island is given up if its step may
     be divided, which costs less unless it is large; if not, the solution is continued from that of
-    simpler problems.  After that contacts are made softer from round to round, and hard again.  It
-    ends when the residual has reached its goal, when ``sweeps`` are done, or when a cycle of rounds
-    has not halved the residual.
+    simpler problems.  Before, an island that may rest is asked whether it can.  After that contacts
+    are made softer from round to round, and hard again.  It ends when the residual has reached its
+    goal, when ``model.sweeps`` are done, or when a cycle of rounds has not halved the residual.
     """
     goal, worst = model.tolerance * speed, np.inf
     n = number_bodies(model, work, first, last)
@@ -58,7 +58,7 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
         return worst
     hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
     rounds, done, former = 0, 0, np.inf
-    while rounds == 0 or (worst > goal and done < sweeps):
+    while rounds == 0 or (worst > goal and done < model.sweeps):
         if rounds == 1:
             leave_errors(work, first, last)
         if not direct or rounds > 0:
@@ -76,6 +76,9 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             increase(state.counts, NEWTON_STEPS, steps)
             if worst > goal and rounds == 1:
+                if may_rest and rests(model, state, work, first, last, speed):
+                    worst = residual(model, work, first, last, 0.0)
+                    break
                 if work.remedy[0] == DIVIDED and last - first <= MANY:
                     break
                 worst = continue_island(model, state, work, first, last, n, goal, hard)
@@ -91,7 +94,7 @@ def iterate(model, state, work, first, last, speed, sweeps, again):
 
 
 @compiled
-def solve_acting(model, state, work, first, last, speed, again):
+def solve_acting(model, state, work, first, last, speed, again, may_rest):
     """Solve an island for the blocks that may act; return the residual.
 
     In a heap most contacts remain open.  Those that do not press and will not have used up most of
@@ -104,7 +107,7 @@ def solve_acting(model, state, work, first, last, speed, again):
     while True:
         worst, before = 0.0, acting
         if acting > first:
-            worst = iterate(model, state, work, first, acting, speed, model.sweeps, again)
+            worst = iterate(model, state, work, first, acting, speed, again, may_rest)
         for s in range(before, last):
             b = work.order[s]
             velocity_of(model, work, b, work.v_new, work.after[b])
@@ -226,17 +229,11 @@ def solve_island(model, state, work, first, last, again):
     if at_rest and rests(model, state, work, first, last, speed):
         return residual(model, work, first, last, 0.0) / speed
     while True:
-        worst = solve_acting(model, state, work, first, last, speed, again)
+        worst = solve_acting(model, state, work, first, last, speed, again, not at_rest)
         if worst > model.tolerance * speed or not switch_reversed_slips(
             model, state, work, first, last
         ):
             break
-    if (
-        worst > model.tolerance * speed
-        and not at_rest
-        and rests(model, state, work, first, last, speed)
-    ):
-        worst = residual(model, work, first, last, 0.0)
     solved = worst <= model.tolerance * speed
     if keeps_grip(model, state, work, first, last, speed, solved):
         worst = residual(model, work, first, last, 0.0)
@@ -258,14 +255,15 @@ def rests(model, state, work, first, last, speed):
                 continue
             for c in range(k):
                 v[i, c] = state.v[i, c]
-            if state.rests[i] and not keeps_contacts(model, work, state.normal, i, state.v[i]):
-                return False  # the velocity of rest changes from place to place
-            if not work.awake[i] or state.rests[i]:
+            if not work.awake[i]:
+                continue
+            if state.rests[i] and keeps_contacts(model, work, state.normal, i, state.v[i]):
                 continue
             if not find_rest_velocity(model, work, state.normal, i, rest):
                 return False
             for c in range(k):
-                if abs(work.v_new[i, c] - rest[c]) * model.units[c] > SLOW * speed:
+                far = abs(work.v_new[i, c] - rest[c]) * model.units[c]
+                if not state.rests[i] and far > SLOW * speed:
                     return False
                 v[i, c] = rest[c]
     return find_equilibrium(model, state, work, first, last, speed)

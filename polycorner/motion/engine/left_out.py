@@ -142,6 +142,7 @@ def body_misses(model, state, work, i, h):
     was a whole step.
     """
     deep, unit = 2.0 * CURVATURE_DEPTH * model.gap_unit, model.gap_unit
+    missed = h * model.tolerance * work.island_speed[i]
     for c in range(model.dimension):
         work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
     evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
@@ -150,7 +151,7 @@ def body_misses(model, state, work, i, h):
     for g in range(model.restitution.size):
         f, following = work.gap[i, g], work.gap_next[i, g]
         if state.touches[i, g]:
-            if following < min(-deep, f) or (g >= model.unilateral and following > deep):
+            if following < min(-deep, f - missed) or (g >= model.unilateral and following > deep):
                 return True
             continue
         rate = rate_of(model, work.gradient, work.v_new, i, g)

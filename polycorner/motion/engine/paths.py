@@ -184,6 +184,7 @@ def acceptable_length(model, state, work, h, out):
 def acceptable_to(model, state, work, i, j, h, out):
     """Return how long a part of a step may be for the gaps of a body or of a pair."""
     deep, length, sunk = 2.0 * CURVATURE_DEPTH * model.gap_unit, h, False
+    missed = h * model.tolerance * work.island_speed[i]  # shorter parts miss no less
     look_ahead(model, state, work, i, j, h)
     for g in range(model.restitution.size if j < 0 else model.pair_gaps):
         if j < 0:
@@ -195,7 +196,7 @@ def acceptable_to(model, state, work, i, j, h, out):
             length = min(length, first_in_gap(model, state, work, i, j, g, acting, h, out))
         if acting:
             following = work.way_gap[FULL, g]
-            sunk = sunk or following < min(-deep, work.way_gap[NEXT, g])
+            sunk = sunk or following < min(-deep, work.way_gap[NEXT, g] - missed)
             sunk = sunk or (j < 0 and g >= model.unilateral and following > deep)
     if sunk and h > SHORTEST_PART * model.step:
         length = min(length, 0.5 * h)

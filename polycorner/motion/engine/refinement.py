@@ -131,7 +131,7 @@ def refine(model, state, work, log, root, index, count):
             length = max(length, INSTANT * H)
             if length >= h:
                 break
-            h = length
+            h, halved = length, length == 0.5 * h
         state.sums[RESIDUAL] = max(state.sums[RESIDUAL], worst)
         if worst > model.tolerance:
             state.counts[UNSOLVED] += 1

@@ -1,0 +1,104 @@
+"""Sixty rigid dumbbells in the drum for twenty minutes: who leaves, and with which hand.
+
+Starts are followed side by side, one on each worker.  Each saves its state every 30 s in a folder
+of its own, so that the same command goes on with what was stopped; with ``--seconds`` the program
+stops by itself.  Figures are those of what was simulated so far.
+"""
+
+import argparse
+import os
+import signal
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from side_by_side import print_table, write
+
+from polycorner import checks
+from polycorner.dumbbells import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import drum_for_bunch
+from polycorner.dumbbells.dynamics.bunch_in_space import (
+    BunchInSpaceRun,
+    follow_in_space,
+    kicks_of_centres,
+)
+from polycorner.dumbbells.pictures.film_in_space import film_in_space
+from polycorner.dumbbells.viewer.page import film_page, write_page
+from polycorner.motion import Checkpoint, Noise
+
+SAVE = 30.0  # s
+KICK_TIME = 0.003  # s, for which a kick is held
+SHARES = 10  # instants at which dumbbells off the drum are counted
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--starts", type=int, default=2, help="how many, from --first on")
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--kicks", type=float, nargs="+", default=[0.0], help="mm/s per sqrt(s)")
+    parser.add_argument("--count", type=int, default=60, help="dumbbells")
+    parser.add_argument("--top", type=float, default=150.0, help="length of the drum, mm")
+    parser.add_argument("--duration", type=float, default=1200.0, help="s")
+    parser.add_argument("--dt", type=float, default=2e-3, help="s")
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--seconds", type=float, default=0.0, help="of real time; 0: to the end")
+    parser.add_argument("--films", action="store_true", help="write a page for each start, too")
+    parser.add_argument("--out", type=Path, default=Path("out/drum_in_space"))
+    options = parser.parse_args(arguments)
+    checks.whole("--starts", options.starts, least=1)
+    checks.real("--seconds", options.seconds, least=0)
+    starts = range(options.first, options.first + options.starts)
+    points = [(start, kicks) for kicks, start in product(options.kicks, starts)]
+    work = partial(followed, options)
+    with ProcessPoolExecutor(options.workers) as pool:
+        rows = list(pool.map(work, points))
+    print_table(f"{options.count} dumbbells in space", list(rows[0]), [[*r.values()] for r in rows])
+    write("drum_in_space", {"settings": vars(options) | {"out": None}, "runs": rows})
+
+
+def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str, Any]:
+    """Follow one start, or go on with it; return its figures."""
+    start, kicks = point
+    folder = options.out / f"kicks-{kicks:g}-start-{start}"
+    timer = threading.Timer(options.seconds, signal.raise_signal, [signal.SIGINT])
+    if options.seconds:
+        timer.daemon = True
+        timer.start()
+    drum = drum_for_bunch(DumbbellDrum(), count=options.count, top=options.top)
+    run = follow_in_space(
+        drum,
+        options.duration,
+        start=start,
+        noise=Noise(kicks=kicks_of_centres(drum, kicks), kick_time=KICK_TIME, seed=start),
+        dt=options.dt,
+        checkpoint=Checkpoint(folder, seconds=SAVE),
+    )
+    timer.cancel()
+    if options.films:
+        write_page(film_page(film_in_space(run)), folder.parent / f"{folder.name}.html")
+    return {"start": start, "kicks": kicks, **figures(run)}
+
+
+def figures(run: BunchInSpaceRun) -> dict[str, Any]:
+    """Return who left and who is where, and how well the motion was solved."""
+    path, census = run.trajectory, run.census(-1)
+    climbed = run.climbed[:: max(1, len(run.times) // SHARES)]
+    return {
+        "s": round(float(run.times[-1]), 1),
+        "left": len(run.exits),
+        **{f"left {kind}": number for kind, number in run.exit_counts().items()},
+        **{f"in {kind}" if kind in {"right", "left"} else kind: n for kind, n in census.items()},
+        "off the drum, mean": round(float(climbed.mean()), 1),
+        "highest, mm": round(float(run.q[..., 1].max()), 1),
+        "overlap, mm": float(f"{path.max_penetration:.2g}"),
+        "unsolved": path.effort.unconverged,
+        "islands": path.effort.islands,
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""A bunch of rigid dumbbells in the drum, free to lift and to climb on each other.
+
+The experiment of [GMBN] sec. 3.2 once more, with :class:`~polycorner.dumbbells.RigidDumbbells` in
+place of dumbbells that lie on a developed drum.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.checks import real, refuse
+from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.dynamics.bunch import BunchRun, scattered
+from polycorner.dumbbells.dynamics.pairs import Handed
+from polycorner.dumbbells.rigid import RigidDumbbells
+from polycorner.motion.checkpoints import Checkpoint
+from polycorner.motion.noise import Noise
+from polycorner.motion.simulation import simulate
+from polycorner.progress import Progress
+from polycorner.spaces.manifold import Array
+
+LAYER = 1.0  # of a ball's radius: dumbbells that are lifted less lie on the drum
+
+
+@dataclass(frozen=True, eq=False)
+class BunchInSpaceRun(BunchRun):
+    """Analysis of the trajectory of a bunch of rigid dumbbells.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        Of rigid dumbbells.
+    rigid : RigidDumbbells
+        What moves.
+    """
+
+    rigid: RigidDumbbells
+
+    @property
+    def drum(self) -> DumbbellDrum:
+        """The drum."""
+        return self.rigid.drum
+
+    @cached_property
+    def q(self) -> Array:
+        """Placements ``phi, eta, theta`` as seen from the axis, ``(T, N, 3)``."""
+        return self.rigid.placements(self.trajectory.q)
+
+    @cached_property
+    def lifts(self) -> Array:
+        """Distances of the farther ball of each dumbbell from the drum, ``(T, N)``, in mm."""
+        return self.rigid.lifts(self.trajectory.q)
+
+    @property
+    def climbed(self) -> Array:
+        """How many dumbbells in the drum do not lie on it, ``(T,)``."""
+        return np.asarray((self.present & ~self._on_drum).sum(axis=1))
+
+    @property
+    def _on_drum(self) -> NDArray[np.bool_]:
+        return np.asarray(self.lifts <= LAYER * self.drum.ball_radius)
+
+    def dyads(self, index: int) -> list[Handed]:
+        """Return the dyads among dumbbells that lie on the drum; see :meth:`BunchRun.dyads`."""
+        lie = self._on_drum[index]
+        return [(i, j, hand) for i, j, hand in super().dyads(index) if lie[i] and lie[j]]
+
+
+def kicks_of_centres(drum: DumbbellDrum, strength: float) -> dict[str, float]:
+    """Return the kicks under which the velocity of a centre diffuses, across and along the drum.
+
+    Both components by ``strength``, in mm/s per sqrt(s); see :class:`~polycorner.Noise`.
+    """
+    size = real("strength", strength, least=0) * RigidDumbbells(drum).mass.mass
+    return {"xD": size, "yD": size}
+
+
+def follow_in_space(
+    drum: DumbbellDrum,
+    duration: float,
+    *,
+    start: int | Array = 0,
+    noise: Noise | None = None,
+    dt: float = 2e-3,
+    interval: float = 0.5,
+    progress: Progress | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> BunchInSpaceRun:
+    """Follow a bunch of rigid dumbbells for ``duration`` s.
+
+    Parameters
+    ----------
+    drum : DumbbellDrum
+        With a bottom, as of :func:`~polycorner.dumbbells.dynamics.bunch.drum_for_bunch`.
+    start : int or (count, 3) array, optional
+        The seed of a :func:`~polycorner.dumbbells.dynamics.bunch.scattered` start, or placements.
+    noise : Noise, optional
+        None by default.  Loads follow from the motion, so that there is no chatter.
+    dt, interval : float, optional
+        Step, and time between records, in s.
+    progress, checkpoint : optional
+        See :func:`~polycorner.motion.simulation.simulate`.
+    """
+    if not drum.floor:
+        refuse("drum", "one with a bottom, on which the bunch lies", "floor=False")
+    rigid = RigidDumbbells(drum)
+    q = start if isinstance(start, np.ndarray) else scattered(drum, np.random.default_rng(start))
+    path = simulate(
+        rigid.system, rigid.state(q), duration, dt,
+        every=max(1, round(interval / dt)), noise=noise, progress=progress, checkpoint=checkpoint,
+    )  # fmt: skip
+    return BunchInSpaceRun(path, rigid)
