@@ -1,6 +1,6 @@
 """What atlases and studies send to workers and get back, in bytes, and what they keep.
 
-Numbers of spheres are arguments, by default 6 7 8 9; ten take a minute, and 0.8 GiB.
+Numbers of spheres are arguments, by default 6 7 8 9; ten take a minute, and 0.4 GiB.
 """
 
 import os
@@ -38,13 +38,13 @@ class Weighing(Inline):
 
     Attributes
     ----------
-    calls : list of (int, int, int, float)
-        Of every call the bytes of its arguments without the shared value and of the shared value,
-        the bytes of its result, and the processor time in s.
+    calls : dict of lists of (int, int, int, float)
+        By function: of every call the bytes of its arguments without the shared value and of the
+        shared value, the bytes of its result, and the processor time in s.
     """
 
     def __init__(self) -> None:
-        self.calls: list[tuple[int, int, int, float]] = []
+        self.calls: dict[str, list[tuple[int, int, int, float]]] = {}
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
         """Compute a call and weigh it."""
@@ -53,21 +53,27 @@ class Weighing(Inline):
         taken = time.process_time() - before
         shared = sum(len(pickle.dumps(part)) for part in args if isinstance(part, Shared))
         sent = len(pickle.dumps((fn, args, kwargs))) - shared
-        self.calls.append((sent, shared, len(pickle.dumps(future.result())), taken))
+        call = (sent, shared, len(pickle.dumps(future.result())), taken)
+        self.calls.setdefault(fn.__name__, []).append(call)
         return future
 
-    def figures(self) -> dict[str, float]:
-        """Return what is to be told of all calls."""
-        sent, shared, back, seconds = zip(*self.calls, strict=True)
+    def figures(self, name: str) -> dict[str, float]:
+        """Return what is to be told of the calls of a function."""
+        sent, shared, back, seconds = zip(*self.calls[name], strict=True)
         return {
-            "tasks": len(self.calls),
-            "shared bytes": shared[0],
-            "bytes of a task": round(statistics.mean(sent)),
-            "bytes of a result": round(statistics.mean(back)),
-            "largest result": max(back),
-            "ms a task": round(1e3 * statistics.mean(seconds), 2),
-            "s of all tasks": round(sum(seconds), 2),
+            f"{name}: tasks": len(sent),
+            f"{name}: shared bytes": shared[0],
+            f"{name}: bytes of a task": round(statistics.mean(sent)),
+            f"{name}: bytes of a result": round(statistics.mean(back)),
+            f"{name}: largest result": max(back),
+            f"{name}: ms a task": round(1e3 * statistics.mean(seconds), 2),
+            f"{name}: s of all tasks": round(sum(seconds), 2),
         }
+
+    @property
+    def seconds(self) -> float:
+        """Processor time of all calls."""
+        return sum(call[-1] for calls in self.calls.values() for call in calls)
 
 
 def atlas(count: int, executor: Any) -> tuple[Skeleton, float]:
@@ -79,12 +85,12 @@ def atlas(count: int, executor: Any) -> tuple[Skeleton, float]:
 
 
 def of_atlas(count: int) -> dict[str, float]:
-    """Weigh the walks of an atlas, and its file."""
+    """Weigh the walks and vertex figures of an atlas, and its file."""
     scale = Weighing()
     found, taken = atlas(count, Workers(scale, lambda: 1))
-    figures = scale.figures()
+    figures = scale.figures("walked") | scale.figures("figured")
     # Weighing counts here.
-    figures["s of the process that searches"] = round(taken - figures["s of all tasks"], 2)
+    figures["s of the process that searches"] = round(taken - scale.seconds, 2)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "atlas.json"
         before = time.process_time()
@@ -105,11 +111,12 @@ def of_study() -> dict[str, float]:
         files = [path for path in store.rglob("*") if path.is_file()]
         kept = sum(path.stat().st_size for path in files)
     points = found["status"].size
-    sent, shared, back, seconds = (sum(column) for column in zip(*scale.calls, strict=True))
+    (calls,) = scale.calls.values()
+    sent, shared, back, seconds = (sum(column) for column in zip(*calls, strict=True))
     return {
         "points": points,
-        "batches": len(scale.calls),
-        "shared bytes of a batch": shared // len(scale.calls),
+        "batches": len(calls),
+        "shared bytes of a batch": shared // len(calls),
         "bytes sent a point": round(sent / points),
         "bytes of a result": round(back / points),
         "bytes stored a point": round(kept / points),

@@ -15,17 +15,15 @@ ATTEMPTS = 3  # how often workers may die while they compute the call whose resu
 
 
 class Lookahead:
-    """Calls of one function, a few in flight for each worker.
+    """Calls of functions, a few in flight for each worker.
 
     Parameters
     ----------
     workers : Workers
-    function : callable
-        Called in a worker; a module-level function.
     """
 
-    def __init__(self, workers: Workers, function: Callable[..., Any]) -> None:
-        self.workers, self.function = workers, function
+    def __init__(self, workers: Workers) -> None:
+        self.workers = workers
         self._calls: dict[Hashable, tuple[Future[Any], tuple[Any, ...]]] = {}
 
     @property
@@ -37,9 +35,10 @@ class Lookahead:
         """Whether a call was started whose result was not taken."""
         return key in self._calls
 
-    def start(self, key: Hashable, *arguments: Any) -> None:
-        """Start a call."""
-        self._calls[key] = (self._submitted(arguments), arguments)
+    def start(self, key: Hashable, function: Callable[..., Any], *arguments: Any) -> None:
+        """Start a call of a module-level function in a worker."""
+        call = (function, *arguments)
+        self._calls[key] = (self._submitted(call), call)
 
     def result(self, key: Hashable) -> Any:
         """Wait for a result and take it; calls that dying workers left are started anew.
@@ -74,23 +73,23 @@ class Lookahead:
         for key in list(self._calls):
             self.drop(key)
 
-    def _submitted(self, arguments: tuple[Any, ...]) -> "Future[Any]":
+    def _submitted(self, call: tuple[Any, ...]) -> "Future[Any]":
         try:
-            return self.workers.executor.submit(self.function, *arguments)
+            return self.workers.executor.submit(*call)
         except Exception as error:
             if not is_broken(error) or not self.workers.replace():
                 msg = f"executor: expected workers that answer; got {error!r}"
                 raise WorkersError(msg) from error
-        return self.workers.executor.submit(self.function, *arguments)
+        return self.workers.executor.submit(*call)
 
     def _renew(self, error: BaseException) -> None:
         """Replace a broken executor, and start again what it did not finish."""
         if is_broken(error) and not self.workers.replace():
             msg = f"executor: expected workers that answer; got {error!r}"
             raise WorkersError(msg) from error
-        for key, (future, arguments) in self._calls.items():
+        for key, (future, call) in self._calls.items():
             if not _is_finished(future) and (is_broken(error) or future.done()):
-                self._calls[key] = (self._submitted(arguments), arguments)
+                self._calls[key] = (self._submitted(call), call)
 
 
 def _is_finished(future: "Future[Any]") -> bool:

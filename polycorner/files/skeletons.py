@@ -13,6 +13,7 @@ from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
+from polycorner.skeletons.curves import Curve
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Crossing, Flag
@@ -21,7 +22,6 @@ from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.states import SearchState
-from polycorner.skeletons.tracing import Curve
 from polycorner.skeletons.walks import End
 
 KIND = Kind("skeleton", "save_skeleton", JSON)

@@ -1,9 +1,12 @@
 """Lengths of edges modulo the symmetry."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.skeletons.dependence import held_at
 from polycorner.skeletons.points import Quotient
 from polycorner.spaces.manifold import Array
 
@@ -32,15 +35,27 @@ def arc_length(quotient: Quotient, points: Array, rows: list[int]) -> float:
     points : (k, n) array
         Points of the curve in order; an arc between neighbours turns by less than a right angle.
     rows : list of int
-        Inequalities that vanish along it.
+        Inequalities that vanish along it; their gradients may have one relation.
 
     Notes
     -----
     An arc on which Newton's method fails counts with the length of its chord.
     """
+    middle = quotient.at(points[len(points) // 2])
+    kept = middle.basis(rows)
+    if len(kept) + len(middle.matrix([])) + 1 == len(middle.q):
+        return _length(quotient, points, kept)
+    starts = (held_at(quotient, q, frozenset(rows), kept) for q in points[:-1])
+    return sum(
+        _length(at.quotient, np.array(ends), at.kept)
+        for at, ends in zip(starts, pairwise(points), strict=True)
+    )
+
+
+def _length(quotient: Quotient, points: Array, rows: list[int]) -> float:
+    """Return the length of a curve on which given functions with independent gradients vanish."""
     from scipy.integrate import quad_vec
 
-    rows = quotient.at(points[len(points) // 2]).basis(rows)
     moved = np.diff(points, axis=0)
     arcs = _Arcs(quotient, points[:-1][moved.any(axis=1)], moved[moved.any(axis=1)], rows)
     length, _ = quad_vec(arcs.speed, 0.0, 1.0, epsabs=ERROR, epsrel=ERROR, quadrature="gk15")

@@ -3,15 +3,17 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
-from polycorner.polyhedra.symmetry import generators, renamed
+from polycorner.polyhedra.symmetry import generators
 from polycorner.skeletons.borders import Border, seeds_of
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import Flag
+from polycorner.skeletons.flags import Flag as NamedFlag
+from polycorner.skeletons.masks import Renaming, mask_of, positions_in
 from polycorner.skeletons.partitions import Partition
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
@@ -19,6 +21,10 @@ from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.vertex_figures import Ray, Sector
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
+
+# An edge or an apex, as in :data:`~polycorner.skeletons.flags.Flag`, and the functions that vanish
+# on a face beside it, as bits.
+Flag = tuple[str, Any, int]
 
 
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
@@ -58,7 +64,7 @@ def _whole(explorer: Explorer) -> bool:
         return False
     for record in explorer.records:
         figure = record.figure
-        flags = [(i, sector.active) for sector in figure.sectors for i in sector.rays]
+        flags = [(i, sector.held) for sector in figure.sectors for i in sector.rays]
         if max(Counter(flags).values(), default=0) > 1:
             return False
     return True
@@ -96,7 +102,7 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
         elif one in flags:
             broken.append(one)
     for crossing in explorer.crossings:
-        surface.join(crossing.start, crossing.stop)
+        surface.join(*(_masked(explorer, flag) for flag in (crossing.start, crossing.stop)))
     patches = _patches(explorer, flags)
     for flag, k in patches.items():
         surface.join(flag, next(other for other, j in patches.items() if j == k))
@@ -106,7 +112,7 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
         curves = _groups(boundary, group)
         faces.append(
             Face(
-                active=_ordered(explorer, group[0][2]),
+                active=tuple(explorer.polyhedron.names[i] for i in positions_in(group[0][2])),
                 boundary=tuple(
                     tuple(sorted({_edge_of(explorer, flag) for flag in curve} - {-1}))
                     for curve in curves
@@ -130,7 +136,7 @@ def _patches(explorer: Explorer, flags: Iterable[Flag]) -> dict[Flag, int]:
         if flag[0] == "apex":
             k, s = flag[1]
             sector = explorer.records[k].figure.sectors[s]
-            here = None if sector.sample is None else sector.sample
+            here = None if sector.sample is None else sector.sample.at(explorer.quotient)
             on = None if here is None else explorer.patch_at(here, sector.active)
             if on is not None:
                 found[flag] = on
@@ -156,19 +162,17 @@ def _border(explorer: Explorer, group: list[Flag], curves: int, patch: int | Non
     members, corners = set(group), []
     for k, record in enumerate(explorer.records):
         for sector in record.figure.sectors:
-            names = explorer.registry.names(sector.active)
             rays = sector.rays
-            if rays and ("half", (k, rays[0]), names) in members:
+            if rays and ("half", (k, rays[0]), mask_of(sector.held)) in members:
                 if record.figure.singular:
                     return None
                 first, last = (
                     _ray(record.figure.rays[i]) for i in (sector.rays[0], sector.rays[-1])
                 )
                 corners.append((first, last))
-    names = group[0][2]
     return Border(
         quotient=explorer.quotient,
-        active=frozenset(i for i, name in enumerate(explorer.polyhedron.names) if name in names),
+        active=frozenset(positions_in(group[0][2])),
         seeds=seeds_of([curve.points for curve in around]) if around else np.empty((0, 0)),
         edges=tuple((c.active, c.points, c.start is None) for c in around),
         corners=tuple(corners),
@@ -208,15 +212,16 @@ def _groups(sets: Partition, flags: Iterable[Flag]) -> list[list[Flag]]:
 def _flags(explorer: Explorer) -> Iterator[Flag]:
     for k, record in enumerate(explorer.records):
         for s, sector in enumerate(record.figure.sectors):
-            names = explorer.registry.names(sector.active)
+            face = mask_of(sector.held)
             for i in sector.rays:
-                yield ("half", (k, i), names)
-            if not sector.rays:
-                yield ("apex", (k, s), names)
+                yield ("half", (k, i), face)
+            # Modulo relabellings, a face around a corner is counted by edges that it has elsewhere.
+            if not sector.rays and not explorer.symmetry.relabels:
+                yield ("apex", (k, s), face)
     for k, curve in enumerate(explorer.curves):
         if curve.start is None:
-            for face in explorer.faces_beside(k):
-                yield explorer.flag(k, face)
+            for beside in explorer.faces_beside(k):
+                yield _masked(explorer, explorer.flag(k, beside))
 
 
 def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
@@ -226,10 +231,15 @@ def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
     beside = [_sectors_by_ray(record) for record in explorer.records]
     for curve in explorer.curves:
         if curve.start is not None:
+            along = Renaming(explorer.polyhedron.names, curve.relabelled)
             for sector in beside[curve.start[0]].get(curve.start[1], ()):
-                face = explorer.registry.names(sector.active)
-                stop: Flag = ("half", curve.stop, renamed(face, curve.relabelled))
-                yield ("half", curve.start, face), stop
+                face = mask_of(sector.held)
+                yield ("half", curve.start, face), ("half", curve.stop, along(face))
+
+
+def _masked(explorer: Explorer, flag: NamedFlag) -> Flag:
+    kind, where, names = flag
+    return kind, where, mask_of(map(explorer.polyhedron.names.index, names))
 
 
 def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
@@ -242,21 +252,22 @@ def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
 
 def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tuple[Flag, Flag]]:
     """Yield flags at one corner that one sector has, or that a relabelling exchanges."""
-    active = [explorer.registry.names(ray.active) for ray in record.figure.rays]
-    alike: dict[frozenset[str], list[int]] = {}
-    for i, names in enumerate(active):
-        alike.setdefault(names, []).append(i)
+    active = [mask_of(ray.active) for ray in record.figure.rays]
+    alike: dict[int, list[int]] = {}
+    for i, edge in enumerate(active):
+        alike.setdefault(edge, []).append(i)
     # What generators join, all products of them join as well.
-    changes = generators(record.stabiliser)
-    images = [[alike.get(renamed(names, p), []) for names in active] for p in changes]
+    names = explorer.polyhedron.names
+    changes = [Renaming(names, p) for p in generators(record.stabiliser)]
+    images = [[alike.get(change(edge), []) for edge in active] for change in changes]
     for sector in record.figure.sectors:
         if not sector.rays:
             continue
-        face = explorer.registry.names(sector.active)
+        face = mask_of(sector.held)
         first, last = sector.rays
         yield ("half", (k, first), face), ("half", (k, last), face)
-        for p, image in zip(changes, images, strict=True):
-            moved = renamed(face, p)
+        for change, image in zip(changes, images, strict=True):
+            moved = change(face)
             for ray in sector.rays:
                 for other in image[ray]:
                     yield ("half", (k, ray), face), ("half", (k, other), moved)

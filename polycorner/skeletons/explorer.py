@@ -11,15 +11,15 @@ import numpy as np
 
 from polycorner.lookahead import Lookahead
 from polycorner.progress import Progress, silent
+from polycorner.skeletons.curves import Curve
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.links import Link, singular_figure
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
-from polycorner.skeletons.remote_walks import walked
 from polycorner.skeletons.singularities import singular_point, singular_points
 from polycorner.skeletons.states import Budget, SearchState, copied
-from polycorner.skeletons.tracing import Curve, EdgeEnd
+from polycorner.skeletons.tracing import FIGURE
 from polycorner.skeletons.vertex_figures import Ray, faces_beside
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
@@ -90,24 +90,27 @@ class Explorer(Prober):
             rng=copy.deepcopy(self.rng),
         )
 
-    # --------------------------------------------------------------------------- order of the work
-
     def run(
         self, budget: Budget, progress: Progress, workers: Workers | None = None
     ) -> Completeness:
         """Work until nothing is left, budget or time is used up, or Ctrl-C.
 
         At least one edge, descent or crossing is done, however short the time.  Workers walk along
-        the edges that are pending; they are put together here, in the order in which they were
-        found, so that the result is the same for any workers.
+        the edges that are pending and compute vertex figures; they are put together here, in the
+        order in which they were found, so that the result is the same for any workers.
         """
-        self.lookahead = None if workers is None else Lookahead(workers, walked)
+        self.lookahead = None if workers is None else Lookahead(workers)
         try:
-            return self._worked(budget, progress)
+            complete = self._worked(budget, progress)
+            self.expand()
+        except KeyboardInterrupt:
+            complete = Completeness.INTERRUPTED
+            self.expand()
         finally:
             if self.lookahead is not None:
                 self.lookahead.close()
             self.lookahead = None
+        return complete
 
     def _worked(self, budget: Budget, progress: Progress) -> Completeness:
         deadline, first = monotonic() + budget.seconds, True
@@ -132,7 +135,9 @@ class Explorer(Prober):
         """
         edges, crossings, descents = len(self.curves) + budget, len(self.tried) + budget, budget
         while True:
-            if self.pending:
+            if self.pending and self.pending[0][1] == FIGURE:
+                self.expand(1)
+            elif self.pending:
                 if not self._is_traced(self.pending[0]):
                     yield len(self.curves) < edges, partial(self._trace, self.pending[0])
                 done = self.pending.popleft()
@@ -268,14 +273,14 @@ class Explorer(Prober):
             for face, ray in self.faces_beside(self._finished).items():
                 flag = self.flag(self._finished, face)
                 if flag not in self.tried:
-                    yield flag, ray.sample, ray.direction
+                    yield flag, ray.start(self.quotient), ray.direction
             self._finished += 1
         for k, record in enumerate(self.records):
             for i, sector in enumerate(record.figure.sectors):
-                flag = ("apex", (k, i), self.registry.names(sector.active))
+                flag = ("apex", (k, i), self.registry.names(sector.held))
                 if not sector.rays and sector.sample is not None and flag not in self.tried:
                     way = self.manifold.chord(sector.sample.q, record.point.q) / self.scales
-                    yield flag, sector.sample, way
+                    yield flag, sector.sample.at(self.quotient), way
 
     def faces_beside(self, k: int) -> Mapping[frozenset[int], Ray]:
         """Return the two-dimensional faces that meet an edge, and a ray into each."""
@@ -306,7 +311,7 @@ class Explorer(Prober):
         for q in curve.points[:: max(1, len(curve.points) // ACROSS)] if curve else ():
             for ray in faces_beside(self.quotient.at(q), curve.active if curve else face):
                 if ray.active == face:
-                    self._cross_along(start, ray.sample, ray.direction)
+                    self._cross_along(start, ray.start(self.quotient), ray.direction)
 
     def _cross_along(self, start: Flag, sample: HeldPoint, direction: Array) -> None:
         """Walk straight across a face and record the edge at the end; look for its apexes."""
@@ -328,17 +333,13 @@ class Explorer(Prober):
         edge = self._edge_at(walk.last, active)
         if edge is not None:
             names = self.registry.names(face)
-            self.crossings.append(Crossing(start, self._flag_of(edge, names)))
+            self.crossings.append(Crossing(start, (*edge, names)))
 
     def flag(self, k: int, face: frozenset[int]) -> Flag:
         """Return the flag of an edge and a face beside it."""
         start = self.curves[k].start
         names = self.registry.names(face)
         return ("half", start, names) if start is not None else ("curve", k, names)
-
-    @staticmethod
-    def _flag_of(edge: tuple[str, EdgeEnd | int], names: frozenset[str]) -> Flag:
-        return (edge[0], edge[1], names)
 
 
 def _searched(quotient: Quotient, starts: Sequence[Array]) -> Explorer:

@@ -1,40 +1,61 @@
-"""Folds: corners where the active gradients have one relation and leave one direction free.
+"""Folds: corners where the gradients of the functions that vanish have just one relation.
 
-Let ``f_1, ..., f_m`` be the active functions, ``sum w_i grad f_i = 0`` their only relation, ``d``
-the only direction along which all their slopes vanish, in the quotient, and ``Q`` the quadratic
-form ``sum w_i v' H_i v / 2``.  If ``Q(d)`` is not zero, say positive, then the values ``y_i`` of
-``f_i`` and a coordinate ``t`` along ``d`` satisfy, to leading order,
+Let ``f_1, ..., f_m`` be these functions, ``sum w_i grad f_i = 0`` the relation, ``d_1, ..., d_F``
+a basis of the *flaps*, the directions along which all their slopes vanish, in the quotient, and
+``Q`` the quadratic form ``sum w_i v' H_i v / 2``.  If ``Q`` is definite on the flaps, say positive,
+then the values ``y_i`` of ``f_i`` and coordinates ``t`` along the flaps satisfy, to leading order,
 
-    sum w_i y_i = t^2 + sum S_kl y_k y_l,
+    sum w_i y_i = Q(t) + sum S_kl y_k y_l,
 
 the sum on the right over the functions with ``w_k = w_l = 0``, and the set ``y >= 0`` is folded
-along ``w . y = 0`` ([AGV] sec. 1).  Where every ``S_kk`` is positive, only functions with positive
-weights open alone:
+along ``w . y = 0`` ([AGV] sec. 1).  Where every ``S_kk`` is at least zero, for one flap:
 
 | functions that open | signs of their weights | what leaves the corner |
 |---|---|---|
 | ``k`` | + | an edge for each sign of ``t`` |
+| ``k`` | 0, ``S_kk = 0`` | a dependent edge: ``t = 0``, and the relation persists along it |
+| ``k, l`` | 0, 0, ``S_kl = -sqrt(S_kk S_ll) < 0`` | a dependent edge along which both open |
 | ``j, k`` | +, + | for each sign of ``t`` a face between the edges of ``j`` and ``k`` |
-| ``j, k`` | +, 0 or - | a face between the two edges of ``j`` |
+| ``j, k`` | +, 0, ``S_kk = 0`` | the same, between an edge of ``j`` and that of ``k`` |
+| ``j, k`` | +, another | a face between the two edges of ``j`` |
+| ``k, l`` | 0, 0, ``S_kk = S_ll = 0 > S_kl`` | two faces between their edges |
+| ``k, l`` | 0, 0, ``S_kk = S_ll = 0 = S_kl`` | a dependent face between their edges |
+| ``k, l`` | 0, 0, ``S_kk = 0 < S_ll``, ``S_kl < 0`` | a face around the edge of ``k`` |
+| ``k, l`` | 0, 0, ``S_kl < -sqrt(S_kk S_ll) < 0`` | a face around the corner, with no edge |
 
-Clusters of spheres that are rigid to second order only are of this kind, and circles that touch.
-Where ``S_kk`` is zero, the relation persists while ``f_k`` opens: part of a cluster stays singular
-as the rest moves.  Such an edge is noted, not followed.  Two functions of weight zero with negative
-``S_kl`` may open on a face around the corner that no edge bounds: not sought.
+Equality is decided to second order.  A dependent edge that would be none to third order is none if
+the sum stays positive there, and noted otherwise.  With two flaps, opening a function of positive
+weight leaves a face around the corner, and with more a larger one.  So a corner with several flaps
+is an end of dependent edges only.  Clusters of spheres that are rigid to second order only are of
+these kinds, and circles that touch.
 """
 
+from collections.abc import Iterator
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows, null_space, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.skeletons.points import EvaluatedPoint, projected
-from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure, curvature
+from polycorner.skeletons.dependence import curvature, dependent_at
+from polycorner.skeletons.points import EvaluatedPoint, Sample, projected
+from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure
 from polycorner.spaces.manifold import Array
 
 # Distances in scale units at which the edges are looked for.
 DISTANCES = (3e-3, 1e-3, 3e-4)
+
+# Distance of held functions from zero, in scale units, up to which a relation persists.
+PERSISTS = 1e-11
+
+# Least eigenvalue of ``Q`` relative to the largest: at a cusp, which is known less exactly, a zero
+# one is not seen as zero.
+CLEAR = 1e-3
+
+# Functions that open along an edge, and the sign of ``t`` there.
+Opening = tuple[int, ...]
+Ends = tuple[Opening, int]
 
 
 def fold_figure(
@@ -51,84 +72,197 @@ def fold_figure(
     rank, full : int
         Rank of their gradients in the quotient, and its dimension.
     """
-    rows = sorted(active)
-    if point.quotient.polyhedron.is_union or len(rows) != full or rank != full - 1:
+    if point.quotient.polyhedron.is_union or len(active) != rank + 1 or rank == full:
         return None
-    frame = null_space(point.matrix([]), RANK_TOLERANCE)
-    held = Rows(unit_rows(point.gradients[rows]) @ frame, RANK_TOLERANCE)
-    weights, flex = held.relations[:, 0], held.null_space
-    weights = np.where(abs(weights) > RANK_TOLERANCE, weights, 0.0)
-    bend = float(curvature(point, rows, weights, flex)[0, 0])
-    if abs(bend) <= RANK_TOLERANCE:
-        return None
-    weights = weights * np.sign(bend)
-    persistent = _persistent(point, rows, held, weights)
-    if persistent is None:
+    fold = _Fold(point, sorted(active))
+    if not fold.is_definite:
         return None
     for distance in DISTANCES:
-        rays = _rays(point, rows, weights, frame @ flex[:, 0], distance)
+        rays = fold.rays(distance)
         if rays is not None:
-            sectors = _sectors(rows, weights, persistent)
-            return VertexFigure(rank, full, rays, sectors, _notes(point, rows, persistent))
+            return VertexFigure(rank, full, *fold.figure(rays, distance))
     return None
 
 
-def _persistent(
-    point: EvaluatedPoint, rows: list[int], held: Rows, weights: Array
-) -> set[int] | None:
-    """Return the functions of weight zero with ``S_kk = 0``, by position in ``rows``.
+def dependent_rays(point: EvaluatedPoint, active: frozenset[int]) -> Iterator[Ray]:
+    """Yield the rays of dependent edges on which two functions open, where there are no flaps.
 
-    None if some ``S_kk`` is negative.
+    The gradients have full rank and one relation, and ``sum w_i y_i = sum S_kl y_k y_l``.  Edges on
+    which one function of weight zero opens leave along extreme rays of the tangent cone; these do
+    not.
     """
-    free = np.flatnonzero(weights == 0)
-    directions = [held.null_space[:, 0], *(held.opening(int(k)) for k in free)]
-    form = curvature(point, rows, weights, np.transpose(directions))
-    own = np.diagonal(form)[1:] - form[0, 1:] ** 2 / form[0, 0]
-    if (own < -RANK_TOLERANCE).any():
-        return None
-    return set(free[own <= RANK_TOLERANCE].tolist())
+    for sign in (1.0, -1.0):
+        fold = _Fold(point, sorted(active), sign)
+        for pair in fold.pairs:
+            ray = fold.dependent_ray(pair, DISTANCES[0])[0]
+            if ray is not None:
+                yield ray
 
 
-def _notes(point: EvaluatedPoint, rows: list[int], persistent: set[int]) -> tuple[str, ...]:
-    every = point.quotient.polyhedron.names
-    names = ", ".join(every[i] for i in rows)
-    return tuple(
-        f"the edge that opens {every[rows[k]]} out of the singular corner {names} has dependent "
-        f"gradients: not followed"
-        for k in sorted(persistent)
-    )
+class _Fold:
+    """The weights of a relation, flaps and the form ``S``; functions by position in ``rows``.
 
-
-def _rays(
-    point: EvaluatedPoint, rows: list[int], weights: Array, flex: Array, distance: float
-) -> tuple[Ray, ...] | None:
-    """Return two rays for every positive weight, one after the other; None if one is not found."""
-    quotient = point.quotient
-    scales = quotient.polyhedron.manifold.scale_array
-    rays = []
-    for k in np.flatnonzero(weights > 0):
-        held = [row for row in rows if row != rows[k]]
-        for way in (flex, -flex):
-            sample = projected(quotient, point.q + distance * scales * way, held, distance / 2)
-            if sample is None or sample.active() != frozenset(held):
-                return None
-            rays.append(Ray(way, frozenset(held), sample, distance))
-    return tuple(rays)
-
-
-def _sectors(rows: list[int], weights: Array, persistent: set[int]) -> tuple[Sector, ...]:
-    """Return the sectors that no edge with dependent gradients bounds.
-
-    Their rays are counted as :func:`_rays` returns them.
+    The sign is such that the form is positive on the flaps; where there are none, it is given.
     """
-    opening = np.flatnonzero(weights > 0).tolist()
-    first = {k: 2 * i for i, k in enumerate(opening)}
-    sectors = []
-    for j, k in combinations(range(len(rows)), 2):
-        face = frozenset(rows).difference((rows[j], rows[k]))
-        ends = [first[i] for i in (j, k) if i in first]
-        if len(ends) == 2:
-            sectors += [Sector((ends[0] + side, ends[1] + side), face) for side in (0, 1)]
-        elif ends and not persistent.intersection((j, k)):
-            sectors.append(Sector((ends[0], ends[0] + 1), face))
-    return tuple(sectors)
+
+    def __init__(self, point: EvaluatedPoint, rows: list[int], sign: float = 1.0) -> None:
+        self.point, self.rows = point, rows
+        self.scales = point.quotient.polyhedron.manifold.scale_array
+        frame = null_space(point.matrix([]), RANK_TOLERANCE)
+        held = Rows(unit_rows(point.gradients[rows]) @ frame, RANK_TOLERANCE)
+        weights = held.relations[:, 0]
+        weights = np.where(abs(weights) > RANK_TOLERANCE, weights, 0.0)
+        self.free = np.flatnonzero(weights == 0).tolist()
+        self.flaps = (frame @ held.null_space).T
+        ways = np.array([*held.null_space.T, *map(held.opening, self.free)])
+        self.form = curvature(point, rows, weights, ways.reshape(-1, frame.shape[1]).T)
+        sign = np.sign(self.form[0, 0]) if len(self.flaps) else sign
+        self.weights, self.form = weights * sign, self.form * sign
+        self.positive = np.flatnonzero(self.weights > 0).tolist()
+
+    @cached_property
+    def cross(self) -> Array:
+        """The form ``S`` on the functions of weight zero."""
+        f = len(self.flaps)
+        flaps, mixed = self.form[:f, :f], self.form[:f, f:]
+        return np.asarray(self.form[f:, f:] - mixed.T @ np.linalg.solve(flaps, mixed))
+
+    @property
+    def is_definite(self) -> bool:
+        """Whether ``Q`` is positive on the flaps, and no ``S_kk`` is negative."""
+        f = len(self.flaps)
+        values = np.linalg.eigvalsh(self.form[:f, :f])
+        clear = values[0] > max(RANK_TOLERANCE, CLEAR * values[-1])
+        return bool(clear and (np.diagonal(self.cross) >= -RANK_TOLERANCE).all())
+
+    @cached_property
+    def dependent(self) -> list[Opening]:
+        """What opens along dependent edges."""
+        own = np.diagonal(self.cross)
+        single = [(k,) for k, s in zip(self.free, own, strict=True) if s <= RANK_TOLERANCE]
+        return [*single, *self.pairs]
+
+    @property
+    def pairs(self) -> list[Opening]:
+        """Pairs that open along dependent edges."""
+        return [pair for pair, excess in self._pairs() if excess <= RANK_TOLERANCE]
+
+    @property
+    def thin(self) -> list[Opening]:
+        """Pairs that open on a face around the corner."""
+        return [pair for pair, excess in self._pairs() if excess > RANK_TOLERANCE]
+
+    def _pairs(self) -> Iterator[tuple[Opening, float]]:
+        """Yield pairs with ``S_kl <= -sqrt(S_kk S_ll) < 0``, and the difference."""
+        own = np.diagonal(self.cross)
+        for i, j in combinations(np.flatnonzero(own > RANK_TOLERANCE).tolist(), 2):
+            excess = float(-self.cross[i, j] - np.sqrt(own[i] * own[j]))
+            if excess >= -RANK_TOLERANCE:
+                yield (self.free[i], self.free[j]), excess
+
+    def rays(self, distance: float) -> dict[Ends, Ray] | None:
+        """Return rays by what opens and the sign of ``t``; None if one is not found."""
+        found: dict[Ends, Ray] = {}
+        for k in self.positive if len(self.flaps) == 1 else ():
+            for side in (1, -1):
+                ray = self._bent_ray(k, side * self.flaps[0], distance)
+                if ray is None:
+                    return None
+                found[(k,), side] = ray
+        for opening in tuple(self.dependent):
+            ray, rest = self.dependent_ray(opening, distance)
+            if ray is not None:
+                found[opening, 0] = ray
+            elif rest > PERSISTS:
+                self.dependent.remove(opening)
+        return found
+
+    def _without(self, opening: Opening) -> frozenset[int]:
+        return frozenset(self.rows).difference(self.rows[k] for k in opening)
+
+    def _ordered(self, opening: Opening) -> tuple[int, ...]:
+        return tuple(sorted(self._without(opening)))
+
+    def _bent_ray(self, k: int, way: Array, distance: float) -> Ray | None:
+        point, held = self.point, self._without((k,))
+        q = point.q + distance * self.scales * way
+        sample = projected(point.quotient, q, sorted(held), distance / 2)
+        if sample is None or sample.active() != held:
+            return None
+        return Ray(way, held, Sample.of(sample), distance)
+
+    def dependent_ray(self, opening: Opening, distance: float) -> tuple[Ray | None, float]:
+        """Return the ray of a dependent edge, or None, and what the weighted sum is along it."""
+        point, held = self.point, self._without(opening)
+        found = dependent_at(point, held)
+        if found is None:
+            return None, 0.0
+        start, way = found
+        slopes = point.gradients[[self.rows[k] for k in opening]] @ way
+        q = point.q + distance * self.scales * way * np.sign(slopes[0])
+        sample = projected(start.quotient, q, start.kept, distance / 2)
+        if sample is None or (slopes * slopes[0] <= 0).any():
+            return None, 0.0
+        away = sample.distances[self.rows] * [row in held for row in self.rows]
+        rest = float(self.weights @ away)
+        placed = dependent_at(point.quotient.at(sample.q), held)
+        if abs(away).max() > PERSISTS or sample.active() != held or placed is None:
+            return None, rest
+        there = Sample.of(placed[0])
+        return Ray(way * np.sign(slopes[0]), held, there, distance, dependent=True), rest
+
+    # ------------------------------------------------------------------------------------- sectors
+
+    def figure(
+        self, rays: dict[Ends, Ray], distance: float
+    ) -> tuple[tuple[Ray, ...], tuple[Sector, ...], tuple[str, ...]]:
+        """Return rays, sectors and notes."""
+        place = {key: i for i, key in enumerate(rays)}
+        sectors = [
+            Sector(tuple(place[end] for end in ends), self._ordered(pair))
+            for pair in combinations(range(len(self.rows)), 2)
+            for ends in self._faces(pair)
+            if all(end in place for end in ends)
+        ]
+        if len(self.flaps) == 2:
+            sectors += [self._around(k, distance) for k in self.positive]
+        if len(self.flaps) == 1:
+            sectors += [Sector((), self._ordered(pair)) for pair in self.thin]
+        return tuple(rays.values()), tuple(sectors), tuple(self._notes(rays))
+
+    def _faces(self, pair: Opening) -> Iterator[tuple[Ends, ...]]:
+        """Yield, for the faces on which two functions open, the rays that bound them."""
+        j, k = sorted(pair, key=lambda i: (i not in self.positive, (i,) not in self.dependent))
+        straight = [(i,) in self.dependent for i in (j, k)]
+        single = len(self.flaps) == 1
+        if j in self.positive and single:
+            if k in self.positive:
+                yield from ((((j,), side), ((k,), side)) for side in (1, -1))
+            elif straight[1]:
+                yield from ((((j,), side), ((k,), 0)) for side in (1, -1))
+            else:
+                yield ((j,), 1), ((j,), -1)
+        elif straight[0] and self.weights[k] == 0:
+            mixed = self.cross[self.free.index(j), self.free.index(k)]
+            ends = ((j,), 0), ((k,) if straight[1] else (j,), 0)
+            if abs(mixed) <= RANK_TOLERANCE and straight[1]:
+                yield ends
+            elif mixed < -RANK_TOLERANCE and single:
+                yield from (ends,) * (1 + straight[1])
+
+    def _around(self, k: int, distance: float) -> Sector:
+        """Return a face around the corner."""
+        held = self._ordered((k,))
+        q = self.point.q + distance * self.scales * self.flaps[0]
+        there = projected(self.point.quotient, q, held, distance / 2)
+        return Sector((), held, None if there is None else Sample.of(there))
+
+    def _notes(self, rays: dict[Ends, Ray]) -> Iterator[str]:
+        every = self.point.quotient.polyhedron.names
+        names = ", ".join(every[i] for i in self.rows)
+        for opening in self.dependent:
+            if (opening, 0) not in rays:
+                yield (
+                    f"the edge that opens {', '.join(every[self.rows[k]] for k in opening)} out of "
+                    f"the singular corner {names} has dependent gradients: not followed"
+                )

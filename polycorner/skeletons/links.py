@@ -20,7 +20,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.folds import fold_figure
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
+from polycorner.skeletons.points import EvaluatedPoint, Quotient, Sample, projected
 from polycorner.skeletons.tracing import EdgeTracer
 from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure, singular_rays
 from polycorner.skeletons.walks import End
@@ -156,25 +156,26 @@ def _link(
     rays: list[Ray] = []
     position: dict[int, int] = {}
     for k, record in enumerate(found.records):
-        there = record.point
-        kept = quotient.at(there.q).basis(record.active)
-        sample = projected(quotient, there.q, kept, 0.1 * radius)
-        if sample is None or not sample.is_curve:
+        kept = quotient.at(record.point.q).basis(record.active)
+        there = projected(quotient, record.point.q, kept, 0.1 * radius)
+        if there is None or not there.is_curve:
             notes.append(f"an edge out of the singular corner {names} has dependent gradients")
             continue
         position[k] = len(rays)
-        way = (sample.q - point.q) / scales
+        way = (there.q - point.q) / scales
+        sample = Sample.of(there)
         rays.append(Ray(way / np.linalg.norm(way), record.active, sample, radius))
     sectors = []
     for curve in found.curves:
         ends = [None if end is None else position.get(end[0]) for end in (curve.start, curve.stop)]
-        middle = HeldPoint(quotient, curve.middle, quotient.at(curve.middle).basis(curve.active))
+        held = tuple(sorted(curve.active))
+        middle = Sample(curve.middle, tuple(quotient.at(curve.middle).basis(held)))
         if curve.kinds[0] is End.CLOSED:
-            sectors.append(Sector((), curve.active, middle))
+            sectors.append(Sector((), held, middle))
         elif ends[0] is None or ends[1] is None:
             notes.append(f"a face at the singular corner {names} could not be followed around it")
         else:
-            sectors.append(Sector((ends[0], ends[1]), curve.active, middle))
+            sectors.append(Sector((ends[0], ends[1]), held, middle))
     return tuple(rays), tuple(sectors)
 
 

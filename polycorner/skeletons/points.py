@@ -19,6 +19,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
+from polycorner.values import Value
 
 # Sizes of Newton steps in scale units: one that is rounding, and one whose square is.
 EXACT = 1e-13
@@ -230,6 +231,26 @@ class HeldPoint(EvaluatedPoint):
             return 1.0
         frame = np.vstack([self._normal.T, t])
         return float(np.sign(np.linalg.det(frame) * np.diagonal(self._factor).prod()))
+
+
+@dataclass(frozen=True, eq=False)
+class Sample(Value):
+    """A point without its values: coordinates, and the functions that are held there.
+
+    Thousands are kept and sent to workers; values, gradients and frame are computed again.
+    """
+
+    q: Array
+    kept: tuple[int, ...]
+
+    @classmethod
+    def of(cls, point: HeldPoint) -> "Sample":
+        """Return that of a point."""
+        return cls(point.q, tuple(point.kept))
+
+    def at(self, quotient: Quotient) -> HeldPoint:
+        """Return the point."""
+        return HeldPoint(quotient, self.q, self.kept)
 
 
 def projected(

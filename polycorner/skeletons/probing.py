@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner.polyhedra.symmetry import renamed
+from polycorner.skeletons.curves import Curve, EdgeEnd
 from polycorner.skeletons.islands import Cloud, minimised, moved_in, on_zero, violated
 from polycorner.skeletons.nets import WITHIN, Net
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.registry import SingularFigure, written_point
 from polycorner.skeletons.surfaces import Surface
-from polycorner.skeletons.tracing import Curve, EdgeEnd, EdgeTracer
+from polycorner.skeletons.tracing import EdgeTracer
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value

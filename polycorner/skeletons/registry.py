@@ -6,15 +6,17 @@ the relabellings that leave the corner in record stands for all of them.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, renamed
-from polycorner.skeletons.points import EvaluatedPoint, Quotient, projected
+from polycorner.skeletons.folds import dependent_rays
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.singularities import SingularPoint, refined
-from polycorner.skeletons.vertex_figures import Ray, VertexFigure, corner_rank, vertex_figure
+from polycorner.skeletons.vertex_figures import VertexFigure, corner_rank, vertex_figure
 from polycorner.spaces.manifold import Array
+from polycorner.workers import Shared
 
 # Distances in scale units: of points that are one corner, of points compared, and of functions from
 # zero at an exact corner.
@@ -27,19 +29,23 @@ Names = frozenset[str]
 SingularFigure = Callable[[EvaluatedPoint, frozenset[int], int], VertexFigure]
 
 
+NO_FIGURE = VertexFigure(0, 0, (), (), ())
+
+
 @dataclass
 class CornerRecord:
     """A corner while the skeleton grows.
 
-    ``orbit[k]`` is the ray that stands for ray ``k``; ``edges`` the edges by such rays.
+    ``orbit[k]`` is the ray that stands for ray ``k``; ``edges`` the edges by such rays.  The figure
+    comes after the corner: see :meth:`CornerRegistry.furnish`.
     """
 
     point: EvaluatedPoint
     active: frozenset[int]
-    figure: VertexFigure
     key: Array
     stabiliser: list[Relabelling]
-    orbit: list[int]
+    figure: VertexFigure = NO_FIGURE
+    orbit: list[int] = field(default_factory=list)
     edges: dict[int, int] = field(default_factory=dict)
 
 
@@ -150,45 +156,56 @@ class CornerRegistry:
     def restore(self, q: Array, active: frozenset[int]) -> None:
         """Add a corner at the point of a saved one."""
         self._add(self.quotient.at(q), active, self._key(q))
+        k = len(self.records) - 1
+        self.furnish(k, self.figure(self.records[k].point, active))
 
     def _add(
         self, point: EvaluatedPoint, active: frozenset[int], key: Array
     ) -> tuple[int, list[Relabelling]]:
-        point, figure = self.figure(point, active)
-        for sentence in figure.notes:
-            self.note(sentence, lost=True)
         stabiliser = self.symmetry.relabellings(self.manifold, point.q, point.q, SAME)
-        record = CornerRecord(point, active, figure, key, stabiliser, [])
-        for i, ray in enumerate(figure.rays):
-            twin = self.match(record, ray.sample.q, ray, stabiliser, range(i))
-            record.orbit.append(i if twin is None else record.orbit[twin[0]])
-        self.records.append(record)
+        self.records.append(CornerRecord(point, active, key, stabiliser))
         return len(self.records) - 1, list(stabiliser)
 
-    def figure(
-        self, point: EvaluatedPoint, active: frozenset[int]
-    ) -> tuple[EvaluatedPoint, VertexFigure]:
-        """Return the point, with rounding removed where it is singular, and its figure."""
+    def figure(self, point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
+        """Return the vertex figure of a corner."""
         rank, full = corner_rank(point, active)
         if rank == full:
-            return point, vertex_figure(point, active)
+            found = vertex_figure(point, active)
+            if len(active) != full + 1 or self.polyhedron.is_union:
+                return found
+            return replace(found, rays=(*found.rays, *dependent_rays(point, active)))
         point = SingularPoint(self.quotient, point.q, sorted(active))
-        return point, self.singular_figure(point, active, corner_rank(point, active)[0])
+        return self.singular_figure(point, active, corner_rank(point, active)[0])
+
+    def furnish(self, k: int, figure: VertexFigure) -> None:
+        """Give a corner its vertex figure, and its point the values that are exact there."""
+        record = self.records[k]
+        for sentence in figure.notes:
+            self.note(sentence, lost=True)
+        if figure.singular:
+            record.point = SingularPoint(self.quotient, record.point.q, sorted(record.active))
+        record.figure, record.orbit = figure, []
+        for i, ray in enumerate(figure.rays):
+            twin = self.match(record, ray.sample.q, ray.active, record.stabiliser, range(i))
+            record.orbit.append(i if twin is None else record.orbit[twin[0]])
 
     def match(
         self,
         record: CornerRecord,
         sample: Array | None,
-        ray: Ray,
+        active: frozenset[int],
         relabellings: Iterable[Relabelling],
         among: Iterable[int],
     ) -> tuple[int, Relabelling] | None:
-        """Return the ray of a corner that a relabelling carries a ray to, and the relabelling."""
+        """Return the ray of a corner that a relabelling carries a ray to, and the relabelling.
+
+        The ray has given active functions; where these do not tell, a point of it decides.
+        """
         alike: dict[Names, list[int]] = {}
         for i in among:
             alike.setdefault(self.names(record.figure.rays[i].active), []).append(i)
-        active = self.names(ray.active)
-        possible = [(i, p) for p in relabellings for i in alike.get(renamed(active, p), [])]
+        names = self.names(active)
+        possible = [(i, p) for p in relabellings for i in alike.get(renamed(names, p), [])]
         if possible and not record.figure.singular and not self.polyhedron.is_union:
             return possible[0]
         for i, p in possible:
@@ -209,6 +226,36 @@ class CornerRegistry:
             if k != i and other.active == ray.active
         )
         return min(ray.distance, *others, math.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class BareCorner:
+    """A corner without values, which travels to a worker."""
+
+    q: Array
+    kind: type[HeldPoint] | None
+    kept: tuple[int, ...]
+    active: frozenset[int]
+
+    @classmethod
+    def of(cls, record: CornerRecord) -> "BareCorner":
+        """Return that of a corner in record."""
+        point = record.point
+        if isinstance(point, HeldPoint):
+            return cls(point.q, type(point), tuple(point.kept), record.active)
+        return cls(point.q, None, (), record.active)
+
+    def point(self, quotient: Quotient) -> EvaluatedPoint:
+        """Return the point with its values."""
+        if self.kind is None:
+            return quotient.at(self.q)
+        return self.kind(quotient, self.q, list(self.kept))
+
+
+def figured(quotient: Shared, singular: SingularFigure, corner: BareCorner) -> VertexFigure:
+    """Return the vertex figure of a corner; called in a worker."""
+    registry = CornerRegistry(quotient.value, singular)
+    return registry.figure(corner.point(quotient.value), corner.active)
 
 
 def written_point(q: Array) -> str:

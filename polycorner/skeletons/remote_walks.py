@@ -1,4 +1,4 @@
-"""Walks along edges in workers: what is sent, and what comes back.
+"""Walks along edges in workers: what comes back.
 
 Points travel as coordinates with the functions that are held there; values, gradients and frames
 are computed again at the other end.
@@ -6,27 +6,12 @@ are computed again at the other end.
 
 from dataclasses import dataclass
 
+from polycorner.skeletons.dependence import follow_edge, held_at, is_dependent
 from polycorner.skeletons.points import HeldPoint, Quotient
-from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.vertex_figures import Ray
-from polycorner.skeletons.walks import End, Walk, follow
+from polycorner.skeletons.walks import End, Walk
 from polycorner.spaces.manifold import Array
 from polycorner.workers import Shared
-
-
-@dataclass(frozen=True, eq=False)
-class Beginning:
-    """The beginning of an edge: a point on it, the direction, and the functions that vanish."""
-
-    q: Array
-    kept: list[int]
-    direction: Array
-    active: frozenset[int]
-
-    @classmethod
-    def of(cls, ray: Ray) -> "Beginning":
-        """Return that of a ray."""
-        return cls(ray.sample.q, ray.sample.kept, ray.direction, ray.active)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,21 +20,27 @@ class Report:
 
     points: Array
     kept: list[int]
-    singular: bool
+    kind: type[HeldPoint] | None
     tangent: Array
     end: End
     length: float
 
-    def walk(self, quotient: Quotient) -> Walk:
-        """Return the walk."""
-        kind = SingularPoint if self.singular else HeldPoint
-        last = kind(quotient, self.points[-1], self.kept)
+    @classmethod
+    def of(cls, walk: Walk) -> "Report":
+        """Return that of a walk."""
+        kind = None if is_dependent(walk.last) else type(walk.last)
+        return cls(walk.points, walk.last.kept, kind, walk.tangent, walk.end, walk.length)
+
+    def walk(self, quotient: Quotient, active: frozenset[int]) -> Walk:
+        """Return the walk along an edge with given active functions."""
+        if self.kind is None:
+            last = held_at(quotient, self.points[-1], active, self.kept)
+        else:
+            last = self.kind(quotient, self.points[-1], self.kept)
         return Walk(self.points, last, self.tangent, self.end, self.length)
 
 
-def walked(quotient: Shared, beginning: Beginning) -> Report:
+def walked(quotient: Shared, ray: Ray) -> Report:
     """Walk along an edge to its end."""
-    start = HeldPoint(quotient.value, beginning.q, beginning.kept)
-    walk = follow(start, beginning.direction, passive=beginning.active)
-    singular = isinstance(walk.last, SingularPoint)
-    return Report(walk.points, walk.last.kept, singular, walk.tangent, walk.end, walk.length)
+    start = ray.start(quotient.value)
+    return Report.of(follow_edge(start, ray.direction, ray.active))

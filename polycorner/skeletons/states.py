@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from polycorner import checks
+from polycorner.skeletons.curves import Curve, EdgeEnd
 from polycorner.skeletons.flags import Crossing, Flag
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
-from polycorner.skeletons.tracing import Curve, EdgeEnd
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 

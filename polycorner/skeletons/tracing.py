@@ -1,10 +1,11 @@
 """Edges while a skeleton grows: traced from corners, or found through one of their points.
 
-The end of an edge at a corner is named by two positions, those of the corner and of the ray.
+Other processes walk along edges and compute vertex figures ahead of when they are needed.
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import replace
+from itertools import chain, islice
 
 import numpy as np
 
@@ -12,53 +13,32 @@ from polycorner.lookahead import Lookahead
 from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
+from polycorner.skeletons.curves import Curve, EdgeEnd, lies_on
+from polycorner.skeletons.dependence import follow_edge, is_dependent
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.registry import (
     NEAR,
-    SAME,
+    BareCorner,
     CornerRecord,
     CornerRegistry,
     SingularFigure,
+    figured,
     written_point,
 )
-from polycorner.skeletons.remote_walks import Beginning, Report
-from polycorner.skeletons.sign_changes import sign_change
-from polycorner.skeletons.vertex_figures import Ray
+from polycorner.skeletons.remote_walks import Report, walked
+from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
 from polycorner.workers import Shared
 
 # Most steps along an edge to a point near its end.
 INWARD = 60
 
-EdgeEnd = tuple[int, int]
+# In place of a ray: the vertex figure of the corner is to be computed.
+FIGURE = -1
 
-
-@dataclass(frozen=True, eq=False)
-class Curve(Value):
-    """An edge while the skeleton grows, of at least two points.
-
-    ``relabelled`` carries the names along the walk to the names at the corner ``stop``.
-    """
-
-    points: Array
-    active: frozenset[int]
-    kinds: tuple[End, End]
-    start: EdgeEnd | None
-    stop: EdgeEnd | None
-    relabelled: Relabelling
-
-    def __post_init__(self) -> None:
-        if len(self.points) < 2:
-            msg = f"points: expected at least two points of an edge; got {len(self.points)}"
-            raise ValueError(msg)
-        super().__post_init__()
-
-    @property
-    def middle(self) -> Array:
-        """The vertex half-way along."""
-        return np.asarray(self.points[len(self.points) // 2])
+# A walk, the relabellings to the corner where it ended, and the position of the edge.
+Arrival = tuple[Walk, list[Relabelling], int]
 
 
 class EdgeTracer:
@@ -73,19 +53,54 @@ class EdgeTracer:
         self.curves: list[Curve] = []
         self.pending: deque[EdgeEnd] = deque()
         self.lookahead: Lookahead | None = None  # where others than this process walk
+        self._arrivals: dict[int, list[Arrival]] = {}  # at corners without a vertex figure
         self._sent = Shared(quotient)
 
     def corner(self, point: EvaluatedPoint) -> tuple[int, list[Relabelling]] | None:
         """Return the corner at a point; the edges of a new one are pending.
 
-        See :meth:`CornerRegistry.find`.
+        See :meth:`CornerRegistry.find`.  Its vertex figure is computed by others in the meantime;
+        edges that arrive before it is needed wait for it.
         """
         known = len(self.records)
         found = self.registry.find(point)
         if found is not None and found[0] == known:
-            orbit = self.records[known].orbit
-            self.pending.extend((known, i) for i, twin in enumerate(orbit) if twin == i)
+            self.pending.append((known, FIGURE))
+            self._arrivals[known] = []
+            if self.lookahead is not None:
+                corner, singular = BareCorner.of(self.records[known]), self.registry.singular_figure
+                self.lookahead.start((known, FIGURE), figured, self._sent, singular, corner)
         return found
+
+    def _furnish(self, k: int) -> None:
+        """Give a corner its vertex figure, and the edges that arrived there their ends."""
+        if k not in self._arrivals:
+            return
+        end, record = (k, FIGURE), self.records[k]
+        if self.lookahead is not None and end in self.lookahead:
+            figure: VertexFigure = self.lookahead.result(end)
+        else:
+            figure = self.registry.figure(record.point, record.active)
+        self.registry.furnish(k, figure)
+        for walk, carried, number in self._arrivals[k]:
+            curve = self.curves[number]
+            stop, relabelled = self._stop(walk, curve.active, k, carried)
+            self.curves[number] = replace(curve, stop=stop, relabelled=relabelled)
+            self._arrived(stop, number)
+        del self._arrivals[k]
+
+    def expand(self, most: int | None = None) -> None:
+        """Put the ends of edges in place of the vertex figures among the first that are pending."""
+        first = list(islice(self.pending, most))
+        for k, i in first:
+            if i == FIGURE:
+                self._furnish(k)
+        ends = [e for end in first for e in (self._ends(end[0]) if end[1] == FIGURE else [end])]
+        self.pending = deque(chain(ends, islice(self.pending, len(first), None)))
+
+    def _ends(self, k: int) -> list[EdgeEnd]:
+        orbit = self.records[k].orbit
+        return [(k, i) for i, twin in enumerate(orbit) if twin == i]
 
     @property
     def records(self) -> list[CornerRecord]:
@@ -107,28 +122,33 @@ class EdgeTracer:
         ray = record.figure.rays[i]
         walk = self._walk(end)
         points = np.vstack([record.point.q, walk.points])
-        stop, carried = self._arrive(walk, ray) if walk.end is End.CORNER else (None, {})
-        curve = Curve(points, ray.active, (End.CORNER, walk.end), end, stop, carried)
+        found = self._at_corner(walk) if walk.end is End.CORNER else None
+        waits = found is not None and found[0] in self._arrivals
+        stop, relabelled = (
+            (None, {}) if found is None or waits else self._stop(walk, ray.active, *found)
+        )
+        curve = Curve(points, ray.active, (End.CORNER, walk.end), end, stop, relabelled)
+        number = len(self.curves)
         self.curves.append(curve)
-        number = len(self.curves) - 1
         record.edges[i] = number
-        if stop is not None:
-            there = self.records[stop[0]]
-            there.edges[there.orbit[stop[1]]] = number
+        if found is not None and waits:
+            self._arrivals[found[0]].append((walk, found[1], number))
+        self._arrived(stop, number)
         self._remark(curve)
 
     def _walk(self, end: EdgeEnd) -> Walk:
         """Return the walk along an edge; others that are pending begin in the meantime."""
         if self.lookahead is None:
             ray = self._ray(end)
-            return follow(ray.sample, ray.direction, passive=ray.active)
+            return follow_edge(ray.start(self.quotient), ray.direction, ray.active)
         for other in self.pending:
-            if not self.lookahead.has_room:
+            if other != end and not self.lookahead.has_room:
                 break
-            if other not in self.lookahead and not self._is_traced(other):
-                self.lookahead.start(other, self._sent, Beginning.of(self._ray(other)))
+            known = other[1] == FIGURE or other in self.lookahead
+            if not known and not self._is_traced(other):
+                self.lookahead.start(other, walked, self._sent, self._ray(other))
         report: Report = self.lookahead.result(end)
-        return report.walk(self.quotient)
+        return report.walk(self.quotient, self._ray(end).active)
 
     def _ray(self, end: EdgeEnd) -> Ray:
         return self.records[end[0]].figure.rays[end[1]]
@@ -140,26 +160,49 @@ class EdgeTracer:
                 lost = kind is End.SINGULAR
                 self.registry.note(f"the edge {label} {kind.value}", lost=lost)
 
-    def _arrive(self, walk: Walk, ray: Ray) -> tuple[EdgeEnd | None, Relabelling]:
-        """Return the end of the edge at the corner where a walk ended."""
-        found = self.corner(walk.last)
+    def _at_corner(self, walk: Walk) -> tuple[int, list[Relabelling]] | None:
+        """Return the corner where a walk ended."""
+        # Along dependent edges more is held than functions of the polyhedron.
+        last = self.quotient.at(walk.last.q) if is_dependent(walk.last) else walk.last
+        return self.corner(last)
+
+    def _arrive(self, walk: Walk, active: frozenset[int]) -> EdgeEnd | None:
+        """Return the end of an edge at the corner where a walk along it ended."""
+        found = self._at_corner(walk)
         if found is None:
-            return None, {}
-        k, carried = found
-        record = self.records[k]
+            return None
+        self._furnish(found[0])
+        return self._stop(walk, active, *found)[0]
+
+    def _stop(
+        self, walk: Walk, active: frozenset[int], k: int, carried: list[Relabelling]
+    ) -> tuple[EdgeEnd | None, Relabelling]:
+        """Return the end of an edge at a corner with a vertex figure, and the relabelling to it."""
+        match = self._matched(k, walk, active, carried)
+        return (None, {}) if match is None else ((k, match[0]), match[1])
+
+    def _arrived(self, stop: EdgeEnd | None, number: int) -> None:
+        if stop is not None:
+            record = self.records[stop[0]]
+            record.edges[record.orbit[stop[1]]] = number
+
+    def _matched(
+        self, k: int, walk: Walk, active: frozenset[int], carried: list[Relabelling]
+    ) -> tuple[int, Relabelling] | None:
+        """Return the ray of a corner on which a walk arrived, and the relabelling to it."""
+        record, sample = self.records[k], None
         rays = record.figure.rays
-        distance = rays[0].distance if rays else 1e-3
-        back = self._before(walk, record, distance)
-        sample = None if back is None else back.q
-        match = self.registry.match(record, sample, ray, carried, range(len(rays)))
+        if record.figure.singular or self.polyhedron.is_union:
+            back = self._before(walk, record, rays[0].distance if rays else 1e-3)
+            sample = None if back is None else back.q
+        match = self.registry.match(record, sample, active, carried, range(len(rays)))
         if match is None:
             self.registry.note(
-                f"the edge {self.registry.written(ray.active)} arrives at a corner "
+                f"the edge {self.registry.written(active)} arrives at a corner "
                 f"that no edge of this kind leaves",
                 lost=True,
             )
-            return None, {}
-        return (k, match[0]), match[1]
+        return match
 
     def _before(self, walk: Walk, record: CornerRecord, distance: float) -> HeldPoint | None:
         """Return the point of a walk at a distance before the corner where it ends.
@@ -167,16 +210,15 @@ class EdgeTracer:
         Singular corners are known less exactly than edges beside each other are apart there, so
         the distance is that from the corner in record, where it is not elsewhere on the orbit.
         """
+        quotient = walk.last.quotient
         moved = self.manifold.chord(record.point.q, walk.last.q)
         end = walk.last.q + moved * (abs(moved / self.scales).max() < NEAR)
         away = np.linalg.norm((walk.points - end) / self.scales, axis=1)
         beyond = np.flatnonzero(away > distance)
         if not record.figure.singular or not len(beyond):
             guess = walk.last.q - distance * self.scales * walk.tangent
-            return projected(self.quotient, guess, walk.last.kept, distance)
-        point: HeldPoint | None = HeldPoint(
-            self.quotient, walk.points[int(beyond[-1])], walk.last.kept
-        )
+            return projected(quotient, guess, walk.last.kept, distance)
+        point: HeldPoint | None = HeldPoint(quotient, walk.points[int(beyond[-1])], walk.last.kept)
         for _ in range(INWARD):
             if point is None:
                 return None
@@ -186,7 +228,7 @@ class EdgeTracer:
             step = min(length - distance, 0.4 * length) * point.tangent(way)
             if np.linalg.norm(step) < 1e-6 * distance:
                 break
-            point = projected(self.quotient, point.q + self.scales * step, point.kept, length)
+            point = projected(quotient, point.q + self.scales * step, point.kept, length)
         return point
 
     def _edge_at(
@@ -205,7 +247,7 @@ class EdgeTracer:
         for way in (t, -t):
             walk = follow(here, way, passive=active, home=True)
             if walk.end is End.CORNER:
-                stop, _ = self._arrive(walk, Ray(way, active, here, 0.0))
+                stop = self._arrive(walk, active)
                 return None if stop is None else ("half", stop)
             walks.append(walk)
             if walk.end is End.CLOSED:
@@ -253,31 +295,8 @@ class EdgeTracer:
         )
 
     def lies_on(self, q: Array, curve: Curve) -> bool:
-        """Whether a point lies on a curve: on the arc over a chord that is as near as it is long.
-
-        The nearest vertex may belong to another part of the curve.
-        """
-        apart = self.symmetry.separations(self.manifold, q, curve.points)
-        near = np.minimum(apart[:-1], apart[1:])
-        chords = np.linalg.norm(np.diff(curve.points, axis=0) / self.scales, axis=1)
-        possible = [k for k in np.argsort(near) if near[k] <= chords[k]]
-        return any(self._on_arc(q, curve, int(k)) for k in possible)
-
-    def _on_arc(self, q: Array, curve: Curve, k: int) -> bool:
-        """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
-        start, end = curve.points[k], curve.points[k + 1]
-        q = self.manifold.image(q, start)
-        kept = self.quotient.at(start).basis(curve.active)
-        along = self.symmetry.displacement(self.manifold, end, start)
-
-        def passed(s: float) -> tuple[float, Array]:
-            at = projected(self.quotient, start + s * (end - start), kept, np.inf)
-            p = start if at is None else at.q
-            return float(self.symmetry.displacement(self.manifold, p, q) @ along), p
-
-        if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
-            return min(self.symmetry.separation(self.manifold, q, p) for p in (start, end)) < SAME
-        return self.symmetry.separation(self.manifold, q, sign_change(passed)[1]) < SAME
+        """Whether a point lies on a curve."""
+        return lies_on(self.quotient, q, curve)
 
     def _undirected(self, point: EvaluatedPoint, active: frozenset[int]) -> list[int]:
         """Return the active functions and equations whose gradients have no direction."""

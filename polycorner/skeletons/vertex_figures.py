@@ -18,7 +18,8 @@ import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, projected
+from polycorner.skeletons.dependence import curvature, held_at
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, Sample, projected
 from polycorner.spaces.manifold import Array
 
 SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -37,14 +38,23 @@ class Ray:
         Scaled unit tangent, orthogonal to the orbit of the symmetry.
     active : frozenset of int
         Functions that vanish along the edge.
-    sample : HeldPoint
+    sample : Sample
         A point of the edge ``distance`` scale units away, holding a basis of ``active``.
+    dependent : bool
+        Whether the gradients of ``active`` have a relation all along.
     """
 
     direction: Array
     active: frozenset[int]
-    sample: HeldPoint
+    sample: Sample
     distance: float
+    dependent: bool = False
+
+    def start(self, quotient: Quotient) -> HeldPoint:
+        """Return the sample with its values and frame."""
+        if self.dependent:
+            return held_at(quotient, self.sample.q, self.active, self.sample.kept)
+        return self.sample.at(quotient)
 
 
 @dataclass(frozen=True)
@@ -55,15 +65,21 @@ class Sector:
     ----------
     rays : tuple of int
         The two rays that bound it, by position; none where it goes all around an apex.
-    active : frozenset of int
-        Functions that vanish on it.
-    sample : HeldPoint, optional
+    held : tuple of int
+        Functions that vanish on it, in ascending order: sets of the many sectors take ten times
+        the memory.
+    sample : Sample, optional
         A point of it near a singular corner.
     """
 
     rays: tuple[int, ...]
-    active: frozenset[int]
-    sample: HeldPoint | None = None
+    held: tuple[int, ...]
+    sample: Sample | None = None
+
+    @property
+    def active(self) -> frozenset[int]:
+        """Functions that vanish on it."""
+        return frozenset(self.held)
 
 
 @dataclass(frozen=True)
@@ -213,25 +229,6 @@ def _names(point: EvaluatedPoint, rows: list[int]) -> str:
     return ", ".join(point.quotient.polyhedron.names[i] for i in rows)
 
 
-def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
-    """Return the weighted sum of the Hessians of unit-slope functions on a subspace.
-
-    Equations count with the multipliers that cancel what is left of the weighted gradients.
-    """
-    quotient = point.quotient
-    polyhedron, solved = quotient.polyhedron, list(quotient.equations)
-    scales = polyhedron.manifold.scale_array
-    frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
-    sizes = np.linalg.norm(point.gradients[rows], axis=1)
-    sizes[sizes == 0] = 1.0  # a vanishing gradient is a relation by itself
-    factors = weights / sizes
-    left = factors @ point.gradients[rows]
-    multipliers = np.linalg.lstsq(point.gradients[solved].T, -left, rcond=None)[0]
-    hessians = polyhedron.bundle.evaluate(point.q, 2)[2] * np.outer(scales, scales)
-    total = np.einsum("i,ijk->jk", [*factors, *multipliers], hessians[[*rows, *solved]])
-    return np.asarray(frame.T @ total @ frame)
-
-
 def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
     """Whether second-order terms isolate the common zeros of the active functions.
 
@@ -274,22 +271,30 @@ def _bases(rows: list[int], slopes: Array, tight: frozenset[int]) -> Iterator[fr
 def _tested(
     point: EvaluatedPoint, active: frozenset[int], direction: Array, base: frozenset[int]
 ) -> Ray | None:
-    """Return the ray if a point a little along the curve lies in the polyhedron."""
+    """Return the ray if a point a little along the curve lies in the polyhedron.
+
+    A function that opens or closes quadratically is within the tolerance of zero near the corner:
+    one that was not zero farther out is not active.
+    """
     quotient = point.quotient
     scales = quotient.polyhedron.manifold.scale_array
-    kept = sorted(base)
+    kept, rows = sorted(base), np.array(sorted(active.difference(base)), dtype=np.int64)
     far = 10 * quotient.tolerance
+    left: set[int] = set()
     for h in [h for h in SAMPLES if h >= far] or [10 * far]:
         sample = projected(quotient, point.q + h * scales * direction, kept, 0.5 * h)
         if sample is None:
             continue
         there = sample.active()
+        if there is not None and not quotient.polyhedron.is_union and there & left:
+            return None
+        left.update(rows[abs(sample.distances[rows]) > quotient.tolerance].tolist())
         if there is not None and there < active and there >= base:
-            return Ray(direction, there, sample, h)
+            return Ray(direction, there, Sample.of(sample), h)
         if there is not None and there < active and quotient.polyhedron.is_union:
             kept_there = sample.basis(there)
             if len(kept_there) == len(kept):
-                return Ray(direction, there, HeldPoint(quotient, sample.q, kept_there), h)
+                return Ray(direction, there, Sample(sample.q, tuple(kept_there)), h)
     return None
 
 
@@ -313,7 +318,7 @@ def _sectors(
         if len(members) == 2 and not point.quotient.polyhedron.is_union:
             # Of a convex cone two extreme rays bound the sector, and both are tight on it.
             i, j = sorted(members)
-            sectors.append(Sector((i, j), frozenset(rows[k] for k in shared)))
+            sectors.append(Sector((i, j), tuple(rows[k] for k in sorted(shared))))
             continue
         for i, j, middle in _arcs(rays, sorted(members)):
             active = _active_along(point, rows, slopes @ middle)
@@ -321,7 +326,7 @@ def _sectors(
                 continue
             known = len(active) if independent or n == 2 else _rank_of(rows, slopes, active)
             if known == n - 2:
-                sectors.append(Sector((i, j), active))
+                sectors.append(Sector((i, j), tuple(sorted(active))))
     return tuple(sectors)
 
 

@@ -22,6 +22,7 @@ from oracles_spheres import (
     stress_and_flex,
     without_one_contact,
 )
+from scipy.linalg import null_space
 from skeleton_shapes import counts
 
 from polycorner import Symmetry, skeleton
@@ -32,7 +33,7 @@ few = settings(max_examples=settings.default.max_examples // 4)
 
 # Rigid clusters [HC] table I; one- and two-dimensional modes [HGB] table I.
 PUBLISHED = {5: (1, 2, 4), 6: (2, 5, 13), 7: (5, 16, 51), 8: (13, 75, 281)}
-NINE = 52
+NINE, TEN = 52, 263
 
 
 @lru_cache
@@ -89,6 +90,30 @@ class TestPublishedCounts:
         assert len(singular.active) == 21
         assert not any("second order" in note for note in atlas.notes)
         assert stress_and_flex(centres, contacts_of(singular.active))[2] > 1e-3
+
+    @pytest.mark.slow
+    def test_ten_spheres_with_the_cluster_of_fewer_contacts(self):
+        """A stress without a sign change on both flexes holds it ([CW] sec. 3)."""
+        atlas = atlas_of(10)
+        assert atlas.complete is Completeness.EXHAUSTED
+        assert len(atlas.corners) == TEN
+        assert Counter(len(c.active) for c in atlas.corners) == {23: 1, 24: 259, 25: 3}
+        (few,) = [c for c in atlas.corners if len(c.active) == 23]
+        centres, contacts = centres_of(few), contacts_of(few.active)
+        matrix = rigidity_matrix(centres, contacts)
+        assert singular_values_above(matrix) == few.rank == 22
+        (stress,) = null_space(matrix.T, rcond=1e-7).T
+        motions = np.array([np.kron(np.ones(10), axis) for axis in np.eye(3)])
+        turns = np.array([np.cross(axis, centres).ravel() for axis in np.eye(3)])
+        flexes = null_space(np.vstack([matrix, motions, turns]), rcond=1e-7).T.reshape(-1, 10, 3)
+        form = sum(
+            w * np.einsum("aik,bik->ab", *[flexes[:, [i]] - flexes[:, [j]]] * 2)
+            for w, (i, j) in zip(stress, contacts, strict=True)
+        )
+        values = np.linalg.eigvalsh(form)
+        assert len(values) == 2
+        assert values[0] * values[1] > 0
+        assert min(abs(values)) > 1e-2
 
     @pytest.mark.parametrize(("count", "gap"), [(6, 0.4142), (7, 0.05146)])
     def test_the_smallest_gap_to_a_non_contact(self, count, gap):

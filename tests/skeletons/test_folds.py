@@ -8,20 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry
-from polycorner.skeletons import links
+from polycorner.skeletons import End, links
+from polycorner.skeletons.arcs import arc_length
+from polycorner.skeletons.dependence import follow_edge
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.points import Quotient
 
 SPACE = Manifold.euclidean("t a b")
 t, a, b = SPACE.symbols
-ORIGIN = np.zeros(3)
 few = settings(max_examples=settings.default.max_examples // 8)
 
 
-def figure(D):
-    point = Quotient.near(D, Symmetry(), 1e-8, 100.0, [ORIGIN]).at(ORIGIN)
+def figure(D, at=None):
+    q = np.zeros(D.manifold.size) if at is None else np.array(at, dtype=float)
+    point = Quotient.near(D, Symmetry(), 1e-8, 100.0, [q]).at(q)
     explorer = Explorer(point.quotient, [], np.random.default_rng(0))
-    return explorer.registry.figure(point, point.active())[1]
+    return explorer.registry.figure(point, point.active())
 
 
 def opened(found):
@@ -81,10 +83,87 @@ def test_a_function_of_weight_zero_does_not_open_alone_where_the_form_is_positiv
 
 
 @pytest.mark.parametrize("mixed", [0.0, 0.5])
-def test_an_edge_along_which_gradients_stay_dependent_is_noted(mixed):
+def test_an_edge_along_which_the_relation_persists(mixed):
+    """Where ``a`` and ``(t + mixed b / 2)^2 - a`` vanish, so does the square, with its slope."""
     found = figure(fold(1.0, 0.0, bent=mixed**2 / 4, mixed=mixed))
-    assert [note for note in found.notes if "dependent gradients: not followed" in note]
-    assert sorted(sorted(ray.active) for ray in found.rays) == [[0, 1], [0, 1], [1, 2], [1, 2]]
+    assert not found.notes
+    (along,) = [ray for ray in found.rays if ray.active == {0, 2}]
+    assert along.sample.q[0] == pytest.approx(-mixed / 2 * along.sample.q[2], abs=1e-12)
+    assert along.sample.q[1] == pytest.approx(0, abs=1e-12)
+    place = [ray is along for ray in found.rays].index(True)
+    between = [s for s in found.sectors if place in s.rays]
+    assert sorted(sorted(s.active) for s in between) == [[0], [0], [2], [2]]
+
+
+@given(weight, weight)
+@few
+def test_an_edge_along_which_two_functions_open(p, q):
+    """With ``c`` and ``d`` at least zero, ``t^2 + (p c - q d)^2 <= 0`` is a ray."""
+    four = Manifold.euclidean("t a c d")
+    x, y, c, d = four.symbols
+    found = figure(Polyhedron(four, [y, c, d, x**2 + (p * c - q * d) ** 2 - y]))
+    (along,) = [ray for ray in found.rays if ray.active == {0, 3}]
+    there = along.sample.q
+    assert there == pytest.approx([0, 0, there[2], p / q * there[2]], abs=1e-12)
+    assert not found.notes
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_dependent_edge_out_of_a_corner_of_full_rank(sign):
+    """Where ``a`` and ``sign (b - t)^2 - a`` vanish."""
+    found = figure(Polyhedron(SPACE, [a, b, t, sign * (b - t) ** 2 - a]))
+    assert (found.rank, found.full, found.singular) == (3, 3, False)
+    (along,) = [ray for ray in found.rays if ray.dependent]
+    assert along.active == {0, 3}
+    assert along.sample.q == pytest.approx(along.sample.q[0] * np.array([1, 0, 1]), abs=1e-12)
+    assert along.sample.q[0] > 0
+
+
+def test_a_face_around_the_corner_on_which_two_functions_open():
+    """``a = 0`` and ``t^2 = 4 c d - c^2 - d^2``: one nappe of a cone."""
+    four = Manifold.euclidean("t a c d")
+    x, y, c, d = four.symbols
+    found = figure(Polyhedron(four, [y, c, d, x**2 + c**2 + d**2 - 4 * c * d - y]))
+    assert [s.rays for s in found.sectors if s.active == {0, 3}] == [()]
+
+
+def test_no_edge_leaves_where_higher_orders_exclude_it():
+    """``t^2 + (c - d)^2 + c^3 = 0`` has no solution but zero where ``c`` is not negative."""
+    four = Manifold.euclidean("t a c d")
+    x, y, c, d = four.symbols
+    found = figure(Polyhedron(four, [y, c, d, x**2 + (c - d) ** 2 + c**3 - y]))
+    assert not [ray for ray in found.rays if ray.active == {0, 3}]
+    assert not found.notes
+
+
+def test_two_flaps_leave_faces_around_the_corner(monkeypatch):
+    """On ``a = t^2 + b^2`` and on ``a = 0``: the link of the corner is two circles."""
+    D = Polyhedron(SPACE, [a, t**2 + 2 * b**2 + t * b - a])
+    found = figure(D)
+    assert (found.rank, found.full, found.rays) == (1, 3, ())
+    monkeypatch.setattr(links, "fold_figure", lambda *_: None)
+    around = Counter(sector.active for sector in figure(D).sectors)
+    assert Counter(sector.active for sector in found.sectors) == around
+    for sector in found.sectors:
+        point = Quotient.near(D, Symmetry(), 1e-8, 100.0, [sector.sample.q]).at(sector.sample.q)
+        assert point.active() == sector.active
+
+
+@pytest.mark.parametrize("scale", [1.0, 30.0])
+def test_a_dependent_edge_is_followed_around_half_a_circle(scale):
+    """The flap, which is radial, turns by as much as the edge."""
+    space = Manifold(("x", "y", "a"), scales=(scale,) * 3)
+    x, y, z = space.symbols
+    wall = (x**2 + y**2 - scale**2) ** 2 / scale**3 - z
+    D, corner = Polyhedron(space, [y, z, wall]), [scale, 0.0, 0.0]
+    found, quotient = figure(D, corner), Quotient.near(D, Symmetry(), 1e-8, 100.0, [])
+    (along,) = [ray for ray in found.rays if ray.active == {1, 2}]
+    walk = follow_edge(along.start(quotient), along.direction, along.active)
+    assert walk.end is End.CORNER
+    assert walk.points[-1] == pytest.approx([-scale, 0, 0], abs=1e-9 * scale)
+    assert np.linalg.norm(walk.points, axis=1) == pytest.approx(scale, rel=1e-12)
+    points = np.vstack([[scale, 0, 0], walk.points])
+    assert arc_length(quotient, points, [1, 2]) == pytest.approx(np.pi, abs=1e-10)
 
 
 def test_a_function_of_weight_zero_opens_along_two_edges_where_the_form_is_negative():

@@ -26,7 +26,7 @@ def figure(D, q, symmetry=None):
     point = np.asarray(q, dtype=float)
     point = Quotient.near(D, symmetry or Symmetry(), 1e-8, 100.0, [point]).at(point)
     explorer = Explorer(point.quotient, [], np.random.default_rng(0))
-    return explorer.registry.figure(point, point.active())[1]
+    return explorer.registry.figure(point, point.active())
 
 
 def directions(found):

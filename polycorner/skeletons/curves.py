@@ -1,0 +1,75 @@
+"""Edges as curves with the rays at their ends, while a skeleton grows.
+
+The end of an edge at a corner is named by two positions, those of the corner and of the ray.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from polycorner.polyhedra.symmetry import Relabelling
+from polycorner.skeletons.points import Quotient, projected
+from polycorner.skeletons.registry import SAME
+from polycorner.skeletons.sign_changes import sign_change
+from polycorner.skeletons.walks import End
+from polycorner.spaces.manifold import Array
+from polycorner.values import Value
+
+EdgeEnd = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Curve(Value):
+    """An edge while the skeleton grows, of at least two points.
+
+    ``relabelled`` carries the names along the walk to the names at the corner ``stop``.
+    """
+
+    points: Array
+    active: frozenset[int]
+    kinds: tuple[End, End]
+    start: EdgeEnd | None
+    stop: EdgeEnd | None
+    relabelled: Relabelling
+
+    def __post_init__(self) -> None:
+        if len(self.points) < 2:
+            msg = f"points: expected at least two points of an edge; got {len(self.points)}"
+            raise ValueError(msg)
+        super().__post_init__()
+
+    @property
+    def middle(self) -> Array:
+        """The vertex half-way along."""
+        return np.asarray(self.points[len(self.points) // 2])
+
+
+def lies_on(quotient: Quotient, q: Array, curve: Curve) -> bool:
+    """Whether a point lies on a curve: on the arc over a chord that is as near as it is long.
+
+    The nearest vertex may belong to another part of the curve.
+    """
+    manifold = quotient.polyhedron.manifold
+    apart = quotient.symmetry.separations(manifold, q, curve.points)
+    near = np.minimum(apart[:-1], apart[1:])
+    chords = np.linalg.norm(np.diff(curve.points, axis=0) / manifold.scale_array, axis=1)
+    possible = [k for k in np.argsort(near) if near[k] <= chords[k]]
+    return any(_on_arc(quotient, q, curve, int(k)) for k in possible)
+
+
+def _on_arc(quotient: Quotient, q: Array, curve: Curve, k: int) -> bool:
+    """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
+    symmetry, manifold = quotient.symmetry, quotient.polyhedron.manifold
+    start, end = curve.points[k], curve.points[k + 1]
+    q = manifold.image(q, start)
+    kept = quotient.at(start).basis(curve.active)
+    along = symmetry.displacement(manifold, end, start)
+
+    def passed(s: float) -> tuple[float, Array]:
+        at = projected(quotient, start + s * (end - start), kept, np.inf)
+        p = start if at is None else at.q
+        return float(symmetry.displacement(manifold, p, q) @ along), p
+
+    if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
+        return min(symmetry.separation(manifold, q, p) for p in (start, end)) < SAME
+    return symmetry.separation(manifold, q, sign_change(passed)[1]) < SAME

@@ -1,0 +1,167 @@
+"""Curves along which the gradients of the functions that vanish have one relation.
+
+Let the rows of ``A(q)`` be the gradients of the functions ``f``, and ``u(q)`` its left singular
+vector of the smallest singular value.  The rows are dependent where ``A' u = 0``.  Nearby, the
+derivative of ``A' u`` along the null directions of ``A`` is the form ``B = sum u_i H_i``.  Where
+``B`` has one null direction on these, ``f`` and the components of ``A' u`` along the other ones,
+the *flaps*, vanish together on a curve in this direction, and one of the ``f`` follows from the
+other functions, whose gradients are independent ([Gov] sec. 4.1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from polycorner.formulas.bundles import Bundle
+from polycorner.polyhedra.cones import Rows, null_space, unit_rows
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
+from polycorner.skeletons.walks import End, Walk, follow
+from polycorner.spaces.manifold import Array
+
+# Largest eigenvalue of the form that counts as zero, relative to the next.
+FLAT = 1e-3
+# Length in scale units after which a walk takes its flaps anew: they turn with the curve.
+SEGMENT = 0.3
+
+
+class _Dependent(Bundle):
+    """A bundle's functions, then components of ``A' u``."""
+
+    def __init__(
+        self, ambient: Bundle, rows: list[int], units: Array, weights: Array, flaps: Array
+    ) -> None:
+        self.ambient, self.rows, self.units = ambient, rows, units
+        self.weights, self.flaps = weights, flaps
+
+    def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
+        """Return values and derivatives; the components' second ones are not known: NaN."""
+        if q.ndim > 1:
+            each = [self.evaluate(p, order) for p in q.reshape(-1, q.shape[-1])]
+            parts = [np.array(part) for part in zip(*each, strict=True)]
+            return tuple(part.reshape(q.shape[:-1] + part.shape[1:]) for part in parts)
+        found = self.ambient.evaluate(q, min(order + 1, 2))
+        matrix = found[1][self.rows] * self.units
+        left, _, right = np.linalg.svd(matrix)
+        weights = left[:, -1] * (1.0 if left[:, -1] @ self.weights > 0 else -1.0)
+        null = right[len(matrix) - 1 :]
+        flaps = self.flaps @ null.T @ null
+        more = [flaps @ (matrix.T @ weights)]
+        if order > 0:
+            # Per unit of scaled coordinates once, per coordinate once.
+            bends = np.einsum("ij,ijk->jk", weights[:, None] * self.units, found[2][self.rows])
+            more.append(flaps @ bends)
+        if order > 1:
+            more.append(np.full((len(flaps), len(q), len(q)), np.nan))
+        return tuple(np.concatenate(both) for both in zip(found, more, strict=False))
+
+
+class DependentSet(Polyhedron):
+    """A polyhedron with equations for the points where gradients have one relation.
+
+    Its attribute ``outer`` is the quotient without these equations.
+
+    Parameters
+    ----------
+    point : EvaluatedPoint
+        A point where they have.
+    rows : list of int
+        Positions of the functions and equations.
+    flaps : (F, n) array
+        Scaled directions along which the gradient of the related sum has to vanish.
+    """
+
+    def __init__(self, point: EvaluatedPoint, rows: list[int], flaps: Array) -> None:
+        self.outer, base = point.quotient, point.quotient.polyhedron
+        self.__setstate__(base.__getstate__())
+        more = [f"relation {k}" for k in range(len(flaps))]
+        self.equation_names = (*base.equation_names, *more)
+        units = 1 / np.linalg.norm(point.gradients[rows], axis=1)
+        weights = np.linalg.svd(point.gradients[rows] * units[:, None])[0][:, -1]
+        scaled = units[:, None] * base.manifold.scale_array
+        self._extended = _Dependent(base.bundle, rows, scaled, weights, flaps)
+
+    @property
+    def bundle(self) -> Bundle:
+        """Inequalities first, equations after them, those of the relation last."""
+        return self._extended
+
+
+def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
+    """Return the weighted sum of the Hessians of unit-slope functions on a subspace.
+
+    Equations count with the multipliers that cancel what is left of the weighted gradients.
+    """
+    quotient = point.quotient
+    polyhedron, solved = quotient.polyhedron, list(quotient.equations)
+    scales = polyhedron.manifold.scale_array
+    frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
+    sizes = np.linalg.norm(point.gradients[rows], axis=1)
+    sizes[sizes == 0] = 1.0  # a vanishing gradient is a relation by itself
+    factors = weights / sizes
+    left = factors @ point.gradients[rows]
+    multipliers = np.linalg.lstsq(point.gradients[solved].T, -left, rcond=None)[0]
+    hessians = polyhedron.bundle.evaluate(point.q, 2)[2] * np.outer(scales, scales)
+    total = np.einsum("i,ijk->jk", [*factors, *multipliers], hessians[[*rows, *solved]])
+    return np.asarray(frame.T @ total @ frame)
+
+
+def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoint, Array] | None:
+    """Return a point as one of a curve of dependent gradients, and the scaled unit tangent there.
+
+    None if the gradients have no relation or several, or do not leave one null direction.
+
+    Parameters
+    ----------
+    point : EvaluatedPoint
+        A point of the curve.
+    active : set of int
+        Functions that vanish along it.
+    """
+    quotient, rows = point.quotient, sorted(active)
+    if not point.sizes[quotient.held(rows)].all():
+        return None  # a relation of one gradient: there is no curve that it follows
+    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    held = Rows(unit_rows(point.gradients[rows]) @ frame, RANK_TOLERANCE)
+    if held.relations.shape[1] != 1:
+        return None
+    form = curvature(point, rows, held.relations[:, 0], held.null_space)
+    values, axes = np.linalg.eigh(form)
+    order = np.argsort(abs(values))
+    if len(values) < 2 or not abs(values[order[0]]) < FLAT * abs(values[order[1]]):
+        return None
+    ways = (frame @ held.null_space @ axes[:, order]).T
+    curve = DependentSet(point, quotient.held(rows), ways[1:])
+    extra = range(len(point.values), len(point.values) + len(ways) - 1)
+    along = replace(quotient, polyhedron=curve, equations=(*quotient.equations, *extra))
+    return HeldPoint(along, point.q, point.basis(active)), ways[0]
+
+
+def held_at(outer: Quotient, q: Array, active: frozenset[int], kept: Sequence[int]) -> HeldPoint:
+    """Return a point of a curve of dependent gradients; where they are not, with what is kept."""
+    found = dependent_at(outer.at(q), active)
+    return HeldPoint(outer, q, kept) if found is None else found[0]
+
+
+def is_dependent(point: HeldPoint) -> bool:
+    """Whether a point is held on a curve of dependent gradients."""
+    return isinstance(point.quotient.polyhedron, DependentSet)
+
+
+def follow_edge(start: HeldPoint, direction: Array, active: frozenset[int]) -> Walk:
+    """Walk along an edge to its end; see :func:`~polycorner.skeletons.walks.follow`."""
+    curve = start.quotient.polyhedron
+    if not isinstance(curve, DependentSet):
+        return follow(start, direction, passive=active)
+    parts, length = [start.q[None]], 0.0
+    while True:
+        walk = follow(start, direction, passive=active, extent=SEGMENT)
+        parts.append(walk.points[1:])
+        length, direction, end = length + walk.length, walk.tangent, walk.end
+        start = held_at(curve.outer, walk.last.q, active, walk.last.kept)
+        if end is End.INFINITY and not is_dependent(start):
+            end = End.SINGULAR
+        if end is not End.INFINITY or length > curve.outer.extent:
+            return Walk(np.concatenate(parts), start, direction, end, length)
