@@ -304,10 +304,13 @@ def _stated(expression: Any, manifold: Manifold) -> SmoothFunction:
     """Return an energy as one function; in many coordinates, as the sum of the terms written."""
     if manifold.size < MANY or not getattr(expression, "is_Add", False):
         return SmoothFunction("energy", expression, manifold)
+    varying = [term for term in expression.args if term.free_symbols]
+    constants = [term for term in expression.args if not term.free_symbols]
+    if not all(s.name in manifold.positions for s in expression.free_symbols) or not varying:
+        return SmoothFunction("energy", expression, manifold)
+    varying[0] = sum(constants, varying[0])
     terms = []
-    for term in expression.args:
+    for term in varying:
         reads = sorted(symbol.name for symbol in term.free_symbols)
-        if not reads or not set(reads) <= manifold.positions.keys():
-            return SmoothFunction("energy", expression, manifold)
         terms.append(SmoothFunction("energy", term, manifold, variables=reads))
     return SmoothFunction.sum("energy", terms)

@@ -325,3 +325,12 @@ def test_a_sum_of_functions_is_one_function():
     assert len(SmoothFunction.sum("again", [total, terms[0]]).terms) == 3
     with pytest.raises(ValueError, match="at least one function"):
         SmoothFunction.sum("none", [])
+
+
+def test_sums_are_taken_term_by_term():
+    M = Manifold.euclidean([f"x{i}" for i in range(150)])
+    x = M.symbols
+    springs = [(b - a) ** 2 for a, b in itertools.pairwise(x)]
+    E = pose(Polyhedron(M, {"floor": x[0]}), sympy.Add(5, *springs)).energy
+    assert len(E.terms) == 149
+    assert E.value(np.arange(150.0)) == pytest.approx(154)
