@@ -2,8 +2,9 @@
 
 Each size runs in a process of its own, on one core.  ``python benchmarks/bench_packings.py`` runs
 all sizes but the largest; ``--sizes discs:10000`` chooses others.  ``--exponents discs:256:20``
-jams twenty packings and estimates how small forces and gaps are distributed.  The results are added
-to ``benchmarks/results/packings.json``.
+jams twenty packings and estimates how small forces and gaps are distributed; ``--spread
+discs:256:8`` tells how times differ between eight starts.  The results are added to
+``benchmarks/results/packings.json``.
 """
 
 import argparse
@@ -14,7 +15,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -125,30 +126,62 @@ def distributions(kind: str, count: int, seeds: int) -> dict[str, float | int | 
     return row | {"closed without force": int(closed.sum())}
 
 
+def spread(kind: str, count: int, seeds: int) -> dict[str, Any]:
+    """Jam one packing for each seed; return processor times and numbers of programmes."""
+    from polycorner.models import PeriodicPacking
+
+    packing = bodies(kind, count)
+    PeriodicPacking.bidisperse(100, packing.dimension).jam(0)  # compiles the kernel
+    soft, jamming, programmes = [], [], []
+    for seed in range(1, seeds + 1):
+        begin = time.process_time()
+        start = packing.soft_start(seed)
+        middle = time.process_time()
+        programmes.append(packing.jam(start).programmes)
+        soft.append(middle - begin)
+        jamming.append(time.process_time() - middle)
+    total = np.add(soft, jamming)
+    return {
+        "kind": kind,
+        "count": count,
+        "seconds, least": float(total.min()),
+        "seconds, mean": float(total.mean()),
+        "seconds, most": float(total.max()),
+        "soft start, mean": float(np.mean(soft)),
+        "jamming, mean": float(np.mean(jamming)),
+        "programmes": programmes,
+    }
+
+
 def exponent(rows: list[dict[str, float]]) -> float:
     """Return the slope of the logarithm of the time against that of the number of bodies."""
     counts, seconds = (np.log([row[key] for row in rows]) for key in ("count", "seconds"))
     return float(np.polyfit(counts, seconds, 1)[0])
 
 
-def keep_distributions(row: dict[str, float | int | str]) -> None:
-    """Print exponents and add them to the results."""
+def keep(row: dict[str, Any], under: str) -> None:
+    """Print a row and add it to the results."""
     print(row)
     kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {"runs": []}
     same = (row["kind"], row["count"])
-    others = [r for r in kept.get("small", []) if (r["kind"], r["count"]) != same]
-    RESULTS.write_text(json.dumps(kept | {"small": [*others, row]}, indent=1) + "\n")
+    others = [r for r in kept.get(under, []) if (r["kind"], r["count"]) != same]
+    RESULTS.write_text(json.dumps(kept | {under: [*others, row]}, indent=1) + "\n")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", default=SIZES)
     parser.add_argument("--exponents", help="kind:bodies:packings, for small forces and gaps")
+    parser.add_argument("--spread", help="kind:bodies:seeds, for times of several starts")
     parser.add_argument("--one", help="run this size here and print it as JSON")
     chosen = parser.parse_args()
     if chosen.exponents:
         kind, count, seeds = chosen.exponents.split(":")
-        keep_distributions(distributions(kind, int(count), int(seeds)))
+        keep(distributions(kind, int(count), int(seeds)), "small")
+        return
+    if chosen.spread:
+        kind, count, seeds = chosen.spread.split(":")
+        keep(spread(kind, int(count), int(seeds)), "spread")
         return
     if chosen.one:
         kind, count = chosen.one.split(":")

@@ -114,7 +114,8 @@ class Family(Value):
         symbols = variables, parameters
         bindings: dict[str, Binding] = {}
         if _is_shared(family, known):
-            bindings = {name: bind(name, e, *symbols, known) for name, e in given.items()}
+            places = {name: i for i, name in enumerate(variables)}
+            bindings = {name: bind(name, e, places, parameters, known) for name, e in given.items()}
             numbers = [(name, b.shape.key, b.reads, b.exact) for name, b in bindings.items()]
             key = digest([*symbols, *numbers])
         else:

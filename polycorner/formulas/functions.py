@@ -1,7 +1,6 @@
 """Smooth functions on a manifold: one SymPy expression gives value, gradient and Hessian."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +9,16 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
-from polycorner.formulas.expressions import announce, check_periodic
 from polycorner.formulas.families import Family
-from polycorner.formulas.signs import check_even
+from polycorner.formulas.periodicity import check_function
 from polycorner.spaces.arguments import finite, reals, scalar
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 if TYPE_CHECKING:
     import sympy
+
+    from polycorner.formulas.rows import SparseRows
 
 
 def _words(argument: str, names: Sequence[str] | None) -> tuple[str, ...]:
@@ -119,6 +119,44 @@ class SmoothFunction(Value):
         """
         return cls.member(Family.of({name: expression}, manifold.names), name, manifold)
 
+    @classmethod
+    def sum(cls, name: str, terms: "Iterable[SmoothFunction]") -> "SmoothFunction":
+        """Return a sum of functions of few coordinates each, such as the energies of many springs.
+
+        Large polyhedra with sparse matrices need the energy in this form.
+
+        Parameters
+        ----------
+        name : str
+            The sum's name.
+        terms : iterable of SmoothFunction
+            On one manifold.  Parameters of one name and one value are one parameter of the sum;
+            those of one name and several values are numbers in it.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For other terms, for none, or for terms on several manifolds.
+
+        Examples
+        --------
+        >>> M = Manifold.euclidean("x y z")
+        >>> spring = Family.of({"spring": (M.symbols[1] - M.symbols[0]) ** 2 / 2}, "xy")
+        >>> pairs = [("x", "y"), ("y", "z")]
+        >>> E = SmoothFunction.sum(
+        ...     "springs", [SmoothFunction.member(spring, "spring", M, reads=p) for p in pairs]
+        ... )
+        >>> E.value([0.0, 1.0, 3.0]), E.gradient([0.0, 1.0, 3.0]).tolist()
+        (2.5, [-1.0, -1.0, 2.0])
+        """
+        checks.instance("name", name, str)
+        parts = tuple(terms)
+        for part in parts:
+            checks.instance("terms", part, SmoothFunction)
+        if not parts or any(part.manifold != parts[0].manifold for part in parts):
+            checks.refuse("terms", "at least one function, all on one manifold", parts[:3])
+        return _Sum(name, parts)
+
     def _bind(
         self,
         family: Family,
@@ -128,7 +166,8 @@ class SmoothFunction(Value):
         parameters: tuple[float, ...],
         label: str | None = None,
     ) -> None:
-        unknown = [coordinate for coordinate in reads if coordinate not in manifold.names]
+        known = manifold.positions
+        unknown = [name for name in reads if name not in known]
         if unknown or len(set(reads)) != len(reads) or len(reads) != len(family.variables):
             msg = (
                 f"reads: expected {len(family.variables)} different ones of the coordinates "
@@ -139,22 +178,37 @@ class SmoothFunction(Value):
         if numbers.shape != (len(family.parameters),):
             msg = f"parameters: expected {len(family.parameters)} numbers; got {numbers.shape}"
             raise ValueError(msg)
-        self.family, self.member_name, self.manifold = family, name, manifold
+        self._family, self.member_name, self.manifold = family, name, manifold
         self.name = label or name
-        self.reads = tuple(manifold.names.index(coordinate) for coordinate in reads)
-        self.parameters = tuple(numbers.tolist())
+        places = tuple([known[coordinate] for coordinate in reads])
+        self._reads = manifold.everything if places == manifold.everything else places
+        self._parameters = tuple(numbers.tolist())
+
+    @property
+    def family(self) -> Family:
+        """The family of formulas that it belongs to."""
+        return self._family
+
+    @property
+    def reads(self) -> tuple[int, ...]:
+        """Positions of the coordinates that it reads."""
+        return self._reads
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """The values of the family's parameters."""
+        return self._parameters
+
+    @property
+    def terms(self) -> "tuple[SmoothFunction, ...]":
+        """The functions whose sum it is: itself alone, unless it was made by :meth:`sum`."""
+        return (self,)
 
     def renamed(self, name: str) -> "SmoothFunction":
         """Return the same function under another name."""
         reads = [self.manifold.names[i] for i in self.reads]
-        return SmoothFunction.member(
-            self.family,
-            self.member_name,
-            self.manifold,
-            parameters=self.parameters,
-            reads=reads,
-            label=name,
-        )
+        bound: Any = {"parameters": self.parameters, "reads": reads, "label": name}
+        return SmoothFunction.member(self.family, self.member_name, self.manifold, **bound)
 
     def __repr__(self) -> str:
         """Return the name and what the function reads."""
@@ -208,20 +262,86 @@ class SmoothFunction(Value):
         return self._bundle.evaluate(self.manifold.points(q), 2)[2][..., 0, :, :]
 
 
-def check_function(function: SmoothFunction, *, periodic: bool = True) -> None:
-    """Warn of kinks; raise ValueError for a function that should be periodic and is not.
+class _Sum(SmoothFunction):
+    """A sum of functions, evaluated term by term; one formula only where that is asked for."""
 
-    A section, such as ``sin((a + b) / 2) = 0``, may change its sign, or fix an angle in one chart.
-    """
-    announce(function.name, function.kinks)
-    if periodic and function.manifold.rotations:
-        check_even(function.name, function.expression, function.manifold, function.parameter_values)
-    if periodic and any(map(math.isfinite, (function.manifold.periods[i] for i in function.reads))):
-        family = function.family
-        check_periodic(
-            function.name,
-            family.expression(function.member_name),
-            function.manifold,
-            dict(zip(family.variables, function.reads, strict=True)),
-            dict(zip(family.parameters, function.parameters, strict=True)),
-        )
+    def __init__(self, name: str, terms: tuple[SmoothFunction, ...]) -> None:
+        self.name = self.member_name = name
+        self.manifold = terms[0].manifold
+        self._terms = tuple([part for term in terms for part in term.terms])
+
+    def renamed(self, name: str) -> SmoothFunction:
+        """Return the same sum under another name."""
+        return _Sum(name, self._terms)
+
+    def __repr__(self) -> str:
+        """Return the name and the number of terms."""
+        return f"SmoothFunction.sum({self.name!r}, {len(self._terms)} terms)"
+
+    @cached_property
+    def _whole(self) -> SmoothFunction:
+        """The sum as one formula."""
+        import sympy
+
+        values: dict[str, set[float]] = {}
+        for term in self._terms:
+            for parameter, value in term.parameter_values.items():
+                values.setdefault(parameter, set()).add(value)
+        shared = {p: found for p, (found, *others) in values.items() if not others}
+        written = sympy.Add(*[_with_numbers(term, shared) for term in self._terms])
+        family = Family.of({self.name: written}, self.manifold.names, shared, unit=self.unit)
+        numbers = tuple(shared.values())
+        return SmoothFunction.member(family, self.name, self.manifold, parameters=numbers)
+
+    @property
+    def terms(self) -> tuple[SmoothFunction, ...]:
+        return self._terms
+
+    @property
+    def family(self) -> Family:
+        return self._whole.family
+
+    @property
+    def reads(self) -> tuple[int, ...]:
+        return self._whole.reads
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        return self._whole.parameters
+
+    @property
+    def unit(self) -> str:
+        return self._terms[0].unit
+
+    @property
+    def kinks(self) -> tuple[str, ...]:
+        return tuple([kink for term in self._terms for kink in term.kinks])
+
+    @cached_property
+    def _rows(self) -> "SparseRows":
+        from polycorner.formulas.rows import SparseRows
+
+        return SparseRows.of(self._terms, self.manifold.size)
+
+    def value(self, q: ArrayLike) -> Any:
+        points = self.manifold.points(q)
+        flat = points.reshape(-1, points.shape[-1])
+        sums = np.array([self._rows.values(point).sum() for point in flat])
+        return scalar(sums.reshape(points.shape[:-1]))
+
+    def gradient(self, q: ArrayLike) -> Array:
+        points = self.manifold.points(q)
+        flat = points.reshape(-1, self.manifold.size)
+        slopes = [self._rows.evaluate(point)[1].sum(axis=0) for point in flat]
+        return np.array(slopes, dtype=np.float64).reshape(points.shape)
+
+
+def _with_numbers(function: SmoothFunction, shared: Mapping[str, float]) -> "sympy.Expr":
+    """Return an expression with numbers in place of all parameters but those that are shared."""
+    import sympy
+
+    own = {p: value for p, value in function.parameter_values.items() if p not in shared}
+    written = function.expression
+    return written.xreplace(
+        {s: sympy.Float(own[s.name]) for s in written.free_symbols if s.name in own}
+    )

@@ -109,11 +109,11 @@ class Binding(Value):
 def bind(
     name: str,
     expression: "sympy.Expr",
-    variables: Sequence[str],
+    variables: Mapping[str, int],
     parameters: Sequence[str],
     definitions: "Mapping[str, sympy.Expr]",
 ) -> Binding:
-    """Return an expression as a shape bound to variables and numbers.
+    """Return an expression as a shape bound to variables, given with their positions, and numbers.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def bind(
 def _general(
     name: str,
     expression: "sympy.Expr",
-    variables: Sequence[str],
+    variables: Mapping[str, int],
     parameters: Sequence[str],
     definitions: "Mapping[str, sympy.Expr]",
 ) -> Binding:
@@ -148,9 +148,9 @@ def _general(
 class _Abstract(Translator):
     """A translator that numbers coordinates as they occur and makes parameters of all numbers."""
 
-    def __init__(self, variables: Sequence[str], parameters: Sequence[str]) -> None:
+    def __init__(self, variables: Mapping[str, int], parameters: Sequence[str]) -> None:
         super().__init__((), parameters)
-        self._positions = {name: i for i, name in enumerate(variables)}
+        self._positions = variables
         self._given = len(parameters)
         self.reads: list[int] = []
         self.numbers: list[Fraction] = []
@@ -176,9 +176,8 @@ class _Abstract(Translator):
 # ------------------------------------------------------------------------------------- polynomials
 
 
-def _polynomial(expression: "sympy.Expr", variables: Sequence[str]) -> Binding | None:
+def _polynomial(expression: "sympy.Expr", position: Mapping[str, int]) -> Binding | None:
     """Return a polynomial of degree one or two that is written as a sum of terms."""
-    position = {name: i for i, name in enumerate(variables)}
     terms: dict[tuple[int, ...], float] = {}
     exact: list[Any] = []
     for term in expression.args if expression.is_Add else (expression,):

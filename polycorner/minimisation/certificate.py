@@ -21,11 +21,8 @@ from polycorner.minimisation.explanation import explanation
 from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.sparse_analysis import (
-    SparseAnalysis,
-    analyse_sparse,
-    sparse_explanation,
-)
+from polycorner.minimisation.sparse_analysis import SparseAnalysis, analyse_sparse
+from polycorner.minimisation.sparse_explanation import sparse_explanation, sparse_sheet
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.strata import (
     RANK_TOLERANCE,
@@ -240,7 +237,7 @@ class Certificate(Value, Printed):
         its multiplier is negative.
         """
         if isinstance(self.found, SparseAnalysis):
-            return sparse_explanation(self.found, self.verdict)
+            return sparse_explanation(self.found, self.verdict, self.note)
         return explanation(self.analysis, self.stratum, self.verdict, self.search, unit, self.note)
 
     def __repr__(self) -> str:
@@ -263,6 +260,8 @@ class Certificate(Value, Printed):
         """Return tables of the point, the active functions and the directions."""
         manifold = self.problem.polyhedron.manifold
         residuals = self.residuals
+        if isinstance(self.found, SparseAnalysis):
+            return sparse_sheet(self.found, self.verdict, self.energy, residuals, self.note)
         return Sheet(
             "Certificate",
             (

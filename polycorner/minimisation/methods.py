@@ -17,6 +17,7 @@ from polycorner.minimisation.polishing import SETTLED, Endpoint
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.rescaling import PATIENCE, advice, rescaled
 from polycorner.minimisation.slsqp import slsqp
+from polycorner.minimisation.sparse_methods import sparse_descent, sparse_on_face
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
@@ -72,10 +73,18 @@ def minimise(
     Certificate
         Its verdict says what was found; a failed search gives a certificate, too.
 
+    Notes
+    -----
+    In a large polyhedron without unions, of functions that read few coordinates each,
+    ``"newton"`` uses sparse matrices throughout: quadratic programmes in a trust region, then
+    Newton's method on the face.  The energy should be a sum of functions of few coordinates
+    (:meth:`.SmoothFunction.sum`), as a SymPy sum is.
+
     Raises
     ------
     TypeError, ValueError
-        For arguments of the wrong kind, or an energy that is not finite at the start.
+        For arguments of the wrong kind, an energy that is not finite at the start, or a polyhedron
+        whose full matrices are too large and that is not sparse.
     SolverError
         If cvxpy does not find its solver.
 
@@ -94,10 +103,15 @@ def minimise(
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
+    problem.check_size()
     q = polyhedron.manifold.point(start, "start")
     if method != "newton":
         problem.check_energy(q, "start")
-    end = _descend_union(problem, q, _diagnosing(method), int(max_iterations))
+    if method == "newton" and problem.is_sparse:
+        problem.check_energy(q, "start")
+        end = sparse_descent(problem, q, int(max_iterations), tolerance)
+    else:
+        end = _descend_union(problem, q, _diagnosing(method), int(max_iterations))
     if end.failure is Verdict.INFEASIBLE:
         problem.check_energy(q, "start")
     ways = (tolerance, rank_tolerance, method, end.iterations)
@@ -148,6 +162,7 @@ def stationary_on(
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)
+    problem.check_size()
     names = polyhedron.names
     if not isinstance(active, list | tuple):
         checks.refuse("active", f"a list of names among {', '.join(names)}", active, TypeError)
@@ -155,7 +170,8 @@ def stationary_on(
     q = polyhedron.manifold.point(start, "start")
     problem.check_energy(q, "start")
     face = frozenset(polyhedron.names.index(name) for name in active)
-    point, last = problem.on_face(face, q)
+    newton = sparse_on_face if problem.is_sparse else Problem.on_face
+    point, last = newton(problem, face, q)
     failure = None if last < SETTLED else Verdict.NOT_CONVERGED
     return Certificate(
         problem, point if failure is None else q, tolerance, rank_tolerance, "face", 1, failure

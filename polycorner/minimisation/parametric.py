@@ -104,10 +104,7 @@ class Lifted:
         d = problem.polyhedron
         held = (*(d.functions[i] for i in certificate.analysis.active), *d.equations)
         self.names = tuple(f.name for f in held)
-        self.slots: dict[tuple[str, float], int] = {}
-        for f in (*held, problem.energy):
-            for slot in zip(f.family.parameters, f.parameters, strict=True):
-                self.slots.setdefault(slot, len(self.slots))
+        self.slots = slots_of((*held, problem.energy))
         self._scales = problem.scales
         self._values = np.array([value for _, value in self.slots])
         self._bundle = self._bind((*held, problem.energy))
@@ -158,6 +155,15 @@ class Lifted:
             curvature=curved * np.outer(scales, scales),
             turning=np.einsum("i,ijp->jp", weights, mixed),
         )
+
+
+def slots_of(functions: Iterable[SmoothFunction]) -> dict[tuple[str, float], int]:
+    """Return a place for every parameter of functions, by its name and value."""
+    slots: dict[tuple[str, float], int] = {}
+    for f in functions:
+        for slot in zip(f.family.parameters, f.parameters, strict=True):
+            slots.setdefault(slot, len(slots))
+    return slots
 
 
 @lru_cache(maxsize=256)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.minimisation.sparse.rows import SparseRows
+from polycorner.formulas.rows import SparseRows
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 if TYPE_CHECKING:
@@ -33,7 +33,9 @@ Flat = tuple[
 ]
 
 MOST_NUMBERS = 20_000_000  # second derivatives that are kept as a full array
+TOO_MANY = 1_000_000_000  # of them, that are not even tried: 8 GB
 MOST_READ = 0.1  # share of the coordinates that a function of a sparse polyhedron reads
+MANY = 100  # coordinates from which on an energy is kept as the sum of the terms it is written as
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,8 @@ class Problem(Value):
     def parameter_values(self) -> dict[str, frozenset[float]]:
         """The values of every parameter of the functions, by name."""
         found: dict[str, frozenset[float]] = {}
-        for f in self.functions:
+        parts = (*self.polyhedron.functions, *self.polyhedron.equations, *self.energy.terms)
+        for f in parts:
             for name, value in zip(f.family.parameters, f.parameters, strict=True):
                 found[name] = found.get(name, frozenset()) | {value}
         return found
@@ -123,8 +126,20 @@ class Problem(Value):
         n = self.dimension
         if self.polyhedron.is_union or self.rows * n * n < MOST_NUMBERS:
             return False
-        read = sum(len(call.reads) * len(call.rows) for call in self._bundle.calls)
+        read = self.sparse_rows.entries + self.sparse_energy.entries
         return read < MOST_READ * self.rows * n
+
+    def check_size(self) -> None:
+        """Raise ValueError for a problem whose full matrices are too large, if it needs these."""
+        n = self.dimension
+        if self.is_sparse or self.rows * n * n < TOO_MANY:
+            return
+        reason = "no unions" if self.polyhedron.is_union else "functions of few coordinates each"
+        msg = (
+            f"polyhedron: expected {reason}, as sparse matrices need; full matrices of "
+            f"{self.rows} functions of {n} coordinates would have {self.rows * n * n:.2g} entries"
+        )
+        raise ValueError(msg)
 
     @cached_property
     def sparse_rows(self) -> SparseRows:
@@ -134,8 +149,8 @@ class Problem(Value):
 
     @cached_property
     def sparse_energy(self) -> SparseRows:
-        """The energy as a sparse row."""
-        return SparseRows.of((self.energy,), self.dimension)
+        """The terms of the energy as sparse rows."""
+        return SparseRows.of(self.energy.terms, self.dimension)
 
     @cached_property
     def flat(self) -> tuple[Flat, int]:
@@ -275,7 +290,7 @@ def _posed(polyhedron: Polyhedron, energy: Any) -> Problem:
     manifold = polyhedron.manifold
     function: Any = energy
     if not isinstance(energy, SmoothFunction):
-        function = SmoothFunction("energy", energy, manifold)
+        function = _stated(energy, manifold)
     if function.manifold != manifold:
         msg = (
             f"energy: is a function of the coordinates {', '.join(function.manifold.names)}; "
@@ -283,3 +298,19 @@ def _posed(polyhedron: Polyhedron, energy: Any) -> Problem:
         )
         raise ValueError(msg)
     return Problem(polyhedron, function)
+
+
+def _stated(expression: Any, manifold: Manifold) -> SmoothFunction:
+    """Return an energy as one function; in many coordinates, as the sum of the terms written."""
+    if manifold.size < MANY or not getattr(expression, "is_Add", False):
+        return SmoothFunction("energy", expression, manifold)
+    varying = [term for term in expression.args if term.free_symbols]
+    constants = [term for term in expression.args if not term.free_symbols]
+    if not all(s.name in manifold.positions for s in expression.free_symbols) or not varying:
+        return SmoothFunction("energy", expression, manifold)
+    varying[0] = sum(constants, varying[0])
+    terms = []
+    for term in varying:
+        reads = sorted(symbol.name for symbol in term.free_symbols)
+        terms.append(SmoothFunction("energy", term, manifold, variables=reads))
+    return SmoothFunction.sum("energy", terms)

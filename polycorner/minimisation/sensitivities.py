@@ -28,6 +28,8 @@ from polycorner.minimisation.parametric import (
     check_rates,
     partial_derivatives,
 )
+from polycorner.minimisation.sparse_analysis import SparseAnalysis
+from polycorner.minimisation.sparse_sensitivities import sparse_derivatives, sparse_obstacle
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.strata import local_pieces
 from polycorner.printing import Printed, Sheet, Table, number, titled, units
@@ -188,6 +190,8 @@ def sensitivity(
     """
     _check_point(certificate)
     rates = check_rates(certificate, parameters)
+    if certificate.problem.is_sparse:
+        return _sparse(certificate, rates)
     lifted, reference = Lifted(certificate), certificate.analysis.reference
     multipliers = np.array(list(certificate.analysis.named_multipliers.values()))
     still, directions = np.zeros(len(lifted.slots)), lifted.directions(rates)
@@ -216,6 +220,22 @@ def sensitivity(
     )
 
 
+def _sparse(certificate: Certificate, rates: Rates) -> Sensitivity:
+    found = sparse_derivatives(certificate, rates)
+    if isinstance(found, str):
+        raise ValueError(_refusal(found))
+    changed = dict(zip(found.names, found.multipliers, strict=True))
+    return Sensitivity(
+        certificate=certificate,
+        rates=rates,
+        point=found.point,
+        multipliers=certificate.problem.stated(changed),
+        energy=found.energy,
+        envelope=found.envelope,
+        free=found.free,
+    )
+
+
 def _check_point(certificate: Certificate) -> None:
     """Raise for a certificate whose point need not depend smoothly on the parameters."""
     checks.instance("certificate", certificate, Certificate)
@@ -230,6 +250,8 @@ def _refusal(reason: str) -> str:
 
 def _reason(certificate: Certificate) -> str:
     """Return the reason why the implicit function theorem does not apply, or an empty string."""
+    if isinstance(certificate.found, SparseAnalysis):
+        return sparse_obstacle(certificate.found)
     analysis, d = certificate.analysis, certificate.problem.polyhedron
     values, gradients = analysis.local.values, analysis.local.gradients
     if analysis.verdict in {Verdict.OUTSIDE, Verdict.DOMAIN_EDGE}:

@@ -14,6 +14,7 @@ from polycorner.minimisation.sparse.optimality import (
     FirstOrder,
     first_order,
     leads_down,
+    multiplier_ranges,
     second_order,
 )
 from polycorner.minimisation.verdicts import Entrapment, Verdict
@@ -51,14 +52,14 @@ class SparseLocal(Value):
         """Evaluate the functions of a problem at a point."""
         scaling = diags_array(problem.scales)
         values, rows = problem.sparse_rows.evaluate(q)
-        energy, slope = problem.sparse_energy.evaluate(q)
-        bent = problem.sparse_energy.curvature(q, np.ones(1))
+        terms, slopes = problem.sparse_energy.evaluate(q)
+        bent = problem.sparse_energy.curvature(q, np.ones(len(terms)))
         return cls(
             problem,
             q,
-            np.append(values, energy),
+            np.append(values, terms.sum()),
             csr_array(rows @ scaling),
-            (slope @ scaling).toarray()[0],
+            np.asarray(slopes.sum(axis=0) * problem.scales),
             csr_array(scaling @ bent @ scaling),
             tolerance,
             rank_tolerance,
@@ -156,10 +157,15 @@ class SparseAnalysis(Value):
 
     @property
     def named_ranges(self) -> dict[str, tuple[float, float]]:
-        """The range of each multiplier, where they are unique."""
-        if not self.independent:
-            self._refuse("ranges of multipliers that are not unique")
-        return {name: (value, value) for name, value in self.named_multipliers.items()}
+        """The range of each multiplier; where it is not unique, from two linear programmes."""
+        if self.independent:
+            return {name: (value, value) for name, value in self.named_multipliers.items()}
+        held = (*self.names, *self.local.problem.polyhedron.equation_names)
+        local, k = self.local, len(self.active)
+        numbers = [*self.active, *range(local.problem.inequalities, len(local.away))]
+        rows = unit(csr_array(local.rows[numbers]))
+        ends = multiplier_ranges(rows, k, local.gradient, self.first.values) / self.sizes
+        return dict(zip(held, map(tuple, ends.T.tolist()), strict=True))
 
     @property
     def curvature(self) -> Curvature:
@@ -279,27 +285,3 @@ def _verdict(
     if len(face.moved) < problem.dimension:
         return Verdict.MINIMUM_ALONG_LOCUS, ""
     return (Verdict.WEAK_MINIMUM if weak else found), ""
-
-
-def sparse_explanation(a: SparseAnalysis, verdict: Verdict) -> str:
-    """Explain a verdict in a few sentences of numbers."""
-    problem, first = a.local.problem, a.first
-    words = verdict.value
-    lines = [
-        f"{words[0].upper()}{words[1:]}.",
-        (
-            f"Of {problem.inequalities} inequalities {len(a.active)} are active; with "
-            f"{len(problem.polyhedron.equations)} equations their gradients have rank "
-            f"{first.rank}. {len(a.unmoved)} of {problem.dimension} coordinates are read by no "
-            "function with a positive multiplier."
-        ),
-    ]
-    if a.obstacle:
-        lines.append(f"{a.obstacle[0].upper()}{a.obstacle[1:]}.")
-    elif len(a.active):
-        values = first.values[: len(a.active)]
-        lines.append(
-            f"Multipliers of unit gradients lie between {values.min():.3g} and {values.max():.3g}; "
-            f"the gradient of the energy is met up to {first.residual:.1e}."
-        )
-    return "\n".join(lines)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Union
 
 from polycorner.formulas.families import Family
-from polycorner.formulas.functions import SmoothFunction, check_function
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.formulas.periodicity import check_function
 from polycorner.spaces.manifold import Manifold
 from polycorner.values import Value
 

@@ -36,6 +36,21 @@ class Geometry(Value):
         return scales
 
     @cached_property
+    def positions(self) -> dict[str, int]:
+        """The position of every coordinate, by name."""
+        return {name: i for i, name in enumerate(self.names)}
+
+    @cached_property
+    def everything(self) -> tuple[int, ...]:
+        """The positions of all coordinates: one tuple, which functions of them all share."""
+        return tuple(range(len(self.names)))
+
+    @cached_property
+    def circles(self) -> frozenset[int]:
+        """The positions of the coordinates that are circles."""
+        return frozenset(self._circles[0].tolist())
+
+    @cached_property
     def _circles(self) -> tuple[NDArray[np.intp], Array]:
         """Positions and periods of the coordinates that are circles."""
         periods = np.array(self.periods, dtype=np.float64)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from polycorner.formulas.rows import Indices, Mask, SparseRows
 from polycorner.minimisation.sparse.faces import FacePoint, on_corner
 from polycorner.minimisation.sparse.programmes import Linearised, step
-from polycorner.minimisation.sparse.rows import Indices, Mask, SparseRows
 from polycorner.spaces.manifold import Array
 
 STRONG = 1e-9  # multiplier, relative to the largest, above which a function counts as held

@@ -10,6 +10,8 @@ from polycorner.spaces.manifold import Array
 
 BACKWARD = 1e-10  # backward error of a factorisation whose pivots' signs are believed
 REFINEMENTS = 3  # steps of iterative refinement
+REGULAR = 1e-10  # regularisation of a symmetric system, relative to its largest entry
+MOST_REFINEMENTS = 20  # of a regularised system
 
 
 def factorised(matrix: Any) -> Any | None:
@@ -96,3 +98,46 @@ def least_squares(rows: csr_array, gradient: Array) -> Array | None:
     system = block_array([[eye_array(n), rows.T], [rows, None]], format="csc")
     x = solved(system, np.concatenate([gradient, np.zeros(k)]))
     return None if x is None else x[n:]
+
+
+class Saddle:
+    """The symmetric system ``[[H, A^T], [A, 0]]``, of any rank, by a factorisation nearby.
+
+    SuperLU factorises ``[[H + r, A^T], [A, -r]]`` for a small ``r``, and refinement with the system
+    itself removes what ``r`` changes ([NW] sec. 19.3, the proximal method of multipliers).  In the
+    null space of the system the solution stays as it was at the start: dependent rows and
+    directions without curvature do no harm, if there is a solution.
+
+    Raises
+    ------
+    ValueError
+        If the factorisation is singular all the same, or not finite.
+    """
+
+    def __init__(self, hessian: Any, rows: csr_array) -> None:
+        k, n = rows.shape
+        self.size = n
+        self.matrix = csc_array(block_array([[hessian, rows.T], [rows, csr_array((k, k))]]))
+        shift = REGULAR * max(1.0, float(abs(self.matrix).max()))
+        shifts = np.concatenate([np.full(n, shift), np.full(k, -shift)])
+        found = factorised(self.matrix + diags_array(shifts))
+        if found is None:
+            msg = "the matrix is singular"
+            raise ValueError(msg)
+        self.lu = found
+
+    def solve(self, right: Array, start: Array) -> Array:
+        """Return the solution that is reached from ``start``, ``(n + k,)``; an array of columns."""
+        x, left = start, right - self.matrix @ start
+        size = float(abs(left).max(initial=0.0))
+        for _ in range(MOST_REFINEMENTS):
+            nearer = x + self.lu.solve(left)
+            after = right - self.matrix @ nearer
+            less = float(abs(after).max(initial=0.0))
+            if not less < size:
+                break
+            x, left, stalls = nearer, after, less > 0.5 * size
+            size = less
+            if stalls:
+                break
+        return x

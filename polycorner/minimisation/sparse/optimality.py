@@ -8,6 +8,7 @@ from scipy.optimize import linprog
 from scipy.sparse import block_array, csr_array, eye_array, hstack
 
 from polycorner.minimisation.sparse.factorisation import (
+    Saddle,
     least_squares,
     negative_eigenvalues,
     rank,
@@ -18,6 +19,7 @@ from polycorner.spaces.manifold import Array
 
 INWARD = 1e-3  # rate, per step of a scale unit, at which a direction leads inward
 SIGN = 1e-8  # negative multiplier, relative to the largest, that counts as zero
+DETERMINED = 1e-7  # entry of a random state of self-stress that counts as zero
 PENALTY = 1e4  # of directions that leave the face, in units of the largest curvature
 
 
@@ -90,6 +92,45 @@ def _central(rows: csr_array, inequalities: int, gradient: Array) -> Array | Non
     return found.x[:k] * scale if found.status == 0 else None
 
 
+def basic_multipliers(rows: csr_array, inequalities: int, gradient: Array) -> Array | None:
+    """Return multipliers ``lam_i >= 0`` of independent rows with the least ``sum |g - A^T lam|``.
+
+    By HiGHS's interior-point method with crossover, which ends at a corner.
+    """
+    k, n = rows.shape
+    scale = float(abs(gradient).max(initial=0.0)) or 1.0
+    beside: Any = hstack
+    balance = beside([rows.T, eye_array(n), -eye_array(n)], format="csr")
+    cost = np.concatenate([np.zeros(k), np.ones(2 * n)])
+    signs = [(0, None)] * inequalities + [(None, None)] * (k - inequalities) + [(0, None)] * (2 * n)
+    solve: Any = linprog
+    found = solve(cost, A_eq=balance, b_eq=gradient / scale, bounds=signs, method="highs-ipm")
+    return found.x[:k] * scale if found.status == 0 else None
+
+
+def multiplier_ranges(rows: csr_array, inequalities: int, gradient: Array, values: Array) -> Array:
+    """Return the least and the largest value ``(2, k)`` of each multiplier of unit gradients.
+
+    A multiplier is determined if no state of self-stress, ``A^T z = 0``, contains it.  Random ones
+    contain all that are in any; for these HiGHS solves two linear programmes each.
+    """
+    ends = np.array([values, values])
+    k, scale = len(values), float(abs(gradient).max(initial=0.0)) or 1.0
+    stresses = Saddle(eye_array(k), csr_array(rows.T))
+    probes = np.random.default_rng(0).standard_normal((k, 2))
+    right = np.vstack([probes, np.zeros((rows.shape[1], 2))])
+    stress = stresses.solve(right, np.zeros_like(right))[:k]
+    signs = [(0, None)] * inequalities + [(None, None)] * (k - inequalities)
+    solve: Any = linprog
+    for i in np.flatnonzero(abs(stress).max(axis=1) > DETERMINED):
+        for row, sign in enumerate((1.0, -1.0)):
+            cost = np.zeros(k)
+            cost[i] = sign
+            found = solve(cost, A_eq=rows.T, b_eq=gradient / scale, bounds=signs)
+            ends[row, i] = found.x[i] * scale if found.status == 0 else -sign * np.inf
+    return ends
+
+
 def leads_down(rows: csr_array, inequalities: int, gradient: Array) -> bool:
     """Whether a direction leads into the polyhedron and lowers the energy to first order."""
     empty = np.full(inequalities, -INWARD), rows[:inequalities]
@@ -107,17 +148,32 @@ def second_order(hessian: Any, rows: csr_array, small: float) -> Verdict:
     ``[[H + small, A^T], [A, delta]]`` has more of them only if ``H + small - A^T A / delta`` is
     negative on a space of larger dimension, which the face meets.
     """
-    n, k = hessian.shape[0], rows.shape[0]
-    delta = 1.0 / (PENALTY * (float(abs(hessian).max()) or 1.0))
-
-    def negative(level: float, corner: float) -> int | None:
-        moved = hessian + level * eye_array(n)
-        if not k:
-            return negative_eigenvalues(moved)
-        system = block_array([[moved, rows.T], [rows, corner * eye_array(k)]], format="csc")
-        return negative_eigenvalues(system)
-
-    if negative(-small, -delta) == k:
+    k, delta = rows.shape[0], _corner(hessian)
+    if _negative(hessian, rows, -small, -delta) == k:
         return Verdict.STRICT_MINIMUM
-    lower = negative(small, delta)
+    lower = _negative(hessian, rows, small, delta)
     return Verdict.SADDLE if lower is not None and lower > k else Verdict.UNDECIDED
+
+
+def nondegenerate(hessian: csr_array, rows: csr_array, small: float) -> bool:
+    """Whether no curvature along ``{A d = 0}`` is between ``-small`` and ``small``.
+
+    ``[[H - c, A^T], [A, -delta]]`` has the same number of negative eigenvalues for both.
+    """
+    delta = _corner(hessian)
+    least = _negative(hessian, rows, small, -delta)
+    return least is not None and least == _negative(hessian, rows, -small, -delta)
+
+
+def _corner(hessian: Any) -> float:
+    return 1.0 / (PENALTY * (float(abs(hessian).max()) or 1.0))
+
+
+def _negative(hessian: Any, rows: csr_array, level: float, corner: float) -> int | None:
+    """Return the number of negative eigenvalues of ``[[H + level, A^T], [A, corner]]``."""
+    n, k = hessian.shape[0], rows.shape[0]
+    moved = hessian + level * eye_array(n)
+    if not k:
+        return negative_eigenvalues(moved)
+    system = block_array([[moved, rows.T], [rows, corner * eye_array(k)]], format="csc")
+    return negative_eigenvalues(system)

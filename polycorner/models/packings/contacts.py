@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.minimisation.sparse.rows import Group, SparseRows
+from polycorner.formulas.rows import Group, SparseRows
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner import checks
+from polycorner.formulas.rows import SparseRows
 from polycorner.minimisation.sparse.chain import ChainEnd, Landscape, descend
-from polycorner.minimisation.sparse.rows import SparseRows
 from polycorner.models.packings.contacts import neighbours, rows_of
 from polycorner.models.packings.jammed import JammedPacking
 from polycorner.models.packings.starts import decompressed, largest_inflation

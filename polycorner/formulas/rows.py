@@ -2,18 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from polycorner.formulas.bundles import resolve
+from polycorner.formulas.bundles import Member, resolve
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.formulas.functions import SmoothFunction
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -96,7 +93,7 @@ class SparseRows(Value):
     dimension: int
 
     @classmethod
-    def of(cls, functions: "Sequence[SmoothFunction]", dimension: int) -> "SparseRows":
+    def of(cls, functions: Sequence[Member], dimension: int) -> "SparseRows":
         """Return the rows of functions, one after the other."""
         found: dict[Any, tuple[Any, list[Any]]] = {}
         for row, f in enumerate(functions):
@@ -116,6 +113,11 @@ class SparseRows(Value):
             if len(part.rows):
                 groups.append(replace(part, rows=place[part.rows]))
         return SparseRows(tuple(groups), len(positions), self.dimension)
+
+    @property
+    def entries(self) -> int:
+        """The number of entries of the Jacobian that may differ from zero."""
+        return sum(len(group.rows) * group.reads.shape[1] for group in self.groups)
 
     @property
     def used(self) -> Mask:
@@ -144,14 +146,19 @@ class SparseRows(Value):
             columns.append(group.read.ravel())
         return values, _assembled(entries, rows, columns, (self.count, self.dimension))
 
-    def curvature(self, q: Array, weights: Array) -> csr_array:
-        """Return ``sum w_i H_i``, ``(n, n)``, for weights ``(m,)`` of the functions."""
+    def curvature(self, q: Array, weights: Array, *, convex: bool = False) -> csr_array:
+        """Return ``sum w_i H_i``, ``(n, n)``, for weights ``(m,)`` of the functions.
+
+        ``convex`` replaces every ``w_i H_i`` by the nearest matrix without negative eigenvalues,
+        and the sum then has none.
+        """
         entries, rows, columns = [], [], []
         for group in self.groups:
             used = group.part(np.flatnonzero(weights[group.rows]))
             if not len(used.rows):
                 continue
             bent = used.evaluate(q, 2)[2] * weights[used.rows][:, None, None]
+            bent = _convex(bent) if convex else bent
             read, k = used.read, used.reads.shape[1]
             entries.append(bent.ravel())
             rows.append(np.repeat(read, k, axis=1).ravel())
@@ -171,6 +178,15 @@ def _group(family: Any, members: list[Any]) -> Group:
         np.array(reads, dtype=np.int64).reshape(len(number), -1),
         np.array(parameters, dtype=np.float64).reshape(len(number), -1),
     )
+
+
+def _convex(matrices: Array) -> Array:
+    """Return symmetric matrices ``(m, k, k)`` without their negative eigenvalues."""
+    if not np.isfinite(matrices).all() or not matrices.any():
+        return matrices
+    values, vectors = np.linalg.eigh(matrices)
+    kept = vectors * np.maximum(values, 0.0)[:, None, :]
+    return np.asarray(kept @ np.swapaxes(vectors, 1, 2))
 
 
 def _assembled(

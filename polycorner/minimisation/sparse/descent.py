@@ -1,0 +1,297 @@
+"""Descent in large sparse polyhedra by sequential quadratic programming with feasible iterates.
+
+At a feasible point each step minimises a convex model of the energy over the linearised polyhedron
+within a box ([NW] ch. 18):
+
+- the model's curvature is that of the Lagrangian, every summand of which reads few coordinates and
+  is replaced by the nearest one without negative curvature;
+- the trial point is projected onto the set, and accepted if the energy falls by a tenth of a
+  per mille of what the model promises; otherwise the box shrinks.
+
+The functions with positive multipliers are a guess at the face of the minimum.  Newton's method on
+it, with the exact curvature, ends the descent: if it stays near, in the set, and no higher, with no
+negative multiplier.  Where the inertia of the KKT matrix shows negative curvature along the face,
+a Lanczos method finds a direction of it, and the descent goes on from a lower point there.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array, eye_array
+
+from polycorner.formulas.rows import Indices
+from polycorner.minimisation.sparse.faces import on_face
+from polycorner.minimisation.sparse.factorisation import Saddle
+from polycorner.minimisation.sparse.nonlinear import Nonlinear, Point
+from polycorner.minimisation.sparse.optimality import (
+    basic_multipliers,
+    first_order,
+    second_order,
+)
+from polycorner.minimisation.sparse.quadratic_programmes import quadratic_step
+from polycorner.minimisation.sparse.restoration import (
+    FEASIBLE,
+    ON_THE_WAY,
+    inside,
+    linearised,
+    near,
+    projected,
+    restored,
+    violation,
+    worst,
+)
+from polycorner.minimisation.verdicts import Verdict
+from polycorner.spaces.manifold import Array
+
+FIRST, LEAST = 0.25, 1e-10  # box of the first step, and of the last, in scale units
+WIDER, FINEST = 4.0, 1e-8  # next box, in units of the displacement; the least one after a success
+THICK = 0.5  # depth, in scale units, of a wall that no step crosses
+SAMPLES = 64  # of a step, at most
+FACTORS = (1.0, 0.5, 0.25, 0.125)  # parts of a step that are tried before the box shrinks
+PROMISED = 1e-4  # part of the decrease that the model promises, with which a step is accepted
+CLOSE = 0.5  # step from which on Newton's method on the face is tried
+SETTLED = 1e-8  # last step of Newton's method, in scale units, up to which it has converged
+RANK = 1e-6  # singular value of unit gradients up to which they are dependent
+NEGATIVE = 1e-9  # multiplier, relative to the largest derivative, that counts as negative
+CORRECTIONS = 20  # of the face on which Newton's method is tried
+FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
+IDLE = 5  # steps without any promise after which a descent has stalled
+PUSHES = (0.1, 0.01, 0.001)  # lengths of steps off a saddle, in scale units
+
+
+@dataclass(frozen=True)
+class DescentEnd:
+    """The end of a descent: a point in scaled coordinates, the number of steps, and a failure."""
+
+    point: Array
+    iterations: int
+    failure: Verdict | None
+
+
+def descend(problem: Nonlinear, start: Array, limit: int, tolerance: float) -> DescentEnd:
+    """Descend from ``start``, never through a wall, until a face carries a minimum.
+
+    Parameters
+    ----------
+    problem : Nonlinear
+    start : (n,) array
+        In scaled coordinates; if it is not feasible, the violation is lowered first.
+    limit : int
+        Number of quadratic programmes.
+    tolerance : float
+        Curvature, relative to the energy's derivatives, that counts as zero.
+    """
+    at = problem.at(start)
+    found = projected(problem, at, 30) if at.is_finite else None
+    if found is None:
+        search = restored(problem, at, limit)
+        if not search.feasible:
+            failure = Verdict.INFEASIBLE if search.stationary else Verdict.NOT_CONVERGED
+            return DescentEnd(search.at.place, 0, failure)
+        found = search.at
+    return _Descent(problem, found, tolerance).run(limit)
+
+
+class _Descent:
+    """The state of a descent: a feasible point, the box of the next step, the last multipliers."""
+
+    def __init__(self, problem: Nonlinear, at: Point, tolerance: float) -> None:
+        self.problem, self.at, self.origin = problem, at, at.place
+        self.tolerance, self.reach = tolerance, FIRST
+        self.multipliers = np.zeros(len(at.distances))
+        self.tried: tuple[Indices, float] | None = None
+        self.idle = 0
+
+    def run(self, limit: int) -> DescentEnd:
+        """Take steps until the descent ends."""
+        for count in range(1, limit + 1):
+            ended = self.advanced()
+            if ended is not None:
+                return DescentEnd(ended[0], count, ended[1])
+            if abs(self.at.place - self.origin).max() > FAR:
+                return DescentEnd(self.at.place, count, Verdict.UNBOUNDED)
+        return DescentEnd(self.at.place, limit, Verdict.NOT_CONVERGED)
+
+    def advanced(self) -> tuple[Array, Verdict | None] | None:
+        """Take one step; return the end of the descent, if this is it, with its failure."""
+        problem, at = self.problem, self.at
+        curved = problem.hessian(at, self.multipliers, convex=True)
+        size = max(float(abs(at.gradient).max()), float(abs(curved).max())) or 1.0
+        kept = near(problem, at, self.reach)
+        model = linearised(problem, at, kept, size)
+        step = quadratic_step(model, csr_array(curved / size), self.reach)
+        if step is None:
+            return self.shrunk(self.reach)
+        d, lam = step.displacement, step.multipliers
+        gaps = model.values + model.rows @ d
+        self.multipliers[:] = 0.0
+        self.multipliers[kept] = lam * size
+        held = kept[lam > gaps]
+        moved = float(abs(d).max())
+        promised = -float(model.gradient @ d + d @ (curved @ d) / (2 * size)) * size
+        if self.is_worth_trying(held, moved):
+            ended = self.on_face_of(held) or self.on_face_of(self.basic(held), basic=True)
+            if ended is not None:
+                return ended
+        noise = 1e-15 * (abs(at.energy) + size)
+        self.idle = self.idle + 1 if promised <= noise else 0
+        if self.idle > IDLE:
+            return at.place, Verdict.NOT_CONVERGED
+        for factor in FACTORS:
+            trial = self.trial(factor * d, held)
+            if (
+                trial is not None
+                and trial.energy <= at.energy - PROMISED * factor * promised + noise
+            ):
+                self.at = trial
+                whole = factor == 1.0 and moved > 0.9 * self.reach
+                self.reach = 2 * self.reach if whole else max(WIDER * factor * moved, FINEST)
+                return None
+        return self.shrunk(FACTORS[-1] * moved)
+
+    def shrunk(self, reach: float) -> tuple[Array, Verdict | None] | None:
+        """Make the box smaller; return the end where it has become too small."""
+        self.reach = 0.5 * min(self.reach, reach)
+        return (self.at.place, Verdict.NOT_CONVERGED) if self.reach < LEAST else None
+
+    def is_worth_trying(self, held: Indices, moved: float) -> bool:
+        """Whether Newton's method on a face may succeed: it is new, or much nearer than before."""
+        if moved > CLOSE and self.tried is None:
+            self.tried = held, np.inf
+            return False
+        same = self.tried is not None and np.array_equal(self.tried[0], held)
+        before = self.tried[1] if self.tried is not None else np.inf
+        worth = moved < 1e-3 or same
+        if worth and same and moved > 0.1 * before:
+            return False
+        self.tried = held, moved if worth else np.inf
+        return worth
+
+    def trial(self, d: Array, held: Indices) -> Point | None:
+        """Return the projected end of a step; None if there is none or a wall is in between."""
+        problem, u = self.problem, self.at.place
+        end = problem.at(u + d)
+        if not end.is_finite:
+            return None
+        found = projected(problem, end, 8, held) or projected(problem, end, 8)
+        if found is None:
+            return None
+        way = found.place - u
+        samples = min(SAMPLES, int(np.ceil(abs(way).max() / THICK)))
+        m = problem.inequalities
+        for k in range(1, samples):
+            depth = -problem.values(u + k / samples * way)[:m] / self.at.sizes[:m]
+            if not depth.max(initial=0.0) <= THICK:
+                return None
+        return found
+
+    def on_face_of(
+        self, held: Indices, *, basic: bool = False
+    ) -> tuple[Array, Verdict | None] | None:
+        """Return the minimum on a face that is corrected on the way; None if there is none here.
+
+        Functions that are violated join it, those with negative multipliers leave it.  On the face
+        of basic functions, where others vanish with multipliers that may be zero, the nearest point
+        of the set is taken instead.  From a saddle the descent goes on.
+        """
+        problem = self.problem
+        for _ in range(CORRECTIONS):
+            everything = np.concatenate([held, problem.equations])
+            near = self.multipliers[everything]
+            found = on_face(problem, everything, self.at.place, near=near)
+            if found is None or not found.last_step < SETTLED:
+                return None
+            at = problem.at(found.point)
+            at = inside(problem, at, everything) if basic else at
+            violated = np.flatnonzero(at.distances[: problem.inequalities] < -FEASIBLE)
+            if len(violated):
+                held = np.union1d(held, violated)
+                continue
+            lam = signed_multipliers(at, everything, len(held), found.multipliers)
+            negative = lam[: len(held)] < -NEGATIVE * float(abs(at.gradient).max())
+            if not negative.any():
+                return self.judged(at, everything, lam)
+            held = held[~negative]
+        return None
+
+    def basic(self, held: Indices) -> Indices:
+        """Return functions with independent gradients that balance the energy without the others.
+
+        Those with positive multipliers at a corner of all multipliers.
+        """
+        at, k = self.at, len(held)
+        rows = csr_array(at.rows[np.concatenate([held, self.problem.equations])])
+        found = basic_multipliers(rows, k, at.gradient)
+        return held if found is None else held[found[:k] > NEGATIVE * abs(found).max(initial=0.0)]
+
+    def judged(
+        self, at: Point, held: Indices, multipliers: Array
+    ) -> tuple[Array, Verdict | None] | None:
+        """Return a stationary point that is no higher, unless the descent can leave a saddle."""
+        problem = self.problem
+        missed = violation(problem, self.at)[held] @ abs(multipliers)
+        noise = 1e-12 * (abs(self.at.energy) + float(abs(at.gradient).max())) + missed
+        if worst(problem, at) > FEASIBLE or not at.energy <= self.at.energy + noise:
+            return None
+        lam = np.zeros(len(at.distances))
+        lam[held] = multipliers
+        closed = np.flatnonzero(at.distances[: problem.inequalities] <= ON_THE_WAY)
+        held = np.union1d(held, closed)  # weakly active ones, too
+        rows, hessian = csr_array(at.rows[held]), problem.hessian(at, lam)
+        size = max(float(abs(at.gradient).max()), float(abs(hessian).max())) or 1.0
+        if second_order(hessian, rows, self.tolerance * size) is Verdict.SADDLE:
+            lower = self.beyond(at, held, downward(hessian, rows))
+            if lower is not None:
+                self.at, self.reach, self.tried = lower, FIRST, None
+                self.multipliers = lam
+                return None
+        return at.place, None
+
+    def beyond(self, at: Point, held: Indices, way: Array | None) -> Point | None:
+        """Return a lower point of a face in a direction of negative curvature, or against it."""
+        if way is None:
+            return None
+        way = way / abs(way).max()
+        noise = 1e-14 * (abs(at.energy) + float(abs(at.gradient).max()))
+        for push in PUSHES:
+            for sign in (1.0, -1.0):
+                ahead = self.problem.at(at.place + sign * push * way)
+                found = projected(self.problem, ahead, 10, held, onto=True)
+                if found is not None and found.energy < at.energy - noise:
+                    return found
+        return None
+
+
+def signed_multipliers(at: Point, held: Indices, inequalities: int, lam: Array) -> Array:
+    """Return multipliers none of which is negative, if gradients are dependent and there are such.
+
+    Where gradients are independent, there are no others than those given.
+    """
+    if not lam[:inequalities].min(initial=0.0) < 0:
+        return lam
+    small = NEGATIVE * float(abs(at.gradient).max())
+    found = first_order(csr_array(at.rows[held]), inequalities, at.gradient, small, RANK)
+    return lam if found.independent or not found.exist else found.values
+
+
+def downward(hessian: csr_array, rows: csr_array) -> Array | None:
+    """Return a direction of the least curvature along ``{A d = 0}``, by Lanczos' method."""
+    from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+
+    n, k = hessian.shape[0], rows.shape[0]
+    saddle = Saddle(eye_array(n), rows)
+
+    def tangential(v: Array) -> Array:
+        right = np.concatenate([np.ravel(v), np.zeros(k)])
+        return saddle.solve(right, np.zeros(n + k))[:n]
+
+    operator: Any = LinearOperator(
+        (n, n), matvec=lambda v: tangential(hessian @ tangential(v)), dtype=np.float64
+    )
+    start = tangential(np.random.default_rng(0).standard_normal(n))
+    try:
+        _, vectors = eigsh(operator, k=1, which="SA", v0=start, tol=1e-3)
+    except ArpackError:
+        return None
+    return tangential(vectors[:, 0])
