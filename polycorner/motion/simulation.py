@@ -250,11 +250,9 @@ def _parameters(
         "solver.tolerance": float(solver.tolerance),
         "solver.sweeps": int(solver.sweeps),
         "solver.refine": solver.refine,
-        "solver.crowd_sweeps": int(solver.crowd_sweeps),
+        **({"solver.crowd_sweeps": int(solver.crowd_sweeps)} if solver.crowd_sweeps else {}),
         "state.time": float(state.time),
-        "state.q": fingerprint(state.q),
-        "state.v": fingerprint(state.v),
-        "state.sticking": fingerprint(state.sticking),
+        **{f"state.{a}": fingerprint(getattr(state, a)) for a in ("q", "v", "sticking")},
     }
 
 
