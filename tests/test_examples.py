@@ -36,6 +36,7 @@ from examples import (
     ex25_rods_jam,
     ex26_drum_in_space,
     ex27_hard_squares,
+    ex28_heap_in_drum,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -344,3 +345,13 @@ def test_in_space_dumbbells_roll_and_pairs_climb_as_in_the_developed_drum(tmp_pa
     assert left < -0.5
     assert found.lift < 0.01
     assert ex26_drum_in_space.draw(found, tmp_path / "drum.png").exists()
+
+
+def test_a_heap_that_is_swept_obeys_the_balances_of_energy_and_angular_momentum(tmp_path):
+    found = ex28_heap_in_drum.main(duration=0.4)
+    assert found.path.effort.unconverged > 100  # steps of the heap are not solved
+    assert found.energy < 1e-3
+    assert found.momentum < 1e-3
+    assert found.path.max_penetration < 0.02  # of a disc's radius
+    assert ex28_heap_in_drum.draw(found, tmp_path / "heap.png").exists()
+    assert ex28_heap_in_drum.film(found.path, tmp_path / "heap.gif").read_bytes()[:3] == b"GIF"
