@@ -9,15 +9,13 @@ discs:256:8`` tells how times differ between eight starts.  The results are adde
 
 import argparse
 import json
-import os
 import resource
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from side_by_side import alone
 
 if TYPE_CHECKING:
     from polycorner.models import PeriodicPacking
@@ -188,23 +186,7 @@ def main() -> None:
         found = spheropack(int(count)) if kind == "spheropack" else measured(kind, int(count))
         print(json.dumps(found))
         return
-    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {"runs": []}
-    single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
-    for size in chosen.sizes.split():
-        command = [sys.executable, __file__, "--one", size]
-        done = subprocess.run(
-            command, check=True, capture_output=True, text=True, env={**os.environ, **single}
-        )
-        row = json.loads(done.stdout.splitlines()[-1])
-        print(row, flush=True)
-        same = (row["kind"], row["count"])
-        kept["runs"] = [r for r in kept["runs"] if (r["kind"], r["count"]) != same] + [row]
-        kept["runs"].sort(key=lambda r: (r["kind"], r["count"]))
-        for kind in ("discs", "spheres"):
-            rows = [r for r in kept["runs"] if r["kind"] == kind]
-            if len(rows) > 1:
-                kept[f"exponent of {kind}"] = exponent(rows)
-        RESULTS.write_text(json.dumps(kept, indent=1) + "\n")
+    alone(__file__, chosen.sizes, RESULTS, dict.fromkeys(("discs", "spheres"), exponent))
 
 
 if __name__ == "__main__":

@@ -11,15 +11,13 @@ import argparse
 import itertools
 import json
 import math
-import os
 import resource
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from side_by_side import alone
 
 RESULTS = Path(__file__).parent / "results" / "sparse.json"
 SIZES = (
@@ -190,23 +188,7 @@ def main() -> None:
         kind, count = chosen.one.split(":")
         print(json.dumps(measured(kind, int(count))))
         return
-    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {"runs": []}
-    single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
-    for size in chosen.sizes.split():
-        command = [sys.executable, __file__, "--one", size]
-        done = subprocess.run(
-            command, check=True, capture_output=True, text=True, env={**os.environ, **single}
-        )
-        row = json.loads(done.stdout.splitlines()[-1])
-        print(row, flush=True)
-        same = (row["kind"], row["count"])
-        kept["runs"] = [r for r in kept["runs"] if (r["kind"], r["count"]) != same] + [row]
-        kept["runs"].sort(key=lambda r: (r["kind"], r["count"]))
-        for kind in MODELS:
-            rows = [r for r in kept["runs"] if r["kind"] == kind]
-            if len(rows) > 1:
-                kept[f"exponents of {kind}"] = exponents(rows)
-        RESULTS.write_text(json.dumps(kept, indent=1) + "\n")
+    alone(__file__, chosen.sizes, RESULTS, dict.fromkeys(MODELS, exponents))
 
 
 if __name__ == "__main__":

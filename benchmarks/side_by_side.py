@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 
 Times = dict[str, list[float]]
+Growth = Callable[[list[dict[str, Any]]], Any]  # exponents, of rows of figures
 
 
 def seconds(task: Callable[[], object], clock: Callable[[], float] = perf_counter) -> float:
@@ -125,3 +126,28 @@ def used() -> float:
     status = Path("/proc/self/status").read_text()
     line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
     return round(int(line.split()[1]) / 1024, 1)
+
+
+def alone(script: str, sizes: str, results: Path, kinds: Mapping[str, Growth]) -> None:
+    """Run a script with ``--one KIND:COUNT`` for every size, one process and one thread each.
+
+    What each prints last is a row of figures.  It replaces the row of its kind and count in the
+    results, where growth of a kind stands beside them as soon as there are two.
+    """
+    kept = json.loads(results.read_text()) if results.exists() else {"runs": []}
+    single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+    for size in sizes.split():
+        command = [sys.executable, script, "--one", size]
+        done = subprocess.run(
+            command, check=True, capture_output=True, text=True, env={**os.environ, **single}
+        )
+        row = json.loads(done.stdout.splitlines()[-1])
+        print(row, flush=True)
+        same = (row["kind"], row["count"])
+        kept["runs"] = [r for r in kept["runs"] if (r["kind"], r["count"]) != same] + [row]
+        kept["runs"].sort(key=lambda r: (r["kind"], r["count"]))
+        for kind, growth in kinds.items():
+            rows = [r for r in kept["runs"] if r["kind"] == kind]
+            if len(rows) > 1:
+                kept[f"growth of {kind}"] = growth(rows)
+        write_atomically(results, json.dumps(kept, indent=1) + "\n")
