@@ -15,8 +15,8 @@ class Solver(Value):
     ----------
     tolerance : float, optional
         Largest residual of a step, relative to the speeds in it; default 1e-8, but see
-        :attr:`System.solver` for more than two bodies.  A step that misses it is counted in
-        ``Effort.unconverged``, with the worst residual, and is an event.
+        :attr:`System.solver` for more than two bodies that touch each other.  A step that misses it
+        is counted in ``Effort.unconverged``, with the worst residual, and is an event.
     sweeps : int, optional
         Most Gauss-Seidel sweeps over one island of touching bodies; default 2000.
     refine : bool, optional
