@@ -36,7 +36,7 @@ def changed():
     f = SmoothFunction("gap", x - a, M, parameters={"a": 1.0})
     c = certify(Polyhedron(M, f), x + y**2 + z**2, [1, 0, 0])
     assert prove(c).proved
-    object.__setattr__(f, "parameters", (2.0,))
+    object.__setattr__(f, "_parameters", (2.0,))
     prove(c)
 
 
