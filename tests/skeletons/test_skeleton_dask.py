@@ -25,7 +25,7 @@ def cluster(caplog):
     caplog.set_level(logging.CRITICAL, logger="distributed")  # which tells of every loss
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None
+            n_workers=2, threads_per_worker=1, dashboard_address=":0"
         ) as local,
         distributed.Client(local, set_as_default=False) as client,
     ):

@@ -108,7 +108,7 @@ def test_a_region_of_ones_own_on_a_local_cluster(caplog):
     here = sweep(lowest, grid, fixed={"region": region})
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, dashboard_address=None
+            n_workers=1, threads_per_worker=1, dashboard_address=":0"
         ) as local,
         distributed.Client(local, set_as_default=False) as client,
     ):
