@@ -12,6 +12,7 @@ from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
+from polycorner.motion.engine.rows import speed_at
 
 MISSED = 1e-12  # scaled gap up to which an equation holds
 
@@ -78,7 +79,7 @@ def bend_equation(model, work, b, gap, following, h, share):
     never_inline()
     if h <= STRAIGHT * model.step:
         return False
-    speed = work.island_speed[work.block_bodies[b, 0]]
+    speed = speed_at(work, b)
     missed = abs(following - gap + h * gap / model.step)
     if missed <= MISSED * model.gap_unit + share * h * speed:
         return False
@@ -91,7 +92,7 @@ def bend_equation(model, work, b, gap, following, h, share):
 def bend_bound(model, work, b, gap, following, h, share):
     """Correct the bound of a contact whose gap curves otherwise; return whether it does."""
     never_inline()
-    speed = work.island_speed[work.block_bodies[b, 0]]
+    speed = speed_at(work, b)
     closing = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
     more = closing - work.block_load[b]
     if abs(more) <= MISSED * model.gap_unit + share * h * speed:

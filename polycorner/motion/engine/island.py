@@ -201,10 +201,9 @@ def begin_island(state, work, first, last):
     for s in range(first, last):
         for side in range(2):
             i = work.block_bodies[work.order[s], side]
-            if i >= 0:
+            if i >= 0 and work.awake[i]:  # sleepers may touch several islands
                 work.island_speed[i] = max(work.island_speed[i], speed)
-                if work.awake[i] and not state.rests[i]:
-                    at_rest = False
+                at_rest = at_rest and state.rests[i] != 0
     increase(state.counts, ISLANDS, ONE)
     return speed, at_rest
 

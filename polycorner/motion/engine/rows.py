@@ -107,10 +107,14 @@ def apply_impulses(model, work, b, along, across):
 
 
 @compiled
+def speed_at(work, b):
+    """Return the largest velocity in the island of a block."""
+    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    return work.island_speed[i] if j < 0 else max(work.island_speed[i], work.island_speed[j])
+
+
+@compiled
 def sticks(model, work, b):
     """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
     slip = abs(work.after[b, 0]) + (abs(work.after[b, 1]) if work.block_rows[b] == 2 else 0.0)
-    speed = work.island_speed[work.block_bodies[b, 0]]
-    if work.block_bodies[b, 1] >= 0:
-        speed = max(speed, work.island_speed[work.block_bodies[b, 1]])
-    return slip <= 2.0 * model.tolerance * speed
+    return slip <= 2.0 * model.tolerance * speed_at(work, b)

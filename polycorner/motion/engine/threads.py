@@ -1,7 +1,7 @@
 """Threads that do the steps of the engine together."""
 
 import ctypes
-import os
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -84,8 +84,8 @@ def assisted(
 def address_of_yield() -> int:
     """Return the address of the function by which a thread lets others run; 0 if there is none."""
     library: Any
-    if os.name == "nt":
-        library, name = ctypes.WinDLL("kernel32"), "SwitchToThread"  # type: ignore[attr-defined]
+    if sys.platform == "win32":
+        library, name = ctypes.WinDLL("kernel32"), "SwitchToThread"
     else:
         library, name = ctypes.CDLL(None), "sched_yield"
     function = getattr(library, name, None)

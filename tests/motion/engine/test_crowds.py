@@ -8,7 +8,9 @@ from scipy.spatial import cKDTree
 
 from polycorner.bodies import Arrangement, HalfSpace, disc
 from polycorner.motion.checkpoints import Checkpoint
+from polycorner.motion.engine.arrays import Work, declarations
 from polycorner.motion.engine.crowds import CROWD, TOLERATED
+from polycorner.motion.engine.threads import OWN
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import simulate, start
 from tests.motion.engine.inclusion import residuals
@@ -42,6 +44,19 @@ def crowds(engine):
     starts = engine.work.island_start
     roots = np.flatnonzero(np.diff(starts) > CROWD)
     return [engine.work.order[starts[i] : starts[i + 1]] for i in roots]
+
+
+def test_threads_share_no_array_in_which_something_is_in_the_making():
+    """Items write to rows of their bodies, blocks or contacts; all else is a thread's own or told.
+
+    Of the rows of bodies some hold the matrix of an island, and are a thread's own as well.
+    """
+    rows = {"N", "N+1", "B", "C", "P"}
+    whole = {name for name, d in declarations(Work).items() if d.shape.split()[0] not in rows}
+    serial = {"list_status", "listed_travel", "near", "sort_keys", "strips", "strip_cursor"}
+    told = {"located", "remedy", "signals", "strip_start", "told", "told_times", "worst"}
+    assert whole - set(OWN) == serial | told
+    assert {"members", "number", "place", "row_start"} <= set(OWN)
 
 
 @pytest.mark.parametrize("sweeps", [0, 6])
