@@ -76,6 +76,19 @@ def measure(count: int, spin: float, threads: list[int]) -> dict[str, dict[str, 
     return figures
 
 
+def exponents(results: dict[str, dict[str, dict[str, Any]]], counts: list[int]) -> dict[str, Any]:
+    """Return slopes of the logarithm of the time of a step against that of the number of discs."""
+    found: dict[str, Any] = {}
+    for name in SPINS:
+        rows = [results[f"{count} {name}"] for count in counts]
+        found[name] = {
+            variant: round(float(np.polyfit(np.log(counts), np.log(times), 1)[0]), 2)
+            for variant in rows[0]
+            if (times := [row[variant]["ms a step"] for row in rows])
+        }
+    return found
+
+
 def main() -> None:
     """Measure, print and write all figures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -90,6 +103,10 @@ def main() -> None:
             columns = list(next(iter(figures.values())))
             rows = [[variant, *row.values()] for variant, row in figures.items()]
             print_table(f"{count} discs, {name}", ["", *columns], rows)
+    if len(chosen.discs) > 1:
+        results["exponents"] = exponents(results, chosen.discs)
+        rows = [[v, *(results["exponents"][name][v] for name in SPINS)] for v in figures]
+        print_table("Exponents of time", ["", *SPINS], rows)
     write("bench_heap", results)
 
 

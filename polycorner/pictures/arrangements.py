@@ -24,6 +24,7 @@ COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D
 FIXED, OUTSIDE, OUTLINE = "0.55", "0.85", "0.2"
 CELL = 2.4  # width of a picture in inches
 MARGIN = 0.15  # around bodies, of their extent
+ACROSS = 1e-9  # by which the normal of a wall across an axis may deviate from it
 ARC = 33  # points of a full circle of an outline
 BALL = 300  # points of a ball
 LIGHT = LightSource(azdeg=315, altdeg=50)
@@ -89,15 +90,36 @@ def _in_the_box(arrangement: Arrangement, placed: dict[str, Body]) -> dict[str, 
 
 
 def _window(arrangement: Arrangement, bodies: Sequence[Body]) -> Array:
-    """Return two opposite corners ``(2, d)`` of a cube around all bodies, or the periodic box."""
+    """Return two opposite corners ``(2, d)`` of a cube around all bodies, or the box around them.
+
+    The box is that of periods, or of pairs of walls across an axis, which are drawn in the plane.
+    """
     parts = [part for body in bodies for part in body.parts.values()]
     low = np.min([part.points.min(axis=0) - part.radius for part in parts], axis=0)
     high = np.max([part.points.max(axis=0) + part.radius for part in parts], axis=0)
     lengths = arrangement.lattice.lengths
     periodic = np.isfinite(lengths)
     low, high = np.where(periodic, 0.0, low), np.where(periodic, lengths, high)
+    if arrangement.dimension == 2:
+        below, above = _between_walls(arrangement)
+        boxed = np.isfinite(above - below)
+        low = np.where(boxed, np.minimum(low, below), low)
+        high = np.where(boxed, np.maximum(high, above), high)
     half = (0.5 + MARGIN) * (high - low).max()
     return np.array([(low + high) / 2 - half, (low + high) / 2 + half])
+
+
+def _between_walls(arrangement: Arrangement) -> tuple[Array, Array]:
+    """Return where walls across each axis are, on either side; infinite where there is none."""
+    below, above = np.full(2, -np.inf), np.full(2, np.inf)
+    for wall in arrangement.walls.values():
+        if isinstance(wall, HalfSpace) and np.abs(wall.normal).max() > 1 - ACROSS:
+            axis = int(np.abs(wall.normal).argmax())
+            if wall.normal[axis] > 0:
+                below[axis] = max(below[axis], wall.point[axis])
+            else:
+                above[axis] = min(above[axis], wall.point[axis])
+    return below, above
 
 
 def _colours(arrangement: Arrangement) -> dict[str, str]:

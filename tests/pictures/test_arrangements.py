@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.patches import Polygon
 
-from polycorner.bodies import Arrangement, HalfSpace, capsule, disc, sphere
+from polycorner.bodies import Arrangement, HalfSpace, box, capsule, disc, sphere
 from polycorner.pictures import draw_arrangement
 
 
@@ -17,6 +17,14 @@ def outlines(figure):
 def test_bodies_are_drawn_once_without_a_period():
     a = Arrangement([disc(0.1), disc(0.2)], {"floor": HalfSpace([0, 1], [0, 0])})
     assert len(outlines(draw_arrangement(a, a.point({"1": [0, 1], "2": [1, 1]})))) == 3
+
+
+def test_a_box_of_walls_is_seen_whole():
+    a = Arrangement([disc(0.1)], box([-1, 0], [1, 3]))
+    axes = draw_arrangement(a, [0.5, 0.2]).axes[0]
+    assert axes.get_xlim()[0] < -1 < 1 < axes.get_xlim()[1]
+    assert axes.get_ylim()[0] < 0 < 3 < axes.get_ylim()[1]
+    assert np.ptp(axes.get_ylim()) < 4
 
 
 def test_images_reach_into_the_box_from_all_sides():

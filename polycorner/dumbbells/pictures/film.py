@@ -1,7 +1,7 @@
 """Films: dumbbells at many instants, with contacts, strata and energies, for pages to play."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -193,6 +193,29 @@ def run_film(
     centres = dumbbell_centres(drum.pair, np.nan_to_num(q))
     centres[~path.present[chosen]] = np.nan
     shots = [_Shot.of(run, k, balls) for k, balls in zip(chosen, centres, strict=True)]
+    return motion_film(
+        title,
+        drum,
+        path,
+        chosen,
+        centres,
+        [shot.roles for shot in shots],
+        [shot.contacts for shot in shots],
+        [Words(shot.face, shot.hands) for shot in shots],
+    )
+
+
+def motion_film(
+    title: str,
+    drum: DumbbellDrum,
+    path: Trajectory,
+    chosen: Sequence[int],
+    centres: Array,
+    roles: Sequence[Sequence[int]],
+    contacts: "Sequence[Mapping[str, Array]]",
+    words: Sequence[Words],
+) -> Film:
+    """Return the film of a motion in a drum, of what is seen at the chosen instants."""
     return Film(
         title,
         described(drum),
@@ -200,13 +223,13 @@ def run_film(
         np.asarray(path.times[chosen]),
         "s",
         centres,
-        np.array([shot.roles for shot in shots]),
+        np.array(roles),
         {
             "Kinetic energy (nJ)": path.kinetic[chosen],
             "Potential energy (nJ)": path.potential[chosen],
         },
-        tuple(shot.contacts for shot in shots),
-        tuple(Words(shot.face, shot.hands) for shot in shots),
+        tuple(contacts),
+        tuple(words),
         wall_around(drum.pair, centres),
         drum.spin,
     )

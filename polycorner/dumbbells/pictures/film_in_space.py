@@ -4,8 +4,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from polycorner.dumbbells.dynamics.bunch_in_space import BunchInSpaceRun
-from polycorner.dumbbells.pictures.bodies import wall_around
-from polycorner.dumbbells.pictures.film import FRAMES, LEFT, RIGHT, SINGLE, Film, Words, described
+from polycorner.dumbbells.pictures.film import (
+    FRAMES,
+    LEFT,
+    RIGHT,
+    SINGLE,
+    Film,
+    Words,
+    motion_film,
+)
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.spaces.manifold import Array
 
@@ -23,22 +30,15 @@ def film_in_space(
     centres = ball_centres(run, chosen)
     dyads = [run.dyads(k) for k in chosen]
     hands = [[sum(hand == sign for *_, hand in found) for sign in (1, -1)] for found in dyads]
-    return Film(
+    return motion_film(
         title,
-        described(drum),
-        drum.pair,
-        np.asarray(path.times[chosen]),
-        "s",
+        drum,
+        path,
+        chosen,
         centres,
-        np.array([_roles(found, drum.count) for found in dyads]),
-        {
-            "Kinetic energy (nJ)": path.kinetic[chosen],
-            "Potential energy (nJ)": path.potential[chosen],
-        },
-        tuple({} for _ in chosen),
-        tuple(Words("", f"{r} right-handed, {left} left-handed dyads") for r, left in hands),
-        wall_around(drum.pair, centres),
-        drum.spin,
+        [_roles(found, drum.count) for found in dyads],
+        [{} for _ in chosen],
+        [Words("", f"{r} right-handed, {left} left-handed dyads") for r, left in hands],
     )
 
 
