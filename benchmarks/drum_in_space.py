@@ -49,8 +49,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--films", action="store_true", help="write a page for each start, too")
     parser.add_argument("--out", type=Path, default=Path("out/drum_in_space"))
     options = parser.parse_args(arguments)
-    checks.whole("--starts", options.starts, least=1)
-    checks.real("--seconds", options.seconds, least=0)
+    try:
+        checks.whole("--starts", options.starts, least=1)
+        checks.real("--seconds", options.seconds, least=0)
+    except ValueError as error:
+        parser.error(str(error))
     starts = range(options.first, options.first + options.starts)
     points = [(start, kicks) for kicks, start in product(options.kicks, starts)]
     work = partial(followed, options)

@@ -24,6 +24,8 @@ class Programmes:
 
     def __init__(self, polyhedron: Polyhedron, height: Any, symmetry: Symmetry | None) -> None:
         instance("polyhedron", polyhedron, Polyhedron)
+        if symmetry is not None:
+            instance("symmetry", symmetry, Symmetry)
         if np.isfinite(polyhedron.manifold.periods).any() or polyhedron.manifold.factors:
             refuse("polyhedron", "a manifold of lines", polyhedron.manifold)
         n = polyhedron.manifold.size
@@ -113,7 +115,7 @@ def _affine(argument: str, functions: Iterable[SmoothFunction], n: int) -> Array
         numbers = {sympy.Symbol(name, real=True): value for name, value in values.items()}
         slopes = [f.expression.diff(q) for q in symbols]
         if any(slope.free_symbols & set(symbols) for slope in slopes):
-            refuse(argument, "affine functions", f.name)
+            refuse(argument, "affine functions", f.expression)
         constant = f.expression.xreplace(dict.fromkeys(symbols, sympy.S.Zero))
         rows.append([float(e.xreplace(numbers)) for e in (*slopes, constant)])
     return np.array(rows).reshape(-1, n + 1)

@@ -200,7 +200,7 @@ CIRCLE = Manifold(("a",), (2 * math.pi,), (1.0,))
         (
             lambda: nerve(Polyhedron(LINE, {"bowl": LINE.symbols[0] ** 2 - 1})),
             ValueError,
-            "polyhedron: expected affine functions; got 'bowl'",
+            r"polyhedron: expected affine functions; got x\*\*2 - 1",
         ),
         (
             lambda: nerve(INTERVAL, LINE.symbols[0] ** 2),
@@ -212,6 +212,7 @@ CIRCLE = Manifold(("a",), (2 * math.pi,), (1.0,))
             ValueError,
             "symmetry: expected symmetries of polyhedron and height",
         ),
+        (lambda: nerve(INTERVAL, symmetry=3), TypeError, "symmetry: expected a Symmetry; got int"),
         (lambda: nerve(INTERVAL, symmetry=WRONG), ValueError, "symmetry: expected symmetries"),
         (
             lambda: nerve(INTERVAL, symmetry=UNLISTED),

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.checks import instance, real, refuse
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import LEFT_AS, Handed, Sizes, dyads_among, left_as
 from polycorner.dumbbells.dynamics.singles import Mean
@@ -192,17 +193,22 @@ def follow_bunch(
     progress, checkpoint : optional
         See :func:`~polycorner.motion.simulation.simulate`.
     """
-    if not drum.floor:
-        msg = "drum: expected one with a bottom, on which the bunch lies; got floor=False"
-        raise ValueError(msg)
+    stride = steps_between_records(drum, dt, interval)
     q = start if isinstance(start, np.ndarray) else scattered(drum, np.random.default_rng(start))
-    stride = max(1, round(interval / dt))
     return BunchRun(
         simulate(
             drum, drum.state(q), duration, dt,
             every=stride, noise=noise, progress=progress, checkpoint=checkpoint,
         )
     )  # fmt: skip
+
+
+def steps_between_records(drum: DumbbellDrum, dt: float, interval: float) -> int:
+    """Return how many steps lie between two records, if a bunch can be followed in a drum."""
+    instance("drum", drum, DumbbellDrum)
+    if not drum.floor:
+        refuse("drum", "one with a bottom, on which the bunch lies", "floor=False")
+    return max(1, round(real("interval", interval, above=0) / real("dt", dt, above=0)))
 
 
 @dataclass(frozen=True)

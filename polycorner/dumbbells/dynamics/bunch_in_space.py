@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.checks import real, refuse
+from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum
-from polycorner.dumbbells.dynamics.bunch import BunchRun, scattered
+from polycorner.dumbbells.dynamics.bunch import BunchRun, scattered, steps_between_records
 from polycorner.dumbbells.dynamics.pairs import Handed
 from polycorner.dumbbells.rigid import RigidDumbbells
 from polycorner.motion.checkpoints import Checkpoint
@@ -103,12 +103,11 @@ def follow_in_space(
     progress, checkpoint : optional
         See :func:`~polycorner.motion.simulation.simulate`.
     """
-    if not drum.floor:
-        refuse("drum", "one with a bottom, on which the bunch lies", "floor=False")
+    every = steps_between_records(drum, dt, interval)
     rigid = RigidDumbbells(drum)
     q = start if isinstance(start, np.ndarray) else scattered(drum, np.random.default_rng(start))
     path = simulate(
         rigid.system, rigid.state(q), duration, dt,
-        every=max(1, round(interval / dt)), noise=noise, progress=progress, checkpoint=checkpoint,
+        every=every, noise=noise, progress=progress, checkpoint=checkpoint,
     )  # fmt: skip
     return BunchInSpaceRun(path, rigid)

@@ -78,9 +78,12 @@ def test_kicks_of_centres_are_those_of_a_mass():
     ("call", "message"),
     [
         (lambda: follow_in_space(DumbbellDrum(count=8), 1.0), "drum: expected one with a bottom"),
+        (lambda: follow_in_space(3, 1.0), "drum: expected a DumbbellDrum; got int"),
+        (lambda: follow_in_space(DRUM, 1.0, dt=0.0), "dt: expected a number > 0; got 0"),
+        (lambda: follow_in_space(DRUM, 1.0, interval=-1.0), "interval: expected a number > 0"),
         (lambda: kicks_of_centres(DRUM, -1.0), "strength"),
     ],
 )
 def test_what_is_no_bunch_is_refused(call, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((TypeError, ValueError), match=message):
         call()
