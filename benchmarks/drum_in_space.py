@@ -19,7 +19,7 @@ from typing import Any
 from side_by_side import print_table, write
 
 from polycorner import checks
-from polycorner.dumbbells import DumbbellDrum
+from polycorner.dumbbells import DumbbellDrum, Shaking
 from polycorner.dumbbells.dynamics.bunch import drum_for_bunch
 from polycorner.dumbbells.dynamics.bunch_in_space import (
     BunchInSpaceRun,
@@ -32,6 +32,7 @@ from polycorner.motion import Checkpoint, Noise
 
 SAVE = 30.0  # s
 KICK_TIME = 0.003  # s, for which a kick is held
+AXES = ("ACROSS", "ALONG", "UP")  # directions of shaking
 SHARES = 10  # instants at which dumbbells off the drum are counted
 
 
@@ -40,6 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--starts", type=int, default=2, help="how many, from --first on")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--kicks", type=float, nargs="+", default=[0.0], help="mm/s per sqrt(s)")
+    parser.add_argument("--shake", type=float, nargs=3, metavar=AXES, help="rms in mm/s^2")
+    parser.add_argument("--band", type=float, nargs=2, default=[5.0, 50.0], help="Hz")
     parser.add_argument("--count", type=int, default=60, help="dumbbells")
     parser.add_argument("--top", type=float, default=150.0, help="length of the drum, mm")
     parser.add_argument("--duration", type=float, default=1200.0, help="s")
@@ -66,12 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str, Any]:
     """Follow one start, or go on with it; return its figures."""
     start, kicks = point
-    folder = options.out / f"kicks-{kicks:g}-start-{start}"
+    shaking = Shaking(options.shake, options.band, seed=start) if options.shake else None
+    noise = f"kicks-{kicks:g}" + (f"-shaken-{shaking.peak:g}" if shaking else "")
+    folder = options.out / f"{noise}-start-{start}"
     timer = threading.Timer(options.seconds, signal.raise_signal, [signal.SIGINT])
     if options.seconds:
         timer.daemon = True
         timer.start()
-    drum = drum_for_bunch(DumbbellDrum(), count=options.count, top=options.top)
+    drum = drum_for_bunch(DumbbellDrum(shaking=shaking), count=options.count, top=options.top)
     run = follow_in_space(
         drum,
         options.duration,
@@ -83,7 +88,8 @@ def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str,
     timer.cancel()
     if options.films:
         write_page(film_page(film_in_space(run)), folder.parent / f"{folder.name}.html")
-    return {"start": start, "kicks": kicks, **figures(run)}
+    shaken = "-" if shaking is None else str(shaking.rms)
+    return {"start": start, "kicks": kicks, "shaken": shaken, **figures(run)}
 
 
 def figures(run: BunchInSpaceRun) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from functools import cached_property, reduce
 from operator import mul
 from typing import Any, Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
@@ -208,7 +207,7 @@ class Arrangement(Value):
     def system(
         self,
         *,
-        gravity: ArrayLike | None = None,
+        gravity: ArrayLike | Sequence[Any] | None = None,
         density: float = 1.0,
         masses: Mapping[str, Mass] | None = None,
         friction: Coefficients = 0.0,
@@ -219,14 +218,15 @@ class Arrangement(Value):
     ) -> System:
         """Return the mechanical system of the bodies.
 
-        Several bodies are one dense system of the engine, with states ``(N,)``.  A single one may
-        be repeated: ``count`` bodies like it, with states ``(count, N)``, touch each other as well,
-        and near ones are found by the first two coordinates; not in a periodic box.
+        Several bodies are one dense system, with states ``(N,)``.  A single one may be repeated:
+        ``count`` bodies like it, with states ``(count, N)``, touch each other as well, and near
+        ones are found by the first two coordinates; not in a periodic box.
 
         Parameters
         ----------
-        gravity : (d,) array, optional
-            Force per mass; default none.
+        gravity : (d,) array, or sequence of sympy.Expr, optional
+            Force per mass; default none.  It may depend on :func:`~polycorner.motion.time_symbol`:
+            for walls that are shaken together, in their axes, it is ``g - a(t)``.
         density : float, optional
             Mass per area or volume of bodies without a mass of their own.
         masses : mapping from str to Mass, optional
@@ -237,8 +237,8 @@ class Arrangement(Value):
         rolling : the same, optional
             Coefficients of rolling resistance: the torque across the normal is at most
             ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
-            (r + s)`` for two rounded parts.  Among repeated bodies in the plane only; none at the
-            sides of polygons and polyhedra.
+            (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.  Among
+            repeated bodies in the plane only.
         restitution : float or mapping from str to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
         exits : mapping from str to float, optional
@@ -264,13 +264,13 @@ class Arrangement(Value):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
-        pull = np.zeros(self.dimension) if gravity is None else gravity
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
         if count > 1 and self.lattice.axes:
             refuse("count", "1 in a periodic box, where each body is listed", count)
         known = masses_of(self.placements, density, masses or {})
-        kinetic, potential = energies(self.placements, known, pull)
+        pull = [0.0] * self.dimension if gravity is None else gravity
+        laws = energies(self.placements, known, pull)
         polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
@@ -282,9 +282,8 @@ class Arrangement(Value):
             family = between(self.placements[0], rubbing, turning, bouncing)
         return System(
             polyhedron,
-            kinetic,
-            potential,
-            friction=friction_of(self.placements, touches, walls, friction, rolling),
+            *laws,
+            friction_of(self.placements, touches, walls, friction, rolling),
             restitution=restitution,
             count=count,
             between=family,

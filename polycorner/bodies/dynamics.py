@@ -7,7 +7,6 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.frames import Frame, symbols
@@ -23,6 +22,7 @@ from polycorner.motion.contacts import (
     PAIR,
     ContactFamily,
     Friction,
+    time_symbol,
     velocities,
 )
 from polycorner.motion.convex_sets import ConvexSet
@@ -75,19 +75,19 @@ def _as_round_as_the_body(p: Placement, mass: Mass) -> bool:
 
 
 def energies(
-    placements: tuple[Placement, ...], masses: Mapping[str, Mass], gravity: ArrayLike
-) -> "tuple[sympy.Expr, sympy.Expr]":
-    """Return kinetic and potential energy as formulas.
+    placements: tuple[Placement, ...], masses: Mapping[str, Mass], gravity: Any
+) -> "tuple[sympy.Expr, sympy.Expr, dict[str, sympy.Expr]]":
+    """Return kinetic and potential energy, and the forces that follow the time, as formulas.
 
-    The kinetic energy is that of the centre of mass and of the rotation about it.
+    The kinetic energy is that of the centre of mass and of the rotation about it.  Weight that does
+    not change has the potential energy; what is added to it as the time goes by is applied.
     """
     import sympy
 
     d = placements[0].body.dimension
-    pull = checks.numbers("gravity", gravity, f"{d} numbers")
-    if pull.shape != (d,) or not np.isfinite(pull).all():
-        refuse("gravity", f"{d} finite numbers", gravity)
+    constant, changing = _pull(gravity, d)
     kinetic = potential = sympy.S.Zero
+    forces: dict[str, sympy.Expr] = {}
     for p in placements:
         mass = masses[p.name]
         rates = velocities(p.manifold)
@@ -97,8 +97,29 @@ def energies(
             for c in centre
         ]
         kinetic += mass.mass * sum(v**2 for v in moving) / 2 + _rotation(p, mass, rates)
-        potential -= mass.mass * sum(g * c for g, c in zip(pull.tolist(), centre, strict=True))
-    return kinetic, potential
+        potential -= mass.mass * sum(g * c for g, c in zip(constant, centre, strict=True))
+        work = mass.mass * sum(g * c for g, c in zip(changing, centre, strict=True))
+        applied = {q.name: sympy.diff(work, q) for q in p.manifold.symbols}
+        forces |= {name: force for name, force in applied.items() if force != 0}
+    return kinetic, potential, forces
+
+
+def _pull(gravity: Any, dimension: int) -> "tuple[list[float], list[sympy.Expr]]":
+    """Return what does not depend on the time in each component of gravity, and the rest."""
+    import sympy
+
+    expected = f"{dimension} finite numbers, or expressions of time_symbol()"
+    now = time_symbol()
+    try:
+        given = [sympy.sympify(component, strict=True) for component in gravity]
+        free = {symbol for component in given for symbol in component.free_symbols}
+    except (AttributeError, TypeError, sympy.SympifyError):
+        refuse("gravity", expected, gravity, TypeError)
+    strange = (sympy.I, sympy.oo, -sympy.oo, sympy.zoo, sympy.nan)
+    if len(given) != dimension or free - {now} or any(part.has(*strange) for part in given):
+        refuse("gravity", expected, gravity)
+    parts = [component.as_independent(now, as_Add=True) for component in given]
+    return [float(constant) for constant, _ in parts], [changing for _, changing in parts]
 
 
 def _rotation(p: Placement, mass: Mass, rates: "tuple[sympy.Symbol, ...]") -> "sympy.Expr":

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 GRAVITY = 9806.65  # mm/s^2
 FREE_FALL = 0.1  # part of the rod radius by which a ball may fall within one step
-RESOLVED = 0.1  # part of the shortest period of shaking that a step may last
 OVERLAP = 1e-6  # mm up to which a start counts as touching
 
 Pair = tuple[float, float]
@@ -214,8 +213,8 @@ class DumbbellDrum(MechanicalSystem):
         shaking = self.shaking
         gravity = GRAVITY + (shaking.peak if shaking is not None else 0.0)
         longest = math.sqrt(2 * FREE_FALL * self.rod_radius / gravity)
-        if shaking is not None and RESOLVED * shaking.shortest_period < longest:
-            return RESOLVED * shaking.shortest_period, "a tenth of the shortest period of shaking"
+        if shaking is not None and shaking.longest_step < longest:
+            return shaking.longest_step, "a tenth of the shortest period of shaking"
         return longest, "in which a ball falls by a tenth of the rod's radius"
 
     def described(self) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from polycorner.formulas.families import Family
 from polycorner.formulas.kernels import address
 from polycorner.motion import formulation as equations
 from polycorner.motion.bodies import Body
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import sympy
@@ -102,11 +103,8 @@ def imperfect_body(
     driven : (float, float, float, float)
         Spin in rad/s, mass of a ball in g, acceleration of gravity in mm/s^2, tilt in rad.
     """
-    shaking, wall, wobble, uneven = found
-    known = list(driven)
-    known += [] if wobble is None else wobble.numbers
-    known += [] if shaking is None else shaking.numbers
-    family, numbers = signals(shaking is not None, wobble is not None), np.array(known)
+    shaking, wall, _, uneven = found
+    family, numbers = _driving(found, driven)
     (now,) = family.kernel.at(np.zeros(1), address(numbers), 0)
     fixed = body.parameters.tolist()
     fixed += [] if wall is None else wall.numbers
@@ -120,6 +118,34 @@ def imperfect_body(
         signal_parameters=numbers,
         slow_signals=shaking is None,
     )
+
+
+def effective_gravity(
+    found: Imperfections, spin: float, gravity: float, tilt: float
+) -> "tuple[sympy.Expr, ...]":
+    """Return the force per mass across, along the axis and up, as functions of the time.
+
+    Parameters
+    ----------
+    found : Imperfections
+        Of which shaking and a wobble have an effect on it.
+    spin, gravity, tilt : float
+        In rad/s, mm/s^2 and rad.
+    """
+    family, numbers = _driving(found, (spin, 1.0, gravity, tilt))
+    values = dict(zip(_symbols(*family.parameters), numbers.tolist(), strict=True))
+    side, heavier, steeper = (family.expression(name).subs(values) for name in SIGNALS[1:])
+    return -side, -(gravity * math.sin(tilt) + steeper), -(gravity * math.cos(tilt) + heavier)
+
+
+def _driving(
+    found: Imperfections, driven: tuple[float, float, float, float]
+) -> tuple[Family, Array]:
+    """Return the functions of the time of an imperfect drum, and their parameters."""
+    known = list(driven)
+    known += [] if found.wobble is None else found.wobble.numbers
+    known += [] if found.shaking is None else found.shaking.numbers
+    return signals(found.shaking is not None, found.wobble is not None), np.array(known)
 
 
 def _signal_names(axis: str) -> list[str]:

@@ -25,6 +25,7 @@ from polycorner.values import Value
 AXES = ("across", "along", "up")
 SIGNAL_MODES, FIELD_MODES = 16, 32
 HIGHEST = 64  # harmonic of a wall that is out of round
+RESOLVED = 0.1  # part of the shortest period of shaking that a step may last
 PEAK = 3.0  # multiple of the root mean square that counts as the largest acceleration
 STEEPEST = 0.5  # slope of a wall out of round up to which formulas of first order are taken
 SHAKING, UNEVEN_FRICTION = 1, 2  # kinds of random numbers that one and the same seed makes
@@ -84,9 +85,9 @@ class Shaking(Imperfection):
         return PEAK * math.hypot(*self.rms)
 
     @property
-    def shortest_period(self) -> float:
-        """Period of the greatest frequency, in s."""
-        return 1 / self.band[1]
+    def longest_step(self) -> float:
+        """A tenth of the period of the greatest frequency, in s."""
+        return RESOLVED / self.band[1]
 
     @property
     def numbers(self) -> list[float]:

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
 from polycorner.checks import instance, refuse
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
+from polycorner.dumbbells.drum_motion import effective_gravity
 from polycorner.motion.mechanics import State
 from polycorner.motion.system import System
 from polycorner.spaces.arguments import reals
@@ -36,7 +37,8 @@ class RigidDumbbells(Value):
     ----------
     drum : DumbbellDrum
         Lengths, tilt, spin, friction and masses: two balls, each of uniform density, on a rod
-        without mass.  ``top`` and ``floor`` are the ends of the drum.  Imperfections are refused.
+        without mass.  ``top`` and ``floor`` are the ends of the drum.  It may be shaken and
+        wobble, which change the effective gravity; other imperfections are refused.
 
     Raises
     ------
@@ -57,7 +59,7 @@ class RigidDumbbells(Value):
 
     def __post_init__(self) -> None:
         instance("drum", self.drum, DumbbellDrum, "DumbbellDrum()")
-        for name in ("shaking", "out_of_round", "wobble", "uneven_friction"):
+        for name in ("out_of_round", "uneven_friction"):
             if (given := getattr(self.drum, name)) is not None:
                 refuse("drum", f"no {name}", given)
         super().__post_init__()
@@ -87,13 +89,12 @@ class RigidDumbbells(Value):
     def system(self) -> System:
         """The mechanical system, in mm, g and s."""
         drum = self.drum
-        down = np.array([0.0, -math.sin(drum.tilt), -math.cos(drum.tilt)])
         sliding = dict.fromkeys(BALLS, drum.sliding)
         if drum.count > 1:
             sliding["between"] = drum.rubbing
         restitution = {"between": drum.restitution} if drum.count > 1 else {}
         return self.arrangement.system(
-            gravity=GRAVITY * down,
+            gravity=effective_gravity(drum.imperfections, drum.spin, GRAVITY, drum.tilt),
             masses={"D": self.mass},
             friction=sliding,
             rolling=dict.fromkeys(BALLS, drum.rolling),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -19,6 +20,7 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
+from polycorner.motion import time_symbol
 
 TRIANGLE = [[0, 0], [2, 0], [1, 1.5]]
 SIMPLEX = [[0, 0, 0], [1, 0, 0], [0, 2, 0], [0.3, 0, 1]]
@@ -218,6 +220,38 @@ def test_a_capsule_falls_on_another_and_lies_still():
     assert path.q[-1, 0, 5] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_disc_rolls_on_a_shaken_floor():
+    """In the axes of the floor, with two thirds of its acceleration; the balance is kept."""
+    t = time_symbol()
+    a = Arrangement({"A": disc(1.0)}, GROUND, orientations="all")
+    shaken = [3 * sympy.cos(5 * t), -10 + 2 * sympy.sin(7 * t)]
+    path = run(a, a.system(gravity=shaken, friction=0.9), {"A": ([0, 1], 0)}, np.zeros(3), 2.0)
+    speed = 3 / 5 * np.sin(5 * path.times) * 2 / 3
+    assert path.v[:, 0, 0] == pytest.approx(speed, abs=1e-4)
+    assert path.v[:, 0, 2] == pytest.approx(-speed, abs=1e-4)
+    assert path.audit < 1e-4
+    assert np.ptp(path.potential) == pytest.approx(0.0, abs=1e-9)
+
+
+BALLS = compound({"1": sphere(0.5), "2": sphere(0.8, at=[2.0, 0.5, 0.0])})
+
+
+@pytest.mark.parametrize("body", [polygon(TRIANGLE), BALLS])
+def test_weight_that_follows_the_time_acts_at_the_centre_of_mass(body):
+    """Which flies as a point would; the body turns freely about it."""
+    d, t = body.dimension, time_symbol()
+    a = Arrangement({"A": body}, {"floor": HalfSpace(np.eye(d)[-1], -50 * np.eye(d)[-1])})
+    system = a.system(gravity=[sympy.cos(3 * t), *[-t] * (d - 1)])
+    spin = 2.0 if d == 2 else np.array([0.3, -0.5, 2.0])
+    q = a.point({"A": np.zeros(d)})
+    path = simulate(system, system.state(q, a.velocity(q, {"A": (np.zeros(d), spin)})), 1.0, 1e-3)
+    moved = a.placed(path.q[-1, 0])["A"]
+    start, end = mass_of(body).centre, mass_of(moved).centre
+    carried = np.cross(spin, start)[:d] if d == 3 else spin * np.array([-start[1], start[0]])
+    expected = start + carried + [(1 - np.cos(3.0)) / 9, *[-1 / 6] * (d - 1)]
+    assert end == pytest.approx(expected, abs=1e-4)
+
+
 def masses(mass, centre, inertia):
     return lambda: Mass(mass, centre, inertia)
 
@@ -229,6 +263,17 @@ def masses(mass, centre, inertia):
         (lambda: Arrangement([disc(1)] * 2).system(friction=0.1), ValueError, "orientations"),
         (lambda: Arrangement([disc(1)] * 2).system(friction=-1), ValueError, "friction"),
         (lambda: Arrangement([disc(1)] * 2).system(gravity=[1, 2, 3]), ValueError, "gravity"),
+        (lambda: Arrangement([disc(1)] * 2).system(gravity=3), TypeError, "gravity: expected 2"),
+        (
+            lambda: Arrangement([disc(1)] * 2).system(gravity=[0, sympy.Symbol("t")]),
+            ValueError,
+            "gravity: expected 2 finite numbers, or expressions of time_symbol",
+        ),
+        (
+            lambda: Arrangement([disc(1)] * 2).system(gravity=[0, sympy.I * time_symbol()]),
+            ValueError,
+            "gravity: expected 2",
+        ),
         (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"1": 1}), TypeError, "masses"),

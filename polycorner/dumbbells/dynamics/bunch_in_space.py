@@ -93,7 +93,8 @@ def follow_in_space(
     Parameters
     ----------
     drum : DumbbellDrum
-        With a bottom, as of :func:`~polycorner.dumbbells.dynamics.bunch.drum_for_bunch`.
+        With a bottom, as of :func:`~polycorner.dumbbells.dynamics.bunch.drum_for_bunch`; it may be
+        shaken and wobble.
     start : int or (count, 3) array, optional
         The seed of a :func:`~polycorner.dumbbells.dynamics.bunch.scattered` start, or placements.
     noise : Noise, optional
@@ -104,6 +105,8 @@ def follow_in_space(
         See :func:`~polycorner.motion.simulation.simulate`.
     """
     every = steps_between_records(drum, dt, interval)
+    if drum.shaking is not None:
+        real("dt", dt, most=drum.shaking.longest_step, unit="s")
     rigid = RigidDumbbells(drum)
     q = start if isinstance(start, np.ndarray) else scattered(drum, np.random.default_rng(start))
     path = simulate(

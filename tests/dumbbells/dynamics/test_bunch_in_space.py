@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from polycorner.dumbbells import DumbbellDrum
+from polycorner.dumbbells import DumbbellDrum, Shaking
 from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, scattered
 from polycorner.dumbbells.dynamics.bunch_in_space import (
     BunchInSpaceRun,
@@ -15,6 +15,7 @@ from polycorner.dumbbells.dynamics.bunch_in_space import (
 from polycorner.dumbbells.dynamics.starts import nested_pair
 
 DRUM = drum_for_bunch(DumbbellDrum(), count=8, top=100.0)
+SHAKING = Shaking((0.0, 600.0, 0.0), (5.0, 100.0))
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +82,10 @@ def test_kicks_of_centres_are_those_of_a_mass():
         (lambda: follow_in_space(3, 1.0), "drum: expected a DumbbellDrum; got int"),
         (lambda: follow_in_space(DRUM, 1.0, dt=0.0), "dt: expected a number > 0; got 0"),
         (lambda: follow_in_space(DRUM, 1.0, interval=-1.0), "interval: expected a number > 0"),
+        (
+            lambda: follow_in_space(replace(DRUM, shaking=SHAKING), 1.0),
+            "dt: expected a number <= 0.001 s; got 0.002",
+        ),
         (lambda: kicks_of_centres(DRUM, -1.0), "strength"),
     ],
 )
