@@ -11,6 +11,8 @@ import matplotlib as mpl
 import pytest
 from hypothesis import HealthCheck, settings
 
+from polycorner.formulas.cache import cache_folder
+
 mpl.use("Agg")
 
 # A shell starts background jobs with Ctrl-C ignored; tests that send it need it to interrupt.
@@ -47,4 +49,17 @@ def kernels_elsewhere(tmp_path_factory):
     """Keep what is compiled in one module in a folder of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("kernels")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def own_searches(tmp_path_factory):
+    """Keep the unfinished searches of one module in a cache of its own; share what is compiled."""
+    own = tmp_path_factory.mktemp("cache")
+    for name in ("kernels", "numba"):
+        shared = cache_folder() / name
+        shared.mkdir(exist_ok=True)
+        (own / name).symlink_to(shared, target_is_directory=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("POLYCORNER_CACHE_DIR", str(own))
         yield

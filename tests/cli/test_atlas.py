@@ -19,12 +19,7 @@ MODELS = (*SEARCHES, "disks")
 KNOWN = {5: (1, 2, 4), 6: (2, 5, 13), 7: (5, 16, 51)}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory):
-    """Keep unfinished searches, and compiled kernels, away from the user's."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_searches")
 
 
 @pytest.mark.parametrize("count", KNOWN)

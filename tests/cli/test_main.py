@@ -25,12 +25,7 @@ every_leaf = pytest.mark.parametrize("name", LEAVES)
 every_answer = pytest.mark.parametrize("name", QUICK)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory):
-    """Keep unfinished searches away from the user's; kernels are compiled anew."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_searches")
 
 
 def run(capsys, name, *arguments):

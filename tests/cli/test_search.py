@@ -12,13 +12,7 @@ from atlas_commands import answer, on_terminal, run, started
 
 from polycorner.models import CriticalSearch
 
-
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory):
-    """Keep unfinished searches, and compiled kernels, away from the user's."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_searches")
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,7 @@ ANSWER = {"components", "corners", "edges", "faces", "euler_characteristic", "co
 CORNER = {"name", "kind", "active", "rank", "dimension", "local_type", "chirality"}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def own_cache(tmp_path_factory):
-    """Keep unfinished searches, and compiled kernels, away from the user's."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("POLYCORNER_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
-        yield
+pytestmark = pytest.mark.usefixtures("own_searches")
 
 
 PAIRS = {

@@ -84,7 +84,7 @@ def test_kicks_of_centres_are_those_of_a_mass():
         (lambda: follow_in_space(DRUM, 1.0, interval=-1.0), "interval: expected a number > 0"),
         (
             lambda: follow_in_space(replace(DRUM, shaking=SHAKING), 1.0),
-            "dt: expected a number <= 0.001 s; got 0.002",
+            "dt: expected a number <= 0.001 in s; got 0.002",
         ),
         (lambda: kicks_of_centres(DRUM, -1.0), "strength"),
     ],
