@@ -11,7 +11,14 @@ import numpy as np
 import sympy
 
 from polycorner import Friction, Manifold, Polyhedron, System, velocities
-from polycorner.motion import ContactFamily, Interval, Solver, pair_coordinates, pair_velocities
+from polycorner.motion import (
+    ContactFamily,
+    Interval,
+    PairFriction,
+    Solver,
+    pair_coordinates,
+    pair_velocities,
+)
 from polycorner.motion.simulation import start as started
 from polycorner.spaces.manifold import Array
 
@@ -48,8 +55,7 @@ def system(count: int, spin: float) -> System:
         between=ContactFamily(
             {"discs": apart - 2 * RADIUS},
             reach=2 * RADIUS,
-            slip={"discs": [along]},
-            static=Interval(BETWEEN),
+            friction=[PairFriction({"discs": along}, Interval(BETWEEN))],
         ),
     )
 

@@ -17,7 +17,6 @@ from polycorner.bodies.dynamics import (
     energies,
     friction_of,
     masses_of,
-    rolling_without,
     smooth,
     without,
 )
@@ -237,8 +236,7 @@ class Arrangement(Value):
         rolling : the same, optional
             Coefficients of rolling resistance: the torque across the normal is at most
             ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
-            (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.  Among
-            repeated bodies in the plane only.
+            (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.
         restitution : float or mapping from str to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
         exits : mapping from str to float, optional
@@ -277,7 +275,7 @@ class Arrangement(Value):
         family = None
         if count > 1:
             friction, rubbing = without(friction, BETWEEN)
-            rolling, turning = rolling_without(rolling, BETWEEN, self.dimension)
+            rolling, turning = without(rolling, BETWEEN)
             restitution, bouncing = without(restitution, BETWEEN)
             family = between(self.placements[0], rubbing, turning, bouncing)
         return System(

@@ -18,15 +18,17 @@ from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
 from polycorner.formulas.compositions import Term, composition
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.motion.bodies import RUBBING
 from polycorner.motion.contacts import (
     PAIR,
     ContactFamily,
     Friction,
+    PairFriction,
     time_symbol,
     velocities,
 )
 from polycorner.motion.convex_sets import ConvexSet
-from polycorner.motion.friction import ConvexPolygon, Disc, Interval
+from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.rotations import rotational_energy
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
 SAME = 1e-9  # relative deviation that counts as none
 AtWall = tuple[str, Wall, Member, Array]  # label of the gap, wall, part, point
 Law = Callable[[], "tuple[sympy.Expr, ...]"]
-PairLaw = Callable[[dict[str, Placement], Touch], "tuple[sympy.Expr, ...]"]
 Coefficient = float | tuple[float, float]  # static and dynamic
 Coefficients = Coefficient | Mapping[str, Coefficient]
 
@@ -197,63 +198,33 @@ def _check_turning(argument: str, rubbing: list[Member], given: Any) -> None:
 def between(p: Placement, mu: Coefficient, rolls: Coefficient, restitution: float) -> ContactFamily:
     """Return the contacts of any two of several bodies like one, with friction if ``mu > 0``.
 
-    The two are called after the body, with 1 and 2, and so are their coordinates.  In the plane
-    they resist rolling if ``rolls > 0``.  A contact of the engine has one set of forces: slip and
-    rolling velocity are its two directions, and the set is the product of both intervals.
+    The two are called after the body, with 1 and 2, and so are their coordinates.  They resist
+    rolling if ``rolls > 0``.
     """
     pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
     space = pair[0].manifold * pair[1].manifold
     one, two = (members(some.name, some.body, some) for some in pair)
     touches = [t for parts in product(one, two) for t in distances(space, *parts)]
     gaps, definitions = _written([t.gap for t in touches])
-    laws = _laws(mu, rolls, [one[0], two[0]])
-    named = {some.name: some for some in pair}
-    slips = {t.gap.name: tuple(row for law, *_ in laws for row in law(named, t)) for t in touches}
-    static = [size for _, size, _ in laws]
-    dynamic = [size for *_, size in laws]
+    named, laws = {some.name: some for some in pair}, []
+    for argument, given, law, kind in (
+        ("friction", mu, slip, RUBBING),
+        ("rolling", rolls, rolling, "rolling"),
+    ):
+        static, dynamic = _both(argument, given)
+        if static == 0:
+            continue
+        _check_turning(argument, [one[0], two[0]], given)
+        sets = _set(static, p.body.dimension), _set(dynamic, p.body.dimension)
+        laws.append(PairFriction({t.gap.name: law(named, t) for t in touches}, *sets, kind))
     return ContactFamily(
         gaps,
         2 * p.body.size / p.manifold.scales[0],
         p.manifold.names[:2],
-        slip=slips if laws else {},
-        static=_product(static, p.body.dimension),
-        dynamic=_product(dynamic, p.body.dimension),
+        friction=tuple(laws),
         restitution=restitution,
         definitions=definitions,
     )
-
-
-def _laws(
-    mu: Coefficient, rolls: Coefficient, rubbing: list[Member]
-) -> list[tuple[PairLaw, float, float]]:
-    """Return the laws of repeated bodies with their static and dynamic coefficients, if not 0."""
-    found: list[tuple[PairLaw, float, float]] = []
-    for argument, given, law in (("friction", mu, slip), ("rolling", rolls, rolling)):
-        static, dynamic = _both(argument, given)
-        if static > 0:
-            _check_turning(argument, rubbing, given)
-            found.append((law, static, dynamic))
-    if len(found) == 2:
-        _check_constant(mu, rolls)
-    return found
-
-
-def _check_constant(mu: Coefficient, rolls: Coefficient) -> None:
-    """Raise unless static and dynamic coefficients are equal: what rolls need not slip."""
-    for argument, given in (("friction", mu), ("rolling", rolls)):
-        static, dynamic = _both(argument, given)
-        if dynamic < static:
-            refuse(argument, "one coefficient where repeated bodies slip and roll", given)
-
-
-def _product(sizes: list[float], dimension: int) -> ConvexSet | None:
-    """Return the forces of one law of friction, or of two of one component each; None of none."""
-    if not sizes:
-        return None
-    if len(sizes) == 1:
-        return _set(sizes[0], dimension)
-    mu, rolls = sizes
-    return ConvexPolygon([(mu, rolls), (-mu, rolls), (-mu, -rolls), (mu, -rolls)])
 
 
 def _written(
@@ -294,17 +265,3 @@ def without(given: Any, name: str) -> tuple[Any, Any]:
     if not isinstance(given, Mapping):
         return given, given
     return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)
-
-
-def rolling_without(given: Any, name: str, dimension: int) -> tuple[Any, Any]:
-    """Return :func:`without` for rolling resistance, which repeated bodies have in the plane only.
-
-    In space one coefficient for all is one for all others.
-    """
-    others, own = without(given, name)
-    if dimension == 2:
-        return others, own
-    if isinstance(given, Mapping) and np.any(own):
-        msg = f"rolling: expected none at {name!r}, among repeated bodies in space; got {own!r}"
-        raise NotImplementedError(msg)
-    return others, 0.0

@@ -28,7 +28,7 @@ from polycorner.dumbbells.imperfections import (
 )
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.formulas.bundles import Call
-from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts
+from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts, PairLaw
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.spaces.manifold import Array
@@ -197,8 +197,7 @@ class DumbbellDrum(MechanicalSystem):
             tuple(values[name] for name in gaps.parameters),
             reads,
             tuple(rub(contact, (length, r, t, rho)) for contact in gaps.names),
-            Disc(self.rubbing[0]),
-            Disc(self.rubbing[1]),
+            (PairLaw(2, Disc(self.rubbing[0]), Disc(self.rubbing[1])),),
             float(self.restitution),
             reach,
         )

@@ -191,8 +191,13 @@ def _told(system: System) -> dict[str, Any]:
     }
     between = system.between and {
         "gaps": {name: text(gap) for name, gap in system.between.gaps.items()},
-        "slip": {name: [text(s) for s in slip] for name, slip in system.between.slip.items()},
-        "friction": f"{system.between.static}, {system.between.dynamic}",
+        "friction": [
+            [
+                {name: [text(s) for s in slip] for name, slip in law.slip.items()},
+                f"{law.static}, {law.moving}",
+            ]
+            for law in system.between.friction
+        ],
         "restitution": system.between.restitution,
     }
     return told | {"count": system.count, "between": between}

@@ -3,6 +3,7 @@ from .checkpoints import Checkpoint
 from .contacts import (
     ContactFamily,
     Friction,
+    PairFriction,
     pair_coordinates,
     pair_velocities,
     time_symbol,
@@ -34,6 +35,7 @@ __all__ = [
     "Interval",
     "MechanicalSystem",
     "Noise",
+    "PairFriction",
     "Solver",
     "State",
     "System",

@@ -89,6 +89,26 @@ class Body(Value):
     slow_signals: bool = False
 
 
+@dataclass(frozen=True)
+class PairLaw(Value):
+    """One law of friction between bodies, which holds at each of their gaps.
+
+    Attributes
+    ----------
+    rows : int
+        Components of its slip velocity, 1 or 2.
+    static, dynamic : ConvexSet
+        Admissible forces per unit normal force while it sticks and while it slips.
+    cause : str
+        Cause under which its dissipation is booked.
+    """
+
+    rows: int
+    static: ConvexSet
+    dynamic: ConvexSet
+    cause: str = RUBBING
+
+
 @dataclass(frozen=True, eq=False)
 class PairContacts(Value):
     """The contacts between any two of several identical bodies.
@@ -101,11 +121,10 @@ class PairContacts(Value):
     reads : tuple of (int, int)
         For each variable of the gaps the body, 0 or 1, and its coordinate.
     slips : tuple of (Family, bool, sequence of float)
-        For each gap the slip velocity at its contact (two rows; variables: the coordinates that
-        the gaps read, then all velocities of both bodies), whether the bodies are exchanged in
-        it, and its parameters; empty without friction.
-    static, dynamic : ConvexSet
-        Admissible friction forces per unit normal force.
+        For each gap the slip velocities at its contact (the rows of all laws; variables: the
+        coordinates that the gaps read, then all velocities of both bodies), whether the bodies
+        are exchanged in them, and their parameters; empty without friction.
+    laws : tuple of PairLaw
     restitution : float
     reach : float
         Distance of body positions beyond which two bodies cannot touch.
@@ -115,8 +134,7 @@ class PairContacts(Value):
     parameters: tuple[float, ...]
     reads: tuple[tuple[int, int], ...]
     slips: "tuple[tuple[Family, bool, tuple[float, ...]], ...]"
-    static: ConvexSet
-    dynamic: ConvexSet
+    laws: tuple[PairLaw, ...]
     restitution: float
     reach: float
 
@@ -152,8 +170,8 @@ class IdenticalBodies(Value):
 
     def __post_init__(self) -> None:
         causes = [IMPACT, *(contact.cause for contact in self.body.friction)]
-        if self.contacts is not None and self.contacts.slips:
-            causes.append(RUBBING)
+        if self.contacts is not None:
+            causes += [law.cause for law in self.contacts.laws]
         object.__setattr__(self, "causes", tuple(dict.fromkeys(causes)))
         super().__post_init__()
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import instance, mapping, names, real, refuse
 from polycorner.formulas.families import Family
-from polycorner.motion.bodies import PairContacts
+from polycorner.motion.bodies import RUBBING, PairContacts, PairLaw
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import TIME, dotted
-from polycorner.motion.friction import Disc, Interval
+from polycorner.motion.friction import Interval
 from polycorner.spaces.manifold import Manifold
 from polycorner.values import Value
 
@@ -130,6 +130,57 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 
 @dataclass(frozen=True)
+class PairFriction(Value):
+    """Dry friction at every gap of two identical bodies, a law as that of :class:`Friction`.
+
+    Parameters
+    ----------
+    slip : mapping from str to sequence of sympy.Expr
+        One or two components of the slip velocity at each gap, affine in the velocities of both
+        bodies (:func:`pair_velocities`).
+    static, dynamic : ConvexSet
+        Force per unit normal force while a contact sticks and while it slips, of as many
+        dimensions as ``slip``; of one dimension an ``Interval(mu)``.  Default of ``dynamic`` is
+        ``static``.
+    kind : str, optional
+        Cause under which its dissipation is booked: ``"rubbing"`` (default), ``"rolling"``, ...
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+    """
+
+    slip: "Mapping[str, tuple[sympy.Expr, ...]]"
+    static: ConvexSet
+    dynamic: ConvexSet | None = None
+    kind: str = RUBBING
+
+    def __post_init__(self) -> None:
+        slip = {name: _several(rows) for name, rows in mapping("slip", self.slip).items()}
+        object.__setattr__(self, "slip", slip)
+        check_set("static", self.static)
+        check_sets("between bodies", self.static, self.dynamic)
+        if self.dynamic is None:
+            object.__setattr__(self, "dynamic", self.static)
+        for name, rows in slip.items():
+            if len(rows) != self.static.dimension:
+                components = f"{self.static.dimension} components at {name!r}, as static has"
+                refuse("slip", components, len(rows))
+        for argument, shape in (("static", self.static), ("dynamic", self.moving)):
+            if isinstance(shape, Interval) and shape.lower != -shape.upper:
+                refuse(
+                    argument, "an interval that is symmetric, for the bodies are identical", shape
+                )
+        super().__post_init__()
+
+    @property
+    def moving(self) -> ConvexSet:
+        """The set while the contact slips."""
+        return self.static if self.dynamic is None else self.dynamic
+
+
+@dataclass(frozen=True)
 class ContactFamily(Value):
     """The contacts between any two of several identical bodies.
 
@@ -146,13 +197,8 @@ class ContactFamily(Value):
     position : sequence of str, optional
         One or two coordinates that are the position of a body, by which near pairs are found;
         default the first two.
-    slip : mapping from str to sequence of sympy.Expr, optional
-        One or two components of the slip velocity at each of the gaps, affine in the velocities;
-        default no friction.
-    static, dynamic : ConvexSet, optional
-        Friction force per unit normal force while a contact sticks and while it slips, of as many
-        dimensions as ``slip``; of one dimension an ``Interval(mu)``.  Default of ``dynamic`` is
-        ``static``.
+    friction : sequence of PairFriction, optional
+        The laws of friction at the gaps, each with a convex set of its own; default none.
     restitution : float, optional
         Newton's coefficient ``0 <= e <= 1``; default 0, plastic.
     definitions : mapping from str to sympy.Expr, optional
@@ -167,9 +213,7 @@ class ContactFamily(Value):
     gaps: "Mapping[str, sympy.Expr]"
     reach: float
     position: tuple[str, ...] = ()
-    slip: "Mapping[str, tuple[sympy.Expr, ...]]" = field(default_factory=dict)
-    static: ConvexSet | None = None
-    dynamic: ConvexSet | None = None
+    friction: tuple[PairFriction, ...] = ()
     restitution: float = 0.0
     definitions: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
 
@@ -181,8 +225,7 @@ class ContactFamily(Value):
         object.__setattr__(self, "reach", real("reach", self.reach, above=0))
         position = (self.position,) if isinstance(self.position, str) else tuple(self.position)
         object.__setattr__(self, "position", position)
-        slip = {name: _several(rows) for name, rows in mapping("slip", self.slip).items()}
-        object.__setattr__(self, "slip", slip)
+        object.__setattr__(self, "friction", _several(self.friction))
         object.__setattr__(
             self, "restitution", real("restitution", self.restitution, least=0, most=1)
         )
@@ -190,36 +233,31 @@ class ContactFamily(Value):
         super().__post_init__()
 
     def _check_friction(self) -> None:
-        if not self.slip:
-            if self.static is not None or self.dynamic is not None:
-                refuse("slip", "the slip velocity at each gap beside static", self.slip)
-            return
-        static = check_set("static", self.static)
-        names("slip", self.slip, self.gaps)
-        if missing := [name for name in self.gaps if name not in self.slip]:
-            refuse("slip", f"the slip velocity at every gap, {missing[0]!r} included", [*self.slip])
-        for name, rows in self.slip.items():
-            if len(rows) != static.dimension:
-                refuse(
-                    "slip", f"{static.dimension} components at {name!r}, as static has", len(rows)
-                )
-        check_sets("between bodies", static, self.dynamic)
-        for argument in ("static", "dynamic"):
-            shape = getattr(self, argument)
-            if isinstance(shape, Interval) and shape.lower != -shape.upper:
-                refuse(
-                    argument, "an interval that is symmetric, for the bodies are identical", shape
-                )
+        for law in self.friction:
+            if not isinstance(law, PairFriction):
+                refuse("friction", "PairFriction values", law, TypeError)
+            names("slip", law.slip, self.gaps)
+            if missing := [name for name in self.gaps if name not in law.slip]:
+                every = f"the slip velocity at every gap, {missing[0]!r} included"
+                refuse("slip", every, [*law.slip])
+
+    def described(self) -> dict[str, Any]:
+        """Return everything that a motion depends on, by name, as plain values."""
+        told: dict[str, Any] = {f"gap {name}": str(gap) for name, gap in self.gaps.items()}
+        told |= {f"definition {name}": str(e) for name, e in self.definitions.items()}
+        told["friction between bodies"] = [
+            f"{law.slip}, {law.static}, {law.moving}, {law.kind}" for law in self.friction
+        ]
+        return told | {"restitution between bodies": self.restitution, "reach": self.reach}
 
     def compiled(self, manifold: Manifold) -> PairContacts:
         """Return the compiled contacts of bodies whose coordinates are those of a manifold."""
         coordinates = tuple(s.name for one in pair_coordinates(manifold) for s in one)
         rates = tuple(s.name for one in pair_velocities(manifold) for s in one)
-        static = self.static or Disc(0.0)
         slips = tuple(
-            (_slip_family(self.slip[name], (*coordinates, *rates)), False, ())
+            (self._slips(name, (*coordinates, *rates)), False, ())
             for name in self.gaps
-            if self.slip
+            if self.friction
         )
         n = manifold.size
         return PairContacts(
@@ -227,21 +265,18 @@ class ContactFamily(Value):
             (),
             tuple((body, c) for body in range(2) for c in range(n)),
             slips,
-            _plane(static),
-            _plane(self.dynamic or static),
+            tuple(
+                PairLaw(law.static.dimension, law.static, law.moving, law.kind)
+                for law in self.friction
+            ),
             self.restitution,
             self.reach,
         )
 
-
-def _slip_family(rows: "tuple[sympy.Expr, ...]", variables: tuple[str, ...]) -> Family:
-    padded = (*rows, *[0] * (2 - len(rows)))  # the engine's contacts slip in two directions
-    return Family.of({f"s{i}": row for i, row in enumerate(padded)}, variables)
-
-
-def _plane(shape: ConvexSet) -> ConvexSet:
-    """Return a set of two dimensions, of which the second is not used if there was but one."""
-    return Disc(shape.upper) if isinstance(shape, Interval) else shape
+    def _slips(self, gap: str, variables: tuple[str, ...]) -> Family:
+        """Return the slip velocities at a gap, law after law."""
+        rows = [row for law in self.friction for row in law.slip[gap]]
+        return Family.of({f"s{i}": row for i, row in enumerate(rows)}, variables)
 
 
 def position_of(

@@ -341,9 +341,5 @@ class System(MechanicalSystem):
             for f in self.friction
         }
         if between is not None:
-            told |= {f"gap {name}": str(gap) for name, gap in between.gaps.items()}
-            told |= {f"definition {name}": str(e) for name, e in between.definitions.items()}
-            told["friction between bodies"] = f"{between.slip}, {between.static}, {between.dynamic}"
-            told["restitution between bodies"] = between.restitution
-            told["reach"] = between.reach
+            told |= between.described()
         return told

@@ -42,6 +42,7 @@ from polycorner.motion import (
     Interval,
     MechanicalSystem,
     Noise,
+    PairFriction,
     Solver,
     System,
     pair_coordinates,
@@ -153,6 +154,10 @@ def family(**changes):
     return ContactFamily(**({"gaps": {"discs": DISTANCE - 2}, "reach": 2.0} | changes))
 
 
+def rubbing(slip=None, **changes):
+    return PairFriction(**({"slip": slip or {"discs": VX}, "static": Interval(0.3)} | changes))
+
+
 def system(**changes):
     given = {"polyhedron": SLOPE, "kinetic": KINETIC, "potential": G * Y} | changes
     return System(**given)
@@ -173,16 +178,21 @@ WRONG = [
     (lambda: family(gaps=[DISTANCE]), TypeError, "gaps"),
     (lambda: family(reach=0.0), ValueError, "reach"),
     (lambda: family(restitution=1.5), ValueError, "restitution"),
-    (lambda: family(static=Disc(0.3)), ValueError, "slip"),
-    (lambda: family(slip={"discs": VX}), TypeError, "static"),
-    (lambda: family(slip={"other": VX}, static=Interval(1)), ValueError, "slip"),
-    (lambda: family(slip={"discs": VX}, static=Disc(1)), ValueError, "slip"),
-    (lambda: family(slip={"discs": VX}, static=Interval(lower=0, upper=1)), ValueError, "static"),
+    (lambda: family(friction=[Interval(0.3)]), TypeError, "friction"),
+    (lambda: family(friction=[rubbing({"other": VX})]), ValueError, "slip"),
+    (lambda: family(friction=[rubbing(), rubbing({"discs": ()})]), ValueError, "slip"),
     (
-        lambda: family(slip={"discs": VX}, static=Interval(1), dynamic=Interval(2)),
+        lambda: family(gaps={"discs": DISTANCE, "far": DISTANCE}, friction=[rubbing()]),
         ValueError,
-        "dynamic",
+        "slip",
     ),
+    (lambda: rubbing(VX), TypeError, "slip"),
+    (lambda: rubbing(static=0.3), TypeError, "static"),
+    (lambda: rubbing(static=Disc(1)), ValueError, "slip"),
+    (lambda: rubbing(static=Interval(lower=0, upper=1)), ValueError, "static"),
+    (lambda: rubbing(dynamic=Interval(lower=0, upper=0.1)), ValueError, "dynamic"),
+    (lambda: rubbing(dynamic=Interval(2)), ValueError, "dynamic"),
+    (lambda: rubbing(dynamic=Disc(0.1)), ValueError, "dynamic"),
     (lambda: system(polyhedron=M), TypeError, "polyhedron"),
     (lambda: system(polyhedron=UNION), ValueError, "polyhedron"),
     (lambda: system(kinetic=VX), ValueError, "kinetic"),

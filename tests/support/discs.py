@@ -24,7 +24,7 @@ SPINNING = Manifold.euclidean("x y w")
 
 def rubbing_discs(static, *, count=3, belt=0.0, **options):
     """Discs that turn, rub against each other, and lie on a belt between two walls."""
-    from polycorner.motion import Friction, Interval
+    from polycorner.motion import Friction, Interval, PairFriction
 
     x, y, _ = SPINNING.symbols
     vx, vy, vw = velocities(SPINNING)
@@ -33,8 +33,9 @@ def rubbing_discs(static, *, count=3, belt=0.0, **options):
     distance = sympy.sqrt((x2 - x1) ** 2 + (y2 - y1) ** 2)
     nx, ny = (x2 - x1) / distance, (y2 - y1) / distance
     slip = nx * (v2 - v1) - ny * (u2 - u1) - o1 - o2
+    rubs = PairFriction({"discs": slip}, static)
     between = ContactFamily(
-        {"discs": distance - 2}, reach=2.0, position=("x", "y"), slip={"discs": slip}, static=static
+        {"discs": distance - 2}, reach=2.0, position=("x", "y"), friction=[rubs]
     )
     return System(
         Polyhedron(SPINNING, {"floor": y - 1, "left": x - 1, "right": 4 - x}),

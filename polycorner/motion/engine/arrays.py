@@ -102,10 +102,11 @@ class Model(NamedTuple):
     pair_inputs: Annotated[Any, whole()]  # coordinates that they read
     pair_reads: Annotated[Any, whole("* 2")]  # body 0 or 1, coordinate
     pair_gaps: Annotated[Any, whole()]  # number of gaps of a pair
-    pair_rubs: Annotated[Any, whole()]  # whether there is friction between bodies
+    pair_laws: Annotated[Any, whole()]  # H: laws of friction at each of these
     pair_slips: Annotated[Any, whole("* 3")]  # address, whether bodies are exchanged, parameters
-    pair_sets: Annotated[Any, whole("2")]  # static and dynamic set
-    pair_cause: Annotated[Any, whole()]  # cause under which dissipation between bodies is booked
+    pair_slip_start: Annotated[Any, whole("H+1")]  # first slip row of each law
+    pair_sets: Annotated[Any, whole("H 2")]  # static and dynamic set
+    pair_causes: Annotated[Any, whole("H")]  # cause under which dissipation is booked
     pair_restitution: Annotated[Any, real()]
     position: Annotated[Any, whole("2")]  # coordinates that are a body's position
     units: Annotated[Any, real("k")]  # length of a unit of each coordinate
@@ -157,10 +158,10 @@ class State(NamedTuple):
     booked_to: Annotated[Any, whole("N")]  # step up to which its work is booked
     neighbour_impulse: Annotated[Any, real("N k")]  # generalised impulses from other bodies
     keys: Annotated[Any, whole("C")]  # contacts between bodies, in ascending order
-    pair_impulse: Annotated[Any, real("C 3")]  # their impulses: normal, friction
+    pair_impulse: Annotated[Any, real("C T+1")]  # their impulses: normal, friction law after law
     pair_release: Annotated[Any, real("C")]  # when the normal impulse would vanish
     pair_action: Annotated[Any, real("C 2*k")]  # generalised impulses on both bodies
-    pair_flags: Annotated[Any, whole("C 2")]  # whether they stick, whether they touch
+    pair_flags: Annotated[Any, whole("C 2")]  # laws that stick, as bits; whether they touch
     cluster: Annotated[Any, whole("N", initial=-1)]  # bodies that need shorter steps: with which
     elapsed: Annotated[Any, real("N")]  # how much of the step these have done
     watched: Annotated[Any, whole("N")]  # whether the way to the next midpoint was examined
@@ -229,7 +230,7 @@ class Work(NamedTuple):
     contact: Annotated[Any, whole("C 3")]  # body, body, gap
     contact_gap: Annotated[Any, real("C")]
     contact_before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
-    contact_impulse: Annotated[Any, real("C 3")]  # initial impulses
+    contact_impulse: Annotated[Any, real("C T+1")]  # initial impulses
     contact_gradient: Annotated[Any, real("C 2*K")]
     block_bodies: Annotated[Any, whole("B 2")]  # the second is -1 for the surroundings
     block_rows: Annotated[Any, whole("B")]  # rows of friction; 0 for a unilateral contact

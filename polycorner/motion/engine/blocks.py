@@ -210,7 +210,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
 @compiled
 def add_pair_blocks(model, state, work, contact, h, count):
     """Append the blocks of a contact between two bodies; return the block count."""
-    k, K, scratch = model.dimension, model.lanes, work.scratch
+    K = model.lanes
     i, j, g = work.contact[contact, 0], work.contact[contact, 1], work.contact[contact, 2]
     rows, at = work.contact_gradient, contact * 2 * K
     before = row_times(model, rows, at, work.v_old, i, j)
@@ -236,11 +236,16 @@ def add_pair_blocks(model, state, work, contact, h, count):
     work.origin[n, 0], work.origin[n, 1], work.origin[n, 2] = PAIR_GAP, contact, g
     work.impulse[n, 0] = work.contact_impulse[contact, 0]
     finish_block(model, work, n)
-    if not model.pair_rubs:
-        return count + 1
-    address, p0 = model.pair_slips[g, 0], model.pair_slips[g, 2]
+    return count + 1 if model.pair_laws == 0 else add_friction(model, state, work, contact, n)
+
+
+@compiled
+def add_friction(model, state, work, contact, pressing):
+    """Append the blocks of friction at a contact after that which presses; return the count."""
+    k, K, scratch, reads = model.dimension, model.lanes, work.scratch, model.pair_inputs
+    i, j, g = work.contact[contact, 0], work.contact[contact, 1], work.contact[contact, 2]
+    address, p0, starts = model.pair_slips[g, 0], model.pair_slips[g, 2], model.pair_slip_start
     first, second = (j, i) if model.pair_slips[g, 1] else (i, j)
-    reads = model.pair_inputs
     for a in range(reads):
         body = first if model.pair_reads[a, 0] == 0 else second
         scratch[a] = work.q_mid[body, model.pair_reads[a, 1]]
@@ -248,23 +253,27 @@ def add_pair_blocks(model, state, work, contact, h, count):
         scratch[reads + c], scratch[reads + k + c] = state.v[first, c], state.v[second, c]
     start, base = scratch.ctypes.data, model.parameters.ctypes.data
     v0 = reads + 2 * k
-    call_kernel(address, start, base + 8 * p0, start + 8 * v0, start + 8 * (v0 + 2), start)
-    b = count + 1
-    new_block(work, b, first, second, TWO)
-    for r in range(2):
-        value = scratch[v0 + r]
-        for c in range(2 * k):
-            slope = scratch[v0 + 2 + r * v0 + reads + c]
-            work.jacobian[b, r, c if c < k else K + c - k] = slope
-            value -= slope * scratch[reads + c]
-        work.offset[b, r] = value
-        work.impulse[b, r] = work.contact_impulse[contact, 1 + r]
-    stuck = index >= 0 and state.pair_flags[index, 0]
-    work.block_set[b] = model.pair_sets[0 if stuck else 1]
-    work.pressing[b] = n
-    work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = PAIR_FRICTION, contact, g
-    finish_block(model, work, b)
-    return count + 2
+    j0 = v0 + starts[model.pair_laws]
+    call_kernel(address, start, base + 8 * p0, start + 8 * v0, start + 8 * j0, start)
+    index = work.contact_before[contact]
+    stuck = state.pair_flags[index, 0] if index >= 0 else ZERO
+    for f in range(model.pair_laws):
+        b = pressing + 1 + f
+        new_block(work, b, first, second, starts[f + 1] - starts[f])
+        for r in range(work.block_rows[b]):
+            row = starts[f] + r
+            value = scratch[v0 + row]
+            for c in range(2 * k):
+                slope = scratch[j0 + row * v0 + reads + c]
+                work.jacobian[b, r, c if c < k else K + c - k] = slope
+                value -= slope * scratch[reads + c]
+            work.offset[b, r] = value
+            work.impulse[b, r] = work.contact_impulse[contact, 1 + row]
+        work.block_set[b] = model.pair_sets[f, 0 if stuck >> f & 1 else 1]
+        work.pressing[b] = pressing
+        work.origin[b, 0], work.origin[b, 1], work.origin[b, 2] = PAIR_FRICTION, contact, f
+        finish_block(model, work, b)
+    return pressing + 1 + model.pair_laws
 
 
 @compiled

@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
-from polycorner.motion.engine.jit import NONE, ZERO, compiled
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import TOUCHING, key_of
 from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rows import sticks
@@ -41,7 +41,7 @@ def store_impulses(model, state, work, begin, end, h):
             if kind == OWN_FRICTION:
                 state.friction[i, f, r] = work.impulse[b, r] / share
             else:
-                work.contact_impulse[i, 1 + r] = work.impulse[b, r]
+                work.contact_impulse[i, 1 + model.pair_slip_start[f] + r] = work.impulse[b, r]
 
 
 @compiled
@@ -151,7 +151,7 @@ def keep_contacts(model, state, work, log, C, h, time, count):
                 count = record(log, count, LOST, i, j, g, time + h, 0.0)
             continue
         state.keys[size], state.pair_release[size] = state.keys[s], time + 0.5 * h
-        for a in range(3):
+        for a in range(state.pair_impulse.shape[1]):
             state.pair_impulse[size, a] = state.pair_impulse[s, a]
         for a in range(2):
             state.pair_flags[size, a] = state.pair_flags[s, a]
@@ -171,21 +171,21 @@ def add_contacts(model, state, work, begin, end, kept, share):
         state.pair_release[size] = work.release[b]
         lasting = 1.0 / share if share > INSTANT else 0.0
         state.pair_impulse[size, 0] = work.impulse[b, 0] * lasting
-        state.pair_impulse[size, 1] = state.pair_impulse[size, 2] = 0.0
         state.pair_flags[size, 0] = 0
         for a in range(k):
             p = state.pair_impulse[size, 0]
             state.pair_action[size, a] = work.jacobian[b, 0, a] * p
             state.pair_action[size, k + a] = work.jacobian[b, 0, K + a] * p
-        if model.pair_rubs:
-            f = b + 1
-            state.pair_flags[size, 0] = 1 if sticks(model, work, f) else 0
+        for law in range(model.pair_laws):
+            f = b + 1 + law
+            if sticks(model, work, f):
+                state.pair_flags[size, 0] |= ONE << law
             one, two = ZERO, K
             if work.block_bodies[f, 0] != work.block_bodies[b, 0]:
                 one, two = K, ZERO
-            for r in range(2):
+            for r in range(work.block_rows[f]):
                 p = work.impulse[f, r] * lasting
-                state.pair_impulse[size, 1 + r] = p
+                state.pair_impulse[size, 1 + model.pair_slip_start[law] + r] = p
                 for a in range(k):
                     state.pair_action[size, a] += work.jacobian[f, r, one + a] * p
                     state.pair_action[size, k + a] += work.jacobian[f, r, two + a] * p
@@ -215,7 +215,7 @@ def sort_contacts(model, state, size):
             x = state.pair_release[t]
             state.pair_release[t] = state.pair_release[t - 1]
             state.pair_release[t - 1] = x
-            for a in range(3):
+            for a in range(state.pair_impulse.shape[1]):
                 x = state.pair_impulse[t, a]
                 state.pair_impulse[t, a] = state.pair_impulse[t - 1, a]
                 state.pair_impulse[t - 1, a] = x

@@ -182,7 +182,7 @@ def switch_reversed_slips(model, state, work, first, last):
         if along < 0.0:
             work.reversed[b] = 1
             kind, f = work.origin[b, 0], work.origin[b, 2]
-            shape = model.friction_sets[f, 0] if kind == OWN_FRICTION else model.pair_sets[0]
+            shape = model.friction_sets[f, 0] if kind == OWN_FRICTION else model.pair_sets[f, 0]
             if shape != work.block_set[b]:
                 work.block_set[b] = shape
                 found = True

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from polycorner.formulas.bundles import Call
-from polycorner.motion.bodies import RUBBING, Body, IdenticalBodies
+from polycorner.motion.bodies import Body, IdenticalBodies
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.arrays import Model, filled
 from polycorner.motion.engine.sizes import Sizes
@@ -157,12 +157,12 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
             "pair_parameters",
             "pair_inputs",
             "pair_gaps",
-            "pair_rubs",
-            "pair_cause",
+            "pair_laws",
             "pair_restitution",
         )
-        empty = {"pair_reads": [], "pair_slips": [], "pair_sets": [0, 0]}
-        return {**dict.fromkeys(numbers, 0), "reach": 0.0, **empty}
+        tables = ("pair_reads", "pair_slips", "pair_sets", "pair_causes")
+        empty: dict[str, Any] = dict.fromkeys(tables, ())
+        return {**dict.fromkeys(numbers, 0), "reach": 0.0, **empty, "pair_slip_start": [0]}
     first = len(parameters)
     parameters += family.parameters
     slips = []
@@ -176,10 +176,11 @@ def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> d
         "pair_inputs": len(family.reads),
         "pair_reads": family.reads,
         "pair_gaps": len(family.gaps.names),
-        "pair_rubs": bool(slips),
+        "pair_laws": len(family.laws),
         "pair_slips": slips,
-        "pair_sets": [sets.add(family.static), sets.add(family.dynamic)],
-        "pair_cause": bodies.causes.index(RUBBING) if family.slips else 0,
+        "pair_slip_start": np.cumsum([0, *(law.rows for law in family.laws)]),
+        "pair_sets": [[sets.add(law.static), sets.add(law.dynamic)] for law in family.laws],
+        "pair_causes": [bodies.causes.index(law.cause) for law in family.laws],
         "pair_restitution": family.restitution,
         "reach": family.reach,
     }

@@ -123,7 +123,7 @@ def detect_pair(model, state, work, slot, limit, share, count):
             work.contact_gap[count] = scratch[n + g]
             index = find_contact(state, (a * model.bodies + b) * m + g)
             work.contact_before[count] = index
-            for c in range(3):
+            for c in range(state.pair_impulse.shape[1]):
                 before = state.pair_impulse[index, c] if index >= 0 else 0.0
                 work.contact_impulse[count, c] = before * share
             for c in range(2 * K):

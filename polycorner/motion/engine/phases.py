@@ -72,7 +72,7 @@ def do_range(model, state, work, kind, begin, end):
             if state.alive[i] and not state.asleep[i]:
                 evaluate_body(model, state, work, i, h, work.told_times[1], told[STEP_INDEX])
     elif kind == ASSEMBLE:
-        b = told[SET_OFF] + (2 if model.pair_rubs else 1) * begin
+        b = told[SET_OFF] + (1 + model.pair_laws) * begin
         assemble_contacts(model, state, work, h, begin, end, b)
     elif kind == STORE:
         store_impulses(model, state, work, begin, end, h)

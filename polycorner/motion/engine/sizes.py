@@ -21,6 +21,8 @@ class Sizes(NamedTuple):
     L: int  # known loads of a body, at least 1
     m: int  # gaps between a body and its surroundings
     G: int  # gaps between two bodies
+    H: int  # laws of friction at each of these
+    T: int  # rows of their slip velocities
     Y: int  # gaps of a body or of two, whichever are more
     D: int  # causes of dissipation
     C: int  # contacts between bodies for which there is room
@@ -39,6 +41,7 @@ class Sizes(NamedTuple):
         body, N, k = bodies.body, bodies.count, bodies.dimension
         F, m, R = len(body.friction), len(body.contacts), sum(c.rows for c in body.friction)
         families = [body.formulation.forces]
+        laws = () if bodies.contacts is None else bodies.contacts.laws
         if bodies.contacts is not None:
             families += [bodies.contacts.gaps, *(slip for slip, _, _ in bodies.contacts.slips)]
         shapes = [(len(f.names), len(f.variables)) for f in families]
@@ -56,11 +59,13 @@ class Sizes(NamedTuple):
             L=max(1, body.formulation.loads),
             m=m,
             G=len(bodies.pair_contacts),
+            H=len(laws),
+            T=sum(law.rows for law in laws),
             Y=max(m, len(bodies.pair_contacts)),
             D=len(bodies.causes),
             C=contacts,
             P=pairs,
-            B=N * (F + m) + 2 * contacts,
+            B=N * (F + m) + (1 + len(laws)) * contacts,
             E=EVENTS + 4 * contacts,
             S=max(contacts, pairs, 1),
             W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,

@@ -48,7 +48,7 @@ def assemble_blocks(model, state, work, h, contacts):
     if work.located[0]:  # contacts have blocks only if they are closed
         blocks = assemble_contacts(model, state, work, h, ZERO, contacts, first)
     else:
-        blocks = first + (2 if model.pair_rubs else 1) * contacts
+        blocks = first + (1 + model.pair_laws) * contacts
         work.told[SET_OFF] = first
         share_range(model, state, work, ASSEMBLE, contacts, h)
     for b in range(blocks):

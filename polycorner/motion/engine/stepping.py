@@ -108,9 +108,8 @@ def book_work(model, state, work, blocks, h):
             after = work.after[b, 0] - work.offset[b, 0]
             state.sums[DISSIPATED] -= work.impulse[b, 0] * 0.5 * (work.before[b, 0] + after)
             continue
-        cause = (
-            model.pair_cause if kind == PAIR_FRICTION else model.friction_causes[work.origin[b, 2]]
-        )
+        f = work.origin[b, 2]
+        cause = model.pair_causes[f] if kind == PAIR_FRICTION else model.friction_causes[f]
         for r in range(work.block_rows[b]):
             slip = 0.5 * (work.before[b, r] + work.offset[b, r] + work.after[b, r])
             state.sums[DISSIPATED + cause] -= work.impulse[b, r] * slip

@@ -24,15 +24,16 @@ TRAY = {
 
 
 @cache
-def discs(gravity, friction, count):
+def discs(gravity, friction, count, rolling=0.0):
     """Return the system of discs in a tray."""
     arrangement = Arrangement({"D": disc(1.0)}, TRAY, orientations="all")
-    return arrangement.system(gravity=[0, -gravity], friction=friction, count=count)
+    laws = {"friction": friction, "rolling": rolling}
+    return arrangement.system(gravity=[0, -gravity], count=count, **laws)
 
 
-def heap(friction=MU, **settings):
+def heap(friction=MU, rolling=0.0, **settings):
     """Return the engine of discs that fall on each other."""
-    system = discs(10.0, friction, SIDE**2)
+    system = discs(10.0, friction, SIDE**2, rolling)
     rows, columns = np.divmod(np.arange(SIDE**2), SIDE)
     places = np.stack([1.6 + 2.01 * columns + rows % 2, 1.01 + 1.75 * rows], axis=-1)
     state = system.state(np.column_stack([places, 0 * rows]))
@@ -59,10 +60,10 @@ def test_threads_share_no_array_in_which_something_is_in_the_making():
     assert {"members", "number", "place", "row_start"} <= set(OWN)
 
 
-@pytest.mark.parametrize("sweeps", [0, 6])
-def test_any_number_of_threads_makes_the_same_motion(sweeps):
+@pytest.mark.parametrize(("sweeps", "rolling"), [(0, 0.0), (6, 0.0), (6, 0.1)])
+def test_any_number_of_threads_makes_the_same_motion(sweeps, rolling):
     steps = 60 if sweeps else 10  # before there is a single island
-    single, several = (heap(crowd_sweeps=sweeps, threads=n) for n in (1, 3))
+    single, several = (heap(rolling=rolling, crowd_sweeps=sweeps, threads=n) for n in (1, 3))
     for engine in (single, several):
         engine.advance(steps)
     if sweeps:

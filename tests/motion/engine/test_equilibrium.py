@@ -35,7 +35,7 @@ def rest_problem(engine, before, share):
             rules.append(p[b, 0] == 0 if opens else p[b, 0] >= 0)
             continue
         drum = work.origin[b, 0] == OWN_FRICTION
-        shape = model.friction_sets[work.origin[b, 2], 0] if drum else model.pair_sets[0]
+        shape = (model.friction_sets if drum else model.pair_sets)[work.origin[b, 2], 0]
         mu = model.set_sizes[shape, 0 if model.set_kinds[shape] == DISC else 1]
         load = (1 - share) * work.block_load[b] if drum else p[owner, 0]
         rules.append(cp.norm(p[b, :rows]) <= mu * load)
