@@ -23,7 +23,7 @@ from polycorner.bodies.dynamics import (
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.masses import Mass
-from polycorner.bodies.neighbours import Pair, check_room, pairs
+from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
 from polycorner.bodies.pairs import Member, Tree, apart, distances, members
 from polycorner.bodies.poses import Placement, frame_of
 from polycorner.bodies.shapes import Body
@@ -219,7 +219,8 @@ class Arrangement(Value):
 
         Several bodies are one dense system, with states ``(N,)``.  A single one may be repeated:
         ``count`` bodies like it, with states ``(count, N)``, touch each other as well, and near
-        ones are found by the first two coordinates; not in a periodic box.
+        ones are found by the first two coordinates.  In a periodic box they touch the nearest
+        images of each other; it has to be more than twice as wide as they reach.
 
         Parameters
         ----------
@@ -264,22 +265,22 @@ class Arrangement(Value):
         """
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
-        if count > 1 and self.lattice.axes:
-            refuse("count", "1 in a periodic box, where each body is listed", count)
         known = masses_of(self.placements, density, masses or {})
         pull = [0.0] * self.dimension if gravity is None else gravity
         laws = energies(self.placements, known, pull)
-        polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self.contacts(excluded=False))))
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
         family = None
         if count > 1:
+            check_width(self.lattice, self.placements[0], [*self.fixed.values()])
             friction, rubbing = without(friction, BETWEEN)
             rolling, turning = without(rolling, BETWEEN)
             restitution, bouncing = without(restitution, BETWEEN)
-            family = between(self.placements[0], rubbing, turning, bouncing)
+            family = between(self.placements[0], self.lattice, rubbing, turning, bouncing)
+        free = count > 1 and self.lattice.axes and not (self.pairs or self.at_walls)
+        lone = own_image(self.lattice, self.placements[0]) if free else {}
         return System(
-            polyhedron,
+            smooth(Polyhedron(self.manifold, lone or AllOf(*self.contacts(excluded=False)))),
             *laws,
             friction_of(self.placements, touches, walls, friction, rolling),
             restitution=restitution,

@@ -3,15 +3,16 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner import checks
 from polycorner.bodies.frames import Frame, symbols
+from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.masses import Mass, mass_of
-from polycorner.bodies.pairs import Member, Touch, distances, members
+from polycorner.bodies.neighbours import pairs
+from polycorner.bodies.pairs import Member, Touch, distances
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.slips import rolling, rolling_at_wall, slip, slip_at_wall
 from polycorner.bodies.walls import Wall
@@ -195,16 +196,18 @@ def _check_turning(argument: str, rubbing: list[Member], given: Any) -> None:
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
-def between(p: Placement, mu: Coefficient, rolls: Coefficient, restitution: float) -> ContactFamily:
+def between(
+    p: Placement, lattice: Lattice, mu: Coefficient, rolls: Coefficient, restitution: float
+) -> ContactFamily:
     """Return the contacts of any two of several bodies like one, with friction if ``mu > 0``.
 
     The two are called after the body, with 1 and 2, and so are their coordinates.  They resist
-    rolling if ``rolls > 0``.
+    rolling if ``rolls > 0``.  In a periodic box the second is the nearest image.
     """
     pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
     space = pair[0].manifold * pair[1].manifold
-    one, two = (members(some.name, some.body, some) for some in pair)
-    touches = [t for parts in product(one, two) for t in distances(space, *parts)]
+    meeting = pairs(lattice, tuple(pair), {})
+    touches = [t for parts in meeting for t in distances(space, *parts)]
     gaps, definitions = _written([t.gap for t in touches])
     named, laws = {some.name: some for some in pair}, []
     for argument, given, law, kind in (
@@ -214,7 +217,7 @@ def between(p: Placement, mu: Coefficient, rolls: Coefficient, restitution: floa
         static, dynamic = _both(argument, given)
         if static == 0:
             continue
-        _check_turning(argument, [one[0], two[0]], given)
+        _check_turning(argument, [*meeting[0]], given)
         sets = _set(static, p.body.dimension), _set(dynamic, p.body.dimension)
         laws.append(PairFriction({t.gap.name: law(named, t) for t in touches}, *sets, kind))
     return ContactFamily(

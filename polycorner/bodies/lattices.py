@@ -54,10 +54,8 @@ class Lattice(Value):
 
     def turns(self, bodies: Sequence[Body], fixed: Sequence[Body]) -> tuple[int, ...]:
         """Return by how many periods coordinates go round: a multiple of the counts of pairs."""
-        still = [radius(p.points, [p]) for body in fixed for p in body.parts.values()]
-        moving = [radius(body.markers, [*body.parts.values()]) for body in bodies]
-        reaches = [a + b for a, b in [*combinations(moving, 2), *product(moving, still)]]
-        return tuple(map(math.lcm, (1,) * len(self.lengths), *map(self.counts, reaches)))
+        counts = map(self.counts, reaches(bodies, fixed))
+        return tuple(map(math.lcm, (1,) * len(self.lengths), *counts))
 
     def shift(self, whole: tuple[int, ...]) -> Array:
         """Return the displacement by whole numbers of periods, ``(d,)``."""
@@ -93,6 +91,13 @@ class Lattice(Value):
         ]
         for whole in product(*ranges):
             yield body.moved(self.shift(whole))
+
+
+def reaches(bodies: Sequence[Body], fixed: Sequence[Body]) -> list[float]:
+    """Return for all pairs of which one moves the largest displacement at which they touch."""
+    still = [radius(p.points, [p]) for body in fixed for p in body.parts.values()]
+    moving = [radius(body.markers, [*body.parts.values()]) for body in bodies]
+    return [a + b for a, b in [*combinations(moving, 2), *product(moving, still)]]
 
 
 def lattice(given: Any, dimension: int) -> Lattice:

@@ -1,13 +1,14 @@
 """Pairs of parts that can touch, and of parts and images of others."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from polycorner.bodies.facets import FLAT
 from polycorner.bodies.images import Image
-from polycorner.bodies.lattices import Lattice, radius
+from polycorner.bodies.lattices import CLEAR, Lattice, radius, reaches
 from polycorner.bodies.pairs import Member, apart, members
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body
@@ -15,6 +16,9 @@ from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
+
+if TYPE_CHECKING:
+    import sympy
 
 ROUNDING = 1e-9  # of the size of a body, by which it may overlap its own image
 
@@ -88,6 +92,27 @@ def check_room(
             refuse("period", f"at least {thickest:g}, the least width of {p.name!r}", least)
         if not p.frame.turns and _overlaps(lattice, p):
             refuse("period", f"periods in which {p.name!r} does not overlap its image", least)
+
+
+def check_width(lattice: Lattice, p: Placement, fixed: Sequence[Body]) -> None:
+    """Raise ValueError unless only one image can touch: of a body like one, and of a fixed one."""
+    reach, shortest = max(reaches([p.body, p.body], fixed)), float(min(lattice.lengths))
+    if max(lattice.counts(reach)) > 1:
+        least = f"lengths of at least {2 * reach / CLEAR:g} for repeated bodies"
+        refuse("period", f"{least} that touch up to {reach:g} apart", shortest)
+
+
+def own_image(lattice: Lattice, p: Placement) -> "dict[str, sympy.Expr]":
+    """Return a gap that never vanishes, for repeated bodies that only touch each other.
+
+    It is that of a ball about a body and its nearest image.
+    """
+    import sympy
+
+    axis = int(np.argmin(lattice.lengths))
+    mark = _mark(tuple(int(k == axis) for k in range(len(lattice.lengths))))
+    room = float(lattice.lengths[axis]) - 2 * radius(p.body.markers, [*p.body.parts.values()])
+    return {f"{p.name}-{p.name}{mark}": sympy.Float(room)}
 
 
 def _overlaps(lattice: Lattice, p: Placement) -> bool:

@@ -151,6 +151,8 @@ class IdenticalBodies(Value):
         Contacts between the bodies; none by default.
     position : (int, int)
         The two coordinates that are a body's position.
+    period : (float, float)
+        After which the position repeats, as lengths; infinite if it does not.
     substrate_speed : float
         Speed of the substrate along the first of them, as a length per time.
     exit_coordinate, exit_limit : int, float
@@ -163,6 +165,7 @@ class IdenticalBodies(Value):
     count: int = 1
     contacts: PairContacts | None = None
     position: tuple[int, int] = (0, 0)
+    period: tuple[float, float] = (np.inf, np.inf)
     substrate_speed: float = 0.0
     exit_coordinate: int = -1
     exit_limit: float = 0.0
@@ -224,8 +227,12 @@ class IdenticalBodies(Value):
         numbers = np.array([*self.contacts.parameters, 0.0])
         where = list(dict.fromkeys(self.position))
         positions = q[:, where] * self.body.units[where]
+        periods = np.array(self.period)[-len(where) :]
+        wraps = np.isfinite(periods)
         for i in range(self.count - 1):
-            apart = np.linalg.norm(positions[i + 1 :] - positions[i], axis=1)
+            away = positions[i + 1 :] - positions[i]
+            away[:, wraps] -= periods[wraps] * np.floor(away[:, wraps] / periods[wraps] + 0.5)
+            apart = np.linalg.norm(away, axis=1)
             for j in (i + 1 + np.flatnonzero(apart < self.contacts.reach)).tolist():
                 at = np.array([q[(i, j)[body], c] for body, c in reads])
                 (values,) = family.kernel.at(at, numbers.ctypes.data, 0)

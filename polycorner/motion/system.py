@@ -235,9 +235,10 @@ class System(MechanicalSystem):
         speed = sum(v / scales[coordinates.index(x)] for x, v in self.substrate.items())
         leaving = [(coordinates.index(x), limit) for x, limit in self.exits.items()]
         exit_at, limit = leaving[0] if leaving else (-1, 0.0)
-        return IdenticalBodies(
-            body, self.count, contacts, position, float(speed), exit_at, float(limit)
-        )
+        one, two = (float(self.manifold.periods[c] / scales[c]) for c in position)
+        period = (math.inf if position[0] == position[1] else one, two)
+        told = contacts, position, period, float(speed)
+        return IdenticalBodies(body, self.count, *told, exit_at, float(limit))
 
     # -------------------------------------------------------------------------------------- states
 

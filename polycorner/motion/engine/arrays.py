@@ -109,6 +109,7 @@ class Model(NamedTuple):
     pair_causes: Annotated[Any, whole("H")]  # cause under which dissipation is booked
     pair_restitution: Annotated[Any, real()]
     position: Annotated[Any, whole("2")]  # coordinates that are a body's position
+    period: Annotated[Any, real("2")]  # after which it repeats, as lengths, or inf
     units: Annotated[Any, real("k")]  # length of a unit of each coordinate
     substrate_speed: Annotated[Any, real()]  # along the first component of the position
     reach: Annotated[Any, real()]  # distance of positions beyond which bodies cannot touch
@@ -290,7 +291,7 @@ class Work(NamedTuple):
     assembled: Annotated[Any, whole("C")]  # the same, in the order of their blocks
     block_of: Annotated[Any, whole("C")]  # block of each, or -1
     shift: Annotated[Any, real("N K")]  # by which bodies of crowds move apart
-    strips: Annotated[Any, whole("1")]  # their number
+    strips: Annotated[Any, whole("2")]  # their number; whether the first follows the last
     body_strip: Annotated[Any, whole("N")]  # strip of a body
     strip: Annotated[Any, whole("B")]  # of what is sorted
     unsorted: Annotated[Any, whole("B")]  # what is to be ordered by strips

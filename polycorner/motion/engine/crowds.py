@@ -15,8 +15,8 @@ deeper it is.  Overlaps that result are taken away little by little, by changes 
 import numpy as np
 
 from polycorner.motion.engine.gauss_seidel import relax_block
-from polycorner.motion.engine.jit import ONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import detection_distance
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import detection_distance, nearest
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import add_row, row_at, row_times
 from polycorner.motion.engine.sizes import STRIPS
@@ -41,16 +41,24 @@ def of_crowd(model, work, b):
 
 @compiled
 def place_of(model, work, i, axis):
-    """Return a component of a body's position, as a length; zero if there is only the other."""
+    """Return a component of a body's position, as a length; zero if there is only the other.
+
+    Where positions repeat it is between minus and plus half a period.
+    """
     c = model.position[axis]
     if axis == 0 and model.position[1] == c:
         return 0.0
-    return work.q_mid[i, c] * model.units[c]
+    return nearest(model, axis, work.q_mid[i, c] * model.units[c])
 
 
 @compiled
 def extent_of(model, state, work, axis):
-    """Return the least component of all positions, and by how much the largest exceeds it."""
+    """Return the least component of all positions, and by how much the largest exceeds it.
+
+    Where positions repeat, that is a period.
+    """
+    if model.period[axis] < np.inf:
+        return -0.5 * model.period[axis], model.period[axis]
     least, largest = np.inf, -np.inf
     for i in range(model.bodies):
         if state.alive[i]:
@@ -61,7 +69,10 @@ def extent_of(model, state, work, axis):
 
 @compiled
 def divide_bodies(model, state, work, h):
-    """Divide bodies among strips across the longer extent; return how many there are."""
+    """Divide bodies among strips across the longer extent; return how many there are.
+
+    Where positions repeat, the first strip follows the last one, and their number is even.
+    """
     axis, least, extent = 0, 0.0, 0.0
     for a in range(2):
         low, length = extent_of(model, state, work, a)
@@ -71,6 +82,10 @@ def divide_bodies(model, state, work, h):
     strips = ONE
     if 0.0 < extent < np.inf:
         strips = max(ONE, min(np.int64(STRIPS), np.int64(extent / reach)))
+    work.strips[1] = ZERO
+    if model.period[axis] < np.inf and strips > 1:
+        strips -= strips % 2
+        work.strips[1] = ONE
     for i in range(model.bodies):
         work.body_strip[i] = 0
         if state.alive[i] and strips > 1:
@@ -95,17 +110,26 @@ def divide_contacts(model, state, work, h, contacts):
     for s in range(contacts):
         contact = work.ranked[s]
         i, j = work.contact[contact, 0], work.contact[contact, 1]
-        if abs(work.body_strip[i] - work.body_strip[j]) > 1:
+        t = strip_of(work, i, j, strips)
+        if t < 0:
             return
-        work.unsorted[s], work.strip[s] = contact, strip_of(work, i, j)
+        work.unsorted[s], work.strip[s] = contact, t
     work.strips[0] = strips
     sort_by_strip(work, ZERO, contacts, strips, work.assembled)
 
 
 @compiled
-def strip_of(work, i, j):
-    """Return the strip of a block that acts on these bodies (-1: none)."""
-    return work.body_strip[i] if j < 0 else min(work.body_strip[i], work.body_strip[j])
+def strip_of(work, i, j, strips):
+    """Return the strip of a block that acts on these bodies, of which the second may be -1: none.
+
+    It is the one that the other body's strip follows; -1 if they are not next to each other.
+    """
+    one = work.body_strip[i]
+    two = one if j < 0 else work.body_strip[j]
+    low, high = min(one, two), max(one, two)
+    if high - low <= 1:
+        return low
+    return high if work.strips[1] and high - low == strips - 1 else NONE
 
 
 @compiled
@@ -133,7 +157,8 @@ def divide_blocks(work, first, last):
         b = work.order[s]
         work.unsorted[s], work.strip[s] = b, ZERO
         if work.strips[0] > 1:
-            work.strip[s] = strip_of(work, work.block_bodies[b, 0], work.block_bodies[b, 1])
+            i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+            work.strip[s] = strip_of(work, i, j, work.strips[0])
     sort_by_strip(work, first, last, work.strips[0], work.order)
 
 

@@ -40,6 +40,7 @@ def model_of(
         "loads": formulation.loads,
         "units": body.units,
         "position": bodies.position,
+        "period": bodies.period,
         "substrate_speed": bodies.substrate_speed,
         "exit_coordinate": bodies.exit_coordinate,
         "exit_limit": bodies.exit_limit,

@@ -27,6 +27,13 @@ def position_of(model, state, i, a, time):
 
 
 @compiled
+def nearest(model, a, x):
+    """Return a difference of positions to the nearest image."""
+    period = model.period[a]
+    return x - period * np.floor(x / period + 0.5) if period < np.inf else x
+
+
+@compiled
 def outdated(model, state, work, h, time):
     """Return whether a body has moved so far that the neighbour list may lack a pair."""
     if work.list_status[1] == 0 or travel(model, work, h) > work.listed_travel[0]:
@@ -36,7 +43,8 @@ def outdated(model, state, work, h, time):
         if state.alive[i]:
             far = 0.0
             for a in range(2):
-                far += (position_of(model, state, i, a, time) - work.listed_position[i, a]) ** 2
+                x = position_of(model, state, i, a, time) - work.listed_position[i, a]
+                far += nearest(model, a, x) ** 2
             if far > limit:
                 return True
     return False
@@ -63,13 +71,23 @@ def heap_sort(values, count):
 
 
 @compiled
+def ahead(period, along, around):
+    """Return whether a body is nearer in the other direction; at half a period one counts."""
+    return 2.0 * along > period or (around and 2.0 * along == period)
+
+
+@compiled
 def list_neighbours(model, state, work, h, time):
-    """List the pairs of bodies that may meet soon, ascending; return whether there was room."""
-    N = model.bodies
+    """List the pairs of bodies that may meet soon, ascending; return whether there was room.
+
+    Where positions repeat, the first bodies along the second axis follow the last ones, up to half
+    a period ahead.
+    """
+    N, period = model.bodies, model.period[1]
     work.listed_travel[0] = max(0.125 * SKIN * model.reach, 2.0 * travel(model, work, h))
     for i in range(N):
         for a in range(2):
-            work.listed_position[i, a] = position_of(model, state, i, a, time)
+            work.listed_position[i, a] = nearest(model, a, position_of(model, state, i, a, time))
     far = model.reach * (1.0 + SKIN) + max(
         0.0, 2.0 * work.listed_travel[0] - 0.25 * SKIN * model.reach
     )
@@ -85,12 +103,14 @@ def list_neighbours(model, state, work, h, time):
         i = ordered[s]
         if not state.alive[i]:
             continue
-        for t in range(s + 1, N):
-            j = ordered[t]
+        for t in range(s + 1, s + N if period < np.inf else N):
+            j = ordered[t if t < N else t - N]
             along = position[j, 1] - position[i, 1]
-            if along > far:
+            if t >= N:
+                along += period
+            if along > far or ahead(period, along, t >= N):
                 break
-            across = position[j, 0] - position[i, 0]
+            across = nearest(model, 0, position[j, 0] - position[i, 0])
             if state.alive[j] and across * across + along * along < far * far:
                 if count == model.neighbour_room:
                     return False
@@ -168,7 +188,8 @@ def square_distance(model, work, a, b):
     far = 0.0
     for d in range(0 if model.position[0] != model.position[1] else 1, 2):
         c = model.position[d]
-        far += ((work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]) ** 2
+        x = (work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]
+        far += nearest(model, d, x) ** 2
     return far
 
 
