@@ -1,14 +1,17 @@
 """Thousands of discs in a turning drum: time of a step, overlaps, energy, by sweeps and threads.
 
 A heap falls from loose rows and settles, with many sweeps; from there all variants go on.  Times
-are those of the clock, for one thread and for more; other load disturbs them.  Overlaps and the
+are those of the clock, which other load disturbs, and of processors, for which threads that wait
+count as well.  Overlaps and the
 residual say how far steps are from solved.
 """
 
 import argparse
 import os
 import statistics
+import time
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,21 +31,30 @@ def solver(sweeps: int, threads: int) -> Solver:
     return Solver(tolerance=1e-4, crowd_sweeps=sweeps, threads=threads)
 
 
-def settled(count: int, spin: float, threads: int) -> dict[str, Any]:
-    """Return the state of a heap that has settled, as an engine saves it."""
+def settled(count: int, spin: float, threads: int, kept: Path | None = None) -> dict[str, Any]:
+    """Return the state of a heap that has settled, as an engine saves it, and keep it in a file."""
+    file = kept / f"heap_{count}_{spin}.npz" if kept else None
+    if file and file.exists():
+        return dict(np.load(file))
     heap = Ours(count, spin, solver(SETTLING, threads))
     heap.step(round(SETTLED / DT))
-    return {name: np.array(array) for name, array in heap.engine.save().items()}
+    state = {name: np.array(array) for name, array in heap.engine.save().items()}
+    if file:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(file, **state)
+    return state
 
 
-def variants(count: int, spin: float, threads: list[int]) -> dict[str, Any]:
+def variants(
+    begun: dict[str, Any], count: int, spin: float, sweeps: list[int], threads: list[int]
+) -> dict[str, Any]:
     """Return all variants, each at its start: the settled heap."""
-    begun, found = settled(count, spin, max(threads)), {}
-    for sweeps in SWEEPS:
+    found: dict[str, Any] = {}
+    for few in sweeps:
         for number in threads:
-            heap = Ours(count, spin, solver(sweeps, number))
+            heap = Ours(count, spin, solver(few, number))
             heap.engine.load(begun)
-            found[f"{sweeps} sweeps, {number} threads"] = heap
+            found[f"{few} sweeps, {number} threads"] = heap
     if have_pymunk():
         for iterations in ITERATIONS:
             for number in (1, 2):
@@ -51,18 +63,25 @@ def variants(count: int, spin: float, threads: list[int]) -> dict[str, Any]:
     return found
 
 
-def measure(count: int, spin: float, threads: list[int]) -> dict[str, dict[str, Any]]:
+def measure(heaps: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the figures of all variants."""
-    heaps = variants(count, spin, threads)
+    work: dict[str, list[float]] = {name: [] for name in heaps}
+
+    def advance(name: str) -> None:
+        begun = time.process_time()
+        heaps[name].step(STEPS)
+        work[name].append(time.process_time() - begun)
+
     for heap in heaps.values():
         heap.step(WARM)
-    times = interleave({name: partial(h.step, STEPS) for name, h in heaps.items()}, ROUNDS)
+    times = interleave({name: partial(advance, name) for name in heaps}, ROUNDS)
     figures = {}
     for name, heap in heaps.items():
         q, v = heap.state
         deep = overlaps(q) / RADIUS
         figures[name] = {
             "ms a step": round(1e3 * statistics.median(times[name]) / STEPS, 2),
+            "of processors": round(1e3 * statistics.median(work[name]) / STEPS, 2),
             "of real time": round(DT * STEPS / statistics.median(times[name]), 3),
             "deepest overlap": float(f"{deep.max():.1e}"),
             "mean overlap": float(f"{deep.mean():.1e}"),
@@ -79,7 +98,7 @@ def measure(count: int, spin: float, threads: list[int]) -> dict[str, dict[str, 
 def exponents(results: dict[str, dict[str, dict[str, Any]]], counts: list[int]) -> dict[str, Any]:
     """Return slopes of the logarithm of the time of a step against that of the number of discs."""
     found: dict[str, Any] = {}
-    for name in SPINS:
+    for name in (key.partition(" ")[2] for key in results if key.startswith(f"{counts[0]} ")):
         rows = [results[f"{count} {name}"] for count in counts]
         found[name] = {
             variant: round(float(np.polyfit(np.log(counts), np.log(times), 1)[0]), 2)
@@ -94,19 +113,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--discs", type=int, nargs="+", default=[1000, 3000, 10000])
     parser.add_argument("--threads", type=int, nargs="+", default=[1, os.cpu_count() or 1])
+    parser.add_argument("--sweeps", type=int, nargs="+", default=list(SWEEPS))
+    parser.add_argument("--drums", nargs="+", choices=SPINS, default=list(SPINS))
+    parser.add_argument("--kept", type=Path, help="folder in which settled heaps are kept")
     chosen = parser.parse_args()
     results: dict[str, Any] = {}
     for count in chosen.discs:
-        for name, spin in SPINS.items():
-            figures = measure(count, spin, chosen.threads)
+        for name in chosen.drums:
+            spin = SPINS[name]
+            begun = settled(count, spin, max(chosen.threads), chosen.kept)
+            figures = measure(variants(begun, count, spin, chosen.sweeps, chosen.threads))
             results[f"{count} {name}"] = figures
             columns = list(next(iter(figures.values())))
             rows = [[variant, *row.values()] for variant, row in figures.items()]
             print_table(f"{count} discs, {name}", ["", *columns], rows)
     if len(chosen.discs) > 1:
         results["exponents"] = exponents(results, chosen.discs)
-        rows = [[v, *(results["exponents"][name][v] for name in SPINS)] for v in figures]
-        print_table("Exponents of time", ["", *SPINS], rows)
+        rows = [[v, *(results["exponents"][name][v] for name in chosen.drums)] for v in figures]
+        print_table("Exponents of time", ["", *chosen.drums], rows)
     write("bench_heap", results)
 
 

@@ -6,7 +6,7 @@ declarations.  Shapes are written in the letters of :class:`Sizes`; ``*`` is any
 
 from collections.abc import Mapping
 from math import prod
-from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -134,6 +134,7 @@ class Model(NamedTuple):
     follows_time: Annotated[Any, whole()]  # whether forces may change much from step to step
     start: Annotated[Any, real()]  # time of the first state
     step: Annotated[Any, real()]  # length of a whole step
+    may_rest: Annotated[Any, whole()]  # whether surroundings alone can hold a body
     crowd_sweeps: Annotated[Any, whole()]  # sweeps over very large islands; 0: these are solved
     threads: Annotated[Any, whole()]
     give_way: Annotated[Any, whole()]  # address: lets other threads run; 0: nothing does
@@ -290,17 +291,33 @@ class Work(NamedTuple):
     ranked: Annotated[Any, whole("C")]  # contacts between bodies by key
     assembled: Annotated[Any, whole("C")]  # the same, in the order of their blocks
     block_of: Annotated[Any, whole("C")]  # block of each, or -1
+    meets: Annotated[Any, whole("P")]  # how many small gaps of a pair were counted
+    found: Annotated[Any, whole("V")]  # contacts that an item finds; from where on it adds them
+    met: Annotated[Any, whole("C")]  # whether a contact of the last step is found in this one
+    happened: Annotated[Any, whole("B")]  # event of a block, or -1
+    event_time: Annotated[Any, real("B")]
+    booked: Annotated[Any, real("V D+5")]  # `State.sums` of an item
+    finite: Annotated[Any, whole("1")]  # whether velocities and gaps are numbers
     shift: Annotated[Any, real("N K")]  # by which bodies of crowds move apart
+    mass_root: Annotated[Any, real("N k K")]  # U of M^-1 = U U'
+    unit_velocity: Annotated[Any, real("N K")]  # w of the velocities v_free + U w
+    unit_shift: Annotated[Any, real("N K")]  # by which bodies move apart, in coordinates w
+    compact: Annotated[Any, whole("B 4")]  # contacts of a crowd: FIRST, ...
+    compact_numbers: Annotated[Any, real("B 8")]  # NORMAL, ...
+    compact_across: Annotated[Any, real("B 5")]  # ACROSS, ...
+    compact_rows: Annotated[Any, real("B 2 2*K")]  # J U of the normal, and of the slip
+    compact_across_rows: Annotated[Any, real("B 2*K")]  # the same of the slip across
+    compact_order: Annotated[Any, whole("B")]  # twice a block, and whether friction follows
     strips: Annotated[Any, whole("2")]  # their number; whether the first follows the last
     body_strip: Annotated[Any, whole("N")]  # strip of a body
     strip: Annotated[Any, whole("B")]  # of what is sorted
     unsorted: Annotated[Any, whole("B")]  # what is to be ordered by strips
-    strip_start: Annotated[Any, whole("Z+1")]  # in `order`
+    strip_start: Annotated[Any, whole("Z+1")]  # in `assembled`, then in `compact_order`
     strip_cursor: Annotated[Any, whole("Z")]
     worst: Annotated[Any, real("Z")]  # residuals of parts of an island
     signals: Annotated[Any, whole("32")]  # TICKET, ...
     told: Annotated[Any, whole("8")]  # KIND, ...
-    told_times: Annotated[Any, real("2")]  # length of the step, time
+    told_times: Annotated[Any, real("4")]  # LENGTH, ...
     to_solve: Annotated[Any, whole("N")]  # bodies that represent islands
 
 
@@ -311,42 +328,7 @@ class Log(NamedTuple):
     numbers: Annotated[Any, real("E 2")]  # time, impulse
 
 
-Record = TypeVar("Record", Model, State, Work, Log)
-
-
 def declarations(record: Any) -> Mapping[str, Declaration]:
     """Return the declarations of a record's arrays."""
     hints = get_type_hints(record, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items()}
-
-
-def allocate(record: type[Record], sizes: Sizes) -> Record:
-    """Return new arrays with their initial values."""
-    return record(
-        **{name: initial_array(declared, sizes) for name, declared in declarations(record).items()}
-    )
-
-
-def initial_array(declared: Declaration, sizes: Sizes) -> Any:
-    """Return a new array with its initial values; of zeros, memory is used as it is written."""
-    extents = declared.extents(sizes)
-    if declared.initial == 0:
-        return np.zeros(extents, dtype=declared.kind)
-    return np.full(extents, declared.initial, dtype=declared.kind)
-
-
-def filled(record: type[Record], sizes: Sizes, values: Mapping[str, Any]) -> Record:
-    """Return a record of given values, brought to their declared types and shapes."""
-    arrays: dict[str, Any] = {}
-    for name, declared in declarations(record).items():
-        array = np.array(values[name], dtype=declared.kind).reshape(declared.extents(sizes))
-        arrays[name] = array if declared.shape else array.item()
-    return record(**arrays)
-
-
-def restored(record: type[Record], sizes: Sizes, saved: Mapping[str, Any]) -> Record:
-    """Return new arrays with saved ones at their beginning: there may be more room than before."""
-    arrays = allocate(record, sizes)
-    for name, array in arrays._asdict().items():
-        array[: len(saved[name])] = saved[name]
-    return arrays

@@ -49,13 +49,23 @@ STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothi
 
 @compiled
 def finish_block(model, work, b):
-    """Compute ``M^-1 J'``, the Delassus matrix and ``J v``."""
+    """Compute ``J v``, and responses unless the block may be of a crowd, which needs none."""
+    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    for r in range(max(1, work.block_rows[b])):
+        at = row_at(model, b, r)
+        work.before[b, r] = row_times(model, work.jacobian, at, work.v_old, i, j)
+        work.free[b, r] = row_times(model, work.jacobian, at, work.v_free, i, j)
+    if model.crowd_sweeps == 0:
+        respond_to_rows(model, work, b)
+
+
+@compiled
+def respond_to_rows(model, work, b):
+    """Compute ``M^-1 J'`` and the Delassus matrix of a block."""
     rows, J, responses = max(1, work.block_rows[b]), work.jacobian, work.response
     i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
     for r in range(rows):
         at = row_at(model, b, r)
-        work.before[b, r] = row_times(model, J, at, work.v_old, i, j)
-        work.free[b, r] = row_times(model, J, at, work.v_free, i, j)
         respond(model, work, at, ZERO, i)
         if j >= 0:
             respond(model, work, at, model.lanes, j)
@@ -293,12 +303,16 @@ def assemble_body_blocks(model, state, work, h):
 @compiled
 def order_contacts(model, work, contacts):
     """Order contacts by key, whatever the order of detection."""
-    keys, ascending = work.sort_keys, True
+    keys, ascending, former = work.sort_keys, True, NONE
+    for s in range(contacts):
+        work.ranked[s] = work.assembled[s] = s
+        key = key_of(model, work, s)
+        ascending, former = ascending and key > former, key
+    if ascending:
+        return
     for s in range(contacts):
         keys[s] = key_of(model, work, s) * contacts + s
-        ascending = ascending and (s == 0 or keys[s] > keys[s - 1])
-    if not ascending:
-        heap_sort(keys, contacts)
+    heap_sort(keys, contacts)
     for s in range(contacts):
         work.ranked[s] = work.assembled[s] = keys[s] % contacts
 

@@ -45,15 +45,6 @@ def store_impulses(model, state, work, begin, end, h):
 
 
 @compiled
-def store_sticking(model, state, work, blocks):
-    """Store which friction contacts between bodies and surroundings stick."""
-    for b in range(blocks):
-        if work.origin[b, 0] == OWN_FRICTION and takes_part(work, b):
-            i, f = work.origin[b, 1], work.origin[b, 2]
-            state.sticks[i, f] = 1 if sticks(model, work, b) else 0
-
-
-@compiled
 def record(log, count, kind, i, j, which, time, value):
     """Record an event; return the number of events."""
     log.entries[count, 0], log.entries[count, 1] = kind, i
@@ -79,51 +70,71 @@ def classify(work, b, was, gap, h, time, scale, out):
 
 
 @compiled
-def record_contacts(model, state, work, log, blocks, h, time, count):
+def observe_block(model, state, work, b, h, time, sums):
+    """Note whether a contact touches, and whether it was made, lost or has bounced, and when.
+
+    For friction with the surroundings, note whether it sticks.
+    """
+    work.happened[b] = NONE
+    kind, i, g = work.origin[b, 0], work.origin[b, 1], work.origin[b, 2]
+    if not takes_part(work, b):
+        return
+    if kind == OWN_FRICTION:
+        state.sticks[i, g] = 1 if sticks(model, work, b) else 0
+    if work.block_rows[b] > 0 or work.bilateral[b]:
+        return
+    out, share, before = work.image, h / model.step, work.before[b, 0]
+    if kind == OWN_GAP:
+        gap, was = work.gap[i, g], state.touches[i, g] != 0
+        pressed, release = state.pressed[i, g], state.release[i, g]
+    else:
+        work.block_of[i] = b
+        gap, index = work.contact_gap[i], work.contact_before[i]
+        was = index >= 0 and state.pair_flags[index, 1] != 0
+        pressed = state.pair_impulse[index, 0] if index >= 0 else 0.0
+        release = state.pair_release[index] if index >= 0 else time
+    sums[PENETRATION] = max(sums[PENETRATION], -gap)
+    classify(work, b, was, gap, h, time, model.gap_unit, out)
+    release = release_time(pressed * share, work.impulse[b, 0], release, h, time)
+    if out[1] >= 0.0:
+        when = out[2]
+        if out[1] == LOST:
+            when = min(release, when)
+        elif before < 0.0:
+            when = min(time + 0.5 * h + max(gap, 0.0) / -before, time + 1.5 * h)
+        elif work.located[0]:
+            when = time + 0.5 * h
+        if out[1] == MADE and work.impulse[b, 0] <= 0.0:
+            release = when
+        work.happened[b], work.event_time[b] = np.int64(out[1]), when
+    if kind == OWN_GAP:
+        state.touches[i, g] = 1 if out[0] > 0.0 else 0
+        state.release[i, g] = release
+        if share > INSTANT:
+            state.pressed[i, g] = work.impulse[b, 0] / share
+    else:
+        work.origin[b, 3] = 1 if out[0] > 0.0 else 0
+        work.release[b] = release
+
+
+@compiled
+def record_contacts(work, log, blocks, count):
     """Record contacts made, lost and bounced; return the number of events."""
-    out, share, contacts = work.image, h / model.step, work.list_status[2]
+    for b in range(blocks):
+        if work.happened[b] >= 0:
+            i, j, g = work.origin[b, 1], NONE, work.origin[b, 2]
+            if work.origin[b, 0] != OWN_GAP:
+                i, j = work.contact[work.origin[b, 1], 0], work.contact[work.origin[b, 1], 1]
+            when, impulse = work.event_time[b], work.impulse[b, 0]
+            count = record(log, count, work.happened[b], i, j, g, when, impulse)
+    return count
+
+
+@compiled
+def forget_blocks(work, contacts):
+    """Forget which blocks the contacts had."""
     for s in range(contacts):
         work.block_of[s] = NONE
-    for b in range(blocks):
-        kind = work.origin[b, 0]
-        if work.block_rows[b] > 0 or work.bilateral[b] or not takes_part(work, b):
-            continue
-        i, g = work.origin[b, 1], work.origin[b, 2]
-        before = work.before[b, 0]
-        if kind == OWN_GAP:
-            gap, was = work.gap[i, g], state.touches[i, g]
-            j, pressed, release = NONE, state.pressed[i, g], state.release[i, g]
-        else:
-            work.block_of[i] = b
-            gap = work.contact_gap[i]
-            j, index = work.contact[i, 1], work.contact_before[i]
-            was = index >= 0 and state.pair_flags[index, 1]
-            pressed = state.pair_impulse[index, 0] if index >= 0 else 0.0
-            release = state.pair_release[index] if index >= 0 else time
-            i = work.contact[i, 0]
-        state.sums[PENETRATION] = max(state.sums[PENETRATION], -gap)
-        classify(work, b, was, gap, h, time, model.gap_unit, out)
-        release = release_time(pressed * share, work.impulse[b, 0], release, h, time)
-        if out[1] >= 0.0:
-            when = out[2]
-            if out[1] == LOST:
-                when = min(release, when)
-            elif before < 0.0:
-                when = min(time + 0.5 * h + max(gap, 0.0) / -before, time + 1.5 * h)
-            elif work.located[0]:
-                when = time + 0.5 * h
-            if out[1] == MADE and work.impulse[b, 0] <= 0.0:
-                release = when
-            count = record(log, count, int(out[1]), i, j, g, when, work.impulse[b, 0])
-        if kind == OWN_GAP:
-            state.touches[i, g] = 1 if out[0] > 0.0 else 0
-            state.release[i, g] = release
-            if share > INSTANT:
-                state.pressed[i, g] = work.impulse[b, 0] / share
-        else:
-            work.origin[b, 3] = 1 if out[0] > 0.0 else 0
-            work.release[b] = release
-    return count
 
 
 @compiled
@@ -139,14 +150,26 @@ def list_blocks(work, contacts):
 
 
 @compiled
-def keep_contacts(model, state, work, log, C, h, time, count):
-    """Keep the contacts between two sleepers, record those lost; return list size and events."""
-    k, size = model.dimension, 0
+def mark_met(state, work, contacts):
+    """Mark the contacts of the last step that are found in this one."""
     for s in range(state.counts[CONTACTS]):
+        work.met[s] = 0
+    for s in range(contacts):
+        if work.block_of[s] >= 0 and work.contact_before[s] >= 0:
+            work.met[work.contact_before[s]] = 1
+
+
+@compiled
+def keep_contacts(model, state, work, log, h, time, count):
+    """Keep the contacts between two sleepers, record those lost; return list size and events."""
+    k, size = model.dimension, ZERO
+    for s in range(state.counts[CONTACTS]):
+        if work.met[s]:
+            continue
         pair = state.keys[s] // model.pair_gaps
         i, j = pair // model.bodies, pair % model.bodies
         if work.awake[i] or work.awake[j] or not (state.alive[i] and state.alive[j]):
-            if state.pair_flags[s, 1] and not listed(model, work, C, state.keys[s]):
+            if state.pair_flags[s, 1]:
                 g = state.keys[s] % model.pair_gaps
                 count = record(log, count, LOST, i, j, g, time + h, 0.0)
             continue
@@ -172,7 +195,7 @@ def add_contacts(model, state, work, begin, end, kept, share):
         lasting = 1.0 / share if share > INSTANT else 0.0
         state.pair_impulse[size, 0] = work.impulse[b, 0] * lasting
         state.pair_flags[size, 0] = 0
-        for a in range(k):
+        for a in range(k if model.may_rest else ZERO):
             p = state.pair_impulse[size, 0]
             state.pair_action[size, a] = work.jacobian[b, 0, a] * p
             state.pair_action[size, k + a] = work.jacobian[b, 0, K + a] * p
@@ -186,23 +209,10 @@ def add_contacts(model, state, work, begin, end, kept, share):
             for r in range(work.block_rows[f]):
                 p = work.impulse[f, r] * lasting
                 state.pair_impulse[size, 1 + model.pair_slip_start[law] + r] = p
-                for a in range(k):
+                for a in range(k if model.may_rest else ZERO):
                     state.pair_action[size, a] += work.jacobian[f, r, one + a] * p
                     state.pair_action[size, k + a] += work.jacobian[f, r, two + a] * p
         state.pair_flags[size, 1] = work.origin[b, 3]
-
-
-@compiled
-def listed(model, work, C, key):
-    """Return whether a contact is in this step's list, which ascends."""
-    low, high = 0, C
-    while low < high:
-        middle = (low + high) // 2
-        if key_of(model, work, work.origin[work.sort_keys[middle], 1]) < key:
-            low = middle + 1
-        else:
-            high = middle
-    return low < C and key_of(model, work, work.origin[work.sort_keys[low], 1]) == key
 
 
 @compiled

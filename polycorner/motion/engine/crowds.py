@@ -5,38 +5,37 @@ A block belongs to the first strip of its bodies, so that it acts on bodies of t
 next one only: strips of even number, and those of odd number, can be swept side by side.  What
 comes out depends on the strips, and not on how many threads there are.
 
-A sweep solves block after block with all others fixed (Gauss-Seidel), the strips of even number
-first; every other sweep goes backwards, and the last one forward.  After few of them a step is not
-solved.  The method is that of contact dynamics with a fixed number of iterations ([Unger]): as
-loads spread over a few contacts in each sweep, a heap is a little soft, and it is the softer the
-deeper it is.  Overlaps that result are taken away little by little, by changes of place.
+A sweep solves contact after contact with all others fixed (Gauss-Seidel), the strips of even number
+first; every other sweep goes backwards, and the last one forward.  Contacts have a compact form
+(:mod:`~polycorner.motion.engine.compact`).  After few sweeps a step is not solved.  The method is
+that of contact dynamics with a fixed number of iterations ([Unger]): as loads spread over a few
+contacts in each sweep, a heap is a little soft, and it is the softer the deeper it is.  Overlaps
+that result are taken away little by little, by changes of place.
 """
 
 import numpy as np
 
-from polycorner.motion.engine.gauss_seidel import relax_block
+from polycorner.motion.engine.codes import WATCHED
+from polycorner.motion.engine.compact import (
+    compact_contact,
+    is_pressed_by_former,
+    judge_contact,
+    press_contact,
+    relax_contact,
+    separate_contact,
+)
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detection_distance, nearest
-from polycorner.motion.engine.partition import island_of
-from polycorner.motion.engine.rows import add_row, row_at, row_times
 from polycorner.motion.engine.sizes import STRIPS
 
 CROWD = 1024  # blocks beyond which an island is a crowd
-TOLERATED = 1e-3  # scaled overlap that is left as it is
-SEPARATED = 0.2  # share of what is too much that one contact takes away
+ABREAST = 4  # strips that take turns
 
 
 @compiled
 def is_crowd(model, first, last):
     """Return whether so many blocks are swept a few times only."""
     return model.crowd_sweeps > 0 and last - first > CROWD
-
-
-@compiled
-def of_crowd(model, work, b):
-    """Return whether a block belongs to a crowd."""
-    i = island_of(work, b)
-    return is_crowd(model, work.island_start[i], work.island_start[i + 1])
 
 
 @compiled
@@ -152,42 +151,63 @@ def sort_by_strip(work, first, last, strips, target):
 
 @compiled
 def divide_blocks(work, first, last):
-    """Order the blocks of an island by strips, which start at ``work.strip_start``."""
-    for s in range(first, last):
-        b = work.order[s]
-        work.unsorted[s], work.strip[s] = b, ZERO
+    """Order the compact contacts of an island by strips, which start at ``work.strip_start``."""
+    count, s = ZERO, first
+    work.told[WATCHED] = 0
+    while s < last:
+        b, pressed = work.order[s], ZERO
+        if s + 1 < last and work.order[s + 1] == b + 1 and is_pressed_by_former(work, b + 1):
+            pressed = ONE
+        if work.block_rows[b] > 0:
+            work.told[WATCHED] = 1
+        work.unsorted[count], work.strip[count] = 2 * b + pressed, ZERO
         if work.strips[0] > 1:
             i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-            work.strip[s] = strip_of(work, i, j, work.strips[0])
-    sort_by_strip(work, first, last, work.strips[0], work.order)
+            work.strip[count] = strip_of(work, i, j, work.strips[0])
+        count += 1
+        s += 1 + pressed
+    sort_by_strip(work, ZERO, count, work.strips[0], work.compact_order)
 
 
 @compiled
-def sweep_strip(model, work, t, backwards):
-    """Solve the blocks of a strip one after the other."""
-    first, last = work.strip_start[t], work.strip_start[t + 1]
-    for s in range(first, last):
-        relax_block(model, work, work.order[first + last - 1 - s if backwards else s])
+def compact_strip(model, work, t):
+    """Write the compact contacts of a strip; return the largest velocity of their rows."""
+    speed = 0.0
+    for r in range(work.strip_start[t], work.strip_start[t + 1]):
+        code = work.compact_order[r]
+        speed = max(speed, compact_contact(model, work, r, code // 2, code % 2 == 1))
+    return speed
 
 
 @compiled
-def separate_strip(model, work, t):
-    """Move bodies apart that overlap in a strip, by a share of what is too much.
+def press_strip(model, work, t):
+    """Apply the impulses from which a step starts."""
+    for r in range(work.strip_start[t], work.strip_start[t + 1]):
+        press_contact(model, work, r)
 
-    The changes of place, in ``work.shift``, are as impulses would make them, but leave velocities
-    as they are.
+
+@compiled
+def sweep_strips(model, work, item, odd, backwards):
+    """Solve the contacts of a few strips of even or of odd number one after the other.
+
+    The strips take turns, contact by contact: as nothing in one waits for another, the processor
+    works on several at once.
     """
-    shift, responses = work.shift, work.response
-    for s in range(work.strip_start[t], work.strip_start[t + 1]):
-        b = work.order[s]
-        if work.block_rows[b] > 0 or work.bilateral[b]:
-            continue
-        i, j, g = work.block_bodies[b, 0], work.block_bodies[b, 1], work.origin[b, 2]
-        gap = work.gap[i, g] if j < 0 else work.contact_gap[work.origin[b, 1]]
-        at = row_at(model, b, ZERO)
-        excess = -gap - TOLERATED * model.gap_unit
-        if excess > 0.0:
-            excess -= row_times(model, work.jacobian, at, shift, i, j)
-        if excess > 0.0:
-            p = SEPARATED * excess * work.delassus[b, 3]
-            add_row(model, responses, at, p, shift, i, j)
+    starts, longest, begin = work.strip_start, ZERO, 2 * ABREAST * item + odd
+    end = min(begin + 2 * ABREAST, work.strips[0])
+    for t in range(begin, end, 2):
+        longest = max(longest, starts[t + 1] - starts[t])
+    for s in range(longest):
+        for t in range(begin, end, 2):
+            if s < starts[t + 1] - starts[t]:
+                relax_contact(model, work, starts[t + 1] - 1 - s if backwards else starts[t] + s)
+
+
+@compiled
+def judge_strip(model, work, t):
+    """Move bodies apart that overlap in a strip, and return its residual."""
+    worst = 0.0
+    for r in range(work.strip_start[t], work.strip_start[t + 1]):
+        separate_contact(model, work, r)
+        worst = max(worst, judge_contact(model, work, r))
+    return worst

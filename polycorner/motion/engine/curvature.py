@@ -6,9 +6,9 @@ from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import BENT, CHANGED, OWN_GAP, SETTLED
 from polycorner.motion.engine.blocks import STRAIGHT
 from polycorner.motion.engine.bounds import equation_offset
-from polycorner.motion.engine.crowds import of_crowd
+from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
-from polycorner.motion.engine.jit import NONE, compiled
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import CURVATURE_DEPTH
@@ -28,15 +28,30 @@ def correct_curvature(model, state, work, blocks, h):
     k, found = model.dimension, False
     for i in range(model.bodies):
         work.curves_shut[i] = 0
+        work.speed[i] = speed_of(model, work.v_new, i)
         for c in range(k):
             work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
-        work.speed[i] = speed_of(model, work.v_new, i)
+    for i in range(model.bodies):
+        if work.stage[i] != SETTLED and not in_crowd(model, work, i):
+            work.curves_shut[i] = correct_island(model, work, i, h)
+            found = found or work.curves_shut[i] != 0
+    return found
+
+
+@compiled
+def in_crowd(model, work, i):
+    """Return whether the island that a body represents is a crowd."""
+    return is_crowd(model, work.island_start[i], work.island_start[i + 1])
+
+
+@compiled
+def correct_island(model, work, island, h):
+    """Raise the velocity bounds of an island; return whether any; see above."""
+    found, first, second = ZERO, NONE, NONE
     fast = np.sqrt(0.5 * CURVATURE_DEPTH) * model.gap_unit / h
-    first, second = NONE, NONE
-    for b in range(blocks):
-        if work.block_rows[b] > 0 or work.stage[island_of(work, b)] == SETTLED:
-            continue
-        if (model.follows_velocity and work.bound[b] == BENT) or of_crowd(model, work, b):
+    for s in range(work.island_start[island], work.island_start[island + 1]):
+        b = work.order[s]
+        if work.block_rows[b] > 0 or (model.follows_velocity and work.bound[b] == BENT):
             continue
         i, g = work.block_bodies[b, 0], work.origin[b, 2]
         if work.origin[b, 0] == OWN_GAP:
@@ -54,19 +69,17 @@ def correct_curvature(model, state, work, blocks, h):
             gap = work.contact_gap[work.origin[b, 1]]
             following = work.scratch[model.pair_inputs + g]
         if work.bilateral[b]:
-            if model.follows_velocity:
-                continue
-            if bend_equation(model, work, b, gap, following, h, model.tolerance):
-                work.curves_shut[island_of(work, b)] = 1
-                found = True
+            if not model.follows_velocity and bend_equation(
+                model, work, b, gap, following, h, model.tolerance
+            ):
+                found = ONE
             continue
         target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
         if following < target - CURVATURE_DEPTH * model.gap_unit:
             work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
             work.offset[b, 0] = (gap - work.block_load[b] - target) / h
             work.bound[b] = BENT
-            work.curves_shut[island_of(work, b)] = 1
-            found = True
+            found = ONE
     return found
 
 

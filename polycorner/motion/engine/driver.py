@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from polycorner.errors import SolverError
 from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.engine.allocation import allocate, restored
 from polycorner.motion.engine.arrays import (
     CONTACTS,
     CONTACTS_FULL,
@@ -22,9 +23,7 @@ from polycorner.motion.engine.arrays import (
     Log,
     State,
     Work,
-    allocate,
     declarations,
-    restored,
 )
 from polycorner.motion.engine.intermediate import compiled_advance
 from polycorner.motion.engine.layout import model_of

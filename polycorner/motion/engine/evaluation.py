@@ -216,3 +216,34 @@ def call_pair_kernel(model, work, kernel, a, b, q):
         scratch[r] = q[body, model.pair_reads[r, 1]]
     j0, p0 = n + m, model.pair_parameters
     call_kernel(kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
+
+
+@compiled
+def start_body(model, state, work, i):
+    """Set the free velocity, due to forces alone, of a body that is awake, and measure its speed.
+
+    Bodies of settled islands remain as they were solved.  Where a velocity or a gap is not a
+    number, ``work.finite`` becomes zero.
+    """
+    if not state.alive[i] or work.stage[work.parent[i]] == SETTLED:
+        return
+    k, finite, speed = model.dimension, True, 0.0
+    for c in range(k):
+        value = state.v[i, c]
+        if work.awake[i]:
+            for a in range(k):
+                value += work.inverse_mass[i, c, a] * (work.force[i, a] + work.kick[i, a])
+        work.v_old[i, c] = state.v[i, c]
+        work.v_free[i, c] = value
+        work.v_new[i, c] = value
+        finite = finite and np.isfinite(value)
+    for c in range(k):
+        carried = model.substrate_speed / model.units[c] if c == model.position[0] else 0.0
+        before = abs(state.v[i, c] - carried) * model.units[c]
+        speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
+    work.speed[i], work.island_speed[i] = speed, speed
+    work.touched[i] = 0
+    for g in range(model.restitution.size):
+        finite = finite and not np.isnan(work.gap[i, g])
+    if not finite:
+        work.finite[0] = 0

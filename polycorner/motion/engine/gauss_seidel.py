@@ -6,6 +6,8 @@ from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.rows import apply_impulses, copy_velocity, load_on, velocity_of
 from polycorner.motion.engine.sets import contains, project
 
+EXACT = 1e-12  # determinant of two rows, over the product of their squares, to solve for both
+
 
 @compiled
 def relax_block(model, work, b):
@@ -44,7 +46,7 @@ def relax_block(model, work, b):
     far = np.sqrt((out[0] - x) ** 2 + (out[1] - y) ** 2) * norm
     d00, d01, d11 = work.delassus[b, 0], work.delassus[b, 1], work.delassus[b, 2]
     determinant = d00 * d11 - d01 * d01
-    if load > 0.0 and determinant > 1e-12 * d00 * d11:
+    if load > 0.0 and determinant > EXACT * d00 * d11:
         sx = x - (d11 * u[0] - d01 * u[1]) / determinant
         sy = y - (d00 * u[1] - d01 * u[0]) / determinant
         if contains(model, shape, sx, sy, load, 0.0):

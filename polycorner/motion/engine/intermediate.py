@@ -31,7 +31,7 @@ from polycorner.formulas.machine_code import load_code, machine_code, machine_ke
 LOG = logging.getLogger("polycorner.compilation")
 ENTRY, FILE, HEAD = "polycorner_advance", "engine_{}.ll.xz", "; made from "
 PACKAGE = "polycorner.motion.engine"
-NOT_COMPILED = ("driver.py", "intermediate.py", "layout.py", "threads.py")
+NOT_COMPILED = ("allocation.py", "driver.py", "intermediate.py", "layout.py", "threads.py")
 ANY, COMMON = 0, (3, 4, 7)  # coordinates: of bodies in the plane, dumbbells, bodies in space
 SECONDS = 2  # of processor time, about, to make machine code
 

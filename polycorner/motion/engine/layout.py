@@ -8,7 +8,8 @@ import numpy as np
 from polycorner.formulas.bundles import Call
 from polycorner.motion.bodies import Body, IdenticalBodies
 from polycorner.motion.convex_sets import ConvexSet
-from polycorner.motion.engine.arrays import Model, filled
+from polycorner.motion.engine.allocation import filled
+from polycorner.motion.engine.arrays import Model
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
@@ -58,6 +59,7 @@ def model_of(
         "crowd_sweeps": solver.crowd_sweeps,
         "threads": solver.threads,
         "give_way": address_of_yield(),
+        "may_rest": sizes.m + sizes.R >= sizes.k,
         **_near(bodies, noise),
         "start": start,
         "step": step,

@@ -54,14 +54,17 @@ def leave_out(model, state, work, blocks, h):
     for i in range(N):
         if work.awake[i]:
             work.members[work.parent[i]] += 1
-    for b in range(blocks):
-        island = island_of(work, b)
-        work.near[0] = slow_travel(model, work.members[island])
-        if work.block_rows[b] == 0 and strikes_early(model, state, work, b):
-            left[island] |= 1
+    for i in range(N):
+        if is_large(work, i):
+            continue
+        work.near[0] = slow_travel(model, work.members[i])
+        for s in range(work.island_start[i], work.island_start[i + 1]):
+            b = work.order[s]
+            if work.block_rows[b] == 0 and strikes_early(model, state, work, b):
+                left[i] |= 1
     mark_misses(model, state, work, left, h)
     for i in range(N):
-        if work.island_start[i + 1] - work.island_start[i] > LARGE and left[i] == 1:
+        if is_large(work, i) and left[i] == 1:
             left[i] = 0
         found = found or left[i]
     if not found:
@@ -92,6 +95,12 @@ def leave_out(model, state, work, blocks, h):
             work.waits[i] = 1
             work.awake[i], work.evaluated[i], work.disturbed[i] = 0, 0, 0
     return True
+
+
+@compiled
+def is_large(work, i):
+    """Return whether impacts need not be located in the island that a body represents."""
+    return work.island_start[i + 1] - work.island_start[i] > LARGE
 
 
 @compiled
@@ -192,7 +201,9 @@ def mark_misses(model, state, work, left, h):
     """Mark the islands with bodies that cross the boundary of a gap on their way."""
     if model.restitution.size > 0:
         for i in range(model.bodies):
-            if state.alive[i] and work.awake[i] and body_misses(model, state, work, i, h):
+            if not (state.alive[i] and work.awake[i]) or is_large(work, work.parent[i]):
+                continue
+            if body_misses(model, state, work, i, h):
                 left[work.parent[i]] |= 1
     slow = model.near_many * model.gap_unit
     if model.pair_kernel == 0 or 2.0 * travel(model, work, h) <= slow:
@@ -202,7 +213,8 @@ def mark_misses(model, state, work, left, h):
         if not (state.alive[i] and state.alive[j] and (work.awake[i] or work.awake[j])):
             continue
         way = h * (work.speed[i] + work.speed[j])
-        if way <= slow:
+        large = is_large(work, work.parent[i]) and is_large(work, work.parent[j])
+        if way <= slow or large:
             continue
         way = max(way, 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j)))
         if work.least_gap[s] > 2.0 * way:

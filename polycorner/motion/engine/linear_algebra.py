@@ -39,9 +39,8 @@ def invert(upper, at, k, mass, out):
 
 
 @compiled
-def solve_spd(A, b, k):
-    """Solve ``A x = b`` in place by Cholesky's method; return whether ``A`` is definite."""
-    never_inline()
+def factorise(A, k):
+    """Replace the lower triangle of ``A`` by Cholesky's factor; return whether it is definite."""
     top = 0.0
     for c in range(k):
         top = max(top, A[c, c])
@@ -58,6 +57,15 @@ def solve_spd(A, b, k):
             for a in range(j):
                 value -= A[i, a] * A[j, a]
             A[i, j] = value / pivot
+    return True
+
+
+@compiled
+def solve_spd(A, b, k):
+    """Solve ``A x = b`` in place by Cholesky's method; return whether ``A`` is definite."""
+    never_inline()
+    if not factorise(A, k):
+        return False
     for i in range(k):
         value = b[i]
         for a in range(i):

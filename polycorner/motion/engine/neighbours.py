@@ -5,7 +5,7 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
-from polycorner.motion.engine.jit import NONE, compiled
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 
 TOUCHING = 1e-7  # scaled gap up to which a contact is made, and kept as it is
 ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
@@ -124,10 +124,70 @@ def list_neighbours(model, state, work, h, time):
 
 
 @compiled
-def detect_pair(model, state, work, slot, limit, share, count):
+def is_near(model, state, work, s, limit):
+    """Return whether a pair with an awake body may meet, and was not examined in this step yet.
+
+    Bodies that wait are where they were, or already where they will be: nothing meets them.
+    """
+    a, b = work.neighbours[s, 0], work.neighbours[s, 1]
+    if work.examined[s] or not (work.awake[a] or work.awake[b]):
+        return False
+    work.examined[s], work.least_gap[s] = 1, 0.0
+    if not (state.alive[a] and state.alive[b]) or work.waits[a] or work.waits[b]:
+        return False
+    return square_distance(model, work, a, b) < (model.reach + limit) ** 2
+
+
+@compiled
+def count_gaps(model, work, slot, limit):
+    """Return how many gaps of a pair are small; the least of all is kept."""
+    count, least = ZERO, np.inf
+    evaluate_pair(model, work, work.neighbours[slot, 0], work.neighbours[slot, 1], work.q_mid)
+    for g in range(model.pair_gaps):
+        gap = work.scratch[model.pair_inputs + g]
+        count, least = count + (ONE if gap < limit else ZERO), min(least, gap)
+    work.least_gap[slot] = least
+    return count
+
+
+@compiled
+def count_range(model, state, work, begin, end, limit):
+    """Count the small gaps of some pairs; return how many there are."""
+    count = ZERO
+    for s in range(begin, end):
+        near = is_near(model, state, work, s, limit)
+        work.meets[s] = count_gaps(model, work, s, limit) if near else ZERO
+        count += work.meets[s]
+    return count
+
+
+@compiled
+def detect_counted(model, state, work, begin, end, limit, share, count):
+    """Add the small gaps of some pairs, which were counted, to the contacts after so many."""
+    cursor = NONE
+    for s in range(begin, end):
+        if work.meets[s]:
+            count, cursor = detect_pair(model, state, work, s, limit, share, count, cursor)
+
+
+@compiled
+def detect_all(model, state, work, pairs, limit, share, count):
+    """Add the small gaps of all pairs to the contacts; return the contact count, or -1 if full."""
+    cursor = NONE
+    for s in range(pairs):
+        if is_near(model, state, work, s, limit):
+            count, cursor = detect_pair(model, state, work, s, limit, share, count, cursor)
+            if count < 0:
+                return NONE
+    return count
+
+
+@compiled
+def detect_pair(model, state, work, slot, limit, share, count, cursor):
     """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full.
 
-    The least of all its gaps is kept.
+    The least of all its gaps is kept.  The cursor, which is returned as well, goes with the pairs
+    through the list of the last step; both ascend.
     """
     a, b, least = work.neighbours[slot, 0], work.neighbours[slot, 1], np.inf
     K, scratch = model.lanes, work.scratch
@@ -138,10 +198,12 @@ def detect_pair(model, state, work, slot, limit, share, count):
         if scratch[n + g] < limit:
             # contacts between sleepers, which are kept, need room as well
             if count + state.counts[CONTACTS] >= model.contact_room:
-                return -1
+                return NONE, cursor
             work.contact[count, 0], work.contact[count, 1], work.contact[count, 2] = a, b, g
             work.contact_gap[count] = scratch[n + g]
-            index = find_contact(state, (a * model.bodies + b) * m + g)
+            key = (a * model.bodies + b) * m + g
+            cursor = place_among(state, key) if cursor < 0 else advanced(state, cursor, key)
+            index = cursor if has_key(state, cursor, key) else NONE
             work.contact_before[count] = index
             for c in range(state.pair_impulse.shape[1]):
                 before = state.pair_impulse[index, c] if index >= 0 else 0.0
@@ -153,7 +215,7 @@ def detect_pair(model, state, work, slot, limit, share, count):
                 work.contact_gradient[count, c] = scratch[n + m + g * n + r]
             count += 1
     work.least_gap[slot] = least
-    return count
+    return count, cursor
 
 
 @compiled
@@ -194,37 +256,37 @@ def square_distance(model, work, a, b):
 
 
 @compiled
-def detect_contacts(model, state, work, h, count):
-    """Add the small gaps of all pairs with an awake body; return the contact count, or -1.
-
-    Bodies that wait are where they were, or already where they will be: nothing meets them.
-    """
-    limit = detection_distance(model, work, h)
-    for s in range(work.list_status[0]):
-        a, b = work.neighbours[s, 0], work.neighbours[s, 1]
-        if work.examined[s] or not (work.awake[a] or work.awake[b]):
-            continue
-        work.examined[s], work.least_gap[s] = 1, 0.0
-        if not (state.alive[a] and state.alive[b]) or work.waits[a] or work.waits[b]:
-            continue
-        if square_distance(model, work, a, b) < (model.reach + limit) ** 2:
-            count = detect_pair(model, state, work, s, limit, h / model.step, count)
-            if count < 0:
-                return NONE
-    return count
+def find_contact(state, key):
+    """Return the index of a contact in the sorted list of the last step, or -1."""
+    place = place_among(state, key)
+    return place if has_key(state, place, key) else NONE
 
 
 @compiled
-def find_contact(state, key):
-    """Return the index of a contact in the sorted list of the last step, or -1."""
-    low, high = 0, state.counts[CONTACTS]
+def place_among(state, key):
+    """Return the index of the first contact of the last step whose key is not less than this."""
+    low, high = ZERO, state.counts[CONTACTS]
     while low < high:
         middle = (low + high) // 2
         if state.keys[middle] < key:
-            low = middle + 1
+            low = middle + ONE
         else:
             high = middle
-    return low if low < state.counts[CONTACTS] and state.keys[low] == key else -1
+    return low
+
+
+@compiled
+def advanced(state, place, key):
+    """Return the same as :func:`place_among`, from a place that is not beyond it."""
+    while place < state.counts[CONTACTS] and state.keys[place] < key:
+        place += ONE
+    return place
+
+
+@compiled
+def has_key(state, place, key):
+    """Return whether the contact of the last step at an index has this key."""
+    return place < state.counts[CONTACTS] and state.keys[place] == key
 
 
 @compiled

@@ -26,6 +26,8 @@ def find_islands(model, work, blocks):
     for i in range(N):
         work.parent[i] = i
     for b in range(blocks):
+        if work.block_rows[b] > 0:
+            continue  # friction between bodies acts where a contact presses
         i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
         if j >= 0 and work.awake[i] and work.awake[j]:
             x, y = root_of(work.parent, i), root_of(work.parent, j)

@@ -10,38 +10,58 @@ up: a thread that comes too late finds a ticket of another phase, or no item lef
 
 import numpy as np
 
+from polycorner.motion.engine.accounts import book_block, book_body
 from polycorner.motion.engine.blocks import assemble_contacts
 from polycorner.motion.engine.codes import (
     ADD,
     AGAIN,
     ASSEMBLE,
     BACKWARDS,
+    BEGIN,
+    BOOK,
+    COMPACT,
     COUNT,
+    COUNT_GAPS,
+    DETECT,
+    DISTANCE,
+    END,
     EVALUATE,
+    ISLAND,
     ITEMS_DONE,
     JUDGE,
     KIND,
+    LENGTH,
     LIMIT,
-    SEPARATE,
+    OBSERVE,
+    PRESS,
     SET_OFF,
     SOLVE,
+    SPEED,
+    START,
     STEP_INDEX,
     STOP,
     STORE,
     SWEEP,
     TICKET,
+    TIME,
 )
-from polycorner.motion.engine.contact_list import add_contacts, store_impulses
-from polycorner.motion.engine.crowds import separate_strip, sweep_strip
-from polycorner.motion.engine.evaluation import evaluate_body
-from polycorner.motion.engine.gauss_seidel import residual
+from polycorner.motion.engine.compact import begin_compact, end_compact
+from polycorner.motion.engine.contact_list import add_contacts, observe_block, store_impulses
+from polycorner.motion.engine.crowds import (
+    compact_strip,
+    judge_strip,
+    press_strip,
+    sweep_strips,
+)
+from polycorner.motion.engine.evaluation import evaluate_body, start_body
 from polycorner.motion.engine.island import solve_island
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import count_range, detect_counted
 from polycorner.motion.engine.signals import call_nothing, increase, read, write
+from polycorner.motion.engine.sizes import AT_ONCE
 
 ITEM_BITS, ITEM_MASK = np.int64(32), np.int64(2**32 - 1)
 PATIENCE = 200  # looks at a signal before other threads are let run
-AT_ONCE = 256  # bodies, contacts or blocks of an item
 
 
 @compiled
@@ -49,12 +69,14 @@ def do_item(model, state, work, item):
     """Do an item of the present phase."""
     kind, told = work.told[KIND], work.told
     if kind == SWEEP:
-        sweep_strip(model, work, 2 * item + told[SET_OFF], told[BACKWARDS])
-    elif kind == SEPARATE:
-        separate_strip(model, work, 2 * item + told[SET_OFF])
+        sweep_strips(model, work, item, told[SET_OFF], told[BACKWARDS] != 0)
+    elif kind == COMPACT:
+        work.worst[item] = compact_strip(model, work, item)
+    elif kind == PRESS:
+        press_strip(model, work, 2 * item + told[SET_OFF])
     elif kind == JUDGE:
-        first, last = work.strip_start[item], work.strip_start[item + 1]
-        work.worst[item] = residual(model, work, first, last, 0.0)
+        t = 2 * item + told[SET_OFF]
+        work.worst[t] = judge_strip(model, work, t)
     elif kind == SOLVE:
         i = work.to_solve[item]
         first, last = work.island_start[i], work.island_start[i + 1]
@@ -66,14 +88,39 @@ def do_item(model, state, work, item):
 @compiled
 def do_range(model, state, work, kind, begin, end):
     """Do what is asked for some bodies, contacts or blocks in a row."""
-    told, h = work.told, work.told_times[0]
+    told, h = work.told, work.told_times[LENGTH]
     if kind == EVALUATE:
         for i in range(begin, end):
             if state.alive[i] and not state.asleep[i]:
-                evaluate_body(model, state, work, i, h, work.told_times[1], told[STEP_INDEX])
+                evaluate_body(model, state, work, i, h, work.told_times[TIME], told[STEP_INDEX])
     elif kind == ASSEMBLE:
         b = told[SET_OFF] + (1 + model.pair_laws) * begin
         assemble_contacts(model, state, work, h, begin, end, b)
+    elif kind == START:
+        for i in range(begin, end):
+            start_body(model, state, work, i)
+    elif kind == COUNT_GAPS:
+        limit = work.told_times[DISTANCE]
+        work.found[begin // AT_ONCE] = count_range(model, state, work, begin, end, limit)
+    elif kind == DETECT:
+        limit, count = work.told_times[DISTANCE], work.found[begin // AT_ONCE]
+        detect_counted(model, state, work, begin, end, limit, h / model.step, count)
+    elif kind in (OBSERVE, BOOK):
+        if told[COUNT] <= AT_ONCE:
+            book_range(model, state, work, kind, begin, end, state.sums)
+        else:
+            item = begin // AT_ONCE
+            for a in range(state.sums.size):
+                work.booked[item, a] = 0.0
+            book_range(model, state, work, kind, begin, end, work.booked[item])
+    elif kind in (BEGIN, END):
+        for i in range(begin, end):
+            if work.awake[i] and work.parent[i] == told[ISLAND]:
+                if kind == BEGIN:
+                    begin_compact(model, work, i)
+                else:
+                    end_compact(model, work, i)
+                    work.island_speed[i] = max(work.island_speed[i], work.told_times[SPEED])
     elif kind == STORE:
         store_impulses(model, state, work, begin, end, h)
     elif kind == ADD:
@@ -81,10 +128,28 @@ def do_range(model, state, work, kind, begin, end):
 
 
 @compiled
+def book_range(model, state, work, kind, begin, end, sums):
+    """Book the work of some blocks, and observe them, or that of some bodies, in given sums."""
+    h, time = work.told_times[LENGTH], work.told_times[TIME]
+    for b in range(begin, end):
+        if kind == OBSERVE:
+            book_block(model, work, b, sums)
+            observe_block(model, state, work, b, h, time, sums)
+        else:
+            book_body(model, state, work, b, sums)
+
+
+@compiled
 def share_range(model, state, work, kind, count, h):
     """Do what is asked for so many bodies, contacts or blocks, together with the other threads."""
-    work.told[COUNT], work.told_times[0] = count, h
-    share_out(model, state, work, kind, (count + AT_ONCE - 1) // AT_ONCE)
+    work.told[COUNT], work.told_times[LENGTH] = count, h
+    share_out(model, state, work, kind, items_of(count))
+
+
+@compiled
+def items_of(count):
+    """Return how many items so many bodies, contacts or blocks are."""
+    return (count + AT_ONCE - 1) // AT_ONCE
 
 
 @compiled

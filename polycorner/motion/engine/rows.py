@@ -52,17 +52,23 @@ def add_row(model, rows, at, factor, v, i, j):
 @compiled
 def add_rows(model, work, rows, b, f, g, v, i, j):
     """Add ``f`` times the first row of a block and ``g`` times the second, if there is one."""
-    K, at, two = model.lanes, row_at(model, b, 0), work.block_rows[b] == 2
-    if not two:
+    at = row_at(model, b, 0)
+    if work.block_rows[b] == 2:
+        add_two_rows(model, rows, at, f, at + 2 * model.lanes, g, v, i, j)
+    else:
         add_row(model, rows, at, f, v, i, j)
-        return
+
+
+@compiled
+def add_two_rows(model, rows, at, f, other, g, v, i, j):
+    """Add multiples of two rows to the velocities of bodies ``i`` and ``j`` (-1: none)."""
+    K = model.lanes
     for side in range(2):
         body = j if side else i
         if body < 0:
             continue
         for c in range(0, K, WIDTH):
-            first, second = at + side * K + c, at + (2 + side) * K + c
-            more = f * load(rows, first) + g * load(rows, second)
+            more = f * load(rows, at + side * K + c) + g * load(rows, other + side * K + c)
             store(v, body * K + c, load(v, body * K + c) + more)
 
 

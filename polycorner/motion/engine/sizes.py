@@ -6,7 +6,8 @@ from polycorner.motion.bodies import IdenticalBodies
 
 WIDTH = 4  # reals in a vector
 MOST_ENTRIES = 48  # of a body above the diagonal of the matrix, on average, at most
-STRIPS = 64  # into which a crowd is divided, at most
+AT_ONCE = 256  # bodies, pairs, contacts or blocks that a thread does at once
+STRIPS = 128  # into which a crowd is divided, at most
 EVENTS = 4096  # events recorded, at least, before the engine returns
 
 
@@ -34,6 +35,7 @@ class Sizes(NamedTuple):
     Q: int  # entries of the matrix above the diagonal: pairs of bodies
     M: int  # numbers in the matrix
     Z: int  # strips
+    V: int  # items of a phase
 
     @classmethod
     def of(cls, bodies: IdenticalBodies, contacts: int) -> "Sizes":
@@ -50,6 +52,7 @@ class Sizes(NamedTuple):
         lanes = -(-k // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
         entries = N * min(N - 1, MOST_ENTRIES)
+        blocks = N * (F + m) + (1 + len(laws)) * contacts
         return cls(
             N=N,
             k=k,
@@ -65,11 +68,12 @@ class Sizes(NamedTuple):
             D=len(bodies.causes),
             C=contacts,
             P=pairs,
-            B=N * (F + m) + (1 + len(laws)) * contacts,
+            B=blocks,
             E=EVENTS + 4 * contacts,
             S=max(contacts, pairs, 1),
             W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
             Q=entries,
             M=(N + 2 * entries) * lanes * lanes,
             Z=STRIPS,
+            V=max(N, pairs, blocks) // AT_ONCE + 1,
         )

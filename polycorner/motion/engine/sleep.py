@@ -149,6 +149,8 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
     Sleepers on which an island acts that is not solved wake up, too.
     """
     k, N = model.dimension, model.bodies
+    if not model.may_rest:
+        return False  # nothing sleeps
     for i in range(N):
         work.disturbed[i] = 0
         for c in range(k):
@@ -198,7 +200,7 @@ def settle(model, state, work, h, index):
             continue
         if work.awake[i]:
             state.rests[i], state.asleep[i] = 0, 0
-            if comes_to_rest(model, state, work, i, rest):
+            if model.may_rest and comes_to_rest(model, state, work, i, rest):
                 state.rests[i] = 1
         if work.awake[i] or work.disturbed[i]:
             for c in range(k):

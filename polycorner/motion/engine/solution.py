@@ -1,33 +1,55 @@
 """Assembly of the blocks of a step, and solution of its islands, by all threads."""
 
-from polycorner.motion.engine.arrays import CONTACTS, SETTLED, SWEEPS
+from polycorner.motion.engine.accounts import add_sums
+from polycorner.motion.engine.arrays import CONTACTS, ISLANDS, SETTLED, SWEEPS
 from polycorner.motion.engine.blocks import (
     assemble_body_blocks,
     assemble_contacts,
     order_contacts,
+    respond_to_rows,
 )
 from polycorner.motion.engine.codes import (
     ADD,
     AGAIN,
     ASSEMBLE,
     BACKWARDS,
+    BEGIN,
+    BOOK,
+    COMPACT,
+    COUNT_GAPS,
+    DETECT,
+    DISTANCE,
+    END,
     EVALUATE,
+    ISLAND,
     JUDGE,
-    SEPARATE,
+    OBSERVE,
+    PRESS,
     SET_OFF,
     SOLVE,
+    SPEED,
+    START,
     STEP_INDEX,
     STORE,
     SWEEP,
+    TIME,
 )
-from polycorner.motion.engine.contact_list import keep_contacts, list_blocks, sort_contacts
-from polycorner.motion.engine.crowds import divide_blocks, divide_contacts, is_crowd
+from polycorner.motion.engine.contact_list import (
+    forget_blocks,
+    keep_contacts,
+    list_blocks,
+    mark_met,
+    sort_contacts,
+)
+from polycorner.motion.engine.crowds import ABREAST, divide_blocks, divide_contacts, is_crowd
 from polycorner.motion.engine.curvature import correct_curvature
-from polycorner.motion.engine.island import begin_island
-from polycorner.motion.engine.jit import ZERO, compiled
-from polycorner.motion.engine.phases import share_out, share_range
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import detect_all, detection_distance
+from polycorner.motion.engine.partition import find_islands
+from polycorner.motion.engine.phases import items_of, share_out, share_range
 from polycorner.motion.engine.rows import apply_impulses
 from polycorner.motion.engine.signals import increase
+from polycorner.motion.engine.sizes import AT_ONCE
 
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 
@@ -35,13 +57,41 @@ MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equat
 @compiled
 def evaluate_bodies(model, state, work, h, time, index):
     """Evaluate all bodies that are not asleep."""
-    work.told_times[1], work.told[STEP_INDEX] = time, index
+    work.told_times[TIME], work.told[STEP_INDEX] = time, index
     share_range(model, state, work, EVALUATE, model.bodies, h)
 
 
 @compiled
+def start_bodies(model, state, work, h):
+    """Start all bodies from forces alone; return whether velocities and gaps are numbers."""
+    work.finite[0] = 1
+    share_range(model, state, work, START, model.bodies, h)
+    return work.finite[0] != 0
+
+
+@compiled
+def detect_contacts(model, state, work, h, count):
+    """Add the small gaps of all pairs with an awake body; return the contact count, or -1.
+
+    Several threads count them first, so that it is known where which contact goes.
+    """
+    pairs, limit = work.list_status[0], detection_distance(model, work, h)
+    if model.threads == 1 or pairs <= AT_ONCE:
+        return detect_all(model, state, work, pairs, limit, h / model.step, count)
+    work.told_times[DISTANCE] = limit
+    share_range(model, state, work, COUNT_GAPS, pairs, h)
+    for item in range(items_of(pairs)):
+        more, work.found[item] = work.found[item], count
+        count += more
+    if count + state.counts[CONTACTS] > model.contact_room:
+        return NONE
+    share_range(model, state, work, DETECT, pairs, h)
+    return count
+
+
+@compiled
 def assemble_blocks(model, state, work, h, contacts):
-    """Assemble the blocks of all awake bodies and of all contacts detected; return their number."""
+    """Assemble the blocks of awake bodies and of contacts, and their islands; return how many."""
     first = assemble_body_blocks(model, state, work, h)
     order_contacts(model, work, contacts)
     divide_contacts(model, state, work, h, contacts)
@@ -51,9 +101,24 @@ def assemble_blocks(model, state, work, h, contacts):
         blocks = first + (1 + model.pair_laws) * contacts
         work.told[SET_OFF] = first
         share_range(model, state, work, ASSEMBLE, contacts, h)
-    for b in range(blocks):
-        apply_impulses(model, work, b, work.impulse[b, 0], work.impulse[b, 1])
+    find_islands(model, work, blocks)
+    start_blocks(model, work, blocks)
     return blocks
+
+
+@compiled
+def start_blocks(model, work, blocks):
+    """Apply the impulses from which the solution of a step starts, except in crowds."""
+    if model.crowd_sweeps == 0:
+        for b in range(blocks):
+            apply_impulses(model, work, b, work.impulse[b, 0], work.impulse[b, 1])
+        return
+    for i in range(model.bodies):
+        if not is_crowd(model, work.island_start[i], work.island_start[i + 1]):
+            for s in range(work.island_start[i], work.island_start[i + 1]):
+                b = work.order[s]
+                respond_to_rows(model, work, b)
+                apply_impulses(model, work, b, work.impulse[b, 0], work.impulse[b, 1])
 
 
 @compiled
@@ -92,20 +157,30 @@ def sweep_crowd(model, state, work, i, h):
     The last sweep goes forward, so that friction follows the contact that presses on it and is in
     its set.
     """
-    first, last = work.island_start[i], work.island_start[i + 1]
-    speed, _ = begin_island(state, work, first, last)
     strips = work.strips[0]
-    divide_blocks(work, first, last)
+    divide_blocks(work, work.island_start[i], work.island_start[i + 1])
+    work.told[ISLAND] = i
+    share_range(model, state, work, BEGIN, model.bodies, h)
+    share_out(model, state, work, COMPACT, strips)
+    speed = work.told_times[SPEED] = greatest(work.worst, strips)
+    share_strips(model, state, work, PRESS, strips, ZERO)
     for left in range(model.crowd_sweeps - 1, -1, -1):
         work.told[BACKWARDS] = left % 2
         share_strips(model, state, work, SWEEP, strips, left % 2)
-    share_strips(model, state, work, SEPARATE, strips, ZERO)
+    share_strips(model, state, work, JUDGE, strips, ZERO)
+    share_range(model, state, work, END, model.bodies, h)
+    increase(state.counts, ISLANDS, ONE)
     increase(state.counts, SWEEPS, model.crowd_sweeps)
-    share_out(model, state, work, JUDGE, strips)
-    worst = 0.0
-    for t in range(strips):
-        worst = max(worst, work.worst[t])
-    work.island_residual[i] = worst / speed if speed > 0.0 else 0.0
+    work.island_residual[i] = greatest(work.worst, strips) / speed if speed > 0.0 else 0.0
+
+
+@compiled
+def greatest(values, count):
+    """Return the greatest of the first numbers of an array, none of which is negative."""
+    most = 0.0
+    for t in range(count):
+        most = max(most, values[t])
+    return most
 
 
 @compiled
@@ -115,10 +190,28 @@ def store_all_impulses(model, state, work, blocks, h):
 
 
 @compiled
+def observe(model, state, work, blocks, h, time):
+    """Book the work of a step, and note what happened to its contacts."""
+    work.told_times[TIME] = time
+    forget_blocks(work, work.list_status[2])
+    book(model, state, work, OBSERVE, blocks, h)
+    book(model, state, work, BOOK, model.bodies, h)
+
+
+@compiled
+def book(model, state, work, kind, count, h):
+    """Let the items of a phase book work, which does not depend on who does them."""
+    share_range(model, state, work, kind, count, h)
+    if count > AT_ONCE:
+        add_sums(state, work, items_of(count))
+
+
+@compiled
 def list_contacts(model, state, work, log, h, time, count):
     """Update the list of contacts between bodies; return the number of events."""
     added = list_blocks(work, work.list_status[2])
-    kept, count = keep_contacts(model, state, work, log, added, h, time, count)
+    mark_met(state, work, work.list_status[2])
+    kept, count = keep_contacts(model, state, work, log, h, time, count)
     work.told[SET_OFF] = kept
     share_range(model, state, work, ADD, added, h)
     state.counts[CONTACTS] = kept + added
@@ -132,4 +225,7 @@ def share_strips(model, state, work, kind, strips, begin):
     for half in range(2):
         odd = (begin + half) % 2
         work.told[SET_OFF] = odd
-        share_out(model, state, work, kind, (strips + 1 - odd) // 2)
+        count = (strips + 1 - odd) // 2
+        if kind == SWEEP:
+            count = (count + ABREAST - 1) // ABREAST
+        share_out(model, state, work, kind, count)

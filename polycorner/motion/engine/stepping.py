@@ -22,112 +22,33 @@ Bodies for which this does not do take shorter steps: :mod:`polycorner.motion.en
 import numpy as np
 
 from polycorner.motion.engine.arrays import (
-    APPLIED_WORK,
     CHANGED,
     CONTACTS,
     CONTACTS_FULL,
-    DISSIPATED,
     DONE,
-    NOISE_WORK,
     NOT_FINITE,
-    PAIR_FRICTION,
     SETTLED,
     SOLVED,
-    SUBSTRATE_WORK,
 )
 from polycorner.motion.engine.blocks import renew_blocks
-from polycorner.motion.engine.contact_list import (
-    EXIT,
-    MOTION,
-    REST,
-    record,
-    record_contacts,
-    store_sticking,
-    takes_part,
-)
+from polycorner.motion.engine.contact_list import EXIT, MOTION, REST, record, record_contacts
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import detect_contacts, list_neighbours, outdated
-from polycorner.motion.engine.partition import find_islands
+from polycorner.motion.engine.neighbours import list_neighbours, outdated
 from polycorner.motion.engine.sleep import settle, wake_neighbours
 from polycorner.motion.engine.solution import (
     assemble_blocks,
+    detect_contacts,
     list_contacts,
+    observe,
     solve_islands,
+    start_bodies,
     store_all_impulses,
 )
 
 FORCE_ROUNDS = 30  # solutions of a step, at most, with forces at its mean velocity
-
-
-@compiled
-def start_bodies(model, state, work):
-    """Set the free velocities, due to forces alone, of awake bodies, and measure all speeds.
-
-    Bodies of settled islands remain as they were solved.  Return whether velocities and gaps are
-    numbers.
-    """
-    k, finite = model.dimension, True
-    for i in range(model.bodies):
-        if not state.alive[i] or work.stage[work.parent[i]] == SETTLED:
-            continue
-        for c in range(k):
-            value = state.v[i, c]
-            if work.awake[i]:
-                for a in range(k):
-                    value += work.inverse_mass[i, c, a] * (work.force[i, a] + work.kick[i, a])
-            work.v_old[i, c] = state.v[i, c]
-            work.v_free[i, c] = value
-            work.v_new[i, c] = value
-            finite = finite and np.isfinite(value)
-        speed = 0.0
-        for c in range(k):
-            carried = model.substrate_speed / model.units[c] if c == model.position[0] else 0.0
-            before = abs(state.v[i, c] - carried) * model.units[c]
-            speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
-        work.speed[i], work.island_speed[i] = speed, speed
-        work.touched[i] = 0
-        for g in range(model.restitution.size):
-            finite = finite and not np.isnan(work.gap[i, g])
-    return finite
-
-
-@compiled
-def book_work(model, state, work, blocks, h):
-    """Book the work done in this step, by cause."""
-    k = model.dimension
-    for b in range(blocks):
-        if not takes_part(work, b):
-            continue
-        kind = work.origin[b, 0]
-        if work.block_rows[b] == 0:
-            if work.bilateral[b]:
-                continue
-            after = work.after[b, 0] - work.offset[b, 0]
-            state.sums[DISSIPATED] -= work.impulse[b, 0] * 0.5 * (work.before[b, 0] + after)
-            continue
-        f = work.origin[b, 2]
-        cause = model.pair_causes[f] if kind == PAIR_FRICTION else model.friction_causes[f]
-        for r in range(work.block_rows[b]):
-            slip = 0.5 * (work.before[b, r] + work.offset[b, r] + work.after[b, r])
-            state.sums[DISSIPATED + cause] -= work.impulse[b, r] * slip
-            state.sums[SUBSTRATE_WORK] -= work.impulse[b, r] * work.offset[b, r]
-    for i in range(model.bodies):
-        if not state.alive[i]:
-            continue
-        if not (work.awake[i] or work.evaluated[i]):
-            continue
-        for c in range(k):
-            mean = 0.5 * (state.v[i, c] + work.v_new[i, c])
-            state.sums[APPLIED_WORK] += mean * work.applied[i, c]
-            state.sums[NOISE_WORK] += mean * work.kick[i, c]
-        if not work.awake[i] and work.evaluated[i]:
-            for f in range(model.frictions):
-                for r in range(model.slip_start[f + 1] - model.slip_start[f]):
-                    drift = work.slip_offset[i, model.slip_start[f] + r]
-                    state.sums[SUBSTRATE_WORK] -= work.proof_friction[i, f, r] * drift
 
 
 @compiled
@@ -154,7 +75,6 @@ def solve(model, state, work, h, time, index, solved):
                 if contacts < 0:
                     return False, blocks
             blocks = assemble_blocks(model, state, work, h, contacts)
-            find_islands(model, work, blocks)
         solve_islands(model, state, work, blocks, h, solved > 0)
         store_all_impulses(model, state, work, blocks, h)
         if model.pair_kernel == 0 or not wake_neighbours(
@@ -162,7 +82,7 @@ def solve(model, state, work, h, time, index, solved):
         ):
             break
         unsettle(model, work)
-        start_bodies(model, state, work)
+        start_bodies(model, state, work, h)
         solved = ZERO
     work.list_status[2] = contacts
     return True, blocks
@@ -212,7 +132,7 @@ def attempt(model, state, work, h, time, index, any_awake):
     blocks = ZERO
     unsettle(model, work)
     for _ in range(FORCE_ROUNDS):
-        if not start_bodies(model, state, work):
+        if not start_bodies(model, state, work, h):
             return NOT_FINITE, blocks
         if not any_awake:
             break
@@ -236,12 +156,11 @@ def attempt(model, state, work, h, time, index, any_awake):
 def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
     """Book, record and make a step that was solved; return the number of events."""
     k, N = model.dimension, model.bodies
-    book_work(model, state, work, blocks, h)
+    observe(model, state, work, blocks, h, time)
     if any_awake:
-        count = record_contacts(model, state, work, log, blocks, h, time, count)
+        count = record_contacts(work, log, blocks, count)
         if model.pair_kernel != 0:
             count = list_contacts(model, state, work, log, h, time, count)
-    store_sticking(model, state, work, blocks)
     for i in range(N):
         work.rested[i] = state.rests[i]
     settle(model, state, work, h, index)

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.motion.engine.arrays import Work, declarations, initial_array
+from polycorner.motion.engine.allocation import initial_array
+from polycorner.motion.engine.arrays import Work, declarations
 from polycorner.motion.engine.codes import STOP
 from polycorner.motion.engine.sizes import Sizes
 

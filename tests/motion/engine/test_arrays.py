@@ -6,16 +6,14 @@ import pytest
 from polycorner import Manifold, Polyhedron
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.motion.contacts import velocities
+from polycorner.motion.engine.allocation import allocate, filled, restored
 from polycorner.motion.engine.arrays import (
     Log,
     Model,
     State,
     Work,
-    allocate,
     declarations,
-    filled,
     real,
-    restored,
     whole,
 )
 from polycorner.motion.engine.layout import model_of

@@ -4,12 +4,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+import sympy
 from scipy.spatial import cKDTree
 
+from polycorner import Friction, Manifold, Polyhedron, System, velocities
 from polycorner.bodies import Arrangement, HalfSpace, disc
+from polycorner.motion import ContactFamily, Disc, pair_coordinates
 from polycorner.motion.checkpoints import Checkpoint
 from polycorner.motion.engine.arrays import Work, declarations
-from polycorner.motion.engine.crowds import CROWD, TOLERATED
+from polycorner.motion.engine.compact import TOLERATED
+from polycorner.motion.engine.crowds import CROWD
 from polycorner.motion.engine.threads import OWN
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import simulate, start
@@ -48,14 +52,14 @@ def crowds(engine):
 
 
 def test_threads_share_no_array_in_which_something_is_in_the_making():
-    """Items write to rows of their bodies, blocks or contacts; all else is a thread's own or told.
+    """Items write to rows of their own; all else is a thread's own or told.
 
     Of the rows of bodies some hold the matrix of an island, and are a thread's own as well.
     """
-    rows = {"N", "N+1", "B", "C", "P"}
+    rows = {"N", "N+1", "B", "C", "P", "H"}
     whole = {name for name, d in declarations(Work).items() if d.shape.split()[0] not in rows}
     serial = {"list_status", "listed_travel", "near", "sort_keys", "strips", "strip_cursor"}
-    told = {"located", "remedy", "signals", "strip_start", "told", "told_times", "worst"}
+    told = {"finite", "located", "remedy", "signals", "strip_start", "told", "told_times", "worst"}
     assert whole - set(OWN) == serial | told
     assert {"members", "number", "place", "row_start"} <= set(OWN)
 
@@ -149,3 +153,47 @@ def test_discs_that_overlap_are_moved_apart_and_keep_their_velocities():
     apart = np.linalg.norm(np.diff(engine.motion.q[near, :2], axis=1)[:, 0], axis=1)
     assert 2.0 - apart.min() < 1.1 * TOLERATED * engine.model.gap_unit
     np.testing.assert_array_equal(engine.motion.v, velocity)
+
+
+def test_friction_of_two_rows_obeys_its_law_in_a_crowd():
+    """Discs pushed together on a table, on which each slides in any direction.
+
+    The friction of each is the point of its disc of forces that is nearest to ``p - rho u``, for
+    any ``rho > 0``, and the impulses are those by which velocities changed.
+    """
+    side, mu, weight = 24, 0.4, 10.0
+    M = Manifold.euclidean("x y")
+    (x1, y1), (x2, y2) = pair_coordinates(M)
+    table = System(
+        Polyhedron(M, {"wall": M.symbols[0]}),
+        sum(v**2 for v in velocities(M)) / 2,
+        0.0,
+        friction=[Friction("table", list(velocities(M)), Disc(mu), load=[weight])],
+        count=side**2,
+        between=ContactFamily({"discs": sympy.sqrt((x2 - x1) ** 2 + (y2 - y1) ** 2) - 2}, reach=2),
+    )
+    rows, columns = np.divmod(np.arange(side**2), side)
+    places = np.column_stack([50 + 2.0 * columns + rows % 2, 50 + np.sqrt(3) * rows])
+    pushed = -0.5 * (places - places.mean(axis=0)) / side
+    solver = Solver(tolerance=1e-4, crowd_sweeps=200)
+    engine = start(table, table.state(places, pushed), DT, solver=solver)
+    engine.advance(5)
+    (blocks,) = crowds(engine)
+    work, motion = engine.work, engine.motion
+    rubs = blocks[work.block_rows[blocks] == 2]
+    assert len(rubs) == side**2
+    p, u = work.impulse[rubs], motion.v[work.block_bodies[rubs, 0]]
+    nearest, limit = p - u, mu * weight * DT
+    far = np.linalg.norm(nearest, axis=1, keepdims=True)
+    nearest = np.where(far > limit, limit * nearest / far, nearest)
+    assert (far > limit).any()
+    assert abs(nearest - p).max() < 1e-3 * abs(pushed).max()
+    others = blocks[work.block_rows[blocks] == 0]
+    v = work.v_free.copy()
+    for b in others:
+        for i, row in zip(work.block_bodies[b], work.jacobian[b, 0].reshape(2, -1), strict=True):
+            v[i] += work.impulse[b, 0] * row
+    v[work.block_bodies[rubs, 0], :2] += p
+    moved = ~motion.rests.astype(bool)  # others have exactly the velocity of rest
+    assert moved.sum() > 50
+    np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-12)

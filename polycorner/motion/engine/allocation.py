@@ -1,0 +1,50 @@
+"""Allocation of the records of the engine, with arrays that begin with a cache line."""
+
+from collections.abc import Mapping
+from math import prod
+from typing import Any, TypeVar
+
+import numpy as np
+
+from polycorner.motion.engine.arrays import Declaration, Log, Model, State, Work, declarations
+from polycorner.motion.engine.sizes import Sizes
+
+LINE = 8  # numbers in a cache line, into which whole vectors fit
+
+Record = TypeVar("Record", Model, State, Work, Log)
+
+
+def allocate(record: type[Record], sizes: Sizes) -> Record:
+    """Return new arrays with their initial values."""
+    return record(
+        **{name: initial_array(declared, sizes) for name, declared in declarations(record).items()}
+    )
+
+
+def initial_array(declared: Declaration, sizes: Sizes) -> Any:
+    """Return a new array with its initial values; of zeros, memory is used as it is written."""
+    extents = declared.extents(sizes)
+    count = prod(extents)
+    room = np.zeros(count + LINE, dtype=declared.kind)
+    first = -room.ctypes.data // room.itemsize % LINE
+    array = room[first : first + count].reshape(extents)
+    if declared.initial != 0:
+        array.fill(declared.initial)
+    return array
+
+
+def filled(record: type[Record], sizes: Sizes, values: Mapping[str, Any]) -> Record:
+    """Return a record of given values, brought to their declared types and shapes."""
+    arrays: dict[str, Any] = {}
+    for name, declared in declarations(record).items():
+        array = np.array(values[name], dtype=declared.kind).reshape(declared.extents(sizes))
+        arrays[name] = array if declared.shape else array.item()
+    return record(**arrays)
+
+
+def restored(record: type[Record], sizes: Sizes, saved: Mapping[str, Any]) -> Record:
+    """Return new arrays with saved ones at their beginning: there may be more room than before."""
+    arrays = allocate(record, sizes)
+    for name, array in arrays._asdict().items():
+        array[: len(saved[name])] = saved[name]
+    return arrays

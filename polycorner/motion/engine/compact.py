@@ -1,0 +1,306 @@
+"""Contacts of a crowd in a compact form, in which sweeps read little memory.
+
+The velocity of a body is ``v_free + U w``, with the root ``U`` of its inverse mass matrix,
+``M^-1 = U U'``.  In the coordinates ``w`` masses are one, and a row ``J U`` is its own response to
+an impulse.  A unilateral contact and the friction that it presses on, which is the next block, are
+one compact contact; any other block is one alone.
+"""
+
+import numpy as np
+
+from polycorner.motion.engine.codes import WATCHED
+from polycorner.motion.engine.gauss_seidel import EXACT
+from polycorner.motion.engine.jit import ONE, TWO, ZERO, compiled
+from polycorner.motion.engine.linear_algebra import factorise
+from polycorner.motion.engine.rows import (
+    add_row,
+    add_two_rows,
+    load_on,
+    row_at,
+    row_times,
+    rows_product,
+)
+from polycorner.motion.engine.sets import INTERVAL, contains, project
+from polycorner.motion.engine.sizes import WIDTH
+from polycorner.motion.engine.vectors import entry, load, store, total, zeros
+
+TOLERATED = 1e-3  # scaled overlap that is left as it is
+SEPARATED = 0.2  # share of what is too much that one contact takes away
+
+# Numbers of a compact contact: velocities of its rows at w = 0, reciprocals of the squares of its
+# rows, the product of its rows, its impulses, and the overlap that is too much.
+NORMAL, NORMAL_RHO, SLIP, SLIP_RHO, COUPLING, PRESSES, RUBS, EXCESS = range(8)
+# Further ones where friction has two rows: of the second, W as in `Work.delassus`, and its impulse.
+ACROSS, W00, W01, W11, RUBS_ACROSS = range(5)
+# Its whole numbers: bodies, the first of its blocks, what it is.  The last one consists of bits and
+# of the number of its set of friction.
+FIRST, SECOND, BLOCK, FORM = range(4)
+HAS_GAP, HAS_FRICTION, BILATERAL, TWO_ROWS, SET_BITS = 1, 2, 4, 8, 4
+
+
+@compiled
+def is_pressed_by_former(work, b):
+    """Return whether a block is friction on which the block before it presses."""
+    return work.block_rows[b] > 0 and work.pressing[b] == b - 1 and b > 0
+
+
+@compiled
+def begin_compact(model, work, i):
+    """Start a body of a crowd at its velocity after forces alone."""
+    k, K, root = model.dimension, model.lanes, work.mass_root[i]
+    for c in range(K):
+        work.unit_velocity[i, c] = work.unit_shift[i, c] = 0.0
+    if model.constant_mass and root[0, 0] > 0.0:
+        return
+    for a in range(k):
+        for c in range(k):
+            root[a, c] = work.inverse_mass[i, a, c] if c <= a else 0.0
+    if not factorise(root, k):
+        root[0, 0] = np.nan
+
+
+@compiled
+def end_compact(model, work, i):
+    """Set the velocity of a body of a crowd, and its change of place."""
+    K, at = model.lanes, i * model.lanes
+    for a in range(model.dimension):
+        velocity, shift = zeros(), zeros()
+        for c in range(0, K, WIDTH):
+            root = load(work.mass_root, (i * model.dimension + a) * K + c)
+            velocity = velocity + root * load(work.unit_velocity, at + c)
+            shift = shift + root * load(work.unit_shift, at + c)
+        work.v_new[i, a] = work.v_free[i, a] + total(velocity)
+        work.shift[i, a] = total(shift)
+
+
+@compiled
+def compact_row(model, work, b, row, r, target, to):
+    """Write a row of a block, times ``U``, to a place for compact contact ``r``."""
+    k, K, at = model.dimension, model.lanes, row_at(model, b, row)
+    exchanged = work.block_bodies[b, 0] != work.compact[r, FIRST]
+    for side in range(2):
+        i = work.compact[r, side]
+        begin = at + (K if (side == 1) != exchanged else 0)
+        for c in range(0, K, WIDTH):
+            value = zeros()
+            if i >= 0 and work.awake[i]:
+                for a in range(k):
+                    root = load(work.mass_root, (i * k + a) * K + c)
+                    value = value + entry(work.jacobian, begin + a) * root
+            store(target, to + side * K + c, value)
+
+
+@compiled
+def places(model, r):
+    """Return where the rows of a compact contact stand: normal, slip, slip across."""
+    return 4 * r * model.lanes, (4 * r + 2) * model.lanes, 2 * r * model.lanes
+
+
+@compiled
+def reciprocal(square):
+    """Return the reciprocal of a square, and one of nothing."""
+    return 1.0 / square if square > 0.0 else 1.0
+
+
+@compiled
+def friction_of(contact):
+    """Return the block of the friction of a compact contact, which has some."""
+    return contact[BLOCK] + (ONE if contact[FORM] & HAS_GAP else ZERO)
+
+
+@compiled
+def compact_contact(model, work, r, b, pressed):
+    """Write a block, and the friction that follows if it is ``pressed``; return their speed."""
+    contact, numbers, rows = work.compact[r], work.compact_numbers[r], work.compact_rows
+    contact[FIRST], contact[SECOND] = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    contact[BLOCK], contact[FORM], numbers[EXCESS] = b, ZERO, 0.0
+    at, _, _ = places(model, r)
+    speed = 0.0
+    if work.block_rows[b] == 0:
+        contact[FORM] = HAS_GAP
+        compact_row(model, work, b, ZERO, r, rows, at)
+        numbers[NORMAL], numbers[PRESSES] = work.free[b, 0] + work.offset[b, 0], work.impulse[b, 0]
+        numbers[NORMAL_RHO] = reciprocal(rows_product(model, rows, at, rows, at, TWO))
+        speed = abs(numbers[NORMAL])
+        if work.bilateral[b]:
+            contact[FORM] |= BILATERAL
+        else:
+            numbers[EXCESS] = -gap_of(work, b) - TOLERATED * model.gap_unit
+    if pressed or work.block_rows[b] > 0:
+        contact[FORM] |= HAS_FRICTION
+        speed = max(speed, compact_friction(model, work, r, friction_of(contact)))
+    return speed
+
+
+@compiled
+def gap_of(work, b):
+    """Return the gap of a unilateral block."""
+    if work.block_bodies[b, 1] < 0:
+        return work.gap[work.block_bodies[b, 0], work.origin[b, 2]]
+    return work.contact_gap[work.origin[b, 1]]
+
+
+@compiled
+def compact_friction(model, work, r, f):
+    """Write the friction of a compact contact; return the largest velocity of its rows."""
+    contact, numbers, rows = work.compact[r], work.compact_numbers[r], work.compact_rows
+    at, along, across = places(model, r)
+    compact_row(model, work, f, ZERO, r, rows, along)
+    square = top = rows_product(model, rows, along, rows, along, TWO)
+    numbers[SLIP], numbers[RUBS] = work.free[f, 0] + work.offset[f, 0], work.impulse[f, 0]
+    numbers[COUPLING], speed = 0.0, abs(numbers[SLIP])
+    if contact[FORM] & HAS_GAP:
+        numbers[COUPLING] = rows_product(model, rows, at, rows, along, TWO)
+    contact[FORM] |= work.block_set[f] << SET_BITS
+    if work.block_rows[f] == 2:
+        more, others = work.compact_across[r], work.compact_across_rows
+        compact_row(model, work, f, ONE, r, others, across)
+        other = rows_product(model, others, across, others, across, TWO)
+        more[ACROSS], more[RUBS_ACROSS] = work.free[f, 1] + work.offset[f, 1], work.impulse[f, 1]
+        if other > 0.0 or more[ACROSS] != 0.0:  # bodies in a plane slip along one row only
+            contact[FORM] |= TWO_ROWS
+            more[W00], more[W11] = square, other
+            more[W01] = rows_product(model, rows, along, others, across, TWO)
+            top = 0.5 * (square + other) + np.sqrt((0.5 * (square - other)) ** 2 + more[W01] ** 2)
+            speed = max(speed, abs(more[ACROSS]))
+    numbers[SLIP_RHO] = reciprocal(top)
+    return speed
+
+
+@compiled
+def press_contact(model, work, r):
+    """Apply the impulses of a compact contact, from which a step starts."""
+    form, numbers, w = work.compact[r, FORM], work.compact_numbers[r], work.unit_velocity
+    i, j, rows = work.compact[r, FIRST], work.compact[r, SECOND], work.compact_rows
+    at, along, across = places(model, r)
+    if form & HAS_GAP:
+        add_row(model, rows, at, numbers[PRESSES], w, i, j)
+    if form & HAS_FRICTION:
+        add_row(model, rows, along, numbers[RUBS], w, i, j)
+    if form & TWO_ROWS:
+        q = work.compact_across[r, RUBS_ACROSS]
+        add_row(model, work.compact_across_rows, across, q, w, i, j)
+
+
+@compiled
+def relax_contact(model, work, r):
+    """Solve the contact with all others fixed, then its friction."""
+    contact, numbers = work.compact[r], work.compact_numbers[r]
+    rows, w = work.compact_rows, work.unit_velocity
+    i, j, form = contact[FIRST], contact[SECOND], contact[FORM]
+    at, along, _ = places(model, r)
+    more = support = 0.0
+    if form & HAS_GAP:
+        p = numbers[PRESSES]
+        u = numbers[NORMAL] + row_times(model, rows, at, w, i, j)
+        new = p - u * numbers[NORMAL_RHO]
+        if not form & BILATERAL:
+            new = max(new, 0.0)
+        numbers[PRESSES], more, support = new, new - p, abs(new)
+        if work.told[WATCHED]:
+            work.impulse[contact[BLOCK], 0] = new
+    if not form & HAS_FRICTION:
+        add_row(model, rows, at, more, w, i, j)
+        return
+    slip = numbers[SLIP] + row_times(model, rows, along, w, i, j) + numbers[COUPLING] * more
+    if not form & HAS_GAP:
+        support = load_on(work, contact[BLOCK])
+    if form & TWO_ROWS:
+        if form & HAS_GAP:
+            add_row(model, rows, at, more, w, i, j)
+        slide_across(model, work, r, support, slip)
+        return
+    q = numbers[RUBS]
+    numbers[RUBS] = nearest(model, work, form >> SET_BITS, q - slip * numbers[SLIP_RHO], support)
+    if form & HAS_GAP:
+        add_two_rows(model, rows, at, more, along, numbers[RUBS] - q, w, i, j)
+    else:
+        add_row(model, rows, along, numbers[RUBS] - q, w, i, j)
+
+
+@compiled
+def nearest(model, work, shape, x, support):
+    """Return the admissible friction along one direction that is nearest to ``x``."""
+    if model.set_kinds[shape] == INTERVAL:
+        a, b = model.set_sizes[shape, 0], model.set_sizes[shape, 1]
+        return min(max(x, a * support), b * support) if support > 0.0 else 0.0
+    project(model, shape, x, 0.0, support, work.image)
+    return work.image[0]
+
+
+@compiled
+def slide_across(model, work, r, support, slip):
+    """Solve friction of two rows, from the slip along the first one."""
+    contact, numbers, more = work.compact[r], work.compact_numbers[r], work.compact_across[r]
+    i, j, shape, w, out = (
+        contact[FIRST],
+        contact[SECOND],
+        contact[FORM] >> SET_BITS,
+        work.unit_velocity,
+        work.image,
+    )
+    _, along, across = places(model, r)
+    # The normal impulse has been applied already.
+    other = more[ACROSS] + row_times(model, work.compact_across_rows, across, w, i, j)
+    x, y, rho = numbers[RUBS], more[RUBS_ACROSS], numbers[SLIP_RHO]
+    project(model, shape, x - slip * rho, y - other * rho, support, out)
+    d00, d01, d11 = more[W00], more[W01], more[W11]
+    determinant = d00 * d11 - d01 * d01
+    if support > 0.0 and determinant > EXACT * d00 * d11:
+        sx = x - (d11 * slip - d01 * other) / determinant
+        sy = y - (d00 * other - d01 * slip) / determinant
+        if contains(model, shape, sx, sy, support, 0.0):
+            out[0], out[1] = sx, sy
+    add_row(model, work.compact_rows, along, out[0] - x, w, i, j)
+    add_row(model, work.compact_across_rows, across, out[1] - y, w, i, j)
+    numbers[RUBS], more[RUBS_ACROSS] = out[0], out[1]
+
+
+@compiled
+def judge_contact(model, work, r):
+    """Leave the impulses and the velocities of the rows in the blocks; return the residual."""
+    contact, numbers, rows = work.compact[r], work.compact_numbers[r], work.compact_rows
+    i, j, form, w = contact[FIRST], contact[SECOND], contact[FORM], work.unit_velocity
+    at, along, across = places(model, r)
+    worst = support = 0.0
+    if form & HAS_GAP:
+        b, p, rho = contact[BLOCK], numbers[PRESSES], numbers[NORMAL_RHO]
+        u, support = numbers[NORMAL] + row_times(model, rows, at, w, i, j), abs(p)
+        work.after[b, 0], work.impulse[b, 0] = u, p
+        worst = abs(u) if form & BILATERAL else abs(max(0.0, p - u * rho) - p) / rho
+    if form & HAS_FRICTION:
+        f, q, rho = friction_of(contact), numbers[RUBS], numbers[SLIP_RHO]
+        if not form & HAS_GAP:
+            support = load_on(work, f)
+        u = numbers[SLIP] + row_times(model, rows, along, w, i, j)
+        work.after[f, 0], work.impulse[f, 0] = u, q
+        if form & TWO_ROWS:
+            y, out = work.compact_across[r, RUBS_ACROSS], work.image
+            row = row_times(model, work.compact_across_rows, across, w, i, j)
+            other = work.compact_across[r, ACROSS] + row
+            work.after[f, 1], work.impulse[f, 1] = other, y
+            project(model, form >> SET_BITS, q - u * rho, y - other * rho, support, out)
+            worst = max(worst, abs(out[0] - q) / rho, abs(out[1] - y) / rho)
+        else:
+            work.after[f, 1] = 0.0
+            x = nearest(model, work, form >> SET_BITS, q - u * rho, support)
+            worst = max(worst, abs(x - q) / rho)
+    return worst if worst < np.inf else np.inf
+
+
+@compiled
+def separate_contact(model, work, r):
+    """Move bodies apart that overlap, by a share of what is too much.
+
+    The changes of place, in ``work.unit_shift``, are as impulses would make them, but leave
+    velocities as they are.
+    """
+    excess = work.compact_numbers[r, EXCESS]
+    if excess <= 0.0:
+        return
+    at, _, _ = places(model, r)
+    i, j, shift = work.compact[r, FIRST], work.compact[r, SECOND], work.unit_shift
+    excess -= row_times(model, work.compact_rows, at, shift, i, j)
+    if excess > 0.0:
+        p = SEPARATED * excess * work.compact_numbers[r, NORMAL_RHO]
+        add_row(model, work.compact_rows, at, p, shift, i, j)
