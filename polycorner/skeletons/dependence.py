@@ -5,16 +5,19 @@ vector of the smallest singular value.  The rows are dependent where ``A' u = 0`
 derivative of ``A' u`` along the null directions of ``A`` is the form ``B = sum u_i H_i``.  Where
 ``B`` has one null direction on these, ``f`` and the components of ``A' u`` along the other ones,
 the *flaps*, vanish together on a curve in this direction, and one of the ``f`` follows from the
-other functions, whose gradients are independent ([Gov] sec. 4.1).
+other functions, whose gradients are independent ([Gov] sec. 4.1).  Where several relations persist
+along a curve, all but one of them are lost with as many functions, which follow from those that are
+left: walks watch that they stay zero.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations, islice
 
 import numpy as np
 
 from polycorner.formulas.bundles import Bundle
-from polycorner.polyhedra.cones import Rows, null_space, unit_rows
+from polycorner.polyhedra.cones import Rows, null_space, rank, unit_rows
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
@@ -23,6 +26,8 @@ from polycorner.spaces.manifold import Array
 
 # Largest eigenvalue of the form that counts as zero, relative to the next.
 FLAT = 1e-3
+# Most sets of functions with one relation that are tried.
+MAX_SETS = 100
 # Length in scale units after which a walk takes its flaps anew: they turn with the curve.
 SEGMENT = 0.3
 
@@ -111,7 +116,7 @@ def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Arr
 def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoint, Array] | None:
     """Return a point as one of a curve of dependent gradients, and the scaled unit tangent there.
 
-    None if the gradients have no relation or several, or do not leave one null direction.
+    None if the gradients have no relation, or do not leave one null direction.
 
     Parameters
     ----------
@@ -124,19 +129,30 @@ def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoi
     if not point.sizes[quotient.held(rows)].all():
         return None  # a relation of one gradient: there is no curve that it follows
     frame = null_space(point.matrix([]), RANK_TOLERANCE)
-    held = Rows(unit_rows(point.gradients[rows]) @ frame, RANK_TOLERANCE)
-    if held.relations.shape[1] != 1:
-        return None
-    form = curvature(point, rows, held.relations[:, 0], held.null_space)
-    values, axes = np.linalg.eigh(form)
-    order = np.argsort(abs(values))
-    if len(values) < 2 or not abs(values[order[0]]) < FLAT * abs(values[order[1]]):
-        return None
-    ways = (frame @ held.null_space @ axes[:, order]).T
-    curve = DependentSet(point, quotient.held(rows), ways[1:])
-    extra = range(len(point.values), len(point.values) + len(ways) - 1)
-    along = replace(quotient, polyhedron=curve, equations=(*quotient.equations, *extra))
-    return HeldPoint(along, point.q, point.basis(active)), ways[0]
+    slopes = unit_rows(point.gradients[rows]) @ frame
+    for some in islice(_with_one_relation(slopes), MAX_SETS):
+        related, held = [rows[i] for i in some], Rows(slopes[some], RANK_TOLERANCE)
+        form = curvature(point, related, held.relations[:, 0], held.null_space)
+        values, axes = np.linalg.eigh(form)
+        order = np.argsort(abs(values))
+        if len(values) < 2 or not abs(values[order[0]]) < FLAT * abs(values[order[1]]):
+            continue
+        ways = (frame @ held.null_space @ axes[:, order]).T
+        curve = DependentSet(point, quotient.held(related), ways[1:])
+        extra = range(len(point.values), len(point.values) + len(ways) - 1)
+        along = replace(quotient, polyhedron=curve, equations=(*quotient.equations, *extra))
+        return HeldPoint(along, point.q, point.basis(active)), ways[0]
+    return None
+
+
+def _with_one_relation(slopes: Array) -> Iterator[list[int]]:
+    """Yield the largest sets of rows that have one relation."""
+    relations = Rows(slopes, RANK_TOLERANCE).relations
+    more = relations.shape[1] - 1
+    related = np.flatnonzero(abs(relations).max(axis=1, initial=0.0) > RANK_TOLERANCE)
+    for lost in combinations(related.tolist(), max(more, 0)):
+        if more >= 0 and (more == 0 or rank(relations[list(lost)], RANK_TOLERANCE) == more):
+            yield [i for i in range(len(slopes)) if i not in lost]
 
 
 def held_at(outer: Quotient, q: Array, active: frozenset[int], kept: Sequence[int]) -> HeldPoint:

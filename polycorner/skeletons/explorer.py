@@ -13,11 +13,12 @@ from polycorner.lookahead import Lookahead
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.curves import Curve
 from polycorner.skeletons.flags import Crossing, Flag
-from polycorner.skeletons.links import Link, singular_figure
+from polycorner.skeletons.links import singular_figure
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
 from polycorner.skeletons.singularities import singular_point, singular_points
+from polycorner.skeletons.spheres_about import Link
 from polycorner.skeletons.states import Budget, SearchState, copied
 from polycorner.skeletons.tracing import FIGURE
 from polycorner.skeletons.vertex_figures import Ray, faces_beside

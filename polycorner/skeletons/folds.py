@@ -25,9 +25,9 @@ along ``w . y = 0`` ([AGV] sec. 1).  Where every ``S_kk`` is at least zero, for 
 
 Equality is decided to second order.  A dependent edge that would be none to third order is none if
 the sum stays positive there, and noted otherwise.  With two flaps, opening a function of positive
-weight leaves a face around the corner, and with more a larger one.  So a corner with several flaps
-is an end of dependent edges only.  Clusters of spheres that are rigid to second order only are of
-these kinds, and circles that touch.
+weight leaves a face around the corner, and with more a larger one; and so does opening one with
+``S_kk < 0``, on a cone.  So a corner with several flaps is an end of dependent edges only.
+Clusters of spheres that are rigid to second order only are of these kinds, and circles that touch.
 """
 
 from collections.abc import Iterator
@@ -59,7 +59,11 @@ Ends = tuple[Opening, int]
 
 
 def fold_figure(
-    point: EvaluatedPoint, active: frozenset[int], rank: int, full: int
+    point: EvaluatedPoint,
+    active: frozenset[int],
+    rank: int,
+    full: int,
+    distances: tuple[float, ...] = DISTANCES,
 ) -> VertexFigure | None:
     """Return the rays and sectors at a fold; None where the corner is none, or not clearly.
 
@@ -71,41 +75,28 @@ def fold_figure(
         Functions that vanish there.
     rank, full : int
         Rank of their gradients in the quotient, and its dimension.
+    distances : tuple of float
+        Distances in scale units at which the edges are looked for.
     """
     if point.quotient.polyhedron.is_union or len(active) != rank + 1 or rank == full:
         return None
     fold = _Fold(point, sorted(active))
     if not fold.is_definite:
         return None
-    for distance in DISTANCES:
+    for distance in distances:
         rays = fold.rays(distance)
         if rays is not None:
             return VertexFigure(rank, full, *fold.figure(rays, distance))
     return None
 
 
-def dependent_rays(point: EvaluatedPoint, active: frozenset[int]) -> Iterator[Ray]:
-    """Yield the rays of dependent edges on which two functions open, where there are no flaps.
-
-    The gradients have full rank and one relation, and ``sum w_i y_i = sum S_kl y_k y_l``.  Edges on
-    which one function of weight zero opens leave along extreme rays of the tangent cone; these do
-    not.
-    """
-    for sign in (1.0, -1.0):
-        fold = _Fold(point, sorted(active), sign)
-        for pair in fold.pairs:
-            ray = fold.dependent_ray(pair, DISTANCES[0])[0]
-            if ray is not None:
-                yield ray
-
-
 class _Fold:
     """The weights of a relation, flaps and the form ``S``; functions by position in ``rows``.
 
-    The sign is such that the form is positive on the flaps; where there are none, it is given.
+    The sign is such that the form is positive on the flaps.
     """
 
-    def __init__(self, point: EvaluatedPoint, rows: list[int], sign: float = 1.0) -> None:
+    def __init__(self, point: EvaluatedPoint, rows: list[int]) -> None:
         self.point, self.rows = point, rows
         self.scales = point.quotient.polyhedron.manifold.scale_array
         frame = null_space(point.matrix([]), RANK_TOLERANCE)
@@ -114,9 +105,10 @@ class _Fold:
         weights = np.where(abs(weights) > RANK_TOLERANCE, weights, 0.0)
         self.free = np.flatnonzero(weights == 0).tolist()
         self.flaps = (frame @ held.null_space).T
+        self.openings = np.array([frame @ held.opening(k) for k in self.free])
         ways = np.array([*held.null_space.T, *map(held.opening, self.free)])
         self.form = curvature(point, rows, weights, ways.reshape(-1, frame.shape[1]).T)
-        sign = np.sign(self.form[0, 0]) if len(self.flaps) else sign
+        sign = np.sign(self.form[0, 0])
         self.weights, self.form = weights * sign, self.form * sign
         self.positive = np.flatnonzero(self.weights > 0).tolist()
 
@@ -129,17 +121,17 @@ class _Fold:
 
     @property
     def is_definite(self) -> bool:
-        """Whether ``Q`` is positive on the flaps, and no ``S_kk`` is negative."""
+        """Whether ``Q`` is positive on the flaps, and no ``S_kk`` negative if there is one flap."""
         f = len(self.flaps)
         values = np.linalg.eigvalsh(self.form[:f, :f])
         clear = values[0] > max(RANK_TOLERANCE, CLEAR * values[-1])
-        return bool(clear and (np.diagonal(self.cross) >= -RANK_TOLERANCE).all())
+        return bool(clear and (f > 1 or (np.diagonal(self.cross) >= -RANK_TOLERANCE).all()))
 
     @cached_property
     def dependent(self) -> list[Opening]:
         """What opens along dependent edges."""
         own = np.diagonal(self.cross)
-        single = [(k,) for k, s in zip(self.free, own, strict=True) if s <= RANK_TOLERANCE]
+        single = [(k,) for k, s in zip(self.free, own, strict=True) if abs(s) <= RANK_TOLERANCE]
         return [*single, *self.pairs]
 
     @property
@@ -170,7 +162,7 @@ class _Fold:
                     return None
                 found[(k,), side] = ray
         for opening in tuple(self.dependent):
-            ray, rest = self.dependent_ray(opening, distance)
+            ray, rest = self._dependent_ray(opening, distance)
             if ray is not None:
                 found[opening, 0] = ray
             elif rest > PERSISTS:
@@ -191,7 +183,7 @@ class _Fold:
             return None
         return Ray(way, held, Sample.of(sample), distance)
 
-    def dependent_ray(self, opening: Opening, distance: float) -> tuple[Ray | None, float]:
+    def _dependent_ray(self, opening: Opening, distance: float) -> tuple[Ray | None, float]:
         """Return the ray of a dependent edge, or None, and what the weighted sum is along it."""
         point, held = self.point, self._without(opening)
         found = dependent_at(point, held)
@@ -225,7 +217,8 @@ class _Fold:
             if all(end in place for end in ends)
         ]
         if len(self.flaps) == 2:
-            sectors += [self._around(k, distance) for k in self.positive]
+            sectors += [self._around(k, self.flaps[0], distance) for k in self.positive]
+            sectors += [self._around(k, way, distance) for k, way in self._cones()]
         if len(self.flaps) == 1:
             sectors += [Sector((), self._ordered(pair)) for pair in self.thin]
         return tuple(rays.values()), tuple(sectors), tuple(self._notes(rays))
@@ -250,10 +243,20 @@ class _Fold:
             elif mixed < -RANK_TOLERANCE and single:
                 yield from (ends,) * (1 + straight[1])
 
-    def _around(self, k: int, distance: float) -> Sector:
-        """Return a face around the corner."""
+    def _cones(self) -> Iterator[tuple[int, Array]]:
+        """Yield functions with ``S_kk < 0``, which open on a cone, and a direction on it."""
+        f = len(self.flaps)
+        for i, k in enumerate(self.free):
+            if self.cross[i, i] < -RANK_TOLERANCE:
+                t = -np.linalg.solve(self.form[:f, :f], self.form[:f, f + i])
+                t[0] += np.sqrt(-self.cross[i, i] / self.form[0, 0])
+                way = self.openings[i] + t @ self.flaps
+                yield k, way / np.linalg.norm(way)
+
+    def _around(self, k: int, way: Array, distance: float) -> Sector:
+        """Return a face around the corner, which goes on in a direction."""
         held = self._ordered((k,))
-        q = self.point.q + distance * self.scales * self.flaps[0]
+        q = self.point.q + distance * self.scales * way
         there = projected(self.point.quotient, q, held, distance / 2)
         return Sector((), held, None if there is None else Sample.of(there))
 

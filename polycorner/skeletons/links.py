@@ -5,7 +5,8 @@ small enough ([Mil] sec. 2): the corners of the link are the edges at the point,
 two-dimensional faces there, and a closed edge without a corner is a face around an apex.
 The link is a polyhedron of one dimension less, so its own skeleton is searched for; two radii must
 agree.  This holds whatever the order of contact: for crossings, cusps and apexes alike.
-At folds the link is known from first and second derivatives and not searched.
+At folds the link is known from first and second derivatives and not searched, and where there are
+several relations its corners are.
 """
 
 from collections import Counter
@@ -14,78 +15,25 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 
-from polycorner.formulas.bundles import Bundle
 from polycorner.polyhedra.cones import null_space, unit_rows
-from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.points import EvaluatedPoint, Quotient, Sample, projected
+from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.tracing import EdgeTracer
 from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure, singular_rays
 from polycorner.skeletons.walks import End
-from polycorner.spaces.manifold import Array, Manifold
+from polycorner.spaces.manifold import Array
 
 # Radii in scale units, of which two in succession must agree.
 RADII = (1e-2, 3e-3, 3e-4, 3e-5)
-# Length of walks in a link, in radii.
-EXTENT = 30.0
 # Random points of a link of a curve or a surface, and sets of functions to hold there.
 POINTS = 16
 MAX_SETS = 40
 HALVINGS = 40  # of Newton steps towards them
-# Largest dimension of a quotient in which links are sampled.
-SAMPLED = 3
 
 Search = Callable[[Quotient, Sequence[Array]], EdgeTracer]
-
-
-class _Sliced(Bundle):
-    """A bundle's functions, and those that vanish on a slice across an orbit and on a sphere."""
-
-    def __init__(self, ambient: Bundle, centre: Array, scales: Array, across: Array) -> None:
-        self.ambient, self.centre, self.scales, self.across = ambient, centre, scales, across
-
-    def evaluate(self, q: Array, order: int) -> tuple[Array, ...]:
-        """Return values and derivatives at one point ``(n,)``."""
-        u, n = (q - self.centre) / self.scales, len(q)
-        values = np.append(self.across @ u, (u @ u - 1) / 2)
-        slopes = np.vstack([self.across, u]) / self.scales
-        bends = np.zeros((len(values), n, n))
-        bends[-1] = np.diag(self.scales**-2)
-        found = self.ambient.evaluate(q, order)
-        return tuple(
-            np.concatenate([part, more])
-            for part, more in zip(found, (values, slopes, bends), strict=False)
-        )
-
-
-class Link(Polyhedron):
-    """A polyhedron's intersection with a sphere about a point, orthogonal to the orbit there.
-
-    Its scales are the radius, so that walks and tolerances shrink with it.
-    """
-
-    def __init__(self, point: EvaluatedPoint, radius: float) -> None:
-        base = point.quotient.polyhedron
-        self.__setstate__(base.__getstate__())
-        manifold = base.manifold
-        scales = radius * manifold.scale_array
-        self.manifold = Manifold(manifold.names, scales=tuple(scales.tolist()))
-        across = unit_rows(point.orbit)
-        extra = [f"slice {k}" for k in range(len(across))]
-        self.equation_names = (*base.equation_names, *extra, "sphere")
-        self._sliced = _Sliced(base.bundle, point.q, scales, across)
-
-    @property
-    def is_large(self) -> bool:
-        """Whether its faces are too many to cross: those of the corner suffice."""
-        return len(self.manifold.names) - len(self.equation_names) >= SAMPLED
-
-    @property
-    def bundle(self) -> Bundle:
-        """Inequalities first, equations after them, the sphere's last."""
-        return self._sliced
 
 
 def singular_figure(
@@ -106,7 +54,7 @@ def singular_figure(
     """
     frame = null_space(point.matrix([]), RANK_TOLERANCE)
     full = int(frame.shape[1])
-    folded = fold_figure(point, active, rank, full)
+    folded = fold_figure(point, active, rank, full) or branched_figure(point, active, rank, full)
     if folded is not None:
         return folded
     before = None
@@ -143,11 +91,7 @@ def _link(
     notes: list[str],
 ) -> tuple[tuple[Ray, ...], tuple[Sector, ...]]:
     """Return rays and sectors from the link of one radius."""
-    quotient = point.quotient
-    sphere = Link(point, radius)
-    extra = range(len(point.values), quotient.count + len(sphere.equation_names))
-    equations = (*quotient.equations, *extra)
-    link = Quotient(sphere, Symmetry(), quotient.tolerance, EXTENT, equations)
+    quotient, link = point.quotient, link_about(point, radius)
     found = search(link, list(_starts(point, link, active, frame, radius, notes)))
     names = ", ".join(quotient.polyhedron.names[i] for i in sorted(active))
     if found.registry.lost:

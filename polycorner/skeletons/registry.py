@@ -6,12 +6,12 @@ the relabellings that leave the corner in record stands for all of them.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, renamed
-from polycorner.skeletons.folds import dependent_rays
+from polycorner.skeletons.branched_corners import with_dependent_rays
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.singularities import SingularPoint, refined
 from polycorner.skeletons.vertex_figures import VertexFigure, corner_rank, vertex_figure
@@ -130,7 +130,7 @@ class CornerRegistry:
     def _polished(self, point: EvaluatedPoint, active: frozenset[int]) -> EvaluatedPoint:
         basis = point.basis(active)
         if len(basis) + len(point.matrix([])) < len(point.q):
-            return refined(point, active, NEAR)
+            return self._refined(point, active)
         exact = projected(self.quotient, point.q, basis, NEAR)
         if exact is None:
             return point
@@ -148,6 +148,20 @@ class CornerRegistry:
                 f"{abs(gaps[i]):.1g} scale units away: not counted as active"
             )
         return exact
+
+    def _refined(self, point: EvaluatedPoint, active: frozenset[int]) -> EvaluatedPoint:
+        """Return a singular corner to rounding, with what vanishes there as well if it is near.
+
+        Functions that close with slope zero vanish to the square root of the tolerance only.
+        """
+        found = refined(point, active, NEAR)
+        away = abs(found.distances[: self.quotient.count])
+        near = frozenset(np.flatnonzero(away < SAME).tolist()) - active
+        if near and not self.polyhedron.is_union:
+            whole = refined(found, active | near, math.sqrt(SAME))
+            if abs(whole.distances[sorted(active | near)]).max() < SLACK:
+                return whole
+        return found
 
     def _key(self, q: Array) -> Array:
         key = self.symmetry.key
@@ -171,9 +185,9 @@ class CornerRegistry:
         rank, full = corner_rank(point, active)
         if rank == full:
             found = vertex_figure(point, active)
-            if len(active) != full + 1 or self.polyhedron.is_union:
+            if len(active) == full or self.polyhedron.is_union:
                 return found
-            return replace(found, rays=(*found.rays, *dependent_rays(point, active)))
+            return with_dependent_rays(found, point, active)
         point = SingularPoint(self.quotient, point.q, sorted(active))
         return self.singular_figure(point, active, corner_rank(point, active)[0])
 

@@ -122,11 +122,11 @@ def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure
     notes: list[str] = []
     rays: list[Ray] = []
     for y, tight in _regular(point, rows, slopes):
-        known = len(rays)
+        known, way = len(rays), frame @ y
         for base in _bases(rows, slopes, tight):
-            covered = [x for x in rays if x.direction @ (frame @ y) > 1 - FLAT]
+            covered = [x for x in rays if x.direction @ way > 1 - FLAT]
             if not any(x.active >= base for x in covered):
-                ray = _tested(point, active, frame @ y, base)
+                ray = _tested(point, active, way, base)
                 if ray is not None and all(x.active != ray.active for x in covered):
                     rays.append(ray)
         if len(rows) == full and len(rays) == known:
@@ -298,21 +298,47 @@ def _tested(
     return None
 
 
+class _Ranks:
+    """Ranks of sets of rows, by duality from their relations, which are few.
+
+    Of ``m`` rows of rank ``r``, a set ``S`` has rank ``|S| - (m - r) + rank R``, where ``R`` holds
+    the weights of the rows outside ``S`` in the relations: those of ``S`` have no such weights.
+    """
+
+    def __init__(self, slopes: Array) -> None:
+        self.count = len(slopes)
+        self.relations = Rows(slopes, RANK_TOLERANCE).relations
+        self._lost: dict[frozenset[int], int] = {}
+
+    def of(self, some: frozenset[int]) -> int:
+        """Return the rank of a set of rows."""
+        related = int(self.relations.shape[1])
+        if not related:
+            return len(some)
+        others = frozenset(range(self.count)).difference(some)
+        if others not in self._lost:
+            weights = np.linalg.svd(self.relations[sorted(others)], compute_uv=False)
+            self._lost[others] = int((weights > RANK_TOLERANCE).sum())
+        return len(some) - related + self._lost[others]
+
+
 def _sectors(
     point: EvaluatedPoint, rows: list[int], slopes: Array, rays: list[Array]
 ) -> tuple[Sector, ...]:
     """Return the sectors between rays that lie in a common two-dimensional flat."""
+    if not rays:
+        return ()
     n = slopes.shape[1]
-    # Subsets of independent rows are independent: no rank is needed for the many pairs of rays.
-    independent = rank(slopes, RANK_TOLERANCE) == len(slopes)
+    ranks = _Ranks(slopes)
     flats: dict[frozenset[int], set[int]] = {}
-    zero = [frozenset(np.flatnonzero(abs(slopes @ y) <= FLAT).tolist()) for y in rays]
-    for i, j in combinations(range(len(rays)), 2):
-        shared = zero[i] & zero[j]
-        if abs(rays[i] @ rays[j]) < 1 - FLAT and len(shared) >= n - 2:
-            known = len(shared) if independent else rank(slopes[sorted(shared)], RANK_TOLERANCE)
-            if known == n - 2:
-                flats.setdefault(shared, set()).update((i, j))
+    every = np.array(rays)
+    zero = abs(every @ slopes.T) <= FLAT
+    many = zero.astype(np.int64) @ zero.T >= n - 2
+    apart = abs(every @ every.T) < 1 - FLAT
+    for i, j in np.argwhere(np.triu(many & apart, 1)).tolist():
+        shared = frozenset(np.flatnonzero(zero[i] & zero[j]).tolist())
+        if shared in flats or ranks.of(shared) == n - 2:
+            flats.setdefault(shared, set()).update((i, j))
     sectors = []
     for shared, members in flats.items():
         if len(members) == 2 and not point.quotient.polyhedron.is_union:
@@ -324,8 +350,7 @@ def _sectors(
             active = _active_along(point, rows, slopes @ middle)
             if active is None:
                 continue
-            known = len(active) if independent or n == 2 else _rank_of(rows, slopes, active)
-            if known == n - 2:
+            if n == 2 or ranks.of(frozenset(map(rows.index, active))) == n - 2:
                 sectors.append(Sector((i, j), tuple(sorted(active))))
     return tuple(sectors)
 

@@ -149,6 +149,20 @@ def test_two_flaps_leave_faces_around_the_corner(monkeypatch):
         assert point.active() == sector.active
 
 
+def test_with_two_flaps_a_function_of_weight_zero_opens_on_a_cone():
+    """``x^2 + y^2 = b^2 / 2 + a`` where the last function stays zero: a cone where ``a`` does."""
+    four = Manifold.euclidean("x y a b")
+    x, y, z, c = four.symbols
+    found = figure(Polyhedron(four, [z, c, x**2 + y**2 + x * c - c**2 / 4 - z]))
+    assert (found.rank, found.full, found.rays, found.notes) == (2, 4, (), ())
+    opens = {frozenset({0, 1, 2}) - sector.active: sector for sector in found.sectors}
+    assert set(opens) == {frozenset([0]), frozenset([1]), frozenset([2])}
+    p, q, height, along = opens[frozenset([1])].sample.q
+    assert p**2 + q**2 + p * along - along**2 / 4 == pytest.approx(0, abs=1e-15)
+    assert along > 0
+    assert height == pytest.approx(0, abs=1e-15)
+
+
 @pytest.mark.parametrize("scale", [1.0, 30.0])
 def test_a_dependent_edge_is_followed_around_half_a_circle(scale):
     """The flap, which is radial, turns by as much as the edge."""

@@ -1,0 +1,247 @@
+"""Vertex figures of corners where gradients have several relations.
+
+The edges are the branches of second order that stay in the polyhedron, see
+:mod:`~polycorner.skeletons.branches`.  Faces are told by where they meet a small sphere about the
+corner: in arcs between the edges' points on it.  The arcs that leave such a point are known as the
+edges out of a corner are, by first derivatives where gradients are independent and otherwise by
+second ones.  Faces that meet the sphere in a closed arc, with no edge, are not sought.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from math import comb
+
+import numpy as np
+
+from polycorner.skeletons.branches import MAX_SETS, PERSISTS, Branches
+from polycorner.skeletons.dependence import dependent_at, follow_edge
+from polycorner.skeletons.folds import DISTANCES, fold_figure
+from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Sample, projected
+from polycorner.skeletons.singularities import SingularPoint
+from polycorner.skeletons.spheres_about import SAMPLED, link_about
+from polycorner.skeletons.vertex_figures import (
+    Ray,
+    Sector,
+    VertexFigure,
+    corner_rank,
+    vertex_figure,
+)
+from polycorner.skeletons.walks import End
+from polycorner.spaces.manifold import Array
+
+# Distance between points of one edge, relative to that from the corner.
+ALIKE = 1e-2
+# Distances in a link at which arcs are looked for: second derivatives shrink with its radius.
+BESIDE = (0.1, 0.03, 0.01)
+# Times that a point of a dependent edge is moved to its distance.
+PLACED = 3
+
+# What holds on an arc, and the edges at its ends.
+Ends = list[tuple[int, Ray]]
+
+
+def dependent_rays(
+    point: EvaluatedPoint, active: frozenset[int], distance: float
+) -> Iterator[Ray | frozenset[int]]:
+    """Yield the rays of dependent edges at a corner; in place of one that is unclear, what is held.
+
+    Parameters
+    ----------
+    point : EvaluatedPoint
+        The corner.
+    active : set of int
+        Functions that vanish there.
+    distance : float
+        From the corner to the samples, in scale units.
+    """
+    branches = Branches(point, sorted(active))
+    found: list[Ray] = []
+    for y, held in branches.double():
+        curve = dependent_at(point, held)
+        if curve is None:
+            yield held
+            continue
+        way = curve[1] * np.sign(curve[1] @ (branches.frame @ y))
+        there = _placed(point, curve[0], way, distance)
+        if there is None or abs(there.distances[sorted(held)]).max() > PERSISTS:
+            if there is None or not branches.excludes(held, there):
+                yield held
+            continue
+        along = there.active()
+        if along is None or along == active or _known(found, along, there.q, distance):
+            continue
+        here = point.quotient.at(there.q)
+        if len(here.basis(along)) == branches.full - 1:
+            continue  # no function but the dependent ones opens: an edge of independent gradients
+        placed = dependent_at(here, along)
+        if placed is None:
+            yield held
+            continue
+        found.append(Ray(way, along, Sample.of(placed[0]), distance, dependent=True))
+        yield found[-1]
+
+
+def branched_rays(
+    point: EvaluatedPoint, active: frozenset[int], distance: float
+) -> tuple[list[Ray], list[frozenset[int]]]:
+    """Return the rays at a singular corner, and sets of functions whose curves are unclear."""
+    scales = point.quotient.polyhedron.manifold.scale_array
+    branches = Branches(point, sorted(active))
+    rays: list[Ray] = []
+    for y, held in branches.simple():
+        way = branches.frame @ y
+        ahead = point.q + distance * scales * way
+        there = projected(point.quotient, ahead, sorted(held), distance / 2)
+        along = None if there is None else there.active()
+        if there is None:
+            branches.unclear.append(held)
+        elif along and along != active and not _known(rays, along, there.q, distance):
+            rays.append(Ray(way, along, Sample.of(there), distance))
+    for found in dependent_rays(point, active, distance):
+        if not isinstance(found, Ray):
+            branches.unclear.append(found)
+        elif not _known(rays, found.active, found.sample.q, distance):
+            rays.append(found)
+    explained = [ray.active for ray in rays if ray.dependent]
+    return rays, [held for held in branches.unclear if held not in explained]
+
+
+def _known(rays: list[Ray], active: frozenset[int], q: Array, distance: float) -> bool:
+    """Whether an edge of given functions goes through a point."""
+    near = ALIKE * distance
+    return any(ray.active == active and abs(ray.sample.q - q).max() < near for ray in rays)
+
+
+def _placed(
+    point: EvaluatedPoint, curve: HeldPoint, way: Array, distance: float
+) -> HeldPoint | None:
+    """Return the point of a curve at a distance from where it begins."""
+    scales = point.quotient.polyhedron.manifold.scale_array
+    there = None
+    for _ in range(PLACED):
+        q = point.q + distance * scales * way
+        there = projected(curve.quotient, q, curve.kept, distance / 2)
+        if there is None:
+            return None
+        way = (there.q - point.q) / scales
+        way = way / np.linalg.norm(way)
+    return there
+
+
+def _unclear(point: EvaluatedPoint, active: frozenset[int], held: frozenset[int]) -> str:
+    """Return the note on an edge that second derivatives do not tell."""
+    names = point.quotient.polyhedron.names
+    opened, every = (", ".join(names[i] for i in sorted(some)) for some in (active - held, active))
+    return (
+        f"whether an edge that opens {opened} leaves the corner {every} is not decided by second "
+        f"derivatives: not followed"
+    )
+
+
+def with_dependent_rays(
+    figure: VertexFigure, point: EvaluatedPoint, active: frozenset[int]
+) -> VertexFigure:
+    """Return the figure of a corner of full rank with the dependent edges that leave it.
+
+    Edges on which one function of weight zero opens leave along extreme rays of the tangent cone;
+    these are on none.
+    """
+    found = list(dependent_rays(point, active, DISTANCES[0]))
+    rays = [ray for ray in found if isinstance(ray, Ray)]
+    unclear = [_unclear(point, active, held) for held in found if not isinstance(held, Ray)]
+    return replace(figure, rays=(*figure.rays, *rays), notes=(*figure.notes, *unclear))
+
+
+def branched_figure(
+    point: EvaluatedPoint, active: frozenset[int], rank: int, full: int
+) -> VertexFigure | None:
+    """Return the rays and sectors at a singular corner, in more than three dimensions.
+
+    None where there are few, where the polyhedron is locally a union, and where the sets of
+    functions are too many.
+
+    Parameters
+    ----------
+    point : EvaluatedPoint
+        The corner.
+    active : set of int
+        Functions that vanish there.
+    rank, full : int
+        Rank of their gradients in the quotient, and its dimension.
+    """
+    if point.quotient.polyhedron.is_union or full <= SAMPLED:
+        return None
+    if not 0 <= len(active) - full + 1 or comb(len(active), full - 1) > MAX_SETS:
+        return None
+    near, far = (branched_rays(point, active, distance) for distance in DISTANCES[1::-1])
+    rays, unclear = far
+    notes = [_unclear(point, active, held) for held in unclear]
+    if Counter(ray.active for ray in near[0]) != Counter(ray.active for ray in rays):
+        notes.append(f"{_unclear(point, active, frozenset())}: different ones at two distances")
+    arcs = _Arcs(point, rays, DISTANCES[0])
+    sectors = arcs.sectors()
+    if arcs.lost:
+        names = point.quotient.polyhedron.names
+        notes.append(
+            f"of the faces at the corner {', '.join(names[i] for i in sorted(active))} at least "
+            f"{arcs.lost} could not be followed around it"
+        )
+    return VertexFigure(rank, full, tuple(rays), sectors, tuple(notes))
+
+
+class _Arcs:
+    """The arcs of a small sphere about a corner between the points of edges.
+
+    ``lost`` counts those that were not found or not followed.
+    """
+
+    def __init__(self, point: EvaluatedPoint, rays: list[Ray], radius: float) -> None:
+        self.rays, self.lost = rays, 0
+        self.link = link_about(point, radius)
+
+    def sectors(self) -> tuple[Sector, ...]:
+        """Return the faces between edges."""
+        ends: dict[frozenset[int], Ends] = defaultdict(list)
+        for i, ray in enumerate(self.rays):
+            for arc in self._leaving(ray):
+                ends[arc.active].append((i, arc))
+        return tuple(
+            Sector(pair, tuple(sorted(held)))
+            for held, some in ends.items()
+            for pair in self._pairs(some)
+        )
+
+    def _leaving(self, ray: Ray) -> tuple[Ray, ...]:
+        """Return the arcs that leave the point of an edge."""
+        point = self.link.at(ray.sample.q)
+        rank, full = corner_rank(point, ray.active)
+        if rank == full:
+            return vertex_figure(point, ray.active).rays
+        point = SingularPoint(self.link, point.q, sorted(ray.active))
+        found = fold_figure(point, ray.active, rank, full, BESIDE)
+        self.lost += found is None
+        return () if found is None else found.rays
+
+    def _pairs(self, ends: Ends) -> Iterator[tuple[int, int]]:
+        """Yield the edges at both ends of the arcs on which the same functions vanish."""
+        left = list(ends)
+        while len(left) > 2:
+            i, arc = left.pop(0)
+            stop = self._followed(arc)
+            if stop is None:
+                break
+            away = [float(np.linalg.norm(end[1].sample.q - stop)) for end in left]
+            yield i, left.pop(int(np.argmin(away)))[0]
+        if len(left) == 2:
+            yield left[0][0], left[1][0]
+        else:
+            self.lost += len(left)
+
+    def _followed(self, arc: Ray) -> Array | None:
+        """Return a point shortly before the end of an arc; None if it ends at no edge."""
+        walk = follow_edge(arc.start(self.link), arc.direction, arc.active)
+        if walk.end is not End.CORNER:
+            return None
+        scales = self.link.polyhedron.manifold.scale_array
+        return np.asarray(walk.last.q - arc.distance * scales * walk.tangent)
