@@ -20,7 +20,7 @@ from polycorner.motion.engine.rows import (
     row_times,
     rows_product,
 )
-from polycorner.motion.engine.sets import INTERVAL, contains, project
+from polycorner.motion.engine.sets import DISC, INTERVAL, contains, project
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import entry, load, store, total, zeros
 
@@ -221,8 +221,10 @@ def relax_contact(model, work, r):
 @compiled
 def nearest(model, work, shape, x, support):
     """Return the admissible friction along one direction that is nearest to ``x``."""
-    if model.set_kinds[shape] == INTERVAL:
-        a, b = model.set_sizes[shape, 0], model.set_sizes[shape, 1]
+    kind, a, b = model.set_kinds[shape], model.set_sizes[shape, 0], model.set_sizes[shape, 1]
+    if kind == DISC:
+        a, b = -a, a
+    if kind in (INTERVAL, DISC):
         return min(max(x, a * support), b * support) if support > 0.0 else 0.0
     project(model, shape, x, 0.0, support, work.image)
     return work.image[0]
