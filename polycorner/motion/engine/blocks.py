@@ -26,12 +26,7 @@ from polycorner.motion.engine.evaluation import (
     evaluate_pair_gaps,
 )
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
-from polycorner.motion.engine.neighbours import (
-    TOUCHING,
-    detection_distance,
-    heap_sort,
-    key_of,
-)
+from polycorner.motion.engine.neighbours import TOUCHING, detection_distance
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import (
     apply_impulses,
@@ -298,23 +293,6 @@ def assemble_body_blocks(model, state, work, h):
         if state.alive[i] and work.awake[i]:
             blocks = add_body_blocks(model, state, work, i, h, limit, blocks)
     return blocks
-
-
-@compiled
-def order_contacts(model, work, contacts):
-    """Order contacts by key, whatever the order of detection."""
-    keys, ascending, former = work.sort_keys, True, NONE
-    for s in range(contacts):
-        work.ranked[s] = work.assembled[s] = s
-        key = key_of(model, work, s)
-        ascending, former = ascending and key > former, key
-    if ascending:
-        return
-    for s in range(contacts):
-        keys[s] = key_of(model, work, s) * contacts + s
-    heap_sort(keys, contacts)
-    for s in range(contacts):
-        work.ranked[s] = work.assembled[s] = keys[s] % contacts
 
 
 @compiled

@@ -294,3 +294,20 @@ def key_of(model, work, slot):
     """Return the key of a contact between bodies: a number that sorts by bodies and gap."""
     a, b, g = work.contact[slot, 0], work.contact[slot, 1], work.contact[slot, 2]
     return (a * model.bodies + b) * model.pair_gaps + g
+
+
+@compiled
+def order_contacts(model, work, contacts):
+    """Order contacts by key, whatever the order of detection."""
+    keys, ascending, former = work.sort_keys, True, NONE
+    for s in range(contacts):
+        work.ranked[s] = work.assembled[s] = s
+        key = key_of(model, work, s)
+        ascending, former = ascending and key > former, key
+    if ascending:
+        return
+    for s in range(contacts):
+        keys[s] = key_of(model, work, s) * contacts + s
+    heap_sort(keys, contacts)
+    for s in range(contacts):
+        work.ranked[s] = work.assembled[s] = keys[s] % contacts

@@ -5,7 +5,6 @@ from polycorner.motion.engine.arrays import CONTACTS, ISLANDS, SETTLED, SWEEPS
 from polycorner.motion.engine.blocks import (
     assemble_body_blocks,
     assemble_contacts,
-    order_contacts,
     respond_to_rows,
 )
 from polycorner.motion.engine.codes import (
@@ -44,7 +43,7 @@ from polycorner.motion.engine.contact_list import (
 from polycorner.motion.engine.crowds import ABREAST, divide_blocks, divide_contacts, is_crowd
 from polycorner.motion.engine.curvature import correct_curvature
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import detect_all, detection_distance
+from polycorner.motion.engine.neighbours import detect_all, detection_distance, order_contacts
 from polycorner.motion.engine.partition import find_islands
 from polycorner.motion.engine.phases import items_of, share_out, share_range
 from polycorner.motion.engine.rows import apply_impulses
