@@ -18,7 +18,8 @@ from polycorner.skeletons.partitions import Partition
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import CornerRecord
-from polycorner.skeletons.vertex_figures import Ray, Sector
+from polycorner.skeletons.sectors import Sector
+from polycorner.skeletons.vertex_figures import Ray
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 

@@ -18,11 +18,11 @@ from polycorner.skeletons.branches import MAX_SETS, PERSISTS, Branches
 from polycorner.skeletons.dependence import dependent_at, follow_edge
 from polycorner.skeletons.folds import DISTANCES, fold_figure
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Sample, projected
+from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.vertex_figures import (
     Ray,
-    Sector,
     VertexFigure,
     corner_rank,
     vertex_figure,

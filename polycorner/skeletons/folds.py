@@ -40,7 +40,8 @@ from polycorner.polyhedra.cones import Rows, null_space, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.dependence import curvature, dependent_at
 from polycorner.skeletons.points import EvaluatedPoint, Sample, projected
-from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure
+from polycorner.skeletons.sectors import Sector
+from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.spaces.manifold import Array
 
 # Distances in scale units at which the edges are looked for.

@@ -20,9 +20,10 @@ from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.points import EvaluatedPoint, Quotient, Sample, projected
+from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.tracing import EdgeTracer
-from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure, singular_rays
+from polycorner.skeletons.vertex_figures import Ray, VertexFigure, singular_rays
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 

@@ -14,8 +14,9 @@ from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.quadrics import common_zeros
+from polycorner.skeletons.sectors import Ranks
 from polycorner.skeletons.singularities import SingularPoint
-from polycorner.skeletons.vertex_figures import _Ranks, corner_rank
+from polycorner.skeletons.vertex_figures import corner_rank
 
 few = settings(max_examples=settings.default.max_examples // 8)
 FOUR = Manifold.euclidean("t a b c")
@@ -73,7 +74,7 @@ def test_ranks_of_sets_from_the_relations_of_all(seed):
     slopes = unit_rows(slopes[slopes.any(axis=1)])
     some = frozenset(np.flatnonzero(rng.random(len(slopes)) < 0.6).tolist())
     if some:
-        assert _Ranks(slopes).of(some) == rank(slopes[sorted(some)], 1e-6)
+        assert Ranks(slopes).of(some) == rank(slopes[sorted(some)], 1e-6)
 
 
 # ------------------------------------------------------------------------------------------ corners
