@@ -56,7 +56,7 @@ def test_threads_share_no_array_in_which_something_is_in_the_making():
 
     Of the rows of bodies some hold the matrix of an island, and are a thread's own as well.
     """
-    rows = {"N", "N+1", "B", "C", "P", "H"}
+    rows = {"N", "N+1", "B", "C", "P", "V"}
     whole = {name for name, d in declarations(Work).items() if d.shape.split()[0] not in rows}
     serial = {"list_status", "listed_travel", "near", "sort_keys", "strips", "strip_cursor"}
     told = {"finite", "located", "remedy", "signals", "strip_start", "told", "told_times", "worst"}
