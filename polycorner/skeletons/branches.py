@@ -31,10 +31,14 @@ from polycorner.spaces.manifold import Array
 
 # Least eigenvalue of a semidefinite form relative to the largest that counts as positive.
 CLEAR = 1e-3
+# Largest number of functions with slopes that open along an edge on which a relation persists.
+OPENING = 3
 # Most sets of functions that are tried, of those in a span.
 MAX_SETS = 20_000
 # Distance in scale units at which, and from zero to which, a relation is seen to persist.
 BESIDE, PERSISTS = 1e-3, 1e-11
+# Weighted sum of functions, some of which are farther from zero than that, which has a sign.
+ROUNDING = 1e-13
 
 # A unit direction in the quotient, and functions that stay zero along it.
 Branch = tuple[Array, frozenset[int]]
@@ -81,21 +85,25 @@ class Branches:
     def double(self) -> Iterator[Branch]:
         """Yield the null directions of semidefinite forms, of both signs."""
         least = len(self.rows) - self.full + 1
-        for opened in self._with_one_relation(range(least, least + self.free + 1)):
+        for opened in self._with_one_relation(range(least, least + self.free + OPENING)):
             held, some = self._held(opened)
             values, axes = _positive(self._forms(held, some)[0])
             if values[1] > max(FLAT, CLEAR * values[-1]) and abs(values[0]) <= FLAT:
                 yield from self._entering(some.null_space @ axes[:, 0], opened, held)
 
     def excludes(self, held: frozenset[int], there: EvaluatedPoint) -> bool:
-        """Whether the weighted sum of a semidefinite form stays positive at a point where it is 0.
+        """Whether higher orders exclude an edge, seen at a point where its other equations hold.
 
-        Functions that were to stay zero are not, and no other point nearby makes up for it.
+        The weighted sum of a form that is positive beside its null direction would have to be zero.
+        Where it is positive, nothing nearby makes up for it; where it is negative and the form has
+        two positive directions or more, whole surfaces do.
         """
         rows = sorted(held)
         some = Rows(self.slopes[[self.rows.index(i) for i in rows]], RANK_TOLERANCE)
-        weights = some.relations[:, 0] * np.sign(np.trace(self._forms(rows, some)[0]))
-        return bool(weights @ there.distances[rows] > PERSISTS)
+        form = self._forms(rows, some)[0]
+        away = some.relations[:, 0] @ there.distances[rows]
+        rest = float(away * np.sign(np.trace(form)))
+        return rest > ROUNDING or (len(form) > 2 and rest < -ROUNDING)
 
     def _with_one_relation(self, sizes: range) -> Iterator[tuple[int, ...]]:
         """Yield what opens where the others have one relation.
