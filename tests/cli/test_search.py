@@ -21,7 +21,11 @@ pytestmark = pytest.mark.usefixtures("own_searches")
         (("tutorial",), 3),
         (("spheres", "--count", "6"), 2),
         pytest.param(("dyad", "--plane"), 15, marks=pytest.mark.slow),
-        (("dyad", "--heading", "20", "--drum", "60", "--length", "20"), 20),
+        pytest.param(
+            ("dyad", "--heading", "20", "--drum", "60", "--length", "20"),
+            20,
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=str,
 )
