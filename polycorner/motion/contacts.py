@@ -131,7 +131,7 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class PairFriction(Value):
-    """Dry friction at every gap of two identical bodies, a law as that of :class:`Friction`.
+    """Dry friction at every gap of two identical bodies, as :class:`~polycorner.Friction` of one.
 
     Parameters
     ----------
