@@ -117,6 +117,8 @@ def _pull(gravity: Any, dimension: int) -> "tuple[list[float], list[sympy.Expr]]
         free = {symbol for component in given for symbol in component.free_symbols}
     except (AttributeError, TypeError, sympy.SympifyError):
         refuse("gravity", expected, gravity, TypeError)
+    if not all(isinstance(component, sympy.Expr) for component in given):
+        refuse("gravity", expected, gravity, TypeError)
     strange = (sympy.I, sympy.oo, -sympy.oo, sympy.zoo, sympy.nan)
     if len(given) != dimension or free - {now} or any(part.has(*strange) for part in given):
         refuse("gravity", expected, gravity)

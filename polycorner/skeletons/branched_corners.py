@@ -172,7 +172,7 @@ def branched_figure(
     """
     if point.quotient.polyhedron.is_union or full <= SAMPLED:
         return None
-    if not 0 <= len(active) - full + 1 or comb(len(active), full - 1) > MAX_SETS:
+    if len(active) < full - 1 or comb(len(active), full - 1) > MAX_SETS:
         return None
     near, far = (branched_rays(point, active, distance) for distance in DISTANCES[1::-1])
     rays, unclear = far

@@ -264,6 +264,7 @@ def masses(mass, centre, inertia):
         (lambda: Arrangement([disc(1)] * 2).system(friction=-1), ValueError, "friction"),
         (lambda: Arrangement([disc(1)] * 2).system(gravity=[1, 2, 3]), ValueError, "gravity"),
         (lambda: Arrangement([disc(1)] * 2).system(gravity=3), TypeError, "gravity: expected 2"),
+        (lambda: Arrangement([disc(1)] * 2).system(gravity=[True, 1]), TypeError, "gravity: exp"),
         (
             lambda: Arrangement([disc(1)] * 2).system(gravity=[0, sympy.Symbol("t")]),
             ValueError,
