@@ -7,6 +7,7 @@ stops by itself.  Figures are those of what was simulated so far.
 
 import argparse
 import os
+import re
 import signal
 import threading
 from collections.abc import Sequence
@@ -19,13 +20,14 @@ from typing import Any
 from side_by_side import print_table, write
 
 from polycorner import checks
-from polycorner.dumbbells import DumbbellDrum, Shaking
+from polycorner.dumbbells import DumbbellDrum, OutOfRound, Shaking, UnevenFriction
 from polycorner.dumbbells.dynamics.bunch import drum_for_bunch
 from polycorner.dumbbells.dynamics.bunch_in_space import (
     BunchInSpaceRun,
     follow_in_space,
     kicks_of_centres,
 )
+from polycorner.dumbbells.imperfections import Imperfection
 from polycorner.dumbbells.pictures.film_in_space import film_in_space
 from polycorner.dumbbells.viewer.page import film_page, write_page
 from polycorner.motion import Checkpoint, Noise
@@ -43,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--kicks", type=float, nargs="+", default=[0.0], help="mm/s per sqrt(s)")
     parser.add_argument("--shake", type=float, nargs=3, metavar=AXES, help="rms in mm/s^2")
     parser.add_argument("--band", type=float, nargs=2, default=[5.0, 50.0], help="Hz")
+    parser.add_argument("--oval", type=float, metavar="MM", help="amplitude of an oval wall")
+    parser.add_argument("--uneven", type=float, nargs=2, metavar=("RMS", "MM"), help="friction")
     parser.add_argument("--count", type=int, default=60, help="dumbbells")
     parser.add_argument("--top", type=float, default=150.0, help="length of the drum, mm")
     parser.add_argument("--duration", type=float, default=1200.0, help="s")
@@ -69,14 +73,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str, Any]:
     """Follow one start, or go on with it; return its figures."""
     start, kicks = point
-    shaking = Shaking(options.shake, options.band, seed=start) if options.shake else None
-    noise = f"kicks-{kicks:g}" + (f"-shaken-{shaking.peak:g}" if shaking else "")
-    folder = options.out / f"{noise}-start-{start}"
+    imperfect: dict[str, Imperfection] = {}
+    if options.shake:
+        imperfect["shaking"] = Shaking(options.shake, options.band, seed=start)
+    if options.oval:
+        imperfect["out_of_round"] = OutOfRound({2: options.oval})
+    if options.uneven:
+        imperfect["uneven_friction"] = UnevenFriction(*options.uneven, seed=start)
+    told = {"shaken": options.shake, "oval": options.oval, "uneven": options.uneven}
+    told = {"kicks": kicks} | {name: value for name, value in told.items() if value}
+    words = [f"{name} {value}" for name, value in told.items()]
+    folder = options.out / re.sub(r"[^\w.]+", "-", " ".join([*words, f"start {start}"]))
     timer = threading.Timer(options.seconds, signal.raise_signal, [signal.SIGINT])
     if options.seconds:
         timer.daemon = True
         timer.start()
-    drum = drum_for_bunch(DumbbellDrum(shaking=shaking), count=options.count, top=options.top)
+    drum = drum_for_bunch(DumbbellDrum(**imperfect), count=options.count, top=options.top)
     run = follow_in_space(
         drum,
         options.duration,
@@ -88,8 +100,7 @@ def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str,
     timer.cancel()
     if options.films:
         write_page(film_page(film_in_space(run)), folder.parent / f"{folder.name}.html")
-    shaken = "-" if shaking is None else str(shaking.rms)
-    return {"start": start, "kicks": kicks, "shaken": shaken, **figures(run)}
+    return {"start": start, **told, **figures(run)}
 
 
 def figures(run: BunchInSpaceRun) -> dict[str, Any]:

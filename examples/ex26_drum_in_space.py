@@ -63,7 +63,7 @@ def main() -> Result:
     for hand, heading in PAIRS:
         start = two.state(nested_pair(DRUM, hand, heading=math.radians(heading)))
         path = simulate(two.system, start, DURATION, STEP, every=EVERY)
-        paths.append(two.placements(path.q))
+        paths.append(two.placements(path.q, path.times[:, None]))
         lifts.append(two.lifts(path.q).max())
     planar = follow_dyads(DRUM, [(hand, math.radians(h)) for hand, h in PAIRS], DURATION)
     formula = np.degrees(onset_azimuths(DRUM, headings))
@@ -74,7 +74,7 @@ def main() -> Result:
 def onset(rigid: RigidDumbbells, heading: float) -> float:
     """Return the azimuth at which a dumbbell that the drum carries begins to roll back."""
     path = simulate(rigid.system, rigid.state([0.0, 0.0, heading]), 17.0, STEP)
-    phi = rigid.placements(path.q[:, 0])[:, 0]
+    phi = rigid.placements(path.q[:, 0], path.times)[:, 0]
     return float(phi[np.argmax(np.diff(phi) < 0)])
 
 

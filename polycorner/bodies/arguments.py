@@ -100,3 +100,14 @@ def _motion(given: Any, p: Placement) -> tuple[Array, Array]:
     if turn.any() and p.frame is Frame.SHIFTED:
         refuse("moving", f"no angular velocity of {p.name!r}, which is shifted only", turn)
     return velocity, turn
+
+
+def angular(argument: str, given: Any, d: int) -> Array:
+    """Return an angular velocity: one number in the plane, three in space, where 0 is none."""
+    expected = "an angular velocity, a finite number" if d == 2 else "3 finite numbers, or 0"
+    found = checks.numbers(argument, given, expected)
+    if d == 3 and found.ndim == 0 and found == 0:
+        return np.zeros(3)
+    if found.shape != (() if d == 2 else (3,)) or not np.isfinite(found).all():
+        refuse(argument, expected, given)
+    return np.atleast_1d(found.astype(np.float64))

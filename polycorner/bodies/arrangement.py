@@ -9,7 +9,7 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike
 
 from polycorner import checks
-from polycorner.bodies.arguments import check_together, coordinates, named, rates
+from polycorner.bodies.arguments import angular, check_together, coordinates, named, rates
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.dynamics import (
     Coefficients,
@@ -72,6 +72,10 @@ class Arrangement(Value):
     period : sequence of float, optional
         The lengths of a periodic box, None or ``inf`` in directions in which it has no ends; see
         the notes.  Walls have to be parallel to the periodic directions.
+    turning : float or (3,) array, optional
+        Angular velocity in rad/s, about the origin, of the axes with all that stands in them, for
+        motion.  Velocities and energies are those in the axes, with the potential of the
+        centrifugal force; gravity keeps the directions of the axes at the time 0.  Default 0.
 
     Raises
     ------
@@ -110,6 +114,7 @@ class Arrangement(Value):
     orientations: Literal["needed", "all", "none"] = "needed"
     unit: str = ""
     period: Sequence[float | None] | None = None
+    turning: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bodies", named(self.bodies))
@@ -127,6 +132,7 @@ class Arrangement(Value):
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
         check_room(self.lattice, self.placements, self.walls)
+        object.__setattr__(self, "turning", angular("turning", self.turning, self.dimension))
         super().__post_init__()
 
     @property
@@ -238,10 +244,8 @@ class Arrangement(Value):
             Coefficients of rolling resistance: the torque across the normal is at most
             ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
             (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.
-        restitution : float or mapping from str to float, optional
+        restitution, exits : optional
             As in :class:`~polycorner.System`; names as for ``friction``.
-        exits : mapping from str to float, optional
-            As in :class:`~polycorner.System`.
         count : int, optional
             Default 1.
 
@@ -266,8 +270,7 @@ class Arrangement(Value):
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
         known = masses_of(self.placements, density, masses or {})
-        pull = [0.0] * self.dimension if gravity is None else gravity
-        laws = energies(self.placements, known, pull)
+        laws = energies(self.placements, known, gravity, self.turning)
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
         family = None
@@ -293,10 +296,9 @@ class Arrangement(Value):
     def symmetry(self) -> Symmetry:
         """Motions of the whole that walls and fixed bodies allow, exchanges of equal bodies.
 
-        Also included are rotations of a body that carry it to itself, and its shifts by periods;
-        not included are mirror images, and motions that carry one wall to another
-        (:attr:`full_symmetry`).  More than ten thousand exchanges, rotations and shifts are left
-        out, all of them.
+        Also rotations of a body that carry it to itself, and its shifts by periods, but no mirror
+        images and motions that carry one wall to another (:attr:`full_symmetry`).  More than ten
+        thousand exchanges, rotations and shifts are left out, all of them.
         """
         return self._congruences.symmetry(self.polyhedron)
 

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.frames import Frame, symbols
@@ -14,6 +15,7 @@ from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.neighbours import pairs
 from polycorner.bodies.pairs import Member, Touch, distances
 from polycorner.bodies.poses import Placement
+from polycorner.bodies.rigid_motions import carried, turned
 from polycorner.bodies.slips import rolling, rolling_at_wall, slip, slip_at_wall
 from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
@@ -77,17 +79,18 @@ def _as_round_as_the_body(p: Placement, mass: Mass) -> bool:
 
 
 def energies(
-    placements: tuple[Placement, ...], masses: Mapping[str, Mass], gravity: Any
+    placements: tuple[Placement, ...], masses: Mapping[str, Mass], gravity: Any, turning: ArrayLike
 ) -> "tuple[sympy.Expr, sympy.Expr, dict[str, sympy.Expr]]":
-    """Return kinetic and potential energy, and the forces that follow the time, as formulas.
+    """Return kinetic and potential energy, and applied forces, as formulas.
 
     The kinetic energy is that of the centre of mass and of the rotation about it.  Weight that does
-    not change has the potential energy; what is added to it as the time goes by is applied.
+    not change has the potential energy; what is added to it as the time goes by is applied.  In
+    axes that turn there are the potential and the forces of :func:`inertial_forces` as well.
     """
     import sympy
 
-    d = placements[0].body.dimension
-    constant, changing = _pull(gravity, d)
+    d, omega = placements[0].body.dimension, np.asarray(turning)
+    constant, changing = _pull([0.0] * d if gravity is None else gravity, d, omega)
     kinetic = potential = sympy.S.Zero
     forces: dict[str, sympy.Expr] = {}
     for p in placements:
@@ -98,16 +101,50 @@ def energies(
             sum(sympy.diff(c, q) * v for q, v in zip(p.manifold.symbols, rates, strict=True))
             for c in centre
         ]
-        kinetic += mass.mass * sum(v**2 for v in moving) / 2 + _rotation(p, mass, rates)
+        energy = mass.mass * sum(v**2 for v in moving) / 2 + _rotation(p, mass, rates)
+        centrifugal, deflecting = inertial_forces(p, energy, omega)
+        kinetic += energy
+        potential += centrifugal
         potential -= mass.mass * sum(g * c for g, c in zip(constant, centre, strict=True))
         work = mass.mass * sum(g * c for g, c in zip(changing, centre, strict=True))
-        applied = {q.name: sympy.diff(work, q) for q in p.manifold.symbols}
-        forces |= {name: force for name, force in applied.items() if force != 0}
+        for q, deflects in zip(p.manifold.symbols, deflecting, strict=True):
+            if (force := sympy.diff(work, q) + deflects) != 0:
+                forces[q.name] = force
     return kinetic, potential, forces
 
 
-def _pull(gravity: Any, dimension: int) -> "tuple[list[float], list[sympy.Expr]]":
-    """Return what does not depend on the time in each component of gravity, and the rest."""
+def inertial_forces(
+    p: Placement, kinetic: "sympy.Expr", turning: Array
+) -> "tuple[sympy.Expr, list[sympy.Expr]]":
+    """Return the centrifugal potential of a body in axes that turn, and the Coriolis forces.
+
+    Where a placement ``q`` of the body has the velocity ``u(q)`` if it rests in axes that turn, the
+    kinetic energy is ``T(q, v + u) = T(q, v) + a.v + T(q, u)`` with ``a = M u``.  So ``-T(q, u)``
+    is a potential, and Lagrange's equations of ``a.v`` give the forces ``(da_j/dq_i - da_i/dq_j)
+    v_j``, which do no work ([Lanczos] ch. 4).
+    """
+    import sympy
+
+    q, v, d = p.manifold.symbols, velocities(p.manifold), p.body.dimension
+    if not turning.any():
+        return sympy.S.Zero, [sympy.S.Zero] * len(q)
+    omega = [sympy.Float(x) for x in turning.tolist()]
+    motion = [sympy.S.Zero] * d + omega
+    field = [*carried(motion, q[:d]), *turned(p.frame, omega, q[d:])]
+    at_rest = dict(zip(v, field, strict=True))
+    a = [sympy.diff(kinetic, rate).xreplace(at_rest) for rate in v]
+    forces = [
+        sum((sympy.diff(a[j], q[i]) - sympy.diff(a[i], q[j])) * v[j] for j in range(len(q)))
+        for i in range(len(q))
+    ]
+    return -sympy.expand(kinetic.xreplace(at_rest)), [sympy.expand(force) for force in forces]
+
+
+def _pull(gravity: Any, dimension: int, turning: Array) -> "tuple[list[float], list[sympy.Expr]]":
+    """Return what does not depend on the time in each component of gravity, and the rest.
+
+    In axes that turn the components are those in the axes at the time.
+    """
     import sympy
 
     expected = f"{dimension} finite numbers, or expressions of time_symbol()"
@@ -122,8 +159,29 @@ def _pull(gravity: Any, dimension: int) -> "tuple[list[float], list[sympy.Expr]]
     strange = (sympy.I, sympy.oo, -sympy.oo, sympy.zoo, sympy.nan)
     if len(given) != dimension or free - {now} or any(part.has(*strange) for part in given):
         refuse("gravity", expected, gravity)
+    if turning.any():
+        given = _turned_back(given, turning, now)
     parts = [component.as_independent(now, as_Add=True) for component in given]
     return [float(constant) for constant, _ in parts], [changing for _, changing in parts]
+
+
+def _turned_back(
+    vector: "list[sympy.Expr]", turning: Array, time: "sympy.Symbol"
+) -> "list[sympy.Expr]":
+    """Return a vector in axes that turn, by Rodrigues' formula; expanded."""
+    import sympy
+
+    speed = float(np.linalg.norm(turning))
+    x, y, z = (*vector, sympy.S.Zero)[:3]
+    n = (turning / speed).tolist() if len(turning) == 3 else [0, 0, float(np.sign(turning[0]))]
+    along = n[0] * x + n[1] * y + n[2] * z
+    across = n[1] * z - n[2] * y, n[2] * x - n[0] * z, n[0] * y - n[1] * x
+    cosine, sine = sympy.cos(speed * time), sympy.sin(speed * time)
+    found = [
+        cosine * g - sine * c + (1 - cosine) * along * w
+        for g, c, w in zip((x, y, z), across, n, strict=True)
+    ]
+    return [sympy.expand(component) for component in found[: len(vector)]]
 
 
 def _rotation(p: Placement, mass: Mass, rates: "tuple[sympy.Symbol, ...]") -> "sympy.Expr":

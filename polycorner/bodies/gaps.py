@@ -20,7 +20,9 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 from polycorner.bodies import frames
+from polycorner.bodies import waves as waviness
 from polycorner.bodies.frames import Frame, symbols
+from polycorner.bodies.waves import waves
 from polycorner.formulas import cache
 from polycorner.formulas.families import Family
 from polycorner.spaces import distances
@@ -66,7 +68,7 @@ def _family(
     written: object,
     stationary: tuple[str, ...] = (),
 ) -> Family:
-    sources = cache.source_key(distances.__name__, frames.__name__, __name__)
+    sources = cache.source_key(distances.__name__, frames.__name__, waviness.__name__, __name__)
     key = repr((sources, written, one.value, two.value, d))
     variables = one.variables(FIRST, d) + two.variables(SECOND, d)
     return Family(names, variables, tuple(parameters), formulas, key, stationary=stationary)
@@ -297,22 +299,41 @@ def _crossing(one: Frame, two: Frame) -> "Formulas":
     return definitions, {"gap": apart / size, **below, **above, "angle": ww - least}
 
 
-@lru_cache(maxsize=8)
-def hollow(one: Frame, d: int) -> Family:
-    """Return the gap of a point and a cylinder or sphere around it.
+@lru_cache(maxsize=16)
+def hollow(one: Frame, d: int, count: int = 0) -> Family:
+    """Return the gap of a point and a cylinder or sphere around it, with ``count`` waves.
 
     Parameters: ``p`` of 1; centre ``c`` and axis ``w`` (a unit vector; zero for a sphere or a
     circle) in space; the radius ``s``.  With the distance ``r`` from the axis the gap is
     ``(s^2 - r^2) / (2 s)``: smooth, and the distance to first order where it vanishes.
+
+    With waves there are the directions ``e`` and ``f`` of the azimuths 0 and a quarter turn, and
+    the harmonic ``k``, amplitude ``z`` and phase ``o`` of each.  At an azimuth where the radius is
+    ``t = s + sum z cos(k phi + o)``, of derivative ``t'``, the gap is ``(t^2 - r^2) / (2 sqrt(t^2 +
+    t'^2))``, again the distance to first order where it vanishes.
     """
     still = Frame.FIXED
     parameters = [*numbers("p", one, d), *numbers("c", still, d), *numbers("w", still, d), "s"]
-    return _family(("gap",), one, still, d, parameters, partial(_hollow, one, d), "hollow")
+    if count:
+        parameters += [*numbers("e", still, d), *numbers("f", still, d)]
+        parameters += [f"{letter}{j}" for j in range(count) for letter in "kzo"]
+    formulas = partial(_hollow, one, d, count)
+    return _family(("gap",), one, still, d, parameters, formulas, ("hollow", count))
 
 
-def _hollow(one: Frame, d: int) -> "Formulas":
+def _hollow(one: Frame, d: int, count: int) -> "Formulas":
+    import sympy
+
+    still = Frame.FIXED
     (s,) = symbols(["s"])
-    axis = _along("w", SECOND, Frame.FIXED, d)
-    away = minus(_at("p", FIRST, one, d), _at("c", SECOND, Frame.FIXED, d))
+    axis, e, f = (_along(letter, SECOND, still, d) for letter in "wef")
+    away = minus(_at("p", FIRST, one, d), _at("c", SECOND, still, d))
     squared = dot(away, away) - dot(away, axis) ** 2
-    return {}, {"gap": (s**2 - squared) / (2 * s)}
+    if not count:
+        return {}, {"gap": (s**2 - squared) / (2 * s)}
+    (azimuth,) = symbols(["azimuth"])
+    terms = [tuple(symbols([f"k{j}", f"z{j}", f"o{j}"])) for j in range(count)]
+    outward, slope = waves(azimuth, terms)
+    definitions = {"azimuth": sympy.atan2(dot(away, f), dot(away, e)), "t": s + outward}
+    (t,) = symbols(["t"])
+    return definitions, {"gap": (t**2 - squared) / (2 * sympy.sqrt(t**2 + slope**2))}

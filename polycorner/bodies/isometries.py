@@ -114,7 +114,10 @@ def _offsets(walls: Sequence[HalfSpace], normal: Array) -> list[float]:
 
 
 def _cylinders(matrix: Array, walls: Sequence[Cylinder]) -> Rows | None:
-    """Cylinders and spheres that differ in radius or direction; of equal ones none is sure."""
+    """Cylinders and spheres that differ in radius or direction; of equal ones none is sure.
+
+    Where there are waves only the identity is sure.
+    """
     found: Rows = []
     for wall in walls:
         targets = [other for other in walls if _fits(matrix, wall, other)]
@@ -130,6 +133,8 @@ def _fits(matrix: Array, wall: Cylinder, other: Cylinder) -> bool:
     """Whether an isometry without a translation makes two walls parallel, of equal radii."""
     if abs(wall.radius - other.radius) > FLAT * wall.radius:
         return False
+    if wall.waves or other.waves:
+        return wall is other and bool((matrix == np.eye(len(matrix))).all())
     if wall.axis is None or other.axis is None:
         return wall.axis is other.axis
     return bool(abs(abs(other.axis @ matrix @ wall.axis) - 1) <= FLAT)

@@ -20,6 +20,7 @@ from polycorner.bodies.images import wrapped
 from polycorner.bodies.pairs import Member, Touch
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
+from polycorner.bodies.waves import waves
 from polycorner.motion.contacts import velocities
 from polycorner.motion.rotations import angular_velocity
 from polycorner.spaces.distances import PARALLEL, cross, dot, foot, minus, norm
@@ -178,7 +179,19 @@ def _inward(wall: Wall, p: "Point") -> "Point":
     if wall.axis is not None:
         axis = _fixed(wall.axis)
         away = minus(away, _scaled(axis, dot(away, axis)))
+    if wall.waves:
+        away = minus(away, _uphill(wall, away))
     return _scaled(away, -1 / norm(away))
+
+
+def _uphill(wall: Cylinder, away: "Point") -> "Point":
+    """Return the change of the radius with the azimuth, along the direction of growing azimuths."""
+    import sympy
+
+    e, f = map(_fixed, wall.around)
+    x, y = dot(away, e), dot(away, f)
+    _, slope = waves(sympy.atan2(y, x), [(k, *pair) for k, pair in wall.waves.items()])
+    return _scaled(minus(_scaled(f, x), _scaled(e, y)), slope / norm(away))
 
 
 def _slip(

@@ -4,7 +4,9 @@ A part stays on the inner side of a wall if its points stay ``radius`` away from
 inside is convex.  The outside of a cylinder, a sphere or a box is that of a fixed body.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,11 +16,14 @@ from polycorner import checks
 from polycorner.bodies import gaps
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.pairs import Member, gap, nearest
+from polycorner.bodies.waves import checked_waves, depth
 from polycorner.checks import refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
+
+ALONG = 1e-6  # 1 minus the cosine of the angle to x up to which an axis counts as along it
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +83,20 @@ class Cylinder(Value):
     spin : float, optional
         Angular velocity of the wall about its axis, in rad/s; of a circle counterclockwise.
         Friction drags bodies along.  Default 0; a sphere does not turn.
+    waves : mapping from int to (float, float), optional
+        Amplitude ``a_k`` and phase ``p_k`` of each harmonic ``k >= 1`` of a wall that is out of
+        round: to first order in ``a / R``, the points of a part of radius ``r`` reach up to
+        ``R - r + sum_k a_k cos(k phi + p_k)``.  The azimuth ``phi`` grows counterclockwise, or
+        right-handed about the axis, from the direction of ``x``, or in space from its projection
+        (of ``y``, where the axis is along ``x``).  Such a wall does not spin; the axes may turn
+        instead, with all that stands in them (``turning`` of :class:`Arrangement`).
     """
 
     radius: float
     axis: Array | None = None
     point: Array = field(default_factory=lambda: np.zeros(2))
     spin: float = 0.0
+    waves: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", checks.real("radius", self.radius, above=0))
@@ -98,6 +111,10 @@ class Cylinder(Value):
         object.__setattr__(self, "spin", checks.real("spin", self.spin))
         if self.spin and self.axis is None and d == 3:
             refuse("spin", "0 for a sphere, which has no axis", self.spin)
+        object.__setattr__(self, "waves", checked_waves(self.waves, self.radius))
+        if self.waves and (self.spin or (self.axis is None and d == 3)):
+            what = "a circle or cylinder that does not spin, where there are waves"
+            refuse("waves", what, self.waves)
         super().__post_init__()
 
     @property
@@ -107,19 +124,32 @@ class Cylinder(Value):
 
     def family(self, frame: Frame) -> Family:
         """Return the gap of a point of a body."""
-        return gaps.hollow(frame, self.dimension)
+        return gaps.hollow(frame, self.dimension, len(self.waves))
 
     def numbers(self, radius: float) -> list[float]:
         """Return its parameters, for a part of a given radius."""
         axis = np.zeros(self.dimension) if self.axis is None else self.axis
-        return [*self.point.tolist(), *axis.tolist(), self.radius - radius]
+        around = self.around.ravel().tolist() if self.waves else []
+        terms = [x for k, (a, p) in self.waves.items() for x in (float(k), a, p)]
+        return [*self.point.tolist(), *axis.tolist(), self.radius - radius, *around, *terms]
+
+    @cached_property
+    def around(self) -> Array:
+        """The directions of the azimuths 0 and a quarter turn, ``(2, d)``."""
+        if self.axis is None:
+            return np.eye(2)
+        first = np.eye(3)[int(abs(self.axis[0]) > 1 - ALONG)]
+        start = first - (first @ self.axis) * self.axis
+        start /= np.linalg.norm(start)
+        return np.stack([start, np.cross(self.axis, start)])
 
     def fixed_by(self) -> tuple[Array, Array]:
         """Return what motions of the wall onto itself keep; see :meth:`HalfSpace.fixed_by`."""
         whole = np.eye(self.dimension)
+        held = whole if self.waves else whole[:0]
         if self.axis is None:
-            return whole, whole[:0]
-        return whole - np.outer(self.axis, self.axis), self.axis[None]
+            return whole, held
+        return whole - np.outer(self.axis, self.axis), np.concatenate([self.axis[None], held])
 
 
 Wall = HalfSpace | Cylinder
@@ -156,8 +186,9 @@ def within(
 ) -> list[tuple[SmoothFunction, Array]]:
     """Return the gaps of a part and a wall, and the points of the part that they are of."""
     radius = member.part.radius
-    if isinstance(wall, Cylinder) and wall.radius <= radius:
-        refuse("walls", f"a radius of {name!r} above that of {member.name!r}", wall.radius)
+    if isinstance(wall, Cylinder) and wall.radius - depth(wall.waves) <= radius:
+        room = f" plus {depth(wall.waves):g} for its waves" if wall.waves else ""
+        refuse("walls", f"a radius of {name!r} above that of {member.name!r}{room}", wall.radius)
     numbers, family = wall.numbers(radius), wall.family(member.frame)
     points = list(enumerate(member.part.points))
     if isinstance(wall, HalfSpace):

@@ -14,12 +14,15 @@ applied force, so that its work is booked.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from polycorner.bodies import waves as waviness
+from polycorner.bodies.waves import waves
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.imperfections import AXES, FIELD_MODES, SIGNAL_MODES, Imperfections
@@ -40,7 +43,13 @@ PARAMETERS = ("l", "r", "rho", "m", "surface", "weight", "pull")
 # Functions of the time: angle by which the drum has turned; S, and what W and P differ by.
 SIGNALS = ("turned", "side", "heavier", "steeper")
 SLIPS = ("slip1_r", "slip1_s", "slip2_r", "slip2_s", "spin")
-MODULES = (equations.__name__, drum_formulas.__name__, dumbbell_formulas.__name__, __name__)
+MODULES = (
+    equations.__name__,
+    drum_formulas.__name__,
+    dumbbell_formulas.__name__,
+    waviness.__name__,
+    __name__,
+)
 
 
 class Shape(NamedTuple):
@@ -225,15 +234,9 @@ def _ball(e: int) -> "tuple[sympy.Expr, sympy.Expr, sympy.Expr, sympy.Expr]":
 
 def _wall(shape: Shape, azimuth: "sympy.Expr") -> "tuple[sympy.Expr, sympy.Expr]":
     """Return by how much the wall is further out at an azimuth, and its derivative."""
-    import sympy
-
     (turned,) = _symbols("turned")
-    wall = slope = sympy.S.Zero
-    for j in range(shape.harmonics):
-        k, a, p = _symbols(f"harmonic{j}", f"a{j}", f"p{j}")
-        turn = k * (azimuth - turned) + p
-        wall, slope = wall + a * sympy.cos(turn), slope - k * a * sympy.sin(turn)
-    return wall, slope
+    terms = [tuple(_symbols(f"harmonic{j}", f"a{j}", f"p{j}")) for j in range(shape.harmonics)]
+    return waves(azimuth - turned, terms)
 
 
 def _unevenness(shape: Shape, azimuth: "sympy.Expr", eta: "sympy.Expr") -> "sympy.Expr":
@@ -243,11 +246,18 @@ def _unevenness(shape: Shape, azimuth: "sympy.Expr", eta: "sympy.Expr") -> "symp
     if not shape.uneven:
         return sympy.S.One
     amplitude, turned = _symbols("unevenness", "turned")
-    total = sympy.S.Zero
-    for j in range(FIELD_MODES):
-        waves, along, start = _symbols(f"waves{j}", f"along{j}", f"start{j}")
-        total += sympy.cos(waves * (azimuth - turned) + along * eta + start)
-    return sympy.Max(0, 1 + amplitude * total)
+    modes = [_symbols(f"waves{j}", f"along{j}", f"start{j}") for j in range(FIELD_MODES)]
+    return uneven_factor(azimuth - turned, eta, amplitude, modes)
+
+
+def uneven_factor(
+    azimuth: "sympy.Expr", eta: "sympy.Expr", amplitude: Any, modes: "Sequence[Sequence[Any]]"
+) -> "sympy.Expr":
+    """Return the factor of friction at a place of the wall, by an azimuth that turns with it."""
+    import sympy
+
+    phases = (around * azimuth + along * eta + start for around, along, start in modes)
+    return sympy.Max(0, 1 + amplitude * sympy.Add(*map(sympy.cos, phases)))
 
 
 def rub(

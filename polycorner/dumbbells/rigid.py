@@ -5,7 +5,9 @@ pressed by their weight at rest.  Here they are compounds of two balls and a rod
 that turns: loads follow from the motion, dumbbells may lift, climb on each other, and pivot.
 
 The axis of the drum is ``y``, rising where the drum is tilted; the lowest line is at ``x = 0, z =
--R``, and azimuths grow towards ``x``.  Sliding friction and rolling resistance act at each ball.
+-R``, and azimuths grow towards ``x``: so they are at the time 0, and from then on these axes turn
+with the drum.  What it carries is at rest in them, exactly; without shaking, nothing depends on the
+time but the direction of gravity.  Sliding friction and rolling resistance act at each ball.
 """
 
 import math
@@ -19,7 +21,8 @@ from scipy.spatial.transform import Rotation
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
 from polycorner.checks import instance, refuse
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
-from polycorner.dumbbells.drum_motion import effective_gravity
+from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
+from polycorner.motion.contacts import Friction
 from polycorner.motion.mechanics import State
 from polycorner.motion.system import System
 from polycorner.spaces.arguments import reals
@@ -37,8 +40,8 @@ class RigidDumbbells(Value):
     ----------
     drum : DumbbellDrum
         Lengths, tilt, spin, friction and masses: two balls, each of uniform density, on a rod
-        without mass.  ``top`` and ``floor`` are the ends of the drum.  It may be shaken and
-        wobble, which change the effective gravity; other imperfections are refused.
+        without mass.  ``top`` and ``floor`` are the ends of the drum.  Shaking and a wobble change
+        the effective gravity; the inside of a wall that is out of round has to be convex.
 
     Raises
     ------
@@ -59,10 +62,13 @@ class RigidDumbbells(Value):
 
     def __post_init__(self) -> None:
         instance("drum", self.drum, DumbbellDrum, "DumbbellDrum()")
-        for name in ("out_of_round", "uneven_friction"):
-            if (given := getattr(self.drum, name)) is not None:
-                refuse("drum", f"no {name}", given)
+        _ = self.arrangement
         super().__post_init__()
+
+    @property
+    def spin(self) -> Array:
+        """The angular velocity of the drum, ``(3,)``, in rad/s."""
+        return np.array([0.0, -self.drum.spin, 0.0])
 
     @cached_property
     def arrangement(self) -> Arrangement:
@@ -71,11 +77,17 @@ class RigidDumbbells(Value):
         half, r = np.array([0.0, drum.length / 2, 0.0]), drum.ball_radius
         rod = capsule(-half, half, drum.rod_radius)
         dumbbell = compound({"1": sphere(r, at=-half), "2": sphere(r, at=half), "rod": rod})
-        wall = Cylinder(drum.drum_radius, np.array([0.0, -1.0, 0.0]), spin=drum.spin)
+        axis, oval = np.array([0.0, -1.0, 0.0]), drum.out_of_round
+        waves = {}
+        if oval is not None:  # azimuths of a cylinder begin at x, a quarter turn from the bottom
+            turned = {k: oval.phases.get(k, 0.0) + k * math.pi / 2 for k in oval.amplitudes}
+            waves = {k: (a, turned[k]) for k, a in oval.amplitudes.items()}
+        wall = Cylinder(drum.drum_radius, axis, waves=waves)
         walls: dict[str, Cylinder | HalfSpace] = {"drum": wall}
         if drum.floor:
             walls["bottom"] = HalfSpace(np.array([0.0, 1.0, 0.0]), np.zeros(3))
-        return Arrangement({"D": dumbbell}, walls, orientations="all", unit="mm")
+        named, axes = {"D": dumbbell}, self.spin
+        return Arrangement(named, walls, orientations="all", unit="mm", turning=axes)
 
     @cached_property
     def mass(self) -> Mass:
@@ -93,7 +105,7 @@ class RigidDumbbells(Value):
         if drum.count > 1:
             sliding["between"] = drum.rubbing
         restitution = {"between": drum.restitution} if drum.count > 1 else {}
-        return self.arrangement.system(
+        system = self.arrangement.system(
             gravity=effective_gravity(drum.imperfections, drum.spin, GRAVITY, drum.tilt),
             masses={"D": self.mass},
             friction=sliding,
@@ -102,9 +114,31 @@ class RigidDumbbells(Value):
             exits={"yD": drum.top} if math.isfinite(drum.top) else {},
             count=drum.count,
         )
+        if drum.uneven_friction is None:
+            return system
+        return replace(system, friction=tuple(map(self._uneven, system.friction)))
+
+    def _uneven(self, friction: Friction) -> Friction:
+        """Return the friction of a ball where coefficients have the factor of its place.
+
+        The power of a force ``p`` in ``mu f C`` at the slip ``s`` is that of ``p / f`` in ``mu C``
+        at ``f s``.  So the slip gets the factor.
+        """
+        import sympy
+
+        drum, (placement,) = self.drum, self.arrangement.placements
+        assert drum.uneven_friction is not None
+        amplitude, *modes = drum.uneven_friction.numbers(math.tau * drum.centre_radius)
+        part = BALLS.index(friction.load)
+        end = [0.0, (part - 0.5) * drum.length, 0.0]
+        x, y, z = placement.frame.point(placement.name, list(map(sympy.Float, end)), 3)
+        factor = uneven_factor(
+            sympy.atan2(x, -z), y, amplitude, np.reshape(modes, (-1, 3)).tolist()
+        )
+        return replace(friction, slip=tuple(factor * s for s in friction.slip))
 
     def state(self, q: ArrayLike) -> State:
-        """Return the state of dumbbells that lie on the drum, move with it and stick to it.
+        """Return the state at the time 0 of dumbbells that lie on the drum, at rest on it.
 
         Parameters
         ----------
@@ -115,11 +149,7 @@ class RigidDumbbells(Value):
         if given.shape != (self.drum.count, 3) and not (alone and given.shape == (3,)):
             refuse("q", f"shape ({self.drum.count}, 3) for phi, eta, theta", given.shape)
         places = np.array([self._place(*row) for row in given.reshape(-1, 3).tolist()])
-        spin = np.array([0.0, -self.drum.spin, 0.0])
-        speeds = [
-            self.arrangement.velocity(p, {"D": (np.cross(spin, p[:3]), spin)}) for p in places
-        ]
-        state = self.system.state(*((places[0], speeds[0]) if alone else (places, speeds)))
+        state = self.system.state(places[0] if alone else places)
         return replace(state, sticking=np.ones_like(state.sticking))  # slips are rounding errors
 
     def _place(self, phi: float, eta: float, theta: float) -> Array:
@@ -133,7 +163,24 @@ class RigidDumbbells(Value):
         centre = np.array([0.0, eta, 0.0]) - away * inward
         return self.arrangement.point({"D": (centre, turned)})
 
-    def placements(self, q: ArrayLike) -> Array:
+    def seen(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
+        """Return coordinates ``(..., 7)`` in axes at rest.
+
+        Parameters
+        ----------
+        q : (..., 7) array
+        t : float or array that broadcasts with ``(...)``, optional
+            Times in s; default 0.
+        """
+        given = np.array(q, dtype=np.float64)
+        places = given.reshape(-1, given.shape[-1])
+        times = np.broadcast_to(np.asarray(t, dtype=np.float64), given.shape[:-1])
+        turn = Rotation.from_rotvec(times.reshape(-1, 1) * self.spin)
+        turned = turn * Rotation.from_quat(places[:, 3:], scalar_first=True)
+        found = [turn.apply(places[:, :3]), turned.as_quat(scalar_first=True)]
+        return np.concatenate(found, axis=-1).reshape(given.shape)
+
+    def placements(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """Return ``phi, eta, theta`` of dumbbells in space, ``(..., 3)``.
 
         These are azimuth and height of the centre, and the direction of the rod as seen from the
@@ -141,9 +188,10 @@ class RigidDumbbells(Value):
 
         Parameters
         ----------
-        q : (..., 7) array
+        q, t
+            As of :meth:`seen`.
         """
-        places = np.asarray(q, dtype=np.float64)
+        places = self.seen(q, t)
         flat = places.reshape(-1, places.shape[-1])
         rod = Rotation.from_quat(flat[:, 3:], scalar_first=True).apply([0.0, 1.0, 0.0])
         phi = np.arctan2(flat[:, 0], -flat[:, 2])

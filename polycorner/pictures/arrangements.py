@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LightSource, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
+from matplotlib.patches import Polygon
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
@@ -26,6 +26,7 @@ CELL = 2.4  # width of a picture in inches
 MARGIN = 0.15  # around bodies, of their extent
 ACROSS = 1e-9  # by which the normal of a wall across an axis may deviate from it
 ARC = 33  # points of a full circle of an outline
+WALL = 360  # points of the inside of a circle or cylinder
 BALL = 300  # points of a ball
 LIGHT = LightSource(azdeg=315, altdeg=50)
 
@@ -156,8 +157,11 @@ def _draw_wall(axes: Axes, wall: HalfSpace | Cylinder, window: Array) -> None:
         axes.add_patch(Polygon(area, facecolor=OUTSIDE, edgecolor=OUTLINE, linewidth=0.8))
         return
     axes.add_patch(Polygon(_corners(middle, size), facecolor=OUTSIDE))
-    centre = (float(wall.point[0]), float(wall.point[1]))
-    axes.add_patch(Circle(centre, wall.radius, facecolor="white", edgecolor=OUTLINE, linewidth=0.8))
+    azimuth = np.linspace(0, math.tau, WALL, endpoint=False)
+    waves = (a * np.cos(k * azimuth + p) for k, (a, p) in wall.waves.items())
+    radius = wall.radius + sum(waves, np.zeros(WALL))
+    curve = wall.point + radius[:, None] * np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+    axes.add_patch(Polygon(curve, facecolor="white", edgecolor=OUTLINE, linewidth=0.8))
 
 
 def _corners(middle: Array, size: float) -> Array:

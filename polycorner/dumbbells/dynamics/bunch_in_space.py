@@ -46,7 +46,7 @@ class BunchInSpaceRun(BunchRun):
     @cached_property
     def q(self) -> Array:
         """Placements ``phi, eta, theta`` as seen from the axis, ``(T, N, 3)``."""
-        return self.rigid.placements(self.trajectory.q)
+        return self.rigid.placements(self.trajectory.q, self.times[:, None])
 
     @cached_property
     def lifts(self) -> Array:
@@ -69,12 +69,12 @@ class BunchInSpaceRun(BunchRun):
 
 
 def kicks_of_centres(drum: DumbbellDrum, strength: float) -> dict[str, float]:
-    """Return the kicks under which the velocity of a centre diffuses, across and along the drum.
+    """Return the kicks under which the velocity of a centre diffuses.
 
-    Both components by ``strength``, in mm/s per sqrt(s); see :class:`~polycorner.Noise`.
+    Each component by ``strength``, in mm/s per sqrt(s); see :class:`~polycorner.Noise`.
     """
     size = real("strength", strength, least=0) * RigidDumbbells(drum).mass.mass
-    return {"xD": size, "yD": size}
+    return dict.fromkeys(["xD", "yD", "zD"], size)
 
 
 def follow_in_space(
@@ -93,8 +93,7 @@ def follow_in_space(
     Parameters
     ----------
     drum : DumbbellDrum
-        With a bottom, as of :func:`~polycorner.dumbbells.dynamics.bunch.drum_for_bunch`; it may be
-        shaken and wobble.
+        With a bottom, as of :func:`~polycorner.dumbbells.dynamics.bunch.drum_for_bunch`.
     start : int or (count, 3) array, optional
         The seed of a :func:`~polycorner.dumbbells.dynamics.bunch.scattered` start, or placements.
     noise : Noise, optional

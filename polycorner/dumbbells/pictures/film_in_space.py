@@ -48,7 +48,7 @@ def ball_centres(run: BunchInSpaceRun, chosen: list[int]) -> Array:
     The axis of the drum is ``y``, its lowest line at ``x = 0, z = -R``; balls of dumbbells that
     have left are NaN.
     """
-    q = run.trajectory.q[chosen]
+    q = run.rigid.seen(run.trajectory.q[chosen], run.times[chosen, None])
     turns = Rotation.from_quat(q[..., 3:].reshape(-1, 4), scalar_first=True)
     rod = turns.apply([0.0, run.drum.length / 2, 0.0]).reshape(*q.shape[:-1], 3)
     centres = q[..., None, :3] + np.stack([-rod, rod], axis=-2)
