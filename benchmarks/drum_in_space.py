@@ -21,7 +21,7 @@ from side_by_side import print_table, write
 
 from polycorner import checks
 from polycorner.dumbbells import DumbbellDrum, OutOfRound, Shaking, UnevenFriction
-from polycorner.dumbbells.dynamics.bunch import drum_for_bunch
+from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch
 from polycorner.dumbbells.dynamics.bunch_in_space import (
     BunchInSpaceRun,
     follow_in_space,
@@ -35,6 +35,7 @@ from polycorner.motion import Checkpoint, Noise
 SAVE = 30.0  # s
 KICK_TIME = 0.003  # s, for which a kick is held
 AXES = ("ACROSS", "ALONG", "UP")  # directions of shaking
+IN = {"right": "in right", "left": "in left"}  # dyads
 SHARES = 10  # instants at which dumbbells off the drum are counted
 
 
@@ -105,18 +106,25 @@ def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str,
 
 def figures(run: BunchInSpaceRun) -> dict[str, Any]:
     """Return who left and who is where, and how well the motion was solved."""
-    path, census = run.trajectory, run.census(-1)
+    path = run.trajectory
     climbed = run.climbed[:: max(1, len(run.times) // SHARES)]
+    return {
+        **figures_of(run),
+        "off the drum, mean": round(float(climbed.mean()), 1),
+        "overlap, mm": float(f"{path.max_penetration:.2g}"),
+        "unsolved": path.effort.unconverged,
+        "islands": path.effort.islands,
+    }
+
+
+def figures_of(run: BunchRun) -> dict[str, Any]:
+    """Return who left, and who is where at the end."""
     return {
         "s": round(float(run.times[-1]), 1),
         "left": len(run.exits),
         **{f"left {kind}": number for kind, number in run.exit_counts().items()},
-        **{f"in {kind}" if kind in {"right", "left"} else kind: n for kind, n in census.items()},
-        "off the drum, mean": round(float(climbed.mean()), 1),
+        **{IN.get(kind, kind): number for kind, number in run.census(-1).items()},
         "highest, mm": round(float(run.q[..., 1].max()), 1),
-        "overlap, mm": float(f"{path.max_penetration:.2g}"),
-        "unsolved": path.effort.unconverged,
-        "islands": path.effort.islands,
     }
 
 
