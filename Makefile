@@ -47,7 +47,7 @@ test: .venv/.dev ## tests and doctests, without those marked slow
 	@$(PYTEST) -n auto -m "not slow"
 
 cores: .venv/.dev ## geometry again, with the linear algebra of an older processor (x86 only)
-	@OPENBLAS_CORETYPE=Haswell $(PYTEST) -n auto -q -m "not slow" \
+	@OPENBLAS_CORETYPE=Haswell HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto -q -m "not slow" \
 	    tests/polyhedra tests/skeletons/test_skeleton.py tests/minimisation
 
 thorough: .venv/.dev ## all tests, with many more generated inputs

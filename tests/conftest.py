@@ -27,6 +27,7 @@ settings.register_profile(
     derandomize=bool(os.environ.get("CI")),
     suppress_health_check=[HealthCheck.too_slow],
 )
+settings.register_profile("brief", settings.get_profile("fast"), max_examples=8)
 settings.register_profile(
     "thorough",
     max_examples=1000,

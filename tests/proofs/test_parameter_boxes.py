@@ -211,7 +211,7 @@ def test_the_pair_is_proved_for_a_range_of_sizes_at_once(corner):
         totals.add(total)
         assert note == f"{len(heard)} cells"
 
-    box = {"t": (1.45, 1.55), "l": (15.7, 16.3)}
+    box = {"t": (1.48, 1.52), "l": (15.9, 16.1)}
     p = prove(corner, parameters=box, progress=progress)
     assert p.proved, str(p)
     assert p.symmetry == ("d/deta1 + d/deta2",)

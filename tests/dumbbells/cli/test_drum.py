@@ -124,13 +124,15 @@ def test_a_movie_with_a_name_needs_no_folder(capsys, tmp_path):
 
 
 def test_imperfections_are_those_of_the_options(capsys, tmp_path):
-    chosen = ("--shake", "30", "0", "20", "--out-of-round", "2", "0.4", "--wobble", "0.5")
+    chosen = ["--shake", "30", "0", "20", "--wobble", "0.5"]
+    for harmonic, amplitude in ((2, 0.4), (1, 0.1), (5, 0.02)):
+        chosen += ["--out-of-round", str(harmonic), str(amplitude)]
     more = ("--uneven-friction", "0.2", "6", "--kicks", "30", "0.3", "0", "0", "--seed", "5")
     found = answer(capsys, "--pair", "R", *SHORT, *chosen, *more, "--out", str(tmp_path))
     assert found["parameters"]["wobble_deg"] == 0.5
     path = load_run(tmp_path / "trajectory.nc")
     assert path.system.shaking == Shaking((30.0, 0.0, 20.0), (1.0, 15.0), seed=5)
-    assert path.system.out_of_round == OutOfRound({2: 0.4})
+    assert path.system.out_of_round == OutOfRound({1: 0.1, 2: 0.4, 5: 0.02})
     assert path.system.wobble == Wobble(math.radians(0.5))
     assert path.system.uneven_friction == UnevenFriction(0.2, 6.0, seed=5)
     assert path.noise.kicks == {"phi": 30.0, "eta": 0.3, "theta": 0.0, "psi": 0.0}
