@@ -102,7 +102,7 @@ def _motion(given: Any, p: Placement) -> tuple[Array, Array]:
     return velocity, turn
 
 
-def angular(argument: str, given: Any, d: int) -> Array:
+def angular(argument: str, given: Any, d: int) -> float | Array:
     """Return an angular velocity: one number in the plane, three in space, where 0 is none."""
     expected = "an angular velocity, a finite number" if d == 2 else "3 finite numbers, or 0"
     found = checks.numbers(argument, given, expected)
@@ -110,4 +110,4 @@ def angular(argument: str, given: Any, d: int) -> Array:
         return np.zeros(3)
     if found.shape != (() if d == 2 else (3,)) or not np.isfinite(found).all():
         refuse(argument, expected, given)
-    return np.atleast_1d(found.astype(np.float64))
+    return float(found) if d == 2 else found.astype(np.float64)

@@ -89,7 +89,7 @@ def energies(
     """
     import sympy
 
-    d, omega = placements[0].body.dimension, np.asarray(turning)
+    d, omega = placements[0].body.dimension, np.atleast_1d(turning)
     constant, changing = _pull([0.0] * d if gravity is None else gravity, d, omega)
     kinetic = potential = sympy.S.Zero
     forces: dict[str, sympy.Expr] = {}
