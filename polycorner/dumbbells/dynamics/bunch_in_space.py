@@ -4,6 +4,7 @@ The experiment of [GMBN] sec. 3.2 once more, with :class:`~polycorner.dumbbells.
 place of dumbbells that lie on a developed drum.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.checks import real
-from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import BunchRun, scattered, steps_between_records
 from polycorner.dumbbells.dynamics.pairs import Handed
 from polycorner.dumbbells.rigid import RigidDumbbells
@@ -52,6 +53,18 @@ class BunchInSpaceRun(BunchRun):
     def lifts(self) -> Array:
         """Distances of the farther ball of each dumbbell from the drum, ``(T, N)``, in mm."""
         return self.rigid.lifts(self.trajectory.q)
+
+    @property
+    def weight_energy(self) -> Array:
+        """Energy of the weight of all dumbbells present, ``(T,)``, in nJ.
+
+        The potential of the trajectory is that in axes that turn, where the direction of the weight
+        follows the time.
+        """
+        heights = self.rigid.seen(self.trajectory.q, self.times[:, None])[..., 1:3]
+        down = GRAVITY * np.array([math.sin(self.drum.tilt), math.cos(self.drum.tilt)])
+        energies = self.rigid.mass.mass * (heights @ down)
+        return np.asarray(np.where(self.present, energies, 0.0).sum(axis=1))
 
     @property
     def climbed(self) -> Array:

@@ -1,5 +1,7 @@
 """Films of rigid dumbbells in the drum, for pages to play and to turn."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -30,7 +32,7 @@ def film_in_space(
     centres = ball_centres(run, chosen)
     dyads = [run.dyads(k) for k in chosen]
     hands = [[sum(hand == sign for *_, hand in found) for sign in (1, -1)] for found in dyads]
-    return motion_film(
+    film = motion_film(
         title,
         drum,
         path,
@@ -40,6 +42,11 @@ def film_in_space(
         [{} for _ in chosen],
         [Words("", f"{r} right-handed, {left} left-handed dyads") for r, left in hands],
     )
+    energies = {
+        "Kinetic energy in the drum's axes (nJ)": path.kinetic[chosen],
+        "Energy of the weight (nJ)": run.weight_energy[chosen],
+    }
+    return replace(film, energies=energies)
 
 
 def ball_centres(run: BunchInSpaceRun, chosen: list[int]) -> Array:

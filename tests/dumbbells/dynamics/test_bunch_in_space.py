@@ -1,11 +1,13 @@
 """Rigid dumbbells that lie in a bunch: carried by the drum, climbed on each other, in dyads."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from polycorner.dumbbells import DumbbellDrum, Shaking
+from polycorner.dumbbells.drum import GRAVITY
 from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, scattered
 from polycorner.dumbbells.dynamics.bunch_in_space import (
     BunchInSpaceRun,
@@ -68,6 +70,16 @@ def test_dyads_are_those_of_the_developed_drum_if_they_lie_on_it(run):
     assert climbed.dyads(0) == [(2, 3, -1)]
     assert (climbed.climbed == 1).all()
     assert climbed.lifts[0, 0] == pytest.approx(4.0, abs=0.1)
+
+
+def test_the_energy_of_the_weight_is_that_of_the_heights_of_balls(run):
+    """As on the developed drum: ``-cos(tilt) cos(phi) rho + sin(tilt) eta`` of two balls each."""
+    phi, eta, theta = np.moveaxis(run.q[..., :3], -1, 0)
+    across = DRUM.length / 2 * np.sin(theta)
+    deep = np.sqrt(DRUM.centre_radius**2 - across**2)  # of the middle, for dumbbells that lie
+    height = math.sin(DRUM.tilt) * eta - math.cos(DRUM.tilt) * np.cos(phi) * deep
+    expected = 2 * DRUM.ball_mass * GRAVITY * height.sum(axis=1)
+    assert run.weight_energy == pytest.approx(expected, rel=1e-4)
 
 
 def test_kicks_of_centres_are_those_of_a_mass():

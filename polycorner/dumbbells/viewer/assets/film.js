@@ -55,6 +55,10 @@ class Player {
     this.contacts.id = "contacts";
     this.stratum.id = "stratum";
     this.hand.id = "chirality";
+    const unknown = { contacts: !film.contacts.names.length, stratum: film.words.every(([face]) => !face) };
+    for (const row of Object.keys(unknown).filter((name) => unknown[name])) {
+      this[row].hidden = this[row].previousSibling.hidden = true; // not recorded
+    }
     this.energies.forEach((value, k) => { value.id = `energy-${k}`; });
     this.controls();
     this.look();
