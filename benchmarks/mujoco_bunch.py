@@ -38,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--top", type=float, default=150.0, help="length of the drum, mm")
     parser.add_argument("--duration", type=float, default=1200.0, help="s")
     parser.add_argument("--dt", type=float, default=1e-3, help="s")
+    parser.add_argument("--segments", type=int, default=720, help="boxes that make the drum")
     parser.add_argument("--impratio", type=float, default=100.0)
     parser.add_argument("--slipping", action="store_true", help="dynamic coefficients of friction")
     options = parser.parse_args(arguments)
@@ -133,6 +134,7 @@ def scene(drum: DumbbellDrum, options: argparse.Namespace) -> DrumScene:
         mu_contact=drum.rubbing[which],
         drum_length=2 * drum.top,
         dt=options.dt,
+        segments=options.segments,
         impratio=options.impratio,
     )
 

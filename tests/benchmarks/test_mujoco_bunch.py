@@ -12,7 +12,7 @@ from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, scattered
 
 OPTIONS = argparse.Namespace(
-    count=6, top=25.0, duration=2 * INTERVAL, dt=2e-3, impratio=100.0, slipping=False
+    count=6, top=25.0, duration=2 * INTERVAL, dt=2e-3, segments=720, impratio=100.0, slipping=False
 )
 
 
