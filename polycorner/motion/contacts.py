@@ -51,8 +51,26 @@ def _symbols(written: Any) -> "Symbols":
     return tuple(sympy.Symbol(name, real=True) for name in written)
 
 
+class FrictionLaw(Value):
+    """Base of laws with a set of forces that hold and one of forces that resist slip."""
+
+    static: ConvexSet
+    dynamic: ConvexSet | None
+
+    def _complete(self, name: str) -> None:
+        """Check the sets, of which the second is the first unless it is given."""
+        check_set("static", self.static)
+        check_sets(name, self.static, self.dynamic)
+        object.__setattr__(self, "dynamic", self.moving)
+
+    @property
+    def moving(self) -> ConvexSet:
+        """The set while the contact slips."""
+        return self.static if self.dynamic is None else self.dynamic
+
+
 @dataclass(frozen=True)
-class Friction(Value):
+class Friction(FrictionLaw):
     """Dry friction: a force in a convex set that grows with a normal load.
 
     The force per unit load ``p`` lies in ``C``, and where it slips it does so against the force
@@ -93,19 +111,11 @@ class Friction(Value):
         object.__setattr__(self, "slip", _several(self.slip))
         if not isinstance(self.load, str):
             object.__setattr__(self, "load", _several(self.load))
-        check_set("static", self.static)
-        check_sets(self.name, self.static, self.dynamic)
-        if self.dynamic is None:
-            object.__setattr__(self, "dynamic", self.static)
+        self._complete(self.name)
         if len(self.slip) != self.static.dimension:
             components = f"{self.static.dimension} components for friction {self.name!r}"
             refuse("slip", f"{components}, as its set has", len(self.slip))
         super().__post_init__()
-
-    @property
-    def moving(self) -> ConvexSet:
-        """The set while the contact slips."""
-        return self.static if self.dynamic is None else self.dynamic
 
 
 def check_set(argument: str, shape: object) -> ConvexSet:
@@ -130,7 +140,7 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 
 @dataclass(frozen=True)
-class PairFriction(Value):
+class PairFriction(FrictionLaw):
     """Dry friction at every gap of two identical bodies, as :class:`~polycorner.Friction` of one.
 
     Parameters
@@ -159,10 +169,7 @@ class PairFriction(Value):
     def __post_init__(self) -> None:
         slip = {name: _several(rows) for name, rows in mapping("slip", self.slip).items()}
         object.__setattr__(self, "slip", slip)
-        check_set("static", self.static)
-        check_sets("between bodies", self.static, self.dynamic)
-        if self.dynamic is None:
-            object.__setattr__(self, "dynamic", self.static)
+        self._complete("between bodies")
         for name, rows in slip.items():
             if len(rows) != self.static.dimension:
                 components = f"{self.static.dimension} components at {name!r}, as static has"
@@ -173,11 +180,6 @@ class PairFriction(Value):
                     argument, "an interval that is symmetric, for the bodies are identical", shape
                 )
         super().__post_init__()
-
-    @property
-    def moving(self) -> ConvexSet:
-        """The set while the contact slips."""
-        return self.static if self.dynamic is None else self.dynamic
 
 
 @dataclass(frozen=True)
