@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 KINKED = frozenset({"Abs", "Min", "Max", "Piecewise"})
 SHOWN = 60  # characters of a formula in a warning
+LONGEST = 2000  # symbols, numbers and operations of a formula that is written out
 SAMPLES = 16  # points at which a period is tested
 CHANGE = 1e-7  # relative change over a period that is rounding
 SPREAD = 2.0  # size, in scale units, of the region of the lines that is sampled
@@ -34,6 +35,21 @@ def kinks(expressions: "Iterable[sympy.Expr]") -> tuple[str, ...]:
             if type(part).__name__ in KINKED:
                 found.append(part)
     return tuple(dict.fromkeys(map(str, found)))
+
+
+def written(expression: Any) -> str:
+    """Return a formula as text; of a long one, which takes long to write, its length."""
+    import sympy
+
+    sizes: dict[sympy.Basic, int] = {}
+
+    def size(part: sympy.Basic) -> int:
+        if part not in sizes:
+            sizes[part] = 1 + sum(map(size, part.args))
+        return sizes[part]
+
+    length = size(sympy.sympify(expression))
+    return str(expression) if length <= LONGEST else f"a formula of length {length}"
 
 
 def announce(name: str, found: Sequence[str]) -> None:

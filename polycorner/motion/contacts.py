@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import instance, mapping, names, real, refuse
+from polycorner.formulas.expressions import written
 from polycorner.formulas.families import Family
 from polycorner.motion.bodies import RUBBING, PairContacts, PairLaw
 from polycorner.motion.convex_sets import ConvexSet
@@ -56,12 +57,17 @@ class FrictionLaw(Value):
 
     static: ConvexSet
     dynamic: ConvexSet | None
+    kind: str
 
     def _complete(self, name: str) -> None:
         """Check the sets, of which the second is the first unless it is given."""
         check_set("static", self.static)
         check_sets(name, self.static, self.dynamic)
         object.__setattr__(self, "dynamic", self.moving)
+
+    def told(self) -> dict[str, str]:
+        """Return the sets and the kind as text."""
+        return {"static": str(self.static), "dynamic": str(self.moving), "kind": self.kind}
 
     @property
     def moving(self) -> ConvexSet:
@@ -245,10 +251,11 @@ class ContactFamily(Value):
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
-        told: dict[str, Any] = {f"gap {name}": str(gap) for name, gap in self.gaps.items()}
-        told |= {f"definition {name}": str(e) for name, e in self.definitions.items()}
+        told: dict[str, Any] = {f"gap {name}": written(gap) for name, gap in self.gaps.items()}
+        told |= {f"definition {name}": written(e) for name, e in self.definitions.items()}
         told["friction between bodies"] = [
-            f"{law.slip}, {law.static}, {law.moving}, {law.kind}" for law in self.friction
+            {**{name: [*map(written, rows)] for name, rows in law.slip.items()}, **law.told()}
+            for law in self.friction
         ]
         return told | {"restitution between bodies": self.restitution, "reach": self.reach}
 

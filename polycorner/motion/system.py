@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import instance, mapping, names, real, refuse, whole
+from polycorner.formulas.expressions import written
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
 from polycorner.motion.contacts import ContactFamily, Friction, position_of
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
@@ -326,19 +327,19 @@ class System(MechanicalSystem):
             "coordinates": [*manifold.names],
             "periods": [str(period) for period in manifold.periods],
             "scales": [*manifold.scales],
-            "kinetic": str(self.kinetic),
-            "potential": str(self.potential),
+            "kinetic": written(self.kinetic),
+            "potential": written(self.potential),
             "count": self.count,
             "restitution": dict(zip(self.contacts, self.restitutions.tolist(), strict=True)),
             "substrate": dict(self.substrate),
             "exits": dict(self.exits),
             "formulas": self.bodies.formula_keys,
         }
-        told |= {f"force {name}": str(force) for name, force in self.forces.items()}
-        told |= {f"gap {f.name}": str(f.expression) for f in self.polyhedron.functions}
-        told |= {f"equation {h.name}": str(h.expression) for h in self.polyhedron.equations}
+        told |= {f"force {name}": written(force) for name, force in self.forces.items()}
+        told |= {f"gap {f.name}": written(f.expression) for f in self.polyhedron.functions}
+        told |= {f"equation {h.name}": written(h.expression) for h in self.polyhedron.equations}
         told |= {
-            f"friction {f.name}": f"{f.slip}, {f.static}, {f.moving}, {f.load}, {f.kind}"
+            f"friction {f.name}": {"slip": [*map(written, f.slip)], "load": str(f.load), **f.told()}
             for f in self.friction
         }
         if between is not None:

@@ -28,6 +28,7 @@ from discs import (
 from kept_files import same_motion as same
 
 from polycorner import AnyOf, Manifold, Polyhedron
+from polycorner.bodies import Arrangement, HalfSpace, capsule
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.files import load_trajectory, save_trajectory
 from polycorner.motion import (
@@ -303,6 +304,22 @@ def test_values_are_copied_pickled_and_sent_to_a_process(spawned, name):
     expected = told(copy.deepcopy(value))
     assert told(pickle.loads(pickle.dumps(value))) == expected
     assert told(spawned.submit(copy.copy, value).result()) == expected
+
+
+def test_long_formulas_are_described_by_their_length_and_told_apart():
+    """What is written of them is the same; what was compiled is not."""
+    told = []
+    for half in (1.0, 1.0, 1.0 + 1e-9):
+        rod = capsule([0, 0, -half], [0, 0, half], 0.3)
+        floor = {"floor": HalfSpace([0, 0, 1], [0, 0, 0])}
+        a = Arrangement({"A": rod}, floor, orientations="all")
+        told.append(a.system(friction={"between": 0.3}, count=2).described())
+    (rubbing,) = told[0]["friction between bodies"]
+    assert rubbing["static"] == "Disc(mu=0.3)"
+    assert rubbing["A1-A2"][0].startswith("a formula of length")
+    assert told[0] == told[1]
+    assert told[0]["friction between bodies"] == told[2]["friction between bodies"]
+    assert told[0]["formulas"] != told[2]["formulas"]
 
 
 def test_a_system_moves_in_another_process_as_it_does_here(spawned):
