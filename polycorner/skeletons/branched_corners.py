@@ -1,4 +1,4 @@
-"""Vertex figures of corners where gradients have several relations.
+"""Vertex figures of corners where gradients have several relations, or one and full rank.
 
 The edges are the branches of second order that stay in the polyhedron, see
 :mod:`~polycorner.skeletons.branches`.  Faces are told by where they meet a small sphere about the
@@ -22,6 +22,7 @@ from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.vertex_figures import (
+    ROUNDING,
     Ray,
     VertexFigure,
     corner_rank,
@@ -34,6 +35,8 @@ from polycorner.spaces.manifold import Array
 ALIKE = 1e-2
 # Distances in a link at which arcs are looked for: second derivatives shrink with its radius.
 BESIDE = (0.1, 0.03, 0.01)
+# Deviation from 1 of the cosine between directions that are one.
+STRAIGHT = 1e-6
 # Times that a point of a dependent edge is moved to its distance.
 PLACED = 3
 
@@ -83,17 +86,29 @@ def dependent_rays(
 
 
 def branched_rays(
-    point: EvaluatedPoint, active: frozenset[int], distance: float
+    point: EvaluatedPoint, active: frozenset[int], distance: float, least: int = 1
 ) -> tuple[list[Ray], list[frozenset[int]]]:
-    """Return the rays at a singular corner, and sets of functions whose curves are unclear."""
+    """Return the rays at a degenerate corner, and sets of functions whose curves are unclear.
+
+    Parameters
+    ----------
+    point : EvaluatedPoint
+        The corner.
+    active : set of int
+        Functions that vanish there.
+    distance : float
+        From the corner to the samples, in scale units.
+    least : int
+        Least dimension that the gradients of what stays zero leave; rays with fewer are left out.
+    """
     scales = point.quotient.polyhedron.manifold.scale_array
     branches = Branches(point, sorted(active))
     rays: list[Ray] = []
-    for y, held in branches.simple():
+    for y, held in branches.simple(least):
         way = branches.frame @ y
         ahead = point.q + distance * scales * way
-        there = projected(point.quotient, ahead, sorted(held), distance / 2)
-        along = None if there is None else there.active()
+        there = _near(point, ahead, sorted(held), distance / 2)
+        along = None if there is None else _along(there, active)
         if there is None:
             branches.unclear.append(held)
         elif along and along != active and not _known(rays, along, there.q, distance):
@@ -105,6 +120,36 @@ def branched_rays(
             rays.append(found)
     explained = [ray.active for ray in rays if ray.dependent]
     return rays, [held for held in branches.unclear if held not in explained]
+
+
+def _near(point: EvaluatedPoint, q: Array, held: list[int], reach: float) -> HeldPoint | None:
+    """Return the nearest point of a curve, first with functions that are independent at its corner.
+
+    Beside the corner the others meet these at small angles.
+    """
+    there = projected(point.quotient, q, held, reach)
+    if there is None:
+        first = projected(point.quotient, q, point.basis(held), reach)
+        there = None if first is None else projected(point.quotient, first.q, held, reach)
+    return there
+
+
+def _along(there: HeldPoint, active: frozenset[int]) -> frozenset[int] | None:
+    """Return what vanishes at a point of a curve; None where that leaves the polyhedron.
+
+    Functions that open to third order are within the tolerance of zero near the corner, but not
+    zero to rounding.
+    """
+    found, away = there.active(), there.distances
+    opened = [i for i in active.intersection(found or ()) if abs(away[i]) > ROUNDING]
+    if found is None or any(away[i] < 0 for i in opened):
+        return None
+    return found.difference(opened)
+
+
+def _is_same(ray: Ray, other: Ray) -> bool:
+    """Whether two rays, of independent gradients, belong to one edge."""
+    return ray.active == other.active and bool(ray.direction @ other.direction > 1 - STRAIGHT)
 
 
 def _known(rays: list[Ray], active: frozenset[int], q: Array, distance: float) -> bool:
@@ -139,17 +184,19 @@ def _unclear(point: EvaluatedPoint, active: frozenset[int], held: frozenset[int]
     )
 
 
-def with_dependent_rays(
+def with_branches(
     figure: VertexFigure, point: EvaluatedPoint, active: frozenset[int]
 ) -> VertexFigure:
-    """Return the figure of a corner of full rank with the dependent edges that leave it.
+    """Return the figure of a corner of full rank with the edges that first derivatives do not tell.
 
-    Edges on which one function of weight zero opens leave along extreme rays of the tangent cone;
-    these are on none.
+    Where more functions vanish than there are dimensions, gradients may be independent along an
+    edge and dependent at the corner, or dependent all along.  Then the edge need not leave along an
+    extreme ray of the tangent cone, but where a function of second or third order changes sign
+    inside a face of the cone.  Faces beside such edges are told at their other corners only.
     """
-    found = list(dependent_rays(point, active, DISTANCES[0]))
-    rays = [ray for ray in found if isinstance(ray, Ray)]
-    unclear = [_unclear(point, active, held) for held in found if not isinstance(held, Ray)]
+    found, held = branched_rays(point, active, DISTANCES[0], least=2)
+    rays = [ray for ray in found if not any(_is_same(ray, other) for other in figure.rays)]
+    unclear = [_unclear(point, active, some) for some in held]
     return replace(figure, rays=(*figure.rays, *rays), notes=(*figure.notes, *unclear))
 
 
@@ -220,8 +267,14 @@ class _Arcs:
             return vertex_figure(point, ray.active).rays
         point = SingularPoint(self.link, point.q, sorted(ray.active))
         found = fold_figure(point, ray.active, rank, full, BESIDE)
-        self.lost += found is None
-        return () if found is None else found.rays
+        if found is not None:
+            return found.rays
+        if len(ray.active) < full - 1:
+            self.lost += 1
+            return ()
+        rays, unclear = branched_rays(point, ray.active, BESIDE[0])
+        self.lost += len(unclear)
+        return tuple(rays)
 
     def _pairs(self, ends: Ends) -> Iterator[tuple[int, int]]:
         """Yield the edges at both ends of the arcs on which the same functions vanish."""
@@ -230,7 +283,8 @@ class _Arcs:
             i, arc = left.pop(0)
             stop = self._followed(arc)
             if stop is None:
-                break
+                self.lost += 1 + len(left)
+                return
             away = [float(np.linalg.norm(end[1].sample.q - stop)) for end in left]
             yield i, left.pop(int(np.argmin(away)))[0]
         if len(left) == 2:

@@ -12,21 +12,30 @@ zero goes one branch, by the implicit function theorem: divide the functions by 
 the corner, and their weighted sums by its square ([CW] sec. 3 has the same forms).  So every edge
 along which gradients are independent leaves along such a zero, simple or not, for some ``H``.
 
+A form that vanishes on a plane says nothing; then the weighted sum is of third order or more, and
+``d`` is where it changes sign on a small circle, beside which the other functions stay zero.  Sums
+below ``1e-11`` at ``1e-3`` count as zero along a whole surface.
+
 Where the form of a set with one relation is semidefinite and has one null direction, that is the
 direction of an edge along which the relation persists, or of a cusp; ``N + 1 - k`` functions with
 one relation leave ``k`` dimensions.
 """
 
+import math
 from collections.abc import Iterator
+from functools import partial
 from itertools import combinations, islice
+from math import comb
 
 import numpy as np
 
-from polycorner.polyhedra.cones import Rows, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.dependence import curvature
 from polycorner.skeletons.points import EvaluatedPoint, projected
 from polycorner.skeletons.quadrics import FLAT, common_zeros
+from polycorner.skeletons.sign_changes import sign_change
+from polycorner.skeletons.spheres_about import Link
 from polycorner.spaces.manifold import Array
 
 # Least eigenvalue of a semidefinite form relative to the largest that counts as positive.
@@ -39,6 +48,10 @@ MAX_SETS = 20_000
 BESIDE, PERSISTS = 1e-3, 1e-11
 # Weighted sum of functions, some of which are farther from zero than that, which has a sign.
 ROUNDING = 1e-13
+
+# Radius in scale units of a circle on which sums of higher order change sign, its points, and the
+# part of the largest sum that may be a zero.
+ROUND, AROUND, NEARLY = 3e-3, 72, 1e-2
 
 # A unit direction in the quotient, and functions that stay zero along it.
 Branch = tuple[Array, frozenset[int]]
@@ -69,17 +82,36 @@ class Branches:
         self.full = int(self.frame.shape[1])
         every = Rows(self.slopes, RANK_TOLERANCE)
         self.relations, self.free = every.relations, self.full - every.rank
+        # Second derivatives shrink with a link's radius.
+        sphere = self.point.quotient.polyhedron
+        self.scale = 1 / sphere.radius if isinstance(sphere, Link) else 1.0
         self.unclear: list[frozenset[int]] = []
 
-    def simple(self) -> Iterator[Branch]:
-        """Yield the directions of branches with independent gradients, of both signs."""
-        for opened in combinations(range(len(self.rows)), len(self.rows) - self.full + 1):
+    def simple(self, least: int = 1) -> Iterator[Branch]:
+        """Yield the directions of branches with independent gradients, of both signs.
+
+        Only of functions that leave at least ``least`` dimensions to first order.  All is unclear
+        where there are too many sets of functions.
+        """
+        count = len(self.rows)
+        if comb(count, self.full - 1) > MAX_SETS:
+            self.unclear.append(frozenset())
+            return
+        for opened in combinations(range(count), count - self.full + 1):
             held, some = self._held(opened)
+            if some.null_space.shape[1] < least:
+                continue
+            if some.null_space.shape[1] > 1 and not self._enters(opened, some):
+                continue
             forms = self._forms(held, some)
             zeros = common_zeros(forms)
+            lines = [d for zero in zeros or () for d in (zero, -zero)]
             if zeros is None and not self._is_explained(forms, held, some):
-                self.unclear.append(frozenset(held))
-            for d in zeros or ():
+                found = self._of_higher_order(forms, held, some)
+                if found is None:
+                    self.unclear.append(frozenset(held))
+                lines = found or []
+            for d in lines:
                 yield from self._entering(some.null_space @ d, opened, held)
 
     def double(self) -> Iterator[Branch]:
@@ -89,7 +121,8 @@ class Branches:
             held, some = self._held(opened)
             values, axes = _positive(self._forms(held, some)[0])
             if values[1] > max(FLAT, CLEAR * values[-1]) and abs(values[0]) <= FLAT:
-                yield from self._entering(some.null_space @ axes[:, 0], opened, held)
+                for d in (axes[:, 0], -axes[:, 0]):
+                    yield from self._entering(some.null_space @ d, opened, held)
 
     def excludes(self, held: frozenset[int], there: EvaluatedPoint) -> bool:
         """Whether higher orders exclude an edge, seen at a point where its other equations hold.
@@ -134,7 +167,8 @@ class Branches:
     def _forms(self, held: list[int], some: Rows) -> Array:
         k = some.null_space.shape[1]
         forms = [curvature(self.point, held, w, some.null_space) for w in some.relations.T]
-        return np.array(forms).reshape(-1, k, k)
+        every = np.array(forms).reshape(-1, k, k)
+        return every * self.scale
 
     def _is_explained(self, forms: Array, held: list[int], some: Rows) -> bool:
         """Whether there is one double zero, or the functions leave more than curves.
@@ -151,11 +185,46 @@ class Branches:
         there = projected(quotient, q, kept, BESIDE / 2)
         return there is not None and abs(there.distances[held]).max() <= PERSISTS
 
+    def _enters(self, opened: tuple[int, ...], some: Rows) -> bool:
+        """Whether the others have a null direction along which no function falls to first order."""
+        slopes = self.slopes[list(opened)] @ some.null_space
+        size = np.linalg.norm(slopes, axis=1)
+        slopes = slopes[size > RANK_TOLERANCE]
+        whole = rank(slopes, RANK_TOLERANCE) == slopes.shape[1]
+        return not whole or bool(extreme_rays(slopes, RANK_TOLERANCE))
+
+    def _of_higher_order(self, forms: Array, held: list[int], some: Rows) -> list[Array] | None:
+        """Return where a weighted sum whose form vanishes on a plane changes sign, on a circle.
+
+        The others stay zero there.  None where there is no such plane, and where the sum may have
+        zeros without a change of sign.
+        """
+        if forms.shape != (1, 2, 2) or abs(forms).max() > FLAT:
+            return None
+        weights, kept = some.relations[:, 0], self.point.basis(held)
+        scales = self.point.quotient.polyhedron.manifold.scale_array
+
+        def total(start: float, step: float, part: float = 0.0) -> tuple[float, Array]:
+            angle = start + part * step
+            d = np.array([math.cos(angle), math.sin(angle)])
+            q = self.point.q + ROUND * scales * (self.frame @ some.null_space @ d)
+            there = projected(self.point.quotient, q, kept, ROUND / 2)
+            return math.nan if there is None else float(weights @ there.distances[held]), d
+
+        angles = np.linspace(0.0, math.tau, AROUND + 1)
+        sums = np.array([total(angle, 0.0)[0] for angle in angles])
+        low = abs(sums) < NEARLY * abs(sums).max()
+        changes = np.flatnonzero(sums[:-1] * sums[1:] < 0)
+        beside = {k + i for k in changes.tolist() for i in (-1, 0, 1, 2)}
+        if np.isnan(sums).any() or not beside.issuperset(np.flatnonzero(low).tolist()):
+            return None
+        arcs = ((float(angles[k]), float(angles[k + 1] - angles[k])) for k in changes)
+        return [sign_change(partial(total, start, step))[1] for start, step in arcs]
+
     def _entering(self, d: Array, opened: tuple[int, ...], held: list[int]) -> Iterator[Branch]:
-        """Yield those of a line's two directions along which no function falls to first order."""
-        for way in (d, -d):
-            if (self.slopes[list(opened)] @ way > -RANK_TOLERANCE).all():
-                yield way, frozenset(held)
+        """Yield a direction if no function falls along it to first order."""
+        if (self.slopes[list(opened)] @ d > -RANK_TOLERANCE).all():
+            yield d, frozenset(held)
 
 
 def _positive(form: Array) -> tuple[Array, Array]:

@@ -19,9 +19,14 @@ along ``w . y = 0`` ([AGV] sec. 1).  Where every ``S_kk`` is at least zero, for 
 | ``j, k`` | +, 0, ``S_kk = 0`` | the same, between an edge of ``j`` and that of ``k`` |
 | ``j, k`` | +, another | a face between the two edges of ``j`` |
 | ``k, l`` | 0, 0, ``S_kk = S_ll = 0 > S_kl`` | two faces between their edges |
-| ``k, l`` | 0, 0, ``S_kk = S_ll = 0 = S_kl`` | a dependent face between their edges |
 | ``k, l`` | 0, 0, ``S_kk = 0 < S_ll``, ``S_kl < 0`` | a face around the edge of ``k`` |
 | ``k, l`` | 0, 0, ``S_kl < -sqrt(S_kk S_ll) < 0`` | a face around the corner, with no edge |
+
+On the functions ``T`` of weight zero let ``S`` be positive semidefinite.  A ray ``u >= 0`` on which
+it vanishes is a dependent edge if no other ray on which it does opens only functions of its own:
+with one function or two these are the edges above, and with three the null vector has to be
+positive.  Where ``T`` is what opens along two of these edges ``u`` and ``v``, and along no other
+one, and ``u' S v = 0``, a dependent face along which all of ``T`` open lies between them.
 
 Equality is decided to second order.  A dependent edge that would be none to third order is none if
 the sum stays positive there, and noted otherwise.  With two flaps, opening a function of positive
@@ -133,7 +138,22 @@ class _Fold:
         """What opens along dependent edges."""
         own = np.diagonal(self.cross)
         single = [(k,) for k, s in zip(self.free, own, strict=True) if abs(s) <= RANK_TOLERANCE]
-        return [*single, *self.pairs]
+        found = [*single, *self.pairs]
+        return [*found, *(some for some in combinations(self.free, 3) if self._null(some, found))]
+
+    def _null(self, some: Opening, known: list[Opening]) -> bool:
+        """Whether the form on some functions is semidefinite, with one null vector, positive."""
+        if any(set(opening) <= set(some) for opening in known):
+            return False
+        values, axes = np.linalg.eigh(self._form_of(some))
+        null = axes[:, 0] * np.sign(axes[0, 0])
+        single = abs(values[0]) <= RANK_TOLERANCE < values[1]
+        return bool(single and null.min() > RANK_TOLERANCE)
+
+    def _form_of(self, some: Opening) -> Array:
+        """Return the form ``S`` on some functions of weight zero."""
+        at = [self.free.index(k) for k in some]
+        return np.asarray(self.cross[np.ix_(at, at)])
 
     @property
     def pairs(self) -> list[Opening]:
@@ -211,10 +231,11 @@ class _Fold:
     ) -> tuple[tuple[Ray, ...], tuple[Sector, ...], tuple[str, ...]]:
         """Return rays, sectors and notes."""
         place = {key: i for i, key in enumerate(rays)}
+        faces = [(pair, e) for pair in combinations(range(len(self.rows)), 2)
+                 for e in self._faces(pair)]  # fmt: skip
         sectors = [
-            Sector(tuple(place[end] for end in ends), self._ordered(pair))
-            for pair in combinations(range(len(self.rows)), 2)
-            for ends in self._faces(pair)
+            Sector(tuple(place[end] for end in ends), self._ordered(opening))
+            for opening, ends in (*faces, *self._dependent_faces())
             if all(end in place for end in ends)
         ]
         if len(self.flaps) == 2:
@@ -239,10 +260,22 @@ class _Fold:
         elif straight[0] and self.weights[k] == 0:
             mixed = self.cross[self.free.index(j), self.free.index(k)]
             ends = ((j,), 0), ((k,) if straight[1] else (j,), 0)
-            if abs(mixed) <= RANK_TOLERANCE and straight[1]:
-                yield ends
-            elif mixed < -RANK_TOLERANCE and single:
+            if mixed < -RANK_TOLERANCE and single:
                 yield from (ends,) * (1 + straight[1])
+
+    def _dependent_faces(self) -> Iterator[tuple[Opening, tuple[Ends, ...]]]:
+        """Yield what opens along dependent faces, and the edges that bound them."""
+        for one, other in combinations(self.dependent, 2):
+            some = tuple(sorted({*one, *other}))
+            form, form_one, form_other = (self._form_of(part) for part in (some, one, other))
+            if sum(set(opening) <= set(some) for opening in self.dependent) > 2:
+                continue
+            u, v = np.zeros((2, len(some)))
+            for y, part, own in ((u, one, form_one), (v, other, form_other)):
+                y[[some.index(k) for k in part]] = abs(np.linalg.eigh(own)[1][:, 0])
+            values = np.linalg.eigvalsh(form)
+            if values[0] >= -RANK_TOLERANCE and abs(u @ form @ v) <= RANK_TOLERANCE:
+                yield some, ((one, 0), (other, 0))
 
     def _cones(self) -> Iterator[tuple[int, Array]]:
         """Yield functions with ``S_kk < 0``, which open on a cone, and a direction on it."""

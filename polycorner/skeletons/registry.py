@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, renamed
-from polycorner.skeletons.branched_corners import with_dependent_rays
+from polycorner.skeletons.branched_corners import with_branches
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.singularities import SingularPoint, refined
 from polycorner.skeletons.vertex_figures import VertexFigure, corner_rank, vertex_figure
@@ -187,7 +187,7 @@ class CornerRegistry:
             found = vertex_figure(point, active)
             if len(active) == full or self.polyhedron.is_union:
                 return found
-            return with_dependent_rays(found, point, active)
+            return with_branches(found, point, active)
         point = SingularPoint(self.quotient, point.q, sorted(active))
         return self.singular_figure(point, active, corner_rank(point, active)[0])
 

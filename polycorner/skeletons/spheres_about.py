@@ -39,12 +39,18 @@ class Link(Polyhedron):
     """A polyhedron's intersection with a sphere about a point, orthogonal to the orbit there.
 
     Its scales are the radius, so that walks and tolerances shrink with it.
+
+    Attributes
+    ----------
+    radius : float
+        In scale units of the polyhedron.
     """
 
     def __init__(self, point: EvaluatedPoint, radius: float) -> None:
         base = point.quotient.polyhedron
         self.__setstate__(base.__getstate__())
         manifold = base.manifold
+        self.radius = radius
         scales = radius * manifold.scale_array
         self.manifold = Manifold(manifold.names, scales=tuple(scales.tolist()))
         across = unit_rows(point.orbit)

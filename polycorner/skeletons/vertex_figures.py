@@ -26,6 +26,8 @@ from polycorner.spaces.manifold import Array
 SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 MAX_CANDIDATES = 20_000
 MAX_BASES = 64
+# Distance from zero, in scale units, of functions that vanish along a curve.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -240,25 +242,27 @@ def _tested(
 ) -> Ray | None:
     """Return the ray if a point a little along the curve lies in the polyhedron.
 
-    A function that opens or closes quadratically is within the tolerance of zero near the corner:
-    one that was not zero farther out is not active.
+    A function that opens to higher order is within the tolerance of zero near the corner: one that
+    is not zero to rounding farther out does not vanish along the curve.
     """
-    quotient = point.quotient
+    quotient, union = point.quotient, point.quotient.polyhedron.is_union
     scales = quotient.polyhedron.manifold.scale_array
     kept, rows = sorted(base), np.array(sorted(active.difference(base)), dtype=np.int64)
     far = 10 * quotient.tolerance
-    left: set[int] = set()
+    opened = np.zeros(len(rows))  # signs of the functions farther out
     for h in [h for h in SAMPLES if h >= far] or [10 * far]:
         sample = projected(quotient, point.q + h * scales * direction, kept, 0.5 * h)
         if sample is None:
             continue
-        there = sample.active()
-        if there is not None and not quotient.polyhedron.is_union and there & left:
-            return None
-        left.update(rows[abs(sample.distances[rows]) > quotient.tolerance].tolist())
+        there, away = sample.active(), sample.distances[rows]
+        opened = np.where(opened == 0, np.sign(away) * (abs(away) > ROUNDING), opened)
+        if there is not None and not union:
+            if there.intersection(rows[opened < 0].tolist()):
+                return None
+            there = there.difference(rows[opened > 0].tolist())
         if there is not None and there < active and there >= base:
             return Ray(direction, there, Sample.of(sample), h)
-        if there is not None and there < active and quotient.polyhedron.is_union:
+        if there is not None and there < active and union:
             kept_there = sample.basis(there)
             if len(kept_there) == len(kept):
                 return Ray(direction, there, Sample(sample.q, tuple(kept_there)), h)

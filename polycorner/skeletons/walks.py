@@ -139,7 +139,11 @@ class _Follower:
             met = [e for e in (self._dependent(point), self._event(point, t)) if e is not None]
             if met:
                 here = self.point
-                self._move(*min(met, key=lambda e: round(part_of_way(here, point, e[0].q), 6)))
+                first = min(met, key=lambda e: round(part_of_way(here, point, e[0].q), 6))
+                if first[0].active() is None and h > SHORTEST_STEP and not self.union:
+                    h /= 2  # several functions close where curves cross: on another of these
+                    continue
+                self._move(*first)
                 return self._walk(End.CORNER)
             back = self._return(point) if self.home else None
             if back is not None:
@@ -197,8 +201,6 @@ class _Follower:
             h /= 2
         return End.CHART if blocked else End.SINGULAR
 
-    # --------------------------------------------------------------------------- singular points
-
     def _stopped(self, end: End) -> Walk:
         """Return the walk where no step is possible: a tip where one is found within reach."""
         tip = singular_point(self.quotient, self.point.q, self.point.kept, TIP)
@@ -227,8 +229,6 @@ class _Follower:
             self.expected = singular_point(self.quotient, low.q, self.point.kept, reach)
         found = dependent_between(self.point, point, self.expected)
         return None if found is None else (found, self.t)
-
-    # ------------------------------------------------------------------------------------ events
 
     def _between(self, other: HeldPoint, s: float) -> HeldPoint:
         """Return the point of the set a fraction ``s`` of the way to ``other``."""

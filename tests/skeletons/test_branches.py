@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry
 from polycorner.polyhedra.cones import rank, unit_rows
+from polycorner.skeletons import branches
 from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.folds import fold_figure
@@ -123,3 +124,18 @@ def test_a_corner_that_a_walk_misses_by_the_root_of_the_tolerance():
     assert registry.find(missed)[0] == registry.find(quotient.at(np.zeros(4)))[0] == 0
     assert registry.records[0].active == {0, 1, 2, 3, 4}
     assert registry.records[0].point.q == pytest.approx(0, abs=1e-9)
+
+
+def test_too_many_sets_of_functions_are_a_note(monkeypatch):
+    """Five functions vanish at the apex of a pyramid over a pentagon."""
+    space = Manifold.euclidean("x y z")
+    x, y, z = space.symbols
+    turns = np.linspace(0, 2 * np.pi, 5, endpoint=False)
+    D = Polyhedron(space, [-z - np.cos(turn) * x - np.sin(turn) * y for turn in turns])
+    point, active = corner(D)
+    registry = Explorer(point.quotient, [], np.random.default_rng(0)).registry
+    found = registry.figure(point.quotient.at(point.q), active)
+    assert (len(found.rays), found.notes) == (5, ())
+    monkeypatch.setattr(branches, "MAX_SETS", 9)
+    (note,) = registry.figure(point.quotient.at(point.q), active).notes
+    assert "not followed" in note

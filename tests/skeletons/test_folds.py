@@ -108,6 +108,46 @@ def test_an_edge_along_which_two_functions_open(p, q):
     assert not found.notes
 
 
+SIX = Manifold.euclidean("t s c d e g")
+x, y, c, d, e, g = SIX.symbols
+
+
+def dependent_parts(form):
+    """Return what opens of ``c, d, e, g`` along the edges and faces where ``t^2 + S`` vanishes.
+
+    There ``s`` and ``t^2 + S - s``, which may not be negative, stay zero.
+    """
+    found = figure(Polyhedron(SIX, [c, d, e, g, y, x**2 + form - y]))
+    rays = [ray for ray in found.rays if {4, 5} <= ray.active]
+    assert not found.notes
+    assert all(ray.dependent for ray in rays)
+    return tuple(
+        sorted(["cdeg"[k] for k in range(4) if k not in part.active] for part in parts)
+        for parts in (rays, [sector for sector in found.sectors if {4, 5} <= sector.active])
+    )
+
+
+def test_faces_along_which_three_functions_open_and_the_relation_persists():
+    """``c + d = e`` is a plane in the octant, between ``c = e`` and ``d = e``; ``g`` is free."""
+    rays, sectors = dependent_parts((c + d - e) ** 2)
+    assert rays == [["c", "e"], ["d", "e"], ["g"]]
+    assert sectors == [["c", "d", "e"], ["c", "e", "g"], ["d", "e", "g"]]
+
+
+def test_an_edge_along_which_three_functions_open():
+    """``c = d = e`` is a ray, and with ``g``, which is free, a face."""
+    rays, sectors = dependent_parts((c - d) ** 2 + (d - e) ** 2)
+    assert rays == [["c", "d", "e"], ["g"]]
+    assert sectors == [["c", "d", "e", "g"]]
+
+
+def test_no_face_where_the_form_is_negative_beside_the_plane_of_two_edges():
+    """``(c + d - e) (c + 2 d - e)`` is negative inside: only ``c = e`` is an end of both planes."""
+    rays, sectors = dependent_parts((c + d - e) * (c + 2 * d - e) + 4 * g**2)
+    assert ["c", "e"] in rays
+    assert ["c", "d", "e"] not in sectors
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_dependent_edge_out_of_a_corner_of_full_rank(sign):
     """Where ``a`` and ``sign (b - t)^2 - a`` vanish."""

@@ -1,0 +1,41 @@
+"""Edges of corners that are told by second and third derivatives, from the definition."""
+
+import pytest
+
+from polycorner import Manifold, Polyhedron, skeleton
+from polycorner.skeletons import Completeness
+
+SPACE = Manifold.euclidean("x y z")
+x, y, z = SPACE.symbols
+PLANE = Manifold.euclidean("x y")
+u, v = PLANE.symbols
+
+
+def wedge(height):
+    """Return the points between a plane and a graph over it, where ``0 <= x <= 1`` and ``y >= 0``.
+
+    The height is positive where ``x > y`` and zero where they are equal.
+    """
+    names = ("floor", "roof", "side", "back", "front")
+    return Polyhedron(SPACE, dict(zip(names, (z, height - z, y, x, 1 - x), strict=True)))
+
+
+@pytest.mark.parametrize("height", [(x - y) * (x + y), (x - y) * (x**2 + y**2)])
+def test_a_roof_that_meets_the_floor_along_an_edge_out_of_a_corner(height):
+    """Both are level at the corner, so that no first derivative tells where they meet."""
+    found = skeleton(wedge(height), [(0.7, 0.2, 0.01)])
+    kinds = sorted(tuple(sorted(edge.active)) for edge in found.edges)
+    at_front = [("floor", "front"), ("front", "roof"), ("front", "side")]
+    assert kinds == sorted([*at_front, ("floor", "roof"), ("floor", "side"), ("roof", "side")])
+    assert found.complete is Completeness.EXHAUSTED
+    assert len(found.corners) == 4
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_function_that_opens_to_third_order_does_not_vanish_along_an_edge(sign):
+    """Of ``v`` and ``v + u^3`` the smaller one is zero along the edge, the other one opens."""
+    box = {"flat": v, "bent": v + sign * u**3, "left": u, "right": 1 - u, "top": 2 - v}
+    found = skeleton(Polyhedron(PLANE, box), [(0.5, 1.2)])
+    kinds = sorted(sorted(edge.active) for edge in found.edges)
+    assert kinds == sorted([["flat" if sign > 0 else "bent"], ["left"], ["right"], ["top"]])
+    assert found.complete is Completeness.EXHAUSTED
