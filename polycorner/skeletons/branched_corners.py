@@ -22,10 +22,10 @@ from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.vertex_figures import (
-    ROUNDING,
     Ray,
     VertexFigure,
     corner_rank,
+    rounding,
     vertex_figure,
 )
 from polycorner.skeletons.walks import End
@@ -141,7 +141,7 @@ def _along(there: HeldPoint, active: frozenset[int]) -> frozenset[int] | None:
     zero to rounding.
     """
     found, away = there.active(), there.distances
-    opened = [i for i in active.intersection(found or ()) if abs(away[i]) > ROUNDING]
+    opened = [i for i in active.intersection(found or ()) if abs(away[i]) > rounding(there)]
     if found is None or any(away[i] < 0 for i in opened):
         return None
     return found.difference(opened)

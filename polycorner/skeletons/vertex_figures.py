@@ -26,8 +26,9 @@ from polycorner.spaces.manifold import Array
 SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 MAX_CANDIDATES = 20_000
 MAX_BASES = 64
-# Distance from zero, in scale units, of functions that vanish along a curve.
-ROUNDING = 1e-12
+# Distances from zero that functions have which vanish along a curve, in scale units: at the least,
+# and over the size of the coordinates.
+ROUNDING, RELATIVE_ROUNDING = 1e-12, 64 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -237,6 +238,15 @@ def _bases(rows: list[int], slopes: Array, tight: frozenset[int]) -> Iterator[fr
             yield frozenset(some)
 
 
+def rounding(point: EvaluatedPoint) -> float:
+    """Return the distance from zero, in scale units, up to which a function vanishes near a point.
+
+    Far from the origin rounding errors of the coordinates count.
+    """
+    size = abs(point.q / point.quotient.polyhedron.manifold.scale_array).max()
+    return max(ROUNDING, RELATIVE_ROUNDING * float(size))
+
+
 def _tested(
     point: EvaluatedPoint, active: frozenset[int], direction: Array, base: frozenset[int]
 ) -> Ray | None:
@@ -255,7 +265,7 @@ def _tested(
         if sample is None:
             continue
         there, away = sample.active(), sample.distances[rows]
-        opened = np.where(opened == 0, np.sign(away) * (abs(away) > ROUNDING), opened)
+        opened = np.where(opened == 0, np.sign(away) * (abs(away) > rounding(point)), opened)
         if there is not None and not union:
             if there.intersection(rows[opened < 0].tolist()):
                 return None

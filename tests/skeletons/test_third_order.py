@@ -1,5 +1,6 @@
 """Edges of corners that are told by second and third derivatives, from the definition."""
 
+import numpy as np
 import pytest
 
 from polycorner import Manifold, Polyhedron, skeleton
@@ -39,3 +40,16 @@ def test_a_function_that_opens_to_third_order_does_not_vanish_along_an_edge(sign
     kinds = sorted(sorted(edge.active) for edge in found.edges)
     assert kinds == sorted([["flat" if sign > 0 else "bent"], ["left"], ["right"], ["top"]])
     assert found.complete is Completeness.EXHAUSTED
+
+
+@pytest.mark.parametrize("away", [0.0, 1e3, 1e5, 1e6])
+def test_rounding_errors_far_from_the_origin_open_nothing(away):
+    """Three functions vanish along an edge, at which two are independent, wherever the set is."""
+    M = Manifold.euclidean("x y z")
+    corner = away * np.array([1 / 3, 2 / 7, 3 / 11])
+    x, y, z = (s - c for s, c in zip(M.symbols, corner, strict=True))
+    walls = {"a": x, "b": y, "c": x + 2 * y + (x**2 + y**2) / 3}
+    D = Polyhedron(M, {**walls, "low": z, "high": 1 - z, "ball": 4 - x**2 - y**2 - z**2})
+    atlas = skeleton(D, [corner + 0.5])
+    assert (len(atlas.corners), len(atlas.edges), len(atlas.faces)) == (6, 9, 5)
+    assert ("a", "b", "c") in {edge.active for edge in atlas.edges}
