@@ -153,8 +153,9 @@ def test_a_step_with_new_ranks_starts_from_the_impulses_of_the_step_before():
     assert left[3] < 2.0 * max(left[:3] + left[4:])
 
 
-def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told():
-    engine, met = heap(crowd_sweeps=6), 0
+@pytest.mark.parametrize("friction", [MU, 0.0])
+def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told(friction):
+    engine, met = heap(friction, crowd_sweeps=6), 0
     for _ in range(80):
         engine.motion.sums[4] = 0.0  # the residual, of all steps before
         engine.advance(1)
@@ -162,12 +163,12 @@ def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told():
         if len(blocks) != 1:
             continue
         (blocks,) = blocks
-        found, v = residuals(work, blocks, MU)
+        found, v = residuals(work, blocks, friction)
         bodies = np.unique(work.block_bodies[blocks])
         moved = bodies[(bodies >= 0) & ~engine.motion.rests[bodies].astype(bool)]
         np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-9 * abs(v).max())
         normal, rubs = work.impulse[blocks, 0], work.pressing[blocks] >= 0
-        limit = MU * work.impulse[work.pressing[blocks[rubs]], 0]
+        limit = friction * work.impulse[work.pressing[blocks[rubs]], 0]
         assert (normal[~rubs] >= 0).all()
         assert (abs(normal[rubs]) <= limit * (1 + 1e-12)).all()
         speed = abs(work.free[blocks] + work.offset[blocks])
