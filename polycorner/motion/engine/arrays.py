@@ -159,6 +159,8 @@ class State(NamedTuple):
     check_due: Annotated[Any, whole("N")]  # step in which a sleeper is checked again
     booked_to: Annotated[Any, whole("N")]  # step up to which its work is booked
     neighbour_impulse: Annotated[Any, real("N k")]  # generalised impulses from other bodies
+    rank: Annotated[Any, whole("N")]  # of a body in the order in which contacts are listed
+    body_of_rank: Annotated[Any, whole("N")]
     keys: Annotated[Any, whole("C")]  # contacts between bodies, in ascending order
     pair_impulse: Annotated[Any, real("C T+1")]  # their impulses: normal, friction law after law
     pair_release: Annotated[Any, real("C")]  # when the normal impulse would vanish
@@ -208,6 +210,8 @@ class Work(NamedTuple):
     stage: Annotated[Any, whole("N")]  # of the island that a body represents: SETTLED, ...
     curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
     parent: Annotated[Any, whole("N")]  # in the union-find forest
+    column: Annotated[Any, whole("N")]  # of a body that is searched for neighbours
+    ordered: Annotated[Any, whole("N")]  # bodies by columns and along them, as listed last
     v_old: Annotated[Any, real("N K")]  # velocities before the step
     v_free: Annotated[Any, real("N K")]  # velocities after forces alone
     v_new: Annotated[Any, real("N K")]  # velocities after the step

@@ -10,7 +10,7 @@ import numpy as np
 
 from polycorner.motion.engine.codes import WATCHED
 from polycorner.motion.engine.gauss_seidel import EXACT
-from polycorner.motion.engine.jit import ONE, TWO, ZERO, compiled
+from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.linear_algebra import factorise
 from polycorner.motion.engine.rows import (
     add_row,
@@ -32,24 +32,18 @@ SEPARATED = 0.2  # share of what is too much that one contact takes away
 NORMAL, NORMAL_RHO, SLIP, SLIP_RHO, COUPLING, PRESSES, RUBS, EXCESS = range(8)
 # Further ones where friction has two rows: of the second, W as in `Work.delassus`, and its impulse.
 ACROSS, W00, W01, W11, RUBS_ACROSS = range(5)
-# Its whole numbers: bodies, the first of its blocks, what it is.  The last one consists of bits and
-# of the number of its set of friction.
+# Its whole numbers: ranks of its bodies, the first of its blocks, what it is: bits, and the number
+# of its set of friction.
 FIRST, SECOND, BLOCK, FORM = range(4)
 HAS_GAP, HAS_FRICTION, BILATERAL, TWO_ROWS, SET_BITS = 1, 2, 4, 8, 4
 
 
 @compiled
-def is_pressed_by_former(work, b):
-    """Return whether a block is friction on which the block before it presses."""
-    return work.block_rows[b] > 0 and work.pressing[b] == b - 1 and b > 0
-
-
-@compiled
-def begin_compact(model, work, i):
+def begin_compact(model, state, work, i):
     """Start a body of a crowd at its velocity after forces alone."""
-    k, K, root = model.dimension, model.lanes, work.mass_root[i]
+    k, K, root, at = model.dimension, model.lanes, work.mass_root[i], state.rank[i]
     for c in range(K):
-        work.unit_velocity[i, c] = work.unit_shift[i, c] = 0.0
+        work.unit_velocity[at, c] = work.unit_shift[at, c] = 0.0
     if model.constant_mass and root[0, 0] > 0.0:
         return
     for a in range(k):
@@ -60,9 +54,9 @@ def begin_compact(model, work, i):
 
 
 @compiled
-def end_compact(model, work, i):
+def end_compact(model, state, work, i):
     """Set the velocity of a body of a crowd, and its change of place."""
-    K, at = model.lanes, i * model.lanes
+    K, at = model.lanes, state.rank[i] * model.lanes
     for a in range(model.dimension):
         velocity, shift = zeros(), zeros()
         for c in range(0, K, WIDTH):
@@ -76,10 +70,10 @@ def end_compact(model, work, i):
 @compiled
 def compact_row(model, work, b, row, r, target, to):
     """Write a row of a block, times ``U``, to a place for compact contact ``r``."""
-    k, K, at = model.dimension, model.lanes, row_at(model, b, row)
-    exchanged = work.block_bodies[b, 0] != work.compact[r, FIRST]
+    k, K, at, first = model.dimension, model.lanes, row_at(model, b, row), work.compact[r, BLOCK]
+    exchanged = work.block_bodies[b, 0] != work.block_bodies[first, 0]
     for side in range(2):
-        i = work.compact[r, side]
+        i = work.block_bodies[first, side]
         begin = at + (K if (side == 1) != exchanged else 0)
         for c in range(0, K, WIDTH):
             value = zeros()
@@ -109,10 +103,11 @@ def friction_of(contact):
 
 
 @compiled
-def compact_contact(model, work, r, b, pressed):
+def compact_contact(model, state, work, r, b, pressed):
     """Write a block, and the friction that follows if it is ``pressed``; return their speed."""
     contact, numbers, rows = work.compact[r], work.compact_numbers[r], work.compact_rows
-    contact[FIRST], contact[SECOND] = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    contact[FIRST], contact[SECOND] = state.rank[i], state.rank[j] if j >= 0 else NONE
     contact[BLOCK], contact[FORM], numbers[EXCESS] = b, ZERO, 0.0
     at, _, _ = places(model, r)
     speed = 0.0
@@ -199,6 +194,8 @@ def relax_contact(model, work, r):
         numbers[PRESSES], more, support = new, new - p, abs(new)
         if work.told[WATCHED]:
             work.impulse[contact[BLOCK], 0] = new
+        if new == 0.0 and p == 0.0 and numbers[RUBS] == 0.0 and not form & TWO_ROWS:
+            return  # an open contact, as before
     if not form & HAS_FRICTION:
         add_row(model, rows, at, more, w, i, j)
         return
@@ -225,7 +222,7 @@ def nearest(model, work, shape, x, support):
     if kind == DISC:
         a, b = -a, a
     if kind in (INTERVAL, DISC):
-        return min(max(x, a * support), b * support) if support > 0.0 else 0.0
+        return min(max(x, a * support), b * support)
     project(model, shape, x, 0.0, support, work.image)
     return work.image[0]
 

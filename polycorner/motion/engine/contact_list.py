@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import TOUCHING, key_of
+from polycorner.motion.engine.neighbours import TOUCHING, key_of, pair_of
 from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rows import sticks
 
@@ -166,8 +166,7 @@ def keep_contacts(model, state, work, log, h, time, count):
     for s in range(state.counts[CONTACTS]):
         if work.met[s]:
             continue
-        pair = state.keys[s] // model.pair_gaps
-        i, j = pair // model.bodies, pair % model.bodies
+        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
         if work.awake[i] or work.awake[j] or not (state.alive[i] and state.alive[j]):
             if state.pair_flags[s, 1]:
                 g = state.keys[s] % model.pair_gaps
@@ -190,7 +189,7 @@ def add_contacts(model, state, work, begin, end, kept, share):
     k, K = model.dimension, model.lanes
     for s in range(begin, end):
         b, size = work.sort_keys[s], kept + s
-        state.keys[size] = key_of(model, work, work.origin[b, 1])
+        state.keys[size] = key_of(model, state, work, work.origin[b, 1])
         state.pair_release[size] = work.release[b]
         lasting = 1.0 / share if share > INSTANT else 0.0
         state.pair_impulse[size, 0] = work.impulse[b, 0] * lasting

@@ -18,7 +18,6 @@ import numpy as np
 from polycorner.motion.engine.codes import WATCHED
 from polycorner.motion.engine.compact import (
     compact_contact,
-    is_pressed_by_former,
     judge_contact,
     press_contact,
     relax_contact,
@@ -26,6 +25,7 @@ from polycorner.motion.engine.compact import (
 )
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detection_distance, nearest
+from polycorner.motion.engine.partition import is_pressed_by_former
 from polycorner.motion.engine.sizes import STRIPS
 
 CROWD = 1024  # blocks beyond which an island is a crowd
@@ -170,12 +170,12 @@ def divide_blocks(work, first, last):
 
 
 @compiled
-def compact_strip(model, work, t):
+def compact_strip(model, state, work, t):
     """Write the compact contacts of a strip; return the largest velocity of their rows."""
     speed = 0.0
     for r in range(work.strip_start[t], work.strip_start[t + 1]):
         code = work.compact_order[r]
-        speed = max(speed, compact_contact(model, work, r, code // 2, code % 2 == 1))
+        speed = max(speed, compact_contact(model, state, work, r, code // 2, code % 2 == 1))
     return speed
 
 

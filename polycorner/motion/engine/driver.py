@@ -96,6 +96,7 @@ class Engine:
         self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
         self.motion = allocate(State, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
+        self.motion.rank[:] = self.motion.body_of_rank[:] = np.arange(bodies.count)
         self.motion.touches[:, self.model.unilateral :] = 1
         self._allocate()
 
@@ -202,6 +203,8 @@ class Engine:
 
     def load(self, arrays: dict[str, Any]) -> None:
         """Continue, bit for bit, from arrays saved before, with at least as much room."""
+        order = np.arange(self.bodies.count)  # that of states saved before bodies had ranks
+        arrays = {"rank": order, "body_of_rank": order, **arrays}
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.motion = restored(State, self._sizes, arrays)
@@ -233,7 +236,8 @@ class Engine:
         names = self.bodies.pair_contacts
         for s in np.flatnonzero(motion.pair_flags[: int(motion.counts[CONTACTS]), 1]):
             pair, g = divmod(int(motion.keys[s]), len(names))
-            bodies = divmod(pair, self.bodies.count)
+            ranks = np.array(divmod(pair, self.bodies.count))
+            bodies = tuple(sorted(motion.body_of_rank[ranks].tolist()))
             own.append((bodies, names[g], float(motion.pair_impulse[s, 0]) / h))
         return own
 

@@ -16,7 +16,7 @@ from polycorner.motion.engine.bounds import is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.jit import NONE, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, speed_of, travel
+from polycorner.motion.engine.neighbours import ZERO_GAP, pair_of, speed_of, travel
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import (
     CURVATURE_DEPTH,
@@ -76,8 +76,7 @@ def leave_out(model, state, work, blocks, h):
         if j >= 0 and left[island_of(work, b)]:
             join(joined, i, j)
     for s in range(state.counts[CONTACTS]):  # piles of sleepers
-        pair = state.keys[s] // model.pair_gaps
-        i, j = pair // N, pair % N
+        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
         if state.pair_flags[s, 1] and not work.awake[i] and not work.awake[j]:
             join(joined, i, j)
     for i in range(N):

@@ -1,4 +1,4 @@
-"""Neighbour lists, and detection of contacts between bodies."""
+"""Detection of contacts between bodies that are neighbours."""
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 TOUCHING = 1e-7  # scaled gap up to which a contact is made, and kept as it is
 ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
 DETECTION = 1e-2  # scaled gap up to which contacts are detected, at least
-SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
 
 
 @compiled
@@ -34,23 +33,6 @@ def nearest(model, a, x):
 
 
 @compiled
-def outdated(model, state, work, h, time):
-    """Return whether a body has moved so far that the neighbour list may lack a pair."""
-    if work.list_status[1] == 0 or travel(model, work, h) > work.listed_travel[0]:
-        return True
-    limit = (0.25 * SKIN * model.reach) ** 2
-    for i in range(model.bodies):
-        if state.alive[i]:
-            far = 0.0
-            for a in range(2):
-                x = position_of(model, state, i, a, time) - work.listed_position[i, a]
-                far += nearest(model, a, x) ** 2
-            if far > limit:
-                return True
-    return False
-
-
-@compiled
 def heap_sort(values, count):
     """Sort the first ``count`` numbers of an array in place."""
     never_inline()
@@ -71,56 +53,17 @@ def heap_sort(values, count):
 
 
 @compiled
-def ahead(period, along, around):
-    """Return whether a body is nearer in the other direction; at half a period one counts."""
-    return 2.0 * along > period or (around and 2.0 * along == period)
+def pair_key(model, state, i, j):
+    """Return the number by which pairs of bodies are sorted: by the lower rank, then the higher."""
+    one, two = state.rank[i], state.rank[j]
+    return min(one, two) * model.bodies + max(one, two)
 
 
 @compiled
-def list_neighbours(model, state, work, h, time):
-    """List the pairs of bodies that may meet soon, ascending; return whether there was room.
-
-    Where positions repeat, the first bodies along the second axis follow the last ones, up to half
-    a period ahead.
-    """
-    N, period = model.bodies, model.period[1]
-    work.listed_travel[0] = max(0.125 * SKIN * model.reach, 2.0 * travel(model, work, h))
-    for i in range(N):
-        for a in range(2):
-            work.listed_position[i, a] = nearest(model, a, position_of(model, state, i, a, time))
-    far = model.reach * (1.0 + SKIN) + max(
-        0.0, 2.0 * work.listed_travel[0] - 0.25 * SKIN * model.reach
-    )
-    found, ordered, position = work.sort_keys, work.parent, work.listed_position
-    for i in range(N):
-        t = i
-        while t > 0 and position[ordered[t - 1], 1] > position[i, 1]:
-            ordered[t] = ordered[t - 1]
-            t -= 1
-        ordered[t] = i
-    count = 0
-    for s in range(N):
-        i = ordered[s]
-        if not state.alive[i]:
-            continue
-        for t in range(s + 1, s + N if period < np.inf else N):
-            j = ordered[t if t < N else t - N]
-            along = position[j, 1] - position[i, 1]
-            if t >= N:
-                along += period
-            if along > far or ahead(period, along, t >= N):
-                break
-            across = nearest(model, 0, position[j, 0] - position[i, 0])
-            if state.alive[j] and across * across + along * along < far * far:
-                if count == model.neighbour_room:
-                    return False
-                found[count] = min(i, j) * N + max(i, j)
-                count += 1
-    heap_sort(found, count)
-    for s in range(count):
-        work.neighbours[s, 0], work.neighbours[s, 1] = found[s] // N, found[s] % N
-    work.list_status[0], work.list_status[1] = count, 1
-    return True
+def pair_of(model, state, key):
+    """Return the bodies of a pair, the one with the lower number first."""
+    one, two = state.body_of_rank[key // model.bodies], state.body_of_rank[key % model.bodies]
+    return min(one, two), max(one, two)
 
 
 @compiled
@@ -201,7 +144,7 @@ def detect_pair(model, state, work, slot, limit, share, count, cursor):
                 return NONE, cursor
             work.contact[count, 0], work.contact[count, 1], work.contact[count, 2] = a, b, g
             work.contact_gap[count] = scratch[n + g]
-            key = (a * model.bodies + b) * m + g
+            key = pair_key(model, state, a, b) * m + g
             cursor = place_among(state, key) if cursor < 0 else advanced(state, cursor, key)
             index = cursor if has_key(state, cursor, key) else NONE
             work.contact_before[count] = index
@@ -290,24 +233,22 @@ def has_key(state, place, key):
 
 
 @compiled
-def key_of(model, work, slot):
+def key_of(model, state, work, slot):
     """Return the key of a contact between bodies: a number that sorts by bodies and gap."""
     a, b, g = work.contact[slot, 0], work.contact[slot, 1], work.contact[slot, 2]
-    return (a * model.bodies + b) * model.pair_gaps + g
+    return pair_key(model, state, a, b) * model.pair_gaps + g
 
 
 @compiled
-def order_contacts(model, work, contacts):
-    """Order contacts by key, whatever the order of detection."""
-    keys, ascending, former = work.sort_keys, True, NONE
+def order_contacts(model, state, work, contacts, ascending):
+    """Order contacts by key, if they are not ``ascending``: they were not all found at once."""
+    keys = work.sort_keys
     for s in range(contacts):
         work.ranked[s] = work.assembled[s] = s
-        key = key_of(model, work, s)
-        ascending, former = ascending and key > former, key
     if ascending:
         return
     for s in range(contacts):
-        keys[s] = key_of(model, work, s) * contacts + s
+        keys[s] = key_of(model, state, work, s) * contacts + s
     heap_sort(keys, contacts)
     for s in range(contacts):
         work.ranked[s] = work.assembled[s] = keys[s] % contacts

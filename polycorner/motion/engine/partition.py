@@ -13,6 +13,12 @@ def root_of(root, i):
 
 
 @compiled
+def is_pressed_by_former(work, b):
+    """Return whether a block is friction on which the block before it presses."""
+    return work.block_rows[b] > 0 and work.pressing[b] == b - 1 and b > 0
+
+
+@compiled
 def island_of(work, b):
     """Return the island of a block: that of one of its bodies that is awake."""
     first = work.block_bodies[b, 0]
@@ -39,13 +45,17 @@ def find_islands(model, work, blocks):
         starts[i + 1] = 0
     for i in range(N):
         work.parent[i] = root_of(work.parent, i)
+    r = 0
     for b in range(blocks):
-        starts[island_of(work, b) + 1] += 1
+        if not is_pressed_by_former(work, b):  # friction is of the same island
+            r = island_of(work, b)
+        work.unsorted[b] = r
+        starts[r + 1] += 1
     for i in range(N):
         starts[i + 1] += starts[i]
     for i in range(N):
         cursor[i] = starts[i]
     for b in range(blocks):
-        r = island_of(work, b)
+        r = work.unsorted[b]
         work.order[cursor[r]] = b
         cursor[r] += 1

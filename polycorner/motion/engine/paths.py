@@ -16,7 +16,7 @@ import numpy as np
 from polycorner.motion.engine.bounds import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, find_contact, square_distance
+from polycorner.motion.engine.neighbours import ZERO_GAP, find_contact, pair_key, square_distance
 
 CURVATURE_DEPTH = 1e-4  # scaled depth to which a gap may close by its curvature within a step
 SHORTEST_PART = 1.0 / 4096.0  # of a step, to which parts are halved
@@ -117,7 +117,7 @@ def first_zero(model, work, base, velocity, i, j, g, duration, slack, out):
 @compiled
 def touching(model, state, i, j, g):
     """Return whether two bodies touched at the end of the last step."""
-    index = find_contact(state, (i * model.bodies + j) * model.pair_gaps + g)
+    index = find_contact(state, pair_key(model, state, i, j) * model.pair_gaps + g)
     return index >= 0 and state.pair_flags[index, 1] != 0
 
 

@@ -71,7 +71,7 @@ def do_item(model, state, work, item):
     if kind == SWEEP:
         sweep_strips(model, work, item, told[SET_OFF], told[BACKWARDS] != 0)
     elif kind == COMPACT:
-        work.worst[item] = compact_strip(model, work, item)
+        work.worst[item] = compact_strip(model, state, work, item)
     elif kind == PRESS:
         press_strip(model, work, 2 * item + told[SET_OFF])
     elif kind == JUDGE:
@@ -117,9 +117,9 @@ def do_range(model, state, work, kind, begin, end):
         for i in range(begin, end):
             if work.awake[i] and work.parent[i] == told[ISLAND]:
                 if kind == BEGIN:
-                    begin_compact(model, work, i)
+                    begin_compact(model, state, work, i)
                 else:
-                    end_compact(model, work, i)
+                    end_compact(model, state, work, i)
                     work.island_speed[i] = max(work.island_speed[i], work.told_times[SPEED])
     elif kind == STORE:
         store_impulses(model, state, work, begin, end, h)

@@ -11,6 +11,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.neighbours import pair_of
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rest import (
@@ -65,8 +66,8 @@ def wake_piles(model, state, work, h, time, index):
         return
     for s in range(state.counts[CONTACTS]):
         if state.pair_flags[s, 1]:
-            pair = state.keys[s] // model.pair_gaps
-            x, y = root_of(root, pair // N), root_of(root, pair % N)
+            i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
+            x, y = root_of(root, i), root_of(root, j)
             root[max(x, y)] = min(x, y)
     for i in range(N):
         if state.alive[i]:
@@ -156,8 +157,7 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
         for c in range(k):
             work.neighbour_impulse[i, c] = 0.0
     for s in range(state.counts[CONTACTS]):
-        pair = state.keys[s] // model.pair_gaps
-        i, j = pair // N, pair % N
+        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
         if work.awake[i] or work.awake[j]:
             work.disturbed[i] = work.disturbed[j] = 1
             continue

@@ -89,10 +89,13 @@ def detect_contacts(model, state, work, h, count):
 
 
 @compiled
-def assemble_blocks(model, state, work, h, contacts):
-    """Assemble the blocks of awake bodies and of contacts, and their islands; return how many."""
+def assemble_blocks(model, state, work, h, contacts, ascending):
+    """Assemble the blocks of awake bodies and of contacts, and their islands; return how many.
+
+    Contacts that were all found at once are ``ascending``.
+    """
     first = assemble_body_blocks(model, state, work, h)
-    order_contacts(model, work, contacts)
+    order_contacts(model, state, work, contacts, ascending)
     divide_contacts(model, state, work, h, contacts)
     if work.located[0]:  # contacts have blocks only if they are closed
         blocks = assemble_contacts(model, state, work, h, ZERO, contacts, first)

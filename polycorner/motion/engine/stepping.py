@@ -36,7 +36,9 @@ from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import list_neighbours, outdated
+from polycorner.motion.engine.neighbour_list import list_neighbours, outdated
+from polycorner.motion.engine.neighbours import pair_of
+from polycorner.motion.engine.ranks import renew_ranks
 from polycorner.motion.engine.sleep import settle, wake_neighbours
 from polycorner.motion.engine.solution import (
     assemble_blocks,
@@ -60,6 +62,7 @@ def solve(model, state, work, h, time, index, solved):
     """
     contacts, blocks = work.list_status[2] if solved else ZERO, solved
     if model.pair_kernel != 0 and not solved:
+        renew_ranks(model, state, work, index)
         if outdated(model, state, work, h, time) and not list_neighbours(
             model, state, work, h, time
         ):
@@ -67,6 +70,7 @@ def solve(model, state, work, h, time, index, solved):
         for s in range(work.list_status[0]):
             work.examined[s] = 0
     while True:
+        found = contacts
         if solved:
             renew_blocks(model, state, work, blocks, h)
         else:
@@ -74,7 +78,7 @@ def solve(model, state, work, h, time, index, solved):
                 contacts = detect_contacts(model, state, work, h, contacts)
                 if contacts < 0:
                     return False, blocks
-            blocks = assemble_blocks(model, state, work, h, contacts)
+            blocks = assemble_blocks(model, state, work, h, contacts, found == 0)
         solve_islands(model, state, work, blocks, h, solved > 0)
         store_all_impulses(model, state, work, blocks, h)
         if model.pair_kernel == 0 or not wake_neighbours(
@@ -181,8 +185,8 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
             state.alive[i] = 0
             count = record(log, count, EXIT, i, NONE, NONE, time + h, 0.0)
             for s in range(state.counts[CONTACTS]):
-                pair = state.keys[s] // model.pair_gaps
-                if i in (pair // N, pair % N):
-                    state.check_due[pair // N] = state.check_due[pair % N] = 0
-                    state.asleep[pair // N] = state.asleep[pair % N] = 0
+                one, two = pair_of(model, state, state.keys[s] // model.pair_gaps)
+                if i in (one, two):
+                    state.check_due[one] = state.check_due[two] = 0
+                    state.asleep[one] = state.asleep[two] = 0
     return count

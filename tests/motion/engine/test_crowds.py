@@ -11,9 +11,10 @@ from polycorner import Friction, Manifold, Polyhedron, System, velocities
 from polycorner.bodies import Arrangement, HalfSpace, disc
 from polycorner.motion import ContactFamily, Disc, pair_coordinates
 from polycorner.motion.checkpoints import Checkpoint
-from polycorner.motion.engine.arrays import Work, declarations
+from polycorner.motion.engine.arrays import CONTACTS, Work, declarations
 from polycorner.motion.engine.compact import TOLERATED
 from polycorner.motion.engine.crowds import CROWD
+from polycorner.motion.engine.ranks import PERIOD
 from polycorner.motion.engine.threads import OWN
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import simulate, start
@@ -49,6 +50,13 @@ def crowds(engine):
     starts = engine.work.island_start
     roots = np.flatnonzero(np.diff(starts) > CROWD)
     return [engine.work.order[starts[i] : starts[i + 1]] for i in roots]
+
+
+def listed_pairs(engine):
+    """Return the pairs of bodies with contacts in the list between steps."""
+    motion = engine.motion
+    ranks = np.stack(divmod(motion.keys[: motion.counts[CONTACTS]], SIDE**2))
+    return set(map(tuple, np.sort(motion.body_of_rank[ranks], axis=0).T.tolist()))
 
 
 def test_threads_share_no_array_in_which_something_is_in_the_making():
@@ -97,8 +105,57 @@ def test_a_run_goes_on_with_another_number_of_threads(tmp_path):
     np.testing.assert_array_equal(rest.q[-1], whole.q[-1])
 
 
-def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told():
-    engine, met = heap(crowd_sweeps=6), 0
+def test_contacts_are_listed_in_the_order_of_ranks_which_are_an_order_in_space():
+    engine = heap(crowd_sweeps=6)
+    engine.advance(PERIOD + 1)  # ranks were renewed in the last step
+    motion, bodies = engine.motion, np.arange(SIDE**2)
+    np.testing.assert_array_equal(motion.body_of_rank[motion.rank], bodies)
+    # Columns across the longer extent, and up in each of them; in the step bodies moved a little.
+    x, y = motion.q[motion.body_of_rank, :2].T
+    back, down = np.diff(x) < -0.01, np.diff(y) < -0.01
+    assert x.max() - x.min() > y.max() - y.min()
+    assert down.sum() < np.ptp(x)  # no more than there are columns
+    assert (np.diff(x)[back] > -2.1).all()
+    assert (np.diff(motion.keys[: motion.counts[CONTACTS]]) > 0).all()
+    assert cKDTree(motion.q[:, :2]).query_pairs(2.0) <= listed_pairs(engine)
+    touching = {bodies for bodies, name, _ in engine.touching() if len(bodies) == 2}
+    assert touching
+    assert touching <= cKDTree(motion.q[:, :2]).query_pairs(2.0 + 1e-3)
+
+
+def test_a_crowd_goes_on_from_where_it_was_saved_with_the_ranks_of_then():
+    whole, part = (heap(crowd_sweeps=6) for _ in range(2))
+    whole.advance(PERIOD + 40)
+    part.advance(PERIOD - 20)
+    resumed = heap(crowd_sweeps=6)
+    resumed.load({name: array.copy() for name, array in part.save().items()})
+    resumed.advance(60)
+    assert (resumed.motion.rank != part.motion.rank).any()
+    for name, array in whole.save().items():
+        np.testing.assert_array_equal(resumed.save()[name], array, err_msg=name)
+
+
+def test_a_step_with_new_ranks_starts_from_the_impulses_of_the_step_before():
+    """The same contacts are known from before, and a few sweeps solve it as well as other steps."""
+    engine, left = heap(crowd_sweeps=6), []
+    engine.advance(PERIOD - 3)
+    for _ in range(6):
+        ranks, pairs = engine.motion.body_of_rank.copy(), listed_pairs(engine)
+        engine.motion.sums[4] = 0.0
+        engine.advance(1)
+        left.append(engine.effort.residual)
+        renewed = (engine.motion.body_of_rank != ranks).any()
+        assert renewed == (engine.steps == PERIOD + 1)
+        work = engine.work
+        known = work.contact_before[: work.list_status[2]] >= 0
+        met = [(i, j) in pairs for i, j in work.contact[: work.list_status[2], :2].tolist()]
+        np.testing.assert_array_equal(known, met)
+    assert left[3] < 2.0 * max(left[:3] + left[4:])
+
+
+@pytest.mark.parametrize("friction", [MU, 0.0])
+def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told(friction):
+    engine, met = heap(friction, crowd_sweeps=6), 0
     for _ in range(80):
         engine.motion.sums[4] = 0.0  # the residual, of all steps before
         engine.advance(1)
@@ -106,12 +163,12 @@ def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told():
         if len(blocks) != 1:
             continue
         (blocks,) = blocks
-        found, v = residuals(work, blocks, MU)
+        found, v = residuals(work, blocks, friction)
         bodies = np.unique(work.block_bodies[blocks])
         moved = bodies[(bodies >= 0) & ~engine.motion.rests[bodies].astype(bool)]
         np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-9 * abs(v).max())
         normal, rubs = work.impulse[blocks, 0], work.pressing[blocks] >= 0
-        limit = MU * work.impulse[work.pressing[blocks[rubs]], 0]
+        limit = friction * work.impulse[work.pressing[blocks[rubs]], 0]
         assert (normal[~rubs] >= 0).all()
         assert (abs(normal[rubs]) <= limit * (1 + 1e-12)).all()
         speed = abs(work.free[blocks] + work.offset[blocks])
@@ -156,7 +213,7 @@ def test_discs_that_overlap_are_moved_apart_and_keep_their_velocities():
 
 
 def test_friction_of_two_rows_obeys_its_law_in_a_crowd():
-    """Discs pushed together on a table, on which each slides in any direction.
+    """Discs pushed together, and on along a table, on which each slides in any direction.
 
     The friction of each is the point of its disc of forces that is nearest to ``p - rho u``, for
     any ``rho > 0``, and the impulses are those by which velocities changed.
@@ -174,7 +231,7 @@ def test_friction_of_two_rows_obeys_its_law_in_a_crowd():
     )
     rows, columns = np.divmod(np.arange(side**2), side)
     places = np.column_stack([50 + 2.0 * columns + rows % 2, 50 + np.sqrt(3) * rows])
-    pushed = -0.5 * (places - places.mean(axis=0)) / side
+    pushed = [0.2, 0.1] - 0.5 * (places - places.mean(axis=0)) / side
     solver = Solver(tolerance=1e-4, crowd_sweeps=200)
     engine = start(table, table.state(places, pushed), DT, solver=solver)
     engine.advance(5)

@@ -1,0 +1,162 @@
+"""List of neighbours: pairs of bodies that may meet within some steps."""
+
+import numpy as np
+
+from polycorner.motion.engine.jit import NONE, ZERO, compiled
+from polycorner.motion.engine.neighbours import (
+    heap_sort,
+    nearest,
+    pair_key,
+    pair_of,
+    position_of,
+    travel,
+)
+
+SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
+MANY = 256  # bodies that are searched for neighbours column by column
+FARTHEST = 1e9  # column
+
+
+@compiled
+def outdated(model, state, work, h, time):
+    """Return whether a body has moved so far that the neighbour list may lack a pair."""
+    if work.list_status[1] == 0 or travel(model, work, h) > work.listed_travel[0]:
+        return True
+    limit = (0.25 * SKIN * model.reach) ** 2
+    for i in range(model.bodies):
+        if state.alive[i]:
+            far = 0.0
+            for a in range(2):
+                x = position_of(model, state, i, a, time) - work.listed_position[i, a]
+                far += nearest(model, a, x) ** 2
+            if far > limit:
+                return True
+    return False
+
+
+@compiled
+def ahead(period, along, around):
+    """Return whether a body is nearer in the other direction; at half a period one counts."""
+    return 2.0 * along > period or (around and 2.0 * along == period)
+
+
+@compiled
+def list_neighbours(model, state, work, h, time):
+    """List the pairs of bodies that may meet soon, ascending; return whether there was room.
+
+    Many bodies are divided into columns, which are searched one by one, each with the next one.
+    Where positions repeat, there is one column, in which the first bodies follow the last ones, up
+    to half a period ahead.
+    """
+    N, found = model.bodies, work.sort_keys
+    work.listed_travel[0] = max(0.125 * SKIN * model.reach, 2.0 * travel(model, work, h))
+    for i in range(N):
+        for a in range(2):
+            work.listed_position[i, a] = nearest(model, a, position_of(model, state, i, a, time))
+    far = model.reach * (1.0 + SKIN) + max(
+        0.0, 2.0 * work.listed_travel[0] - 0.25 * SKIN * model.reach
+    )
+    divide_into_columns(model, work, far)
+    sort_by_columns(work, N)
+    count = begin = ZERO
+    while begin < N and count >= 0:
+        end = end_of_column(work, begin, N)
+        count = search_column(model, state, work, begin, end, far, count)
+        begin = end
+    if count < 0:
+        return False
+    heap_sort(found, count)
+    for s in range(count):
+        work.neighbours[s, 0], work.neighbours[s, 1] = pair_of(model, state, found[s])
+    work.list_status[0], work.list_status[1] = count, 1
+    return True
+
+
+@compiled
+def divide_into_columns(model, work, far):
+    """Divide bodies into columns, wider than neighbours are apart, where there are many."""
+    width = 2.0 * model.reach
+    while width < far:
+        width *= 2.0
+    one = model.bodies < MANY or min(model.period[0], model.period[1]) < np.inf
+    for i in range(model.bodies):
+        x = work.listed_position[i, 0] / width
+        work.column[i] = ZERO if one or not abs(x) < FARTHEST else np.int64(np.floor(x))
+
+
+@compiled
+def sort_by_columns(work, count):
+    """Sort bodies by columns, and along the second axis in each of them.
+
+    This is done by insertion, as they are nearly sorted from the last time.
+    """
+    ordered, position, column = work.ordered, work.listed_position, work.column
+    if ordered[0] == ordered[count - 1]:  # the first time
+        for i in range(count):
+            ordered[i] = i
+    for s in range(count):
+        i, t = ordered[s], s
+        while t > 0:
+            j = ordered[t - 1]
+            if column[j] < column[i] or (
+                column[j] == column[i] and position[j, 1] <= position[i, 1]
+            ):
+                break
+            ordered[t] = j
+            t -= 1
+        ordered[t] = i
+
+
+@compiled
+def end_of_column(work, begin, count):
+    """Return where the column ends that begins at a place in the order."""
+    end = begin
+    while end < count and work.column[work.ordered[end]] == work.column[work.ordered[begin]]:
+        end += 1
+    return end
+
+
+@compiled
+def search_column(model, state, work, begin, end, far, count):
+    """Add the neighbours within a column, and between it and the next; return how many there are.
+
+    If there is no room, that is -1.
+    """
+    ordered, position, period = work.ordered, work.listed_position, model.period[1]
+    size, low, last = end - begin, end, end
+    if end < model.bodies and work.column[ordered[end]] == work.column[ordered[begin]] + 1:
+        last = end_of_column(work, end, model.bodies)
+    for s in range(begin, end):
+        i = ordered[s]
+        for t in range(s + 1, s + size if period < np.inf else end):
+            j = ordered[t if t < end else t - size]
+            along = position[j, 1] - position[i, 1]
+            if t >= end:
+                along += period
+            if along > far or ahead(period, along, t >= end):
+                break
+            count = add_if_near(model, state, work, i, j, along, far, count)
+        while low < last and position[ordered[low], 1] < position[i, 1] - far:
+            low += 1
+        for t in range(low, last):
+            j = ordered[t]
+            along = position[j, 1] - position[i, 1]
+            if along > far:
+                break
+            count = add_if_near(model, state, work, i, j, along, far, count)
+        if count < 0:
+            break
+    return count
+
+
+@compiled
+def add_if_near(model, state, work, i, j, along, far, count):
+    """Add a pair to the neighbours if it is one; return how many there are, or -1: no room."""
+    across = nearest(model, 0, work.listed_position[j, 0] - work.listed_position[i, 0])
+    near = across * across + along * along < far * far
+    if count < 0 or not (near and state.alive[i] and state.alive[j]):
+        return count
+    if count == model.neighbour_room:
+        return NONE
+    work.sort_keys[count] = pair_key(model, state, i, j)
+    return count + 1
