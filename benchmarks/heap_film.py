@@ -17,6 +17,7 @@ from discs_in_drum import DT, drum_radius, loose_rows, system
 from numpy.typing import NDArray
 from side_by_side import print_table, write
 
+from polycorner import checks
 from polycorner.motion import Solver, simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
@@ -26,7 +27,7 @@ EVERY = 20  # steps between two instants of the film
 COLOURS = "#0072B2", "#E69F00", "#009E73", "#CC79A7"  # of the layers at the start
 
 PAGE = """<!doctype html><meta charset="utf-8"><title>{count} discs in a drum</title>
-<style>body{{margin:1em;font:15px sans-serif;text-align:center}}canvas{{max-width:100%}}
+<style>body{{margin:1em;font:15px sans-serif;text-align:center}}canvas{{max-width:min(100%,85vh)}}
 input{{width:min(60em,80%)}}</style>
 <canvas id="view" width="{pixels}" height="{pixels}"></canvas>
 <p><button id="play">pause</button> <input id="instant" type="range" min="0" max="{last}" value="0">
@@ -196,7 +197,13 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out"))
     given = parser.parse_args()
-    solver = Solver(tolerance=1e-4, crowd_sweeps=given.sweeps, threads=given.threads)
+    try:
+        checks.whole("--discs", given.discs, least=1)
+        checks.real("--spin", given.spin, unit="rad/s")
+        checks.real("--duration", given.duration, above=0, unit="s")
+        solver = Solver(tolerance=1e-4, crowd_sweeps=given.sweeps, threads=given.threads)
+    except ValueError as error:
+        parser.error(str(error))
     begun = time.process_time()
     path = moved(given.discs, given.spin, given.duration, solver)
     spent = time.process_time() - begun
