@@ -128,7 +128,11 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("arguments", FILES, ids=" ".join)
+@pytest.mark.parametrize(
+    "arguments",
+    [pytest.param(a, marks=pytest.mark.slow) if "dyad" in a else a for a in FILES],
+    ids=" ".join,
+)
 def test_files_are_written(tmp_path, arguments):
     folder = tmp_path / "new" / "folder"
     code, out, err = run(*arguments, "--out", str(folder))

@@ -106,7 +106,8 @@ def test_three_discs_on_the_square_torus(least):
     assert found.minima[0].point[-1] == pytest.approx(LARGEST)
 
 
-@pytest.mark.parametrize("least", [pytest.param(0.2575, marks=pytest.mark.slow), 0.252])
+@pytest.mark.slow
+@pytest.mark.parametrize("least", [0.2575, 0.252])
 def test_four_discs_on_the_square_torus(least):
     """The densest ones are the only critical ones with a larger radius.
 
