@@ -20,14 +20,13 @@ from typing import Any
 from side_by_side import print_table, write
 
 from polycorner import checks
-from polycorner.dumbbells import DumbbellDrum, OutOfRound, Shaking, UnevenFriction
+from polycorner.dumbbells import DumbbellDrum, OutOfRound, RigidDumbbells, Shaking, UnevenFriction
 from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch
 from polycorner.dumbbells.dynamics.bunch_in_space import (
     BunchInSpaceRun,
     follow_in_space,
     kicks_of_centres,
 )
-from polycorner.dumbbells.imperfections import Imperfection
 from polycorner.dumbbells.pictures.film_in_space import film_in_space
 from polycorner.dumbbells.viewer.page import film_page, write_page
 from polycorner.motion import Checkpoint, Noise
@@ -60,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         checks.whole("--starts", options.starts, least=1)
         checks.real("--seconds", options.seconds, least=0)
+        RigidDumbbells(DumbbellDrum(**imperfections(options, 0)))
     except ValueError as error:
         parser.error(str(error))
     starts = range(options.first, options.first + options.starts)
@@ -71,16 +71,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     write("drum_in_space", {"settings": vars(options) | {"out": None}, "runs": rows})
 
 
+def imperfections(options: argparse.Namespace, start: int) -> dict[str, Any]:
+    """Return the imperfections of the drum of a start, by name."""
+    found: dict[str, Any] = {}
+    if options.shake:
+        found["shaking"] = Shaking(options.shake, options.band, seed=start)
+    if options.oval:
+        found["out_of_round"] = OutOfRound({2: options.oval})
+    if options.uneven:
+        found["uneven_friction"] = UnevenFriction(*options.uneven, seed=start)
+    return found
+
+
 def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str, Any]:
     """Follow one start, or go on with it; return its figures."""
     start, kicks = point
-    imperfect: dict[str, Imperfection] = {}
-    if options.shake:
-        imperfect["shaking"] = Shaking(options.shake, options.band, seed=start)
-    if options.oval:
-        imperfect["out_of_round"] = OutOfRound({2: options.oval})
-    if options.uneven:
-        imperfect["uneven_friction"] = UnevenFriction(*options.uneven, seed=start)
     told = {"shaken": options.shake, "oval": options.oval, "uneven": options.uneven}
     told = {"kicks": kicks} | {name: value for name, value in told.items() if value}
     words = [f"{name} {value}" for name, value in told.items()]
@@ -89,7 +94,9 @@ def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str,
     if options.seconds:
         timer.daemon = True
         timer.start()
-    drum = drum_for_bunch(DumbbellDrum(**imperfect), count=options.count, top=options.top)
+    drum = drum_for_bunch(
+        DumbbellDrum(**imperfections(options, start)), count=options.count, top=options.top
+    )
     run = follow_in_space(
         drum,
         options.duration,

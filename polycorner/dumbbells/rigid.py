@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
+from polycorner.bodies.waves import depth
 from polycorner.checks import instance, refuse
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
@@ -62,7 +63,13 @@ class RigidDumbbells(Value):
 
     def __post_init__(self) -> None:
         instance("drum", self.drum, DumbbellDrum, "DumbbellDrum()")
-        _ = self.arrangement
+        if (oval := self.drum.out_of_round) is not None:
+            room = self.drum.drum_radius - self.drum.ball_radius
+            if depth({k: (a, 0.0) for k, a in oval.amplitudes.items()}) >= room:
+                least = (
+                    f"a convex wall, out of round with the sum of |a_k| (k^2 + 1) below {room:g} mm"
+                )
+                refuse("drum", least, oval)
         super().__post_init__()
 
     @property

@@ -190,7 +190,7 @@ def test_bad_input():
     with pytest.raises(TypeError, match="drum: expected"):
         RigidDumbbells("drum")
     corrugated = DumbbellDrum(out_of_round=OutOfRound({30: 0.2}))
-    with pytest.raises(ValueError, match="waves: expected amplitudes"):
+    with pytest.raises(ValueError, match="drum: expected a convex wall"):
         RigidDumbbells(corrugated)
     with pytest.raises(ValueError, match="q: expected shape"):
         RigidDumbbells(DumbbellDrum()).state([[0.0, 0.0]])
