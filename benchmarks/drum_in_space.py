@@ -17,6 +17,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from side_by_side import print_table, write
 
 from polycorner import checks
@@ -125,10 +126,14 @@ def figures(run: BunchInSpaceRun) -> dict[str, Any]:
 
 
 def figures_of(run: BunchRun) -> dict[str, Any]:
-    """Return who left, and who is where at the end."""
+    """Return who left, when and with which heading, and who is where at the end."""
+    records = [int(np.searchsorted(run.times, time)) - 1 for time, _ in run.exits]
+    headings = [run.q[k, body, 2] for k, (_, body) in zip(records, run.exits, strict=True)]
     return {
         "s": round(float(run.times[-1]), 1),
         "left": len(run.exits),
+        "at, s": [round(time) for time, _ in run.exits],
+        "headings, deg": np.degrees(headings).round().astype(int).tolist(),
         **{f"left {kind}": number for kind, number in run.exit_counts().items()},
         **{IN.get(kind, kind): number for kind, number in run.census(-1).items()},
         "highest, mm": round(float(run.q[..., 1].max()), 1),
