@@ -173,11 +173,11 @@ def _grip() -> "Formulas":
     definitions: Expressions = {"sine": length * sympy.sin(theta) / (2 * rho)}
     definitions["chord"] = sympy.sqrt(1 - sine**2)
     found: Expressions = {"spin": r * psi_dot, "load": 2 * heavy * sympy.cos(phi) * chord}
-    for k, e in BALLS.items():
-        offset = (e * length / 2 * axis[0], e * length / 2 * axis[1])
-        moving = _at(offset, (rho * phi_dot - surface, eta_dot), theta_dot)
-        found[f"slip{k}_r"] = sympy.trigsimp(sympy.expand(_dot(moving, rolling))) - r * psi_dot
-        found[f"slip{k}_s"] = sympy.trigsimp(sympy.expand(_dot(moving, axis)))
+    velocity = (rho * phi_dot - surface, eta_dot)
+    across, along = (sympy.expand(_dot(velocity, direction)) for direction in (rolling, axis))
+    for k, e in BALLS.items():  # which turn about the centre, across the axis
+        found[f"slip{k}_r"] = across - e * length * theta_dot / 2 - r * psi_dot
+        found[f"slip{k}_s"] = along
         found[f"load{k}"] = heavy * (sympy.cos(phi) * chord - e * sympy.sin(phi) * sine)
     return definitions, found
 

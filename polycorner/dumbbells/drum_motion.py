@@ -214,7 +214,7 @@ def _imperfect_laws(shape: Shape) -> equations.Laws:
         down = (weight + heavier) * cosine - side * sine
         energy += side * rho * sine - heavier * rho * cosine - wall * down + steeper * eta
         load = down + slope / rho * ((weight + heavier) * sine + side * cosine)
-        loads.append(sympy.Max(0, load) * _unevenness(shape, azimuth, eta))
+        loads.append(_positive(load) * _unevenness(shape, azimuth, eta))
     perfect = _laws()
     forces = {str(x): -sympy.diff(energy, x) for x in q[:3]}
     return equations.Laws(perfect.kinetic, perfect.potential, forces, perfect.slips, tuple(loads))
@@ -250,6 +250,13 @@ def _unevenness(shape: Shape, azimuth: "sympy.Expr", eta: "sympy.Expr") -> "symp
     return uneven_factor(azimuth - turned, eta, amplitude, modes)
 
 
+def _positive(expression: "sympy.Expr") -> "sympy.Expr":
+    """Return the positive part of an expression that has both signs, as SymPy need not find out."""
+    import sympy
+
+    return sympy.Max(0, expression, evaluate=False)
+
+
 def uneven_factor(
     azimuth: "sympy.Expr", eta: "sympy.Expr", amplitude: Any, modes: "Sequence[Sequence[Any]]"
 ) -> "sympy.Expr":
@@ -257,7 +264,7 @@ def uneven_factor(
     import sympy
 
     phases = (around * azimuth + along * eta + start for around, along, start in modes)
-    return sympy.Max(0, 1 + amplitude * sympy.Add(*map(sympy.cos, phases)))
+    return _positive(1 + amplitude * sympy.Add(*map(sympy.cos, phases)))
 
 
 def rub(

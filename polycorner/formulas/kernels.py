@@ -127,9 +127,12 @@ class CompiledKernel:
     @cached_property
     def _lanes(self) -> Any:
         """The code for batches in lanes; None for polynomials, whose loops are as fast."""
-        if self._size - self._k > MOST_IN_LANES or isinstance(self.kernel.program, Polynomial):
+        name = f"{self._name}_lanes"
+        if self._size - self._k > MOST_IN_LANES:
             return None
-        engine, (batch,), _ = self._code(emit_lanes, f"{self._name}_lanes", ("batch",))
+        if read_code(name) is None and isinstance(self.kernel.program, Polynomial):
+            return None
+        engine, (batch,), _ = self._code(emit_lanes, name, ("batch",))
         call = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 5)(batch)
         return engine, call
 

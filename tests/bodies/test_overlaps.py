@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
@@ -75,17 +75,15 @@ def least(a, q):
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_placement_is_free_if_no_point_is_in_both(d, first, second, orientations):
     rng = np.random.default_rng([d, len(first), len(second), len(orientations)])
+    bodies = [some_body(rng, d, first), some_body(rng, d, second)]
+    a = Arrangement(bodies, orientations=orientations)
     free = []
-    for _ in range(3):
-        a = Arrangement(
-            [some_body(rng, d, first), some_body(rng, d, second)], orientations=orientations
-        )
-        for _ in range(25):
-            q = anywhere(rng, a)
-            expected = least(a, q)
-            if abs(expected) > NEAR:
-                assert a.polyhedron.contains(q) == (expected > 0)
-                free.append(expected > 0)
+    for _ in range(75):
+        q = anywhere(rng, a)
+        expected = least(a, q)
+        if abs(expected) > NEAR:
+            assert a.polyhedron.contains(q) == (expected > 0)
+            free.append(expected > 0)
     assert any(free)
     assert not all(free)
 
@@ -107,6 +105,7 @@ def test_the_least_gap_is_the_distance(d, kinds):
     assert apart > 20
 
 
+@settings(max_examples=5 * settings().max_examples // 25)  # each compiles shapes of its own
 @given(seeds, st.sampled_from([2, 3]))
 def test_compounds_fixed_bodies_and_walls(seed, d):
     rng = np.random.default_rng(seed)
@@ -121,11 +120,12 @@ def test_compounds_fixed_bodies_and_walls(seed, d):
         walls=walls,
         fixed={"C": hull},
     )
-    q = anywhere(rng, a)
-    bodies = a.placed(q)
-    expected = min(least(a, q), *(inner(bodies[name], walls) for name in "AB"))
-    if abs(expected) > NEAR:
-        assert a.polyhedron.contains(q) == (expected > 0)
+    for _ in range(20):
+        q = anywhere(rng, a)
+        bodies = a.placed(q)
+        expected = min(least(a, q), *(inner(bodies[name], walls) for name in "AB"))
+        if abs(expected) > NEAR:
+            assert a.polyhedron.contains(q) == (expected > 0)
 
 
 def inner(body, walls):

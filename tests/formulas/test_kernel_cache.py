@@ -34,6 +34,7 @@ for radius in (125.0, float("inf")):
     pair = DumbbellPair(16, 3, 1.5, radius)
     q = pair.nested("R")
     values = pair.polyhedron.evaluate(q, 1)[0]
+    pair.polyhedron.evaluate([q] * 99, 1)
     energy = pair.energy.gradient(q)
     kernels = [pair.polyhedron.functions[0].family.kernel, pair.energy.family.kernel]
     print(*(kernel.compiled(1).origin for kernel in kernels))
