@@ -1,9 +1,11 @@
 """First and later answers as problems grow: how much of the time is compilation.
 
 Every case runs in a fresh interpreter with an empty cache of compiled formulas; the compiled
-descent, which is made once for an installation, is loaded before the clock starts.  The clock runs
-from the polyhedron to the verdict of a certificate, or to the skeleton; SymPy's own work on the
-user's formulas comes before.  ``warm`` is the median of the same search repeated in that process,
+descent and the engine of motion, which are made once for an installation, are loaded before the
+clock starts.  The clock runs from the polyhedron to the verdict of a certificate, or to the
+skeleton; SymPy's own work on the user's formulas comes before.  For blocks, a rounded polyhedron of
+``n`` corners that falls on a rounded brick, with friction, it runs from the bodies to the end of
+ten steps.  ``warm`` is the median of the same search repeated in that process,
 up to seven times in about two seconds.
 """
 
@@ -13,11 +15,13 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from itertools import combinations
 from typing import Any
 
 from side_by_side import ROOT, print_table, seconds, write
 
+POSES = 7  # coordinates of a body in space
 ROUNDS, WARM, ENOUGH = 3, 7, 2.0  # rounds, repetitions, seconds of repetition
 CASES = {
     "bounds": (10, 30, 50, 100, 200),
@@ -25,6 +29,7 @@ CASES = {
     "half-planes, minimum": (50, 500),
     "half-planes, skeleton": (50, 500),
     "discs, all distances": (10, 20),
+    "blocks": (4, 8),
 }
 
 
@@ -69,10 +74,16 @@ def problem(case: str, n: int) -> tuple[Any, Any, Any, Any]:
 def one(case: str, n: int) -> None:
     """Print the times of one case, as JSON."""
     from polycorner import Manifold, Polyhedron, minimise, skeleton
+    from polycorner.motion.engine.intermediate import compiled_advance
 
     line = Manifold.euclidean("t")
     (t,) = line.symbols
     minimise(Polyhedron(line, [t]), t, [1.0])  # loads the descent, from the usual cache
+    if case == "blocks":
+        compiled_advance(POSES)
+        made_systems: list[Any] = []
+        timed(lambda: made_systems.append(block_on_brick(n)), lambda: fall(*made_systems[0]))
+        return
     space, parts, energy, start = problem(case, n)
     made: list[Any] = []
 
@@ -82,8 +93,36 @@ def one(case: str, n: int) -> None:
         else:
             assert minimise(made[0], energy, start).is_minimum
 
+    timed(lambda: made.append(Polyhedron(space, parts)), search)
+
+
+def block_on_brick(n: int) -> tuple[Any, Any]:
+    """Return a polyhedron of 4 or 8 corners above a brick on a floor, and where they are."""
+    from itertools import product
+
+    from polycorner.bodies import Arrangement, HalfSpace, polytope
+
+    cube = list(product((-1, 1), repeat=3))
+    corners = cube if n == len(cube) else [c for c in cube if c[0] * c[1] * c[2] > 0]
+    brick = list(product((-2, 2), (-2, 2), (-0.5, 0.5)))
+    bodies = {"A": polytope(corners, 0.1), "B": polytope(brick, 0.1)}
+    a = Arrangement(bodies, {"floor": HalfSpace([0, 0, 1], [0, 0, 0])})
+    system = a.system(gravity=[0, 0, -10.0], friction=0.5)
+    return system, system.state(a.point({"A": [0, 0, 3.0], "B": [0, 0, 0.6]}))
+
+
+def fall(system: Any, state: Any) -> None:
+    """Move bodies by ten steps."""
+    from polycorner import simulate
+
+    simulate(system, state, 0.01, 1e-3)
+
+
+def timed(make: Callable[[], object], search: Callable[[], object]) -> None:
+    """Print how long the first and later answers take, as JSON."""
+
     def first() -> None:
-        made.append(Polyhedron(space, parts))
+        make()
         search()
 
     with tempfile.TemporaryDirectory() as folder:

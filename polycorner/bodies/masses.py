@@ -1,7 +1,12 @@
 """Mass, centre of mass and inertia of bodies of uniform density.
 
 A rounded polygon consists of the polygon, a rectangle on every edge and a sector of a circle at
-every vertex; a capsule in space of a cylinder and two half balls.
+every vertex; a capsule in space of a cylinder and two half balls.  A rounded polyhedron consists of
+the polyhedron, a prism on every face, a sector of a cylinder at every edge, and at every vertex the
+part of a ball whose directions ``n`` are normals there.  These are a spherical polygon: its area is
+the angle by which the faces miss ``2 pi`` at the vertex.  The tangential part of a constant vector
+``e`` has the divergence ``-2 n.e`` on the sphere, and ``n_i`` times it ``e_i - 3 n_i n.e``, so that
+the integrals of ``n`` and ``n n^T`` over the polygon are integrals along its sides, which are arcs.
 """
 
 import math
@@ -17,6 +22,8 @@ from polycorner.bodies.shapes import Body, Part
 from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
+
+FLAT = 1e-9  # angle below which triangles are parts of one face
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +86,6 @@ def mass_of(body: Body, density: float = 1.0) -> Mass:
     """Return the mass of a body of uniform density, per area in the plane or volume in space.
 
     Parts that overlap count twice.
-
-    Raises
-    ------
-    NotImplementedError
-        For rounded polyhedra.
     """
     density = checks.real("density", density, above=0)
     pieces = [piece for part in body.parts.values() for piece in _pieces(part)]
@@ -93,6 +95,7 @@ def mass_of(body: Body, density: float = 1.0) -> Mass:
     for piece in pieces:
         away = piece.centre - centre
         second += piece.second + piece.amount * np.outer(away, away)
+    second = (second + second.T) / 2  # where moments cancel, rounding errors need not
     inertia = np.trace(second) * np.eye(len(centre)) - second
     planar = len(centre) == 2
     return Mass(density * mass, centre, density * (np.trace(second) if planar else inertia))
@@ -112,13 +115,8 @@ def _pieces(part: Part) -> Iterator[_Piece]:
         yield from _planar(part)
     elif len(part.points) <= 2:
         yield _rod(part)
-    elif part.radius > 0:
-        msg = "density: expected no rounded polyhedron; give its Mass"
-        raise NotImplementedError(msg)
     else:
-        middle = part.points.mean(axis=0)
-        for triangle in ConvexHull(part.points).simplices:
-            yield _simplex(np.vstack([middle, part.points[triangle]]))
+        yield from _polyhedral(part)
 
 
 def _planar(part: Part) -> Iterator[_Piece]:
@@ -182,3 +180,58 @@ def _rod(part: Part) -> _Piece:
     radial = tube * r**2 / 4 + ball * r**2 / 5
     uu = np.outer(u, u)
     return _Piece(tube + ball, points.mean(axis=0), axial * uu + radial * (np.eye(3) - uu))
+
+
+def _polyhedral(part: Part) -> Iterator[_Piece]:
+    points, r, hull = part.points, part.radius, ConvexHull(part.points)
+    middle, normals = points.mean(axis=0), hull.equations[:, :3]
+    for triangle, n in zip(hull.simplices, normals, strict=True):
+        yield _simplex(np.vstack([middle, points[triangle]]))
+        if r > 0:
+            yield _prism(points[triangle], r * n)
+    if r == 0:
+        return
+    missing, first = np.full(len(points), math.tau), np.zeros_like(points)
+    second = np.zeros((len(points), 3, 3))
+    for face, triangle in enumerate(hull.simplices):
+        for k, vertex in enumerate(triangle):
+            a, b = np.delete(triangle, k)
+            missing[vertex] -= _angle(points[a] - points[vertex], points[b] - points[vertex])
+            other = hull.neighbors[face, k]  # across the side from a to b
+            turn = _angle(normals[face], normals[other])
+            if face < other and turn > FLAT:
+                both, along = normals[face] + normals[other], _unit(points[b] - points[a])
+                yield _wedge(points[a], points[b], r, turn, _unit(both))
+                for end, outward in ((a, along), (b, -along)):
+                    first[end] -= turn / 2 * outward
+                    second[end] -= math.tan(turn / 2) * np.outer(both, outward)
+    for k, angle in enumerate(missing):
+        amount = angle * r**3 / 3
+        away, about = r**4 / 4 * first[k] / amount, r**5 / 15 * (angle * np.eye(3) + second[k])
+        yield _Piece(amount, points[k] + away, about - amount * np.outer(away, away))
+
+
+def _unit(u: Array) -> Array:
+    return np.asarray(u / np.linalg.norm(u))
+
+
+def _angle(u: Array, v: Array) -> float:
+    return math.atan2(float(np.linalg.norm(np.cross(u, v))), float(u @ v))
+
+
+def _prism(corners: Array, up: Array) -> _Piece:
+    """Return a prism on a triangle, of a height and direction normal to it."""
+    area = float(np.linalg.norm(np.cross(*(corners[1:] - corners[0])))) / 2
+    amount, centre = area * float(np.linalg.norm(up)), corners.mean(axis=0)
+    away = corners - centre
+    return _Piece(amount, centre + up / 2, amount / 12 * (away.T @ away + np.outer(up, up)))
+
+
+def _wedge(start: Array, end: Array, r: float, angle: float, b: Array) -> _Piece:
+    """Return the sector of a cylinder around a line, about the direction ``b``."""
+    length, u = float(np.linalg.norm(end - start)), _unit(end - start)
+    sector = _sector(np.zeros(2), r, angle, np.array([1.0, 0.0]))
+    plane = np.array([b, np.cross(u, b)])
+    amount = sector.amount * length
+    second = length * plane.T @ sector.second @ plane + amount * length**2 / 12 * np.outer(u, u)
+    return _Piece(amount, (start + end) / 2 + sector.centre @ plane, second)

@@ -83,7 +83,7 @@ def _places(touch: Touch) -> "Iterator[tuple[Point, Point, Any]]":
     if len(second) <= 2:
         p, q = _nearest(first, second)
         apart = minus(p, q)
-        yield p, _scaled(apart, 1 / norm(apart)), sympy.true
+        yield p, _scaled(apart, _reciprocal(norm(apart))), sympy.true
         return
     (p,), hull = first, touch.two.part.facets
     assert hull is not None, touch.two.name
@@ -95,7 +95,7 @@ def _places(touch: Touch) -> "Iterator[tuple[Point, Point, Any]]":
     for k, w in enumerate(away):
         later = squares[k + 1 :]
         nearest = _at_most(squares[k], sympy.Min(*later, evaluate=False)) if later else sympy.true
-        yield p, _scaled(w, 1 / sympy.sqrt(squares[k])), nearest
+        yield p, _scaled(w, _reciprocal(sympy.sqrt(squares[k]))), nearest
 
 
 def _over_faces(
@@ -207,7 +207,7 @@ def _slip(
     velocity = minus(_velocity(placements, one, place), _velocity(placements, two, other))
     if one.part.dimension == 2:
         return (normal[0] * velocity[1] - normal[1] * velocity[0],)
-    return tuple(dot(tangent, velocity) for tangent in _tangents(normal))
+    return _along_tangents(normal, velocity)
 
 
 def _rolling(
@@ -220,7 +220,7 @@ def _rolling(
     spin = _scaled(minus(_spin(placements, one), _spin(placements, two)), radius)
     if one.part.dimension == 2:
         return (spin[2],)
-    return tuple(dot(tangent, spin) for tangent in _tangents(normal))
+    return _along_tangents(normal, spin)
 
 
 def _velocity(placements: dict[str, Placement], thing: Member | Wall, place: "Point") -> "Point":
@@ -258,15 +258,29 @@ def _spin(placements: dict[str, Placement], thing: Member | Wall) -> "Point":
     return (zero, zero, zero)
 
 
-def _tangents(n: "Point") -> "tuple[Point, Point]":
-    """Return two unit vectors orthogonal to a unit vector and to each other."""
+def _along_tangents(n: "Point", velocity: "Point") -> "tuple[sympy.Expr, sympy.Expr]":
+    """Return a vector's components along two unit vectors orthogonal to ``n`` and to each other.
+
+    Products are left as they are written: SymPy would ask whether ``n`` makes them infinite.
+    """
     import sympy
 
     x, y, z = map(sympy.sympify, n)
-    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=not z.free_symbols)
-    a = -1 / (side + z)
-    b = x * y * a
-    return (1 + side * x**2 * a, side * b, -side * x), (b, side + y**2 * a, -y)
+    known = bool(x.is_number and y.is_number and z.is_number)
+    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=known)
+
+    def product(*factors: "sympy.Expr") -> "sympy.Expr":
+        return sympy.Mul(*factors, evaluate=known)
+
+    a = -1 / (side + z) if known else sympy.Pow(-side - z, -1, evaluate=False)
+    b = product(x, y, a)
+    one = (1 + product(side, x, x, a), product(side, b), product(-1, side, x))
+    two = (b, side + product(y, y, a), -y)
+    first, second = (
+        sympy.Add(*(product(t, v) for t, v in zip(tangent, velocity, strict=True)), evaluate=known)
+        for tangent in (one, two)
+    )
+    return first, second
 
 
 def _plus(p: "Point", u: "Point") -> "Point":
@@ -288,8 +302,15 @@ def _at_most(a: "sympy.Expr | int", b: "sympy.Expr | int") -> Any:
     """Return the condition ``a <= b``; of formulas SymPy is not asked, which takes long."""
     import sympy
 
-    formulas = sympy.sympify(a).free_symbols | sympy.sympify(b).free_symbols
-    return sympy.Le(a, b, evaluate=not formulas)
+    known = sympy.sympify(a).is_number and sympy.sympify(b).is_number
+    return sympy.Le(a, b, evaluate=bool(known))
+
+
+def _reciprocal(a: "sympy.Expr") -> "sympy.Expr":
+    """Return ``1 / a``; of formulas SymPy is not asked whether they are infinite."""
+    import sympy
+
+    return sympy.Pow(a, -1, evaluate=bool(a.is_number))
 
 
 def _at(member: Member, point: Array) -> "Point":

@@ -38,6 +38,16 @@ def children(graph: Graph, node: int) -> tuple[int, ...]:
     return () if op in LEAVES else tuple([int(a) for a in args])
 
 
+def reach(graph: Graph, node: int, reached: set[int]) -> None:
+    """Add a node and all that it depends on to a set that contains what its own nodes do."""
+    waiting = [node]
+    while waiting:
+        a = waiting.pop()
+        if a not in reached:
+            reached.add(a)
+            waiting += children(graph, a)
+
+
 def depth(graph: Graph, outputs: Iterable[int]) -> int:
     """Return the length of the longest chain of operations under the outputs."""
     lengths: list[int] = []
@@ -51,6 +61,7 @@ class Reverse:
 
     def __init__(self, graph: Graph, held: Iterable[int] = ()) -> None:
         self.graph, self.held = graph, frozenset(held)
+        self._fixed = graph.variables_among(self.held)
         self._rows: dict[int, Row] = {}
 
     def row(self, node: int) -> Row:
@@ -75,6 +86,8 @@ class Reverse:
                 self._add_branches(found, a, w)
             else:
                 for child, slope in g.partials(a):
+                    if not g.support(child) & ~self._fixed:
+                        continue
                     if child not in adjoints:
                         heapq.heappush(waiting, -child)
                     self._add(adjoints, child, g.mul(w, slope))

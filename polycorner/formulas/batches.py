@@ -1,15 +1,16 @@
 """Entry points of a kernel as LLVM functions: one point, rows of points, a batch in lanes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 
 from polycorner.formulas import emit
-from polycorner.formulas.adjoints import derivatives
+from polycorner.formulas.adjoints import derivatives, reach
 from polycorner.formulas.programs import Polynomial, Program
 
+LONG = 5000  # operations after which a function of machine code ends
 SPARSE = 64  # results from which on structural zeros are cleared together
 POINTER, VOID = ir.PointerType(emit.F64), ir.VoidType()
 
@@ -52,9 +53,57 @@ def _emit_point(
     if isinstance(program, Polynomial):
         builder = _emit_polynomial(builder, program, order, point.args)
     else:
-        _emit_body(builder, *derivatives(program, order), point.args, lanes=1)
+        _emit_whole(builder, point, *derivatives(program, order))
     builder.ret_void()
     return point
+
+
+def _emit_whole(
+    b: ir.IRBuilder, point: ir.Function, program: Program, levels: tuple[list[int], ...]
+) -> None:
+    """Emit a program for one point: at once, or in functions of a few results each if it is long.
+
+    LLVM takes more than proportionally longer for longer functions.  What results of several share
+    is computed in each.
+    """
+    parts = list(_parts(program, levels))
+    if len(parts) == 1:
+        _emit_body(b, program, levels, point.args, lanes=1)
+        return
+    results = point.args[2:]
+    for nodes, pointer in zip(levels, results, strict=False):
+        if _is_sparse(program, nodes):
+            _clear(b, pointer, len(nodes))
+    for k, entries in enumerate(parts):
+        part = ir.Function(point.module, point.function_type, f"{point.name}_{k}")
+        part.linkage = "internal"
+        part.attributes.add("noinline")
+        inside = ir.IRBuilder(part.append_basic_block())
+        emitter = emit.Emitter(inside, program.graph, _leaves(inside, program, part.args, 1), 1)
+        for level, position, node in entries:
+            inside.store(emitter.value(node), at_offset(inside, part.args[2 + level], position))
+        inside.ret_void()
+        b.call(part, point.args)
+
+
+def _parts(program: Program, levels: tuple[list[int], ...]) -> Iterator[list[tuple[int, int, int]]]:
+    """Yield results in groups, as level, position and node: whole functions, until it is long."""
+    zero, count = program.graph.const(0), len(program.outputs)
+    sparse = [_is_sparse(program, nodes) for nodes in levels]
+    group: list[tuple[int, int, int]] = []
+    reached: set[int] = set()
+    for f in range(count):
+        if len(reached) > LONG:
+            yield group
+            group, reached = [], set()
+        for level, nodes in enumerate(levels):
+            width = len(nodes) // count
+            for position in range(f * width, (f + 1) * width):
+                node = nodes[position]
+                if not (sparse[level] and node == zero):
+                    reach(program.graph, node, reached)
+                    group.append((level, position, node))
+    yield group
 
 
 def _emit_polynomial(
@@ -195,21 +244,8 @@ def _emit_body(
     *,
     lanes: int,
 ) -> None:
-    q, p, *results = pointers
-    leaves: dict[tuple[str, int], ir.Value] = {}
-
-    def leaf(op: str, position: int) -> ir.Value:
-        if (op, position) not in leaves:
-            stride = program.variables if op == "var" else 0
-            leaves[op, position] = gather(b, q if op == "var" else p, position, stride, lanes)
-        return leaves[op, position]
-
-    # All leaves are loaded first, since LLVM must assume that stores may alias later loads.
-    for i in range(program.variables):
-        leaf("var", i)
-    for i in range(program.parameters):
-        leaf("par", i)
-    emitter = emit.Emitter(b, program.graph, leaf, lanes)
+    results = pointers[2:]
+    emitter = emit.Emitter(b, program.graph, _leaves(b, program, pointers, lanes), lanes)
     for nodes, pointer in zip(levels, results, strict=False):
         if lanes == 1 and _is_sparse(program, nodes):
             _store_sparse(b, emitter, pointer, nodes)
@@ -217,6 +253,16 @@ def _emit_body(
         for start in range(0, len(nodes), emit.LANES):
             values = [emitter.value(node) for node in nodes[start : start + emit.LANES]]
             _store(b, values, pointer, start, len(nodes), lanes)
+
+
+def _leaves(
+    b: ir.IRBuilder, program: Program, pointers: Any, lanes: int
+) -> Callable[[str, int], ir.Value]:
+    """Load variables and parameters; LLVM must assume that stores may alias later loads."""
+    q, p, *_ = pointers
+    variables = [gather(b, q, i, program.variables, lanes) for i in range(program.variables)]
+    parameters = [gather(b, p, i, 0, lanes) for i in range(program.parameters)]
+    return lambda op, position: (variables if op == "var" else parameters)[position]
 
 
 def _is_sparse(program: Program, nodes: list[int]) -> bool:
@@ -230,14 +276,17 @@ def _store_sparse(
 ) -> None:
     """Clear all results and store those that are not structurally zero."""
     zero = emitter.graph.const(0)
-    byte, flag = ir.IntType(8), ir.IntType(1)
-    clear = b.module.declare_intrinsic("llvm.memset", [ir.PointerType(byte), emit.I64])
-    size = ir.Constant(emit.I64, 8 * len(nodes))
-    block = b.bitcast(pointer, ir.PointerType(byte))
-    b.call(clear, [block, ir.Constant(byte, 0), size, ir.Constant(flag, 0)])
+    _clear(b, pointer, len(nodes))
     for position, node in enumerate(nodes):
         if node != zero:
             b.store(emitter.value(node), at_offset(b, pointer, position))
+
+
+def _clear(b: ir.IRBuilder, pointer: ir.Value, count: int) -> None:
+    byte, flag = ir.IntType(8), ir.IntType(1)
+    clear = b.module.declare_intrinsic("llvm.memset", [ir.PointerType(byte), emit.I64])
+    block, size = b.bitcast(pointer, ir.PointerType(byte)), ir.Constant(emit.I64, 8 * count)
+    b.call(clear, [block, ir.Constant(byte, 0), size, ir.Constant(flag, 0)])
 
 
 def at_offset(b: ir.IRBuilder, pointer: ir.Value, position: int) -> ir.Value:

@@ -79,7 +79,8 @@ class Family(Value):
     stationary : tuple of str
         Definitions ``t`` on which no function depends to the first order, ``df/dt = 0``: what a
         minimum over ``t`` is taken at, such as the foot of a perpendicular.  First derivatives
-        leave their changes out (the envelope theorem, [Danskin]); second ones do not.
+        leave their changes out (the envelope theorem, [Danskin]); second ones do not.  Also
+        variables by which derivatives are not asked for, and zero.
     """
 
     names: tuple[str, ...]

@@ -57,6 +57,14 @@ class Graph:
             support |= self._supports[int(child)]
         return support
 
+    def support(self, a: int) -> int:
+        """Return the variables that a node depends on, one bit each."""
+        return self._supports[a]
+
+    def variables_among(self, nodes: Iterable[int]) -> int:
+        """Return which variables are among nodes, one bit each."""
+        return sum(self._supports[a] for a in nodes if self.nodes[a][0] == "var")
+
     def const(self, value: Fraction | int | str) -> int:
         """Return a constant node: an exact fraction, or ``"pi"`` or ``"e"``."""
         if value == 0:

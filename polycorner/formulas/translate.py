@@ -38,7 +38,8 @@ def compile_expressions(
     names : sequence of str, optional
         Names of the expressions in error messages.
     stationary : iterable of str, optional
-        Definitions on which no expression depends to the first order.
+        Definitions on which no expression depends to the first order, and variables by which
+        derivatives are not asked for.
 
     Raises
     ------

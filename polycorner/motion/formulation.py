@@ -112,24 +112,29 @@ class Formulation:
 
     @cached_property
     def slip(self) -> Family:
-        """The slip velocities."""
+        """The slip velocities; of their derivatives those by velocities, others are left zero."""
         names = tuple(f"s{i}" for i in range(self.slips))
-        return self._family(names, lambda: list(self.laws().slips))
+        return self._family(names, lambda: list(self.laws().slips), held=self.coordinates)
 
     @cached_property
     def energies(self) -> Family:
         """Kinetic and potential energy."""
         return self._family(("T", "V"), lambda: [self.laws().kinetic, self.laws().potential])
 
-    def _family(self, names: tuple[str, ...], expressions: Callable[[], list[Any]]) -> Family:
+    def _family(
+        self,
+        names: tuple[str, ...],
+        expressions: Callable[[], list[Any]],
+        held: tuple[str, ...] = (),
+    ) -> Family:
         def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
             from sympy import sympify
 
             values = [sympify(expression) for expression in expressions()]
             return {}, dict(zip(names, values, strict=True))
 
-        key = repr((self.key, names)) if self.key else ""
-        return Family(names, self.variables, self.parameters, formulas, key)
+        key = repr((self.key, names, held)) if self.key else ""
+        return Family(names, self.variables, self.parameters, formulas, key, stationary=held)
 
     def _symbols(self) -> "tuple[list[sympy.Symbol], list[sympy.Symbol]]":
         import sympy

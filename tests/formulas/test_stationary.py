@@ -78,3 +78,18 @@ def test_gaps_do_not_depend_on_feet_and_normals(shape):
         )
         for a, b in zip(one, other, strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("few", [adjoints.FEW, 0], ids=["forward", "reverse"])
+def test_derivatives_by_variables_that_are_held_are_zero_and_others_as_they_are(few, monkeypatch):
+    monkeypatch.setattr(adjoints, "FEW", few)
+    formulas = dict(zip("fghkl", RESTS, strict=True))
+    q = np.random.default_rng(3).uniform(-1.5, 1.5, (6, 3))
+    free, held = (
+        evaluated(
+            Family(tuple(formulas), NAMES, (), lambda: ({}, formulas), stationary=s).program(), q, 1
+        )
+        for s in ((), ("y",))
+    )
+    assert (held[0] == free[0]).all()
+    assert (held[1] == free[1] * [1, 0, 1]).all()
