@@ -153,7 +153,7 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         potential=of("potential"),
         dissipated=by("dissipated"),
         work=by("work"),
-        events=tuple(read_events(events, names)),
+        events=read_events(events, names),
         max_penetration=float(at["max_penetration"]),
         effort=Effort(**whole, residual=float(at["effort_residual"])),
         noise=_noise(at),

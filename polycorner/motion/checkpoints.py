@@ -19,8 +19,9 @@ import numpy as np
 from polycorner.atomic import PART
 from polycorner.checks import real
 from polycorner.container import BINARY, Kind
+from polycorner.motion.events import joined
 from polycorner.motion.recorder import Recorder
-from polycorner.motion.tables import event_table, read_events, read_touches, touch_table
+from polycorner.motion.tables import event_arrays, read_events, read_touches, touch_table
 from polycorner.values import Value
 
 KIND = Kind("checkpoint", "a simulation", BINARY)
@@ -142,7 +143,7 @@ class SavedRun:
         arrays = {name: np.array(rows[since:]) for name, rows in recorder.columns.items()}
         arrays["left"] = np.array(recorder.left[since:], dtype=np.float64)
         arrays |= touch_table(recorder.touching[since:], names)
-        arrays |= event_table(recorder.events[self._events :], names)
+        arrays |= event_arrays(joined(recorder.events[self._events :], names))
         KIND.save_arrays(self._chunk(self._chunks), arrays)
         state = {
             "parameters": np.array(json.dumps(self.parameters)),
@@ -167,7 +168,7 @@ class SavedRun:
                 rows.extend(chunk[name])
             recorder.left += chunk["left"].tolist()
             recorder.touching += read_touches(chunk, names, len(chunk["left"]))
-            recorder.events += read_events(chunk, names)
+            recorder.events.append(read_events(chunk, names))
         if len(recorder.left) != int(state["frames"]):
             msg = f"{int(state['frames'])} instants were saved, {len(recorder.left)} are there"
             raise ValueError(msg)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.motion.engine.driver import Engine
-from polycorner.motion.events import Event, EventKind
+from polycorner.motion.events import EventKind, EventTable, joined
 from polycorner.motion.trajectory import Touch, Trajectory
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ class Recorder:
             name: [] for name in ("t", "q", "v", "rests", "alive", "energies", "sums")
         }
         self.touching: list[tuple[Touch, ...]] = []
-        self.events: list[Event] = []
+        self.events: list[EventTable] = []  # of one advance after the other
         self.left: list[float] = []
         self.gone = 0.0
 
@@ -43,10 +43,9 @@ class Recorder:
     def advance(self, steps: int) -> None:
         """Advance the engine, recording events and the energy that leaves with bodies."""
         happened = self.engine.advance(steps)
-        self.events += happened
-        for event in happened:
-            if event.kind == EventKind.EXIT:
-                self.gone -= self.engine.energy_of(event.bodies[0])
+        self.events.append(happened)
+        for event in happened.of_kind(EventKind.EXIT):
+            self.gone -= self.engine.energy_of(event.bodies[0])
 
     def trajectory(self, system: "MechanicalSystem", **run: Any) -> Trajectory:
         """Return what was recorded; ``run`` are the arguments of the simulation."""
@@ -69,7 +68,7 @@ class Recorder:
             potential=energies[:, 1],
             dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(bodies.causes)},
             work=work,
-            events=tuple(sorted(self.events, key=lambda event: event.time)),
+            events=joined(self.events, bodies.contact_names).in_time(),
             max_penetration=float(self.engine.motion.sums[3]),
             effort=self.engine.effort,
             **run,

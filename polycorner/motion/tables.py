@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.motion.events import Event, EventKind
+from polycorner.motion.events import Event, EventKind, EventTable
 from polycorner.motion.trajectory import Touch
 
 
@@ -43,17 +43,23 @@ def event_table(events: Iterable[Event], names: Sequence[str]) -> dict[str, Any]
         for event in listed
     ]
     numbers = [(event.time, event.impulse) for event in listed]
-    return {
-        "event": np.array(whole, dtype=np.int64).reshape(-1, 4),
-        "event_numbers": np.array(numbers, dtype=np.float64).reshape(-1, 2),
-    }
+    columns = np.array(whole, dtype=np.int64).reshape(-1, 4)
+    return event_arrays(EventTable(columns, np.array(numbers).reshape(-1, 2), names))
 
 
-def read_events(table: Any, names: Sequence[str]) -> list[Event]:
-    """Return events from :func:`event_table`."""
-    return [
-        Event(time, EventKind(kind), (i,) if j < 0 else (i, j), "" if at < 0 else names[at], value)
-        for (kind, i, j, at), (time, value) in zip(
-            table["event"].tolist(), table["event_numbers"].tolist(), strict=True
-        )
-    ]
+def event_arrays(events: EventTable) -> dict[str, Any]:
+    """Return the arrays of events, by the names that they have in files."""
+    return {"event": events.whole, "event_numbers": events.numbers}
+
+
+def read_events(table: Any, names: Sequence[str]) -> EventTable:
+    """Return events from :func:`event_table`; ValueError if there is no such kind or contact."""
+    events = EventTable(table["event"], table["event_numbers"], names)
+    for kind in np.unique(events.whole[:, 0]):
+        EventKind(kind)
+    if len(events) and not (
+        -1 <= events.whole[:, 3].min() <= events.whole[:, 3].max() < len(names)
+    ):
+        msg = f"there are {len(names)} contacts"
+        raise ValueError(msg)
+    return events

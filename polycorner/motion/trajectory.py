@@ -1,7 +1,7 @@
 """Trajectories: recorded states, contacts, events, and the balance of energy."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -50,7 +50,8 @@ class Trajectory(Value, Printed):
     work : mapping from str to (T,) array
         Work done until each instant by the moving ``substrate``, by ``applied`` forces and by
         ``noise``, and what ``left`` with bodies that left (negative).
-    events : tuple of Event
+    events : sequence of Event
+        In time.  They are held as arrays; each becomes an object when it is asked for.
     max_penetration : float
         The deepest overlap met, in units of the gaps.
     effort : Effort
@@ -78,7 +79,7 @@ class Trajectory(Value, Printed):
     potential: Array
     dissipated: Mapping[str, Array]
     work: Mapping[str, Array]
-    events: tuple[Event, ...]
+    events: Sequence[Event]
     max_penetration: float
     effort: Effort
     noise: Noise = field(default_factory=Noise)

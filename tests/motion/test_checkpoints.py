@@ -21,6 +21,7 @@ from polycorner import atomic as writing
 from polycorner.models.textbook import bouncing_ball
 from polycorner.motion import Checkpoint, Event, EventKind, Noise, Solver, simulate
 from polycorner.motion.checkpoints import KIND, STATE, SavedRun
+from polycorner.motion.tables import event_table, read_events
 
 NOISE = Noise(kicks={"x": 0.3}, seed=5)
 LASTING = 1.5
@@ -239,12 +240,14 @@ class Engine:
 
 
 def recorder(rows):
+    happened = [Event(0.05, EventKind.IMPACT, (0,), "right", 2.0)] * bool(rows)
+    names = ("left", "right")
     return SimpleNamespace(
         engine=Engine(),
         columns={"times": [0.1 * k for k in range(rows)]},
         left=[0.0] * rows,
         touching=[(((0,), "left", 1.5),)] * rows,
-        events=[Event(0.05, EventKind.IMPACT, (0,), "right", 2.0)] * bool(rows),
+        events=[read_events(event_table(happened, names), names)],
         gone=0.25,
     )
 

@@ -202,6 +202,7 @@ class Work(NamedTuple):
     located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
     remedy: Annotated[Any, whole("1")]  # for islands that are not solved: LAST, DIVIDED or HALVED
     awake: Annotated[Any, whole("N")]
+    apart: Annotated[Any, whole("N")]  # whether surroundings are known to be far from a body
     touched: Annotated[Any, whole("N")]  # 0: by nothing; 1: by surroundings only; 2: by bodies
     evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
     speed: Annotated[Any, real("N")]
@@ -293,7 +294,6 @@ class Work(NamedTuple):
     island_vector: Annotated[Any, real("N*K")]
     matrix: Annotated[Any, real("M")]  # of an island, block by block
     ranked: Annotated[Any, whole("C")]  # contacts between bodies by key
-    assembled: Annotated[Any, whole("C")]  # the same, in the order of their blocks
     block_of: Annotated[Any, whole("C")]  # block of each, or -1
     meets: Annotated[Any, whole("P")]  # how many small gaps of a pair were counted
     found: Annotated[Any, whole("V")]  # contacts that an item finds; from where on it adds them
@@ -316,7 +316,7 @@ class Work(NamedTuple):
     body_strip: Annotated[Any, whole("N")]  # strip of a body
     strip: Annotated[Any, whole("B")]  # of what is sorted
     unsorted: Annotated[Any, whole("B")]  # what is to be ordered by strips
-    strip_start: Annotated[Any, whole("Z+1")]  # in `assembled`, then in `compact_order`
+    strip_start: Annotated[Any, whole("Z+1")]  # in `compact_order`
     strip_cursor: Annotated[Any, whole("Z")]
     worst: Annotated[Any, real("Z")]  # residuals of parts of an island
     signals: Annotated[Any, whole("32")]  # TICKET, ...

@@ -26,7 +26,7 @@ from polycorner.motion.engine.evaluation import (
     evaluate_pair_gaps,
 )
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
-from polycorner.motion.engine.neighbours import TOUCHING, detection_distance
+from polycorner.motion.engine.neighbours import TOUCHING
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import (
     apply_impulses,
@@ -282,15 +282,11 @@ def add_friction(model, state, work, contact, pressing):
 
 
 @compiled
-def assemble_body_blocks(model, state, work, h):
+def assemble_body_blocks(model, state, work, h, limit):
     """Assemble the blocks of all awake bodies and their surroundings; return their number."""
     blocks = ZERO
     for i in range(model.bodies):
-        for c in range(model.dimension):
-            work.q_next[i, c] = work.q_mid[i, c] + h * state.v[i, c]
-    limit = detection_distance(model, work, h)
-    for i in range(model.bodies):
-        if state.alive[i] and work.awake[i]:
+        if state.alive[i] and work.awake[i] and not work.apart[i]:
             blocks = add_body_blocks(model, state, work, i, h, limit, blocks)
     return blocks
 
@@ -300,7 +296,7 @@ def assemble_contacts(model, state, work, h, begin, end, blocks):
     """Assemble the blocks of a range of contacts in their order; return the block count."""
     first, second = NONE, NONE
     for s in range(begin, end):
-        contact = work.assembled[s]
+        contact = work.ranked[s]
         if work.contact[contact, 0] != first or work.contact[contact, 1] != second:
             first, second = work.contact[contact, 0], work.contact[contact, 1]
             evaluate_pair_gaps(model, work, first, second, work.q_next)

@@ -4,15 +4,15 @@
 # item; phase and number of items; items done; whether the call ends.
 TICKET, LIMIT, ITEMS_DONE, STOP = 0, 8, 16, 24
 
-# What the items of a phase are.  Bodies: they are evaluated, start from forces alone, begin and end
-# sweeps, their work is booked.  Pairs: small gaps are counted, and become contacts.  Contacts:
-# their blocks are assembled, they are added to the list.  Islands: they are solved.  Strips:
-# contacts are made compact, pressed as before, swept, judged.  Blocks: impulses are stored, events
-# are observed.
-EVALUATE, START, BEGIN, END, BOOK, COUNT_GAPS, DETECT, ASSEMBLE, ADD = range(9)
-SOLVE, COMPACT, PRESS, SWEEP, JUDGE, STORE, OBSERVE = range(9, 16)
+# What the items of a phase are.  Bodies: they are evaluated, start from forces alone, are
+# predicted, begin and end sweeps, their work is booked.  Pairs: small gaps are counted, and become
+# contacts.  Contacts: their blocks are assembled, they are added to the list.  Islands: they are
+# solved.  Strips: contacts are made compact, pressed as before, swept, judged.  Blocks: impulses
+# are stored, events are observed.
+EVALUATE, START, PREDICT, BEGIN, END, BOOK, COUNT_GAPS, DETECT, ASSEMBLE, ADD = range(10)
+SOLVE, COMPACT, PRESS, SWEEP, JUDGE, STORE, OBSERVE = range(10, 17)
 
 # What threads are told of a phase.  WATCHED: whether friction that is apart from the contact that
 # presses on it looks at its impulse.
-KIND, STEP_INDEX, COUNT, SET_OFF, AGAIN, BACKWARDS, ISLAND, WATCHED = range(8)
+KIND, STEP_INDEX, COUNT, SET_OFF, AGAIN, ISLAND, WATCHED = range(7)
 LENGTH, TIME, SPEED, DISTANCE = range(4)  # of the step; of an island; of contacts

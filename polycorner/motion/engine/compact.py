@@ -25,6 +25,7 @@ from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import entry, load, store, total, zeros
 
 TOLERATED = 1e-3  # scaled overlap that is left as it is
+RELAXATION = 1.5  # multiple by which impulses change in a sweep of what would solve a contact
 SEPARATED = 0.2  # share of what is too much that one contact takes away
 
 # Numbers of a compact contact: velocities of its rows at w = 0, reciprocals of the squares of its
@@ -179,7 +180,7 @@ def press_contact(model, work, r):
 
 @compiled
 def relax_contact(model, work, r):
-    """Solve the contact with all others fixed, then its friction."""
+    """Change the impulse of a contact with all others fixed, then that of its friction."""
     contact, numbers = work.compact[r], work.compact_numbers[r]
     rows, w = work.compact_rows, work.unit_velocity
     i, j, form = contact[FIRST], contact[SECOND], contact[FORM]
@@ -188,7 +189,7 @@ def relax_contact(model, work, r):
     if form & HAS_GAP:
         p = numbers[PRESSES]
         u = numbers[NORMAL] + row_times(model, rows, at, w, i, j)
-        new = p - u * numbers[NORMAL_RHO]
+        new = p - RELAXATION * u * numbers[NORMAL_RHO]
         if not form & BILATERAL:
             new = max(new, 0.0)
         numbers[PRESSES], more, support = new, new - p, abs(new)
@@ -208,7 +209,8 @@ def relax_contact(model, work, r):
         slide_across(model, work, r, support, slip)
         return
     q = numbers[RUBS]
-    numbers[RUBS] = nearest(model, work, form >> SET_BITS, q - slip * numbers[SLIP_RHO], support)
+    aim = q - RELAXATION * slip * numbers[SLIP_RHO]
+    numbers[RUBS] = nearest(model, work, form >> SET_BITS, aim, support)
     if form & HAS_GAP:
         add_two_rows(model, rows, at, more, along, numbers[RUBS] - q, w, i, j)
     else:

@@ -5,9 +5,11 @@ A block belongs to the first strip of its bodies, so that it acts on bodies of t
 next one only: strips of even number, and those of odd number, can be swept side by side.  What
 comes out depends on the strips, and not on how many threads there are.
 
-A sweep solves contact after contact with all others fixed (Gauss-Seidel), the strips of even number
-first; every other sweep goes backwards, and the last one forward.  Contacts have a compact form
-(:mod:`~polycorner.motion.engine.compact`).  After few sweeps a step is not solved.  The method is
+A sweep goes to contact after contact with all others fixed, the strips of even number first, and
+changes an impulse by more than would solve the contact (successive over-relaxation).  All sweeps go
+the same way: backwards after forwards would begin with the strips that were swept last.  Contacts
+have a compact form (:mod:`~polycorner.motion.engine.compact`).  After few sweeps a step is not
+solved.  The method is
 that of contact dynamics with a fixed number of iterations ([Unger]): as loads spread over a few
 contacts in each sweep, a heap is a little soft, and it is the softer the deeper it is.  Overlaps
 that result are taken away little by little, by changes of place.
@@ -94,30 +96,6 @@ def divide_bodies(model, state, work, h):
 
 
 @compiled
-def divide_contacts(model, state, work, h, contacts):
-    """Order contacts by strips, and by key within these, so that a strip is in one place in memory.
-
-    Where bodies touch that are not near each other, there is a single strip.
-    """
-    work.strips[0] = 1
-    if model.crowd_sweeps == 0:
-        return
-    for i in range(model.bodies):
-        for c in range(model.dimension):
-            work.shift[i, c] = 0.0
-    strips = divide_bodies(model, state, work, h)
-    for s in range(contacts):
-        contact = work.ranked[s]
-        i, j = work.contact[contact, 0], work.contact[contact, 1]
-        t = strip_of(work, i, j, strips)
-        if t < 0:
-            return
-        work.unsorted[s], work.strip[s] = contact, t
-    work.strips[0] = strips
-    sort_by_strip(work, ZERO, contacts, strips, work.assembled)
-
-
-@compiled
 def strip_of(work, i, j, strips):
     """Return the strip of a block that acts on these bodies, of which the second may be -1: none.
 
@@ -132,27 +110,30 @@ def strip_of(work, i, j, strips):
 
 
 @compiled
-def sort_by_strip(work, first, last, strips, target):
-    """Bring ``work.unsorted[first:last]`` in the order of ``work.strip`` to a target."""
-    starts, cursor = work.strip_start, work.strip_cursor
+def sort_by_strip(work, count, strips):
+    """Sort the first entries of ``work.unsorted``, whose strips are known, by these."""
+    starts, cursor, target = work.strip_start, work.strip_cursor, work.compact_order
     for t in range(strips + 1):
         starts[t] = 0
-    for s in range(first, last):
+    for s in range(count):
         starts[work.strip[s] + 1] += 1
-    starts[0] = first
     for t in range(strips):
         starts[t + 1] += starts[t]
         cursor[t] = starts[t]
-    for s in range(first, last):
+    for s in range(count):
         t = work.strip[s]
         target[cursor[t]] = work.unsorted[s]
         cursor[t] += 1
 
 
 @compiled
-def divide_blocks(work, first, last):
-    """Order the compact contacts of an island by strips, which start at ``work.strip_start``."""
-    count, s = ZERO, first
+def divide_blocks(model, state, work, first, last, h):
+    """Order the compact contacts of an island by strips, which start at ``work.strip_start``.
+
+    Where bodies touch that are not near each other, there is a single strip.
+    """
+    count, s, apart = ZERO, first, False
+    strips = divide_bodies(model, state, work, h)
     work.told[WATCHED] = 0
     while s < last:
         b, pressed = work.order[s], ZERO
@@ -160,13 +141,14 @@ def divide_blocks(work, first, last):
             pressed = ONE
         if work.block_rows[b] > 0:
             work.told[WATCHED] = 1
-        work.unsorted[count], work.strip[count] = 2 * b + pressed, ZERO
-        if work.strips[0] > 1:
-            i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-            work.strip[count] = strip_of(work, i, j, work.strips[0])
+        t = strip_of(work, work.block_bodies[b, 0], work.block_bodies[b, 1], strips)
+        work.unsorted[count], work.strip[count], apart = 2 * b + pressed, t, apart or t < 0
         count += 1
         s += 1 + pressed
-    sort_by_strip(work, ZERO, count, work.strips[0], work.compact_order)
+    work.strips[0] = ONE if apart else strips
+    for t in range(count if apart else ZERO):
+        work.strip[t] = ZERO
+    sort_by_strip(work, count, work.strips[0])
 
 
 @compiled
@@ -187,7 +169,7 @@ def press_strip(model, work, t):
 
 
 @compiled
-def sweep_strips(model, work, item, odd, backwards):
+def sweep_strips(model, work, item, odd):
     """Solve the contacts of a few strips of even or of odd number one after the other.
 
     The strips take turns, contact by contact: as nothing in one waits for another, the processor
@@ -200,7 +182,7 @@ def sweep_strips(model, work, item, odd, backwards):
     for s in range(longest):
         for t in range(begin, end, 2):
             if s < starts[t + 1] - starts[t]:
-                relax_contact(model, work, starts[t + 1] - 1 - s if backwards else starts[t] + s)
+                relax_contact(model, work, starts[t] + s)
 
 
 @compiled

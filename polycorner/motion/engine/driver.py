@@ -29,7 +29,7 @@ from polycorner.motion.engine.intermediate import compiled_advance
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.engine.threads import assisted, copies
-from polycorner.motion.events import Event, EventKind
+from polycorner.motion.events import EventTable, joined
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
 from polycorner.spaces.manifold import Array
@@ -142,23 +142,23 @@ class Engine:
             parts=counts[PARTS],
         )
 
-    def advance(self, steps: int) -> list[Event]:
+    def advance(self, steps: int) -> EventTable:
         """Advance by so many steps and return the events in them."""
         # Compiles the engine, unless the cache has it.
         advance = compiled_advance(self.bodies.dimension)
-        events: list[Event] = []
+        events: list[EventTable] = []
         while steps > 0:
             first, *others = self._addresses
             with assisted(advance, self.work, others):
                 why, done, count = advance(first, steps)
-            events += self._read(count)
+            events.append(self._read(count))
             steps -= done
             if why == CONTACTS_FULL:
                 self.capacity *= 2
                 self.load(self.save())
             elif why == NOT_FINITE:
                 raise SolverError(self._what_is_not_finite())
-        return events
+        return joined(events, self.bodies.contact_names)
 
     def __reduce__(self) -> NoReturn:
         msg = "an engine cannot be copied or pickled: load what it saves into another"
@@ -186,16 +186,12 @@ class Engine:
                     return f"the gap {name!r}{where} is not a number"
         return f"the velocities after t = {self.time:.6g} are not finite"
 
-    def _read(self, count: int) -> list[Event]:
-        contacts, names = self.bodies.body.contacts, self.bodies.pair_contacts
-        events = []
-        for (kind, i, j, which), (time, value) in zip(
-            self.log.entries[:count].tolist(), self.log.numbers[:count].tolist(), strict=True
-        ):
-            contact = "" if which < 0 else (contacts[which] if j < 0 else names[which])
-            bodies = (i,) if j < 0 else (i, j)
-            events.append(Event(self.start + time, EventKind(kind), bodies, contact, value))
-        return events
+    def _read(self, count: int) -> EventTable:
+        whole, numbers = self.log.entries[:count].copy(), self.log.numbers[:count].copy()
+        between = (whole[:, 2] >= 0) & (whole[:, 3] >= 0)
+        whole[between, 3] += len(self.bodies.body.contacts)
+        numbers[:, 0] += self.start
+        return EventTable(whole, numbers, self.bodies.contact_names)
 
     def save(self) -> dict[str, Any]:
         """Return the arrays that are the state, bit for bit (not copied)."""

@@ -243,6 +243,8 @@ def start_body(model, state, work, i):
         speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
     work.speed[i], work.island_speed[i] = speed, speed
     work.touched[i] = 0
+    for c in range(k if model.crowd_sweeps > 0 else 0):
+        work.shift[i, c] = 0.0
     for g in range(model.restitution.size):
         finite = finite and not np.isnan(work.gap[i, g])
     if not finite:

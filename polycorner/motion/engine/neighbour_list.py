@@ -3,14 +3,7 @@
 import numpy as np
 
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import (
-    heap_sort,
-    nearest,
-    pair_key,
-    pair_of,
-    position_of,
-    travel,
-)
+from polycorner.motion.engine.neighbours import nearest, position_of, travel
 
 SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
 MANY = 256  # bodies that are searched for neighbours column by column
@@ -48,7 +41,7 @@ def list_neighbours(model, state, work, h, time):
     Where positions repeat, there is one column, in which the first bodies follow the last ones, up
     to half a period ahead.
     """
-    N, found = model.bodies, work.sort_keys
+    N = model.bodies
     work.listed_travel[0] = max(0.125 * SKIN * model.reach, 2.0 * travel(model, work, h))
     for i in range(N):
         for a in range(2):
@@ -65,11 +58,39 @@ def list_neighbours(model, state, work, h, time):
         begin = end
     if count < 0:
         return False
-    heap_sort(found, count)
-    for s in range(count):
-        work.neighbours[s, 0], work.neighbours[s, 1] = pair_of(model, state, found[s])
+    sort_pairs(state, work, N, count)
     work.list_status[0], work.list_status[1] = count, 1
     return True
+
+
+@compiled
+def sort_pairs(state, work, bodies, count):
+    """Sort pairs of ranks, and replace them by the bodies, the one with the lower number first.
+
+    Pairs are counted by the lower rank; the few higher ranks of each are sorted by insertion.
+    """
+    pairs, higher, cursor = work.neighbours, work.sort_keys, work.cursor
+    for one in range(bodies + 1):
+        cursor[one] = 0
+    for s in range(count):
+        cursor[pairs[s, 0] + 1] += 1
+    for one in range(bodies):
+        cursor[one + 1] += cursor[one]
+    for s in range(count):
+        higher[cursor[pairs[s, 0]]] = pairs[s, 1]
+        cursor[pairs[s, 0]] += 1
+    begin = ZERO
+    for one in range(bodies):
+        for s in range(begin, cursor[one]):
+            two, t = higher[s], s
+            while t > begin and higher[t - 1] > two:
+                higher[t] = higher[t - 1]
+                t -= 1
+            higher[t] = two
+        for s in range(begin, cursor[one]):
+            i, j = state.body_of_rank[one], state.body_of_rank[higher[s]]
+            pairs[s, 0], pairs[s, 1] = min(i, j), max(i, j)
+        begin = cursor[one]
 
 
 @compiled
@@ -151,12 +172,13 @@ def search_column(model, state, work, begin, end, far, count):
 
 @compiled
 def add_if_near(model, state, work, i, j, along, far, count):
-    """Add a pair to the neighbours if it is one; return how many there are, or -1: no room."""
+    """Add the ranks of two neighbours, if they are; return how many pairs there are, or -1."""
     across = nearest(model, 0, work.listed_position[j, 0] - work.listed_position[i, 0])
     near = across * across + along * along < far * far
     if count < 0 or not (near and state.alive[i] and state.alive[j]):
         return count
     if count == model.neighbour_room:
         return NONE
-    work.sort_keys[count] = pair_key(model, state, i, j)
+    one, two = state.rank[i], state.rank[j]
+    work.neighbours[count, 0], work.neighbours[count, 1] = min(one, two), max(one, two)
     return count + 1

@@ -244,11 +244,11 @@ def order_contacts(model, state, work, contacts, ascending):
     """Order contacts by key, if they are not ``ascending``: they were not all found at once."""
     keys = work.sort_keys
     for s in range(contacts):
-        work.ranked[s] = work.assembled[s] = s
+        work.ranked[s] = s
     if ascending:
         return
     for s in range(contacts):
         keys[s] = key_of(model, state, work, s) * contacts + s
     heap_sort(keys, contacts)
     for s in range(contacts):
-        work.ranked[s] = work.assembled[s] = keys[s] % contacts
+        work.ranked[s] = keys[s] % contacts

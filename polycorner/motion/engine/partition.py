@@ -1,6 +1,8 @@
 """Partition of the blocks of a step into islands of touching bodies."""
 
-from polycorner.motion.engine.jit import compiled
+import numpy as np
+
+from polycorner.motion.engine.jit import NONE, ZERO, compiled
 
 
 @compiled
@@ -45,17 +47,25 @@ def find_islands(model, work, blocks):
         starts[i + 1] = 0
     for i in range(N):
         work.parent[i] = root_of(work.parent, i)
-    r = 0
+    r = last = begin = ZERO
     for b in range(blocks):
         if not is_pressed_by_former(work, b):  # friction is of the same island
             r = island_of(work, b)
         work.unsorted[b] = r
-        starts[r + 1] += 1
+        if r != last:  # many in a row are of one island
+            starts[last + 1] += b - begin
+            last, begin = r, np.int64(b)
+    starts[last + 1] += blocks - begin
     for i in range(N):
         starts[i + 1] += starts[i]
     for i in range(N):
         cursor[i] = starts[i]
+    last, place = NONE, ZERO
     for b in range(blocks):
         r = work.unsorted[b]
-        work.order[cursor[r]] = b
-        cursor[r] += 1
+        if r != last:
+            if last >= 0:
+                cursor[last] = place
+            last, place = r, cursor[r]
+        work.order[place] = b
+        place += 1

@@ -16,7 +16,6 @@ from polycorner.motion.engine.codes import (
     ADD,
     AGAIN,
     ASSEMBLE,
-    BACKWARDS,
     BEGIN,
     BOOK,
     COMPACT,
@@ -33,6 +32,7 @@ from polycorner.motion.engine.codes import (
     LENGTH,
     LIMIT,
     OBSERVE,
+    PREDICT,
     PRESS,
     SET_OFF,
     SOLVE,
@@ -57,6 +57,7 @@ from polycorner.motion.engine.evaluation import evaluate_body, start_body
 from polycorner.motion.engine.island import solve_island
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import count_range, detect_counted
+from polycorner.motion.engine.prediction import predict_body
 from polycorner.motion.engine.signals import call_nothing, increase, read, write
 from polycorner.motion.engine.sizes import AT_ONCE
 
@@ -69,7 +70,7 @@ def do_item(model, state, work, item):
     """Do an item of the present phase."""
     kind, told = work.told[KIND], work.told
     if kind == SWEEP:
-        sweep_strips(model, work, item, told[SET_OFF], told[BACKWARDS] != 0)
+        sweep_strips(model, work, item, told[SET_OFF])
     elif kind == COMPACT:
         work.worst[item] = compact_strip(model, state, work, item)
     elif kind == PRESS:
@@ -99,6 +100,9 @@ def do_range(model, state, work, kind, begin, end):
     elif kind == START:
         for i in range(begin, end):
             start_body(model, state, work, i)
+    elif kind == PREDICT:
+        for i in range(begin, end):
+            predict_body(model, state, work, i, h, work.told_times[DISTANCE])
     elif kind == COUNT_GAPS:
         limit = work.told_times[DISTANCE]
         work.found[begin // AT_ONCE] = count_range(model, state, work, begin, end, limit)

@@ -11,7 +11,6 @@ from polycorner.motion.engine.codes import (
     ADD,
     AGAIN,
     ASSEMBLE,
-    BACKWARDS,
     BEGIN,
     BOOK,
     COMPACT,
@@ -23,6 +22,7 @@ from polycorner.motion.engine.codes import (
     ISLAND,
     JUDGE,
     OBSERVE,
+    PREDICT,
     PRESS,
     SET_OFF,
     SOLVE,
@@ -40,7 +40,7 @@ from polycorner.motion.engine.contact_list import (
     mark_met,
     sort_contacts,
 )
-from polycorner.motion.engine.crowds import ABREAST, divide_blocks, divide_contacts, is_crowd
+from polycorner.motion.engine.crowds import ABREAST, divide_blocks, is_crowd
 from polycorner.motion.engine.curvature import correct_curvature
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import detect_all, detection_distance, order_contacts
@@ -94,9 +94,10 @@ def assemble_blocks(model, state, work, h, contacts, ascending):
 
     Contacts that were all found at once are ``ascending``.
     """
-    first = assemble_body_blocks(model, state, work, h)
+    limit = work.told_times[DISTANCE] = detection_distance(model, work, h)
+    share_range(model, state, work, PREDICT, model.bodies, h)
+    first = assemble_body_blocks(model, state, work, h, limit)
     order_contacts(model, state, work, contacts, ascending)
-    divide_contacts(model, state, work, h, contacts)
     if work.located[0]:  # contacts have blocks only if they are closed
         blocks = assemble_contacts(model, state, work, h, ZERO, contacts, first)
     else:
@@ -154,22 +155,17 @@ def solve_islands(model, state, work, blocks, h, again):
 
 @compiled
 def sweep_crowd(model, state, work, i, h):
-    """Sweep over the blocks of a crowd, which is not solved, as often as asked.
-
-    The last sweep goes forward, so that friction follows the contact that presses on it and is in
-    its set.
-    """
+    """Sweep over the blocks of a crowd, which is not solved, as often as asked."""
+    divide_blocks(model, state, work, work.island_start[i], work.island_start[i + 1], h)
     strips = work.strips[0]
-    divide_blocks(work, work.island_start[i], work.island_start[i + 1])
     work.told[ISLAND] = i
     share_range(model, state, work, BEGIN, model.bodies, h)
     share_out(model, state, work, COMPACT, strips)
     speed = work.told_times[SPEED] = greatest(work.worst, strips)
-    share_strips(model, state, work, PRESS, strips, ZERO)
-    for left in range(model.crowd_sweeps - 1, -1, -1):
-        work.told[BACKWARDS] = left % 2
-        share_strips(model, state, work, SWEEP, strips, left % 2)
-    share_strips(model, state, work, JUDGE, strips, ZERO)
+    share_strips(model, state, work, PRESS, strips)
+    for _ in range(model.crowd_sweeps):
+        share_strips(model, state, work, SWEEP, strips)
+    share_strips(model, state, work, JUDGE, strips)
     share_range(model, state, work, END, model.bodies, h)
     increase(state.counts, ISLANDS, ONE)
     increase(state.counts, SWEEPS, model.crowd_sweeps)
@@ -222,10 +218,9 @@ def list_contacts(model, state, work, log, h, time, count):
 
 
 @compiled
-def share_strips(model, state, work, kind, strips, begin):
-    """Do what is asked for the strips of even and of odd number; ``begin``: with which of these."""
-    for half in range(2):
-        odd = (begin + half) % 2
+def share_strips(model, state, work, kind, strips):
+    """Do what is asked for the strips of even number, and then for those of odd number."""
+    for odd in range(2):
         work.told[SET_OFF] = odd
         count = (strips + 1 - odd) // 2
         if kind == SWEEP:

@@ -18,7 +18,7 @@ from polycorner.motion.engine.ranks import PERIOD
 from polycorner.motion.engine.threads import OWN
 from polycorner.motion.noise import Solver
 from polycorner.motion.simulation import simulate, start
-from tests.motion.engine.inclusion import residuals
+from tests.motion.engine.inclusion import residuals, response
 
 SIDE, MU, DT = 22, 0.3, 5e-3
 TRAY = {
@@ -192,6 +192,74 @@ def test_more_sweeps_come_nearer_to_the_solution():
         left.append(engine.effort.residual)
     assert left[1] < 0.1 * left[0]
     assert left[2] < 1e-10
+
+
+def swept_plainly(work, blocks, sweeps):
+    """Return the impulses after Gauss-Seidel sweeps from none, each contact solved in its turn."""
+    v, p, K = work.v_free.copy(), np.zeros(len(blocks)), work.v_free.shape[1]
+    sides = [
+        [
+            (i, work.jacobian[b, 0, side * K : side * K + K], response(work, b, side, i)[0])
+            for side, i in enumerate(work.block_bodies[b])
+            if i >= 0
+        ]
+        for b in blocks
+    ]
+    for _ in range(sweeps):
+        for k, b in enumerate(blocks):
+            u = work.offset[b, 0] + sum(row @ v[i] for i, row, _ in sides[k])
+            new = max(0.0, p[k] - u / sum(row @ answer for _, row, answer in sides[k]))
+            for i, _, answer in sides[k]:
+                v[i] += (new - p[k]) * answer
+            p[k] = new
+    return p
+
+
+def dual_energy(work, blocks, impulse):
+    """Return ``p' W p / 2 + p' c``, which the impulses of a frictionless step minimise."""
+    work.impulse[blocks, 0], K = impulse, work.v_free.shape[1]
+    v = residuals(work, blocks, 0.0)[1]
+    sides = work.jacobian[blocks, 0].reshape(len(blocks), 2, K)
+    rows = np.einsum("bsk,bsk->bs", sides, v[work.block_bodies[blocks]])
+    after = np.where(work.block_bodies[blocks] >= 0, rows, 0.0).sum(axis=1)
+    return impulse @ (0.5 * (after + work.free[blocks, 0]) + work.offset[blocks, 0])
+
+
+def test_sweeps_come_nearer_to_the_solution_than_if_each_contact_were_solved():
+    """Frictionless discs that lie on each other, from no impulses: over-relaxation reaches on."""
+    begun = heap(friction=0.0, crowd_sweeps=20)
+    begun.advance(60)
+    saved = {name: array.copy() for name, array in begun.save().items()}
+    saved["normal"][:] = saved["pair_impulse"][:] = 0.0
+    found = []
+    for sweeps in (20, 2000):
+        engine = heap(friction=0.0, crowd_sweeps=sweeps)
+        engine.load({name: array.copy() for name, array in saved.items()})
+        engine.advance(1)
+        (blocks,) = crowds(engine)
+        blocks = np.sort(blocks[engine.work.block_rows[blocks] == 0])
+        found.append(engine.work.impulse[blocks, 0].copy())
+    few, least, plain = (
+        dual_energy(engine.work, blocks, p)
+        for p in (*found, swept_plainly(engine.work, blocks, 20))
+    )
+    assert 0.0 < few - least < 0.7 * (plain - least)
+
+
+def test_surroundings_that_are_far_press_on_no_body():
+    """What a body remembers of a contact is forgotten where there is none, and kept elsewhere."""
+    engine = heap(crowd_sweeps=6)
+    engine.advance(60)
+    motion = engine.motion
+    for array in (motion.normal, motion.pressed, motion.friction, motion.sticks):
+        array[:] = 1
+    engine.advance(1)
+    apart = (engine.work.gap > 0.5).all(axis=1)
+    assert 0.5 * SIDE**2 < apart.sum() < SIDE**2 - 10
+    for array in (motion.normal, motion.pressed, motion.friction, motion.sticks):
+        assert not array[apart].any()
+    assert motion.normal[~apart].any()
+    assert motion.sticks[~apart].any()
 
 
 def test_discs_that_overlap_are_moved_apart_and_keep_their_velocities():
