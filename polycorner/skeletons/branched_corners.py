@@ -72,7 +72,7 @@ def dependent_rays(
                 yield held
             continue
         along = there.active()
-        if along is None or along == active or _known(found, along, there.q, distance):
+        if along is None or along == active or _known(point, found, along, there.q, distance):
             continue
         here = point.quotient.at(there.q)
         if len(here.basis(along)) == branches.full - 1:
@@ -111,12 +111,12 @@ def branched_rays(
         along = None if there is None else _along(there, active)
         if there is None:
             branches.unclear.append(held)
-        elif along and along != active and not _known(rays, along, there.q, distance):
+        elif along and along != active and not _known(point, rays, along, there.q, distance):
             rays.append(Ray(way, along, Sample.of(there), distance))
     for found in dependent_rays(point, active, distance):
         if not isinstance(found, Ray):
             branches.unclear.append(found)
-        elif not _known(rays, found.active, found.sample.q, distance):
+        elif not _known(point, rays, found.active, found.sample.q, distance):
             rays.append(found)
     explained = [ray.active for ray in rays if ray.dependent]
     return rays, [held for held in branches.unclear if held not in explained]
@@ -152,10 +152,12 @@ def _is_same(ray: Ray, other: Ray) -> bool:
     return ray.active == other.active and bool(ray.direction @ other.direction > 1 - STRAIGHT)
 
 
-def _known(rays: list[Ray], active: frozenset[int], q: Array, distance: float) -> bool:
-    """Whether an edge of given functions goes through a point."""
-    near = ALIKE * distance
-    return any(ray.active == active and abs(ray.sample.q - q).max() < near for ray in rays)
+def _known(
+    point: EvaluatedPoint, rays: list[Ray], active: frozenset[int], q: Array, distance: float
+) -> bool:
+    """Whether an edge of given functions goes through a point at a distance from the corner."""
+    near = ALIKE * distance * point.quotient.polyhedron.manifold.scale_array
+    return any(ray.active == active and (abs(ray.sample.q - q) < near).all() for ray in rays)
 
 
 def _placed(
@@ -268,6 +270,7 @@ class _Arcs:
         point = SingularPoint(self.link, point.q, sorted(ray.active))
         found = fold_figure(point, ray.active, rank, full, BESIDE)
         if found is not None:
+            self.lost += len(found.notes)
             return found.rays
         if len(ray.active) < full - 1:
             self.lost += 1

@@ -23,7 +23,7 @@ one relation leave ``k`` dimensions.
 
 import math
 from collections.abc import Iterator
-from functools import partial
+from functools import cached_property, partial
 from itertools import combinations, islice
 from math import comb
 
@@ -31,7 +31,7 @@ import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.skeletons.dependence import curvature
+from polycorner.skeletons.dependence import unit_hessians
 from polycorner.skeletons.points import EvaluatedPoint, projected
 from polycorner.skeletons.quadrics import FLAT, common_zeros
 from polycorner.skeletons.sign_changes import sign_change
@@ -86,6 +86,11 @@ class Branches:
         sphere = self.point.quotient.polyhedron
         self.scale = 1 / sphere.radius if isinstance(sphere, Link) else 1.0
         self.unclear: list[frozenset[int]] = []
+
+    @cached_property
+    def bends(self) -> Array:
+        """Hessians of the functions in the quotient, ``(m, full, full)``, of unit slope."""
+        return np.asarray(self.frame.T @ unit_hessians(self.point, self.rows) @ self.frame)
 
     def simple(self, least: int = 1) -> Iterator[Branch]:
         """Yield the directions of branches with independent gradients, of both signs.
@@ -165,10 +170,9 @@ class Branches:
         return [self.rows[i] for i in left], Rows(self.slopes[left], RANK_TOLERANCE)
 
     def _forms(self, held: list[int], some: Rows) -> Array:
-        k = some.null_space.shape[1]
-        forms = [curvature(self.point, held, w, some.null_space) for w in some.relations.T]
-        every = np.array(forms).reshape(-1, k, k)
-        return every * self.scale
+        rows = [self.rows.index(i) for i in held]
+        sums = np.tensordot(some.relations.T, self.bends[rows], 1)
+        return np.asarray(some.null_space.T @ sums @ some.null_space * self.scale)
 
     def _is_explained(self, forms: Array, held: list[int], some: Rows) -> bool:
         """Whether there is one double zero, or the functions leave more than curves.
