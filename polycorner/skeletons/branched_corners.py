@@ -61,6 +61,8 @@ def dependent_rays(
     branches = Branches(point, sorted(active))
     found: list[Ray] = []
     for y, held in branches.double():
+        if any(_contains(ray, held, branches.frame @ y) for ray in found):
+            continue
         curve = dependent_at(point, held)
         if curve is None:
             yield held
@@ -150,6 +152,11 @@ def _along(there: HeldPoint, active: frozenset[int]) -> frozenset[int] | None:
 def _is_same(ray: Ray, other: Ray) -> bool:
     """Whether two rays, of independent gradients, belong to one edge."""
     return ray.active == other.active and bool(ray.direction @ other.direction > 1 - STRAIGHT)
+
+
+def _contains(ray: Ray, held: frozenset[int], way: Array) -> bool:
+    """Whether a dependent edge is the only curve in a direction on which some functions vanish."""
+    return held <= ray.active and bool(ray.direction @ way > 1 - STRAIGHT)
 
 
 def _known(
