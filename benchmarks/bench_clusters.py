@@ -2,7 +2,8 @@
 
 Numbers of spheres are arguments, by default 7 8 9; ten take a minute or two.  With ``--save FILE``
 one atlas is searched for by ``--workers`` processes for up to ``--minutes``, and resumed if the
-file exists.
+file exists.  With ``--faces`` the faces of one that is finished are examined for clusters that no
+motion with one degree of freedom leads to.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from side_by_side import print_table, write
 from polycorner import Skeleton, skeleton
 from polycorner.files import load_skeleton, save_skeleton
 from polycorner.models import SphereCluster
-from polycorner.skeletons import Budget, Completeness, resume
+from polycorner.skeletons import Budget, Completeness, examine_faces, resume
 from polycorner.workers import opened
 
 WORKERS = (None, 1, 2)
@@ -59,7 +60,7 @@ def mebibytes(who: int) -> float:
     return resource.getrusage(who).ru_maxrss / 1024
 
 
-def resumable(count: int, workers: int, minutes: float, file: Path) -> None:
+def resumable(count: int, workers: int, minutes: float, file: Path, faces: bool) -> None:
     """Search for one atlas, or resume, and save it; print counts, times and memory."""
     model, start = SphereCluster(count), monotonic()
     found = load_skeleton(file, symmetry=model.symmetry) if file.exists() else None
@@ -77,6 +78,11 @@ def resumable(count: int, workers: int, minutes: float, file: Path) -> None:
             report(found, monotonic() - start)
             if found.complete is not Completeness.BUDGET or left < EVERY:
                 break
+        if faces and found.complete is not Completeness.BUDGET:
+            found = examine_faces(found, executor=executor)
+            print("faces examined")
+            report(found, monotonic() - start)
+            save_skeleton(found, file)
     print(f"in workers {seconds(resource.RUSAGE_CHILDREN):.0f} s, "
           f"the largest {mebibytes(resource.RUSAGE_CHILDREN):.0f} MiB")  # fmt: skip
 
@@ -100,11 +106,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="with --save: processes")
     parser.add_argument("--minutes", type=float, default=math.inf, help="with --save: limit")
     parser.add_argument("--save", type=Path, help="file of one atlas, resumed if it exists")
+    parser.add_argument("--faces", action="store_true", help="with --save: examine faces as well")
     given = parser.parse_args()
     if given.save is None:
         compare(given.counts)
     else:
-        resumable(given.counts[0], given.workers, given.minutes, given.save)
+        resumable(given.counts[0], given.workers, given.minutes, given.save, given.faces)
 
 
 def compare(counts: list[int]) -> None:

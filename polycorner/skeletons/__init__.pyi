@@ -1,7 +1,7 @@
 from .elements import Skeleton
 from .parts import Completeness, Contact, Corner, Edge, Face
 from .refinement import traced
-from .search import resume, skeleton
+from .search import examine_faces, resume, skeleton
 from .states import Budget
 from .walks import End
 
@@ -14,6 +14,7 @@ __all__ = [
     "End",
     "Face",
     "Skeleton",
+    "examine_faces",
     "resume",
     "skeleton",
     "traced",

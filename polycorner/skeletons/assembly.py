@@ -3,29 +3,22 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
-from polycorner.polyhedra.symmetry import generators
 from polycorner.skeletons.borders import Border, seeds_of
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import Flag as NamedFlag
-from polycorner.skeletons.masks import Renaming, mask_of, positions_in
+from polycorner.skeletons.incidences import Flag, flags_of, groups_of, joins_of, masked
+from polycorner.skeletons.masks import mask_of, positions_in
 from polycorner.skeletons.partitions import Partition
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import CornerRecord
-from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.vertex_figures import Ray
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
-
-# An edge or an apex, as in :data:`~polycorner.skeletons.flags.Flag`, and the functions that vanish
-# on a face beside it, as bits.
-Flag = tuple[str, Any, int]
 
 
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
@@ -93,24 +86,24 @@ def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
 
 def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
     """Assemble faces: flags that meet at corners and along edges, then crossings."""
-    flags = dict.fromkeys(_flags(explorer))
+    flags = dict.fromkeys(flags_of(explorer))
     boundary, surface = Partition(flags), Partition(flags)
     broken: list[Flag] = []
-    for one, other in _joins(explorer):
+    for one, other in joins_of(explorer):
         if one in flags and other in flags:
             boundary.join(one, other)
             surface.join(one, other)
         elif one in flags:
             broken.append(one)
     for crossing in explorer.crossings:
-        surface.join(*(_masked(explorer, flag) for flag in (crossing.start, crossing.stop)))
+        surface.join(*(masked(explorer, flag) for flag in (crossing.start, crossing.stop)))
     patches = _patches(explorer, flags)
     for flag, k in patches.items():
         surface.join(flag, next(other for other, j in patches.items() if j == k))
     loose = {boundary[flag] for flag in [*broken, *_ends(explorer, flags)]}
     faces = []
-    for group in _groups(surface, flags):
-        curves = _groups(boundary, group)
+    for group in groups_of(surface, flags):
+        curves = groups_of(boundary, group)
         faces.append(
             Face(
                 active=tuple(explorer.polyhedron.names[i] for i in positions_in(group[0][2])),
@@ -200,78 +193,6 @@ def _contacts(
         least = None if at or along or on else explorer.least.get(name)
         found[name] = Contact(at, along, on, least)
     return found
-
-
-def _groups(sets: Partition, flags: Iterable[Flag]) -> list[list[Flag]]:
-    """Return flags by class, in the order they come."""
-    found: dict[int, list[Flag]] = {}
-    for flag in flags:
-        found.setdefault(sets[flag], []).append(flag)
-    return list(found.values())
-
-
-def _flags(explorer: Explorer) -> Iterator[Flag]:
-    for k, record in enumerate(explorer.records):
-        for s, sector in enumerate(record.figure.sectors):
-            face = mask_of(sector.held)
-            for i in sector.rays:
-                yield ("half", (k, i), face)
-            # Modulo relabellings, a face around a corner is counted by edges that it has elsewhere.
-            if not sector.rays and not explorer.symmetry.relabels:
-                yield ("apex", (k, s), face)
-    for k, curve in enumerate(explorer.curves):
-        if curve.start is None:
-            for beside in explorer.faces_beside(k):
-                yield _masked(explorer, explorer.flag(k, beside))
-
-
-def _joins(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
-    """Yield flags that belong to one boundary curve of one face."""
-    for k, record in enumerate(explorer.records):
-        yield from _joins_at(explorer, k, record)
-    beside = [_sectors_by_ray(record) for record in explorer.records]
-    for curve in explorer.curves:
-        if curve.start is not None:
-            along = Renaming(explorer.polyhedron.names, curve.relabelled)
-            for sector in beside[curve.start[0]].get(curve.start[1], ()):
-                face = mask_of(sector.held)
-                yield ("half", curve.start, face), ("half", curve.stop, along(face))
-
-
-def _masked(explorer: Explorer, flag: NamedFlag) -> Flag:
-    kind, where, names = flag
-    return kind, where, mask_of(map(explorer.polyhedron.names.index, names))
-
-
-def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
-    found: dict[int, list[Sector]] = {}
-    for sector in record.figure.sectors:
-        for ray in dict.fromkeys(sector.rays):
-            found.setdefault(ray, []).append(sector)
-    return found
-
-
-def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tuple[Flag, Flag]]:
-    """Yield flags at one corner that one sector has, or that a relabelling exchanges."""
-    active = [mask_of(ray.active) for ray in record.figure.rays]
-    alike: dict[int, list[int]] = {}
-    for i, edge in enumerate(active):
-        alike.setdefault(edge, []).append(i)
-    # What generators join, all products of them join as well.
-    names = explorer.polyhedron.names
-    changes = [Renaming(names, p) for p in generators(record.stabiliser)]
-    images = [[alike.get(change(edge), []) for edge in active] for change in changes]
-    for sector in record.figure.sectors:
-        if not sector.rays:
-            continue
-        face = mask_of(sector.held)
-        first, last = sector.rays
-        yield ("half", (k, first), face), ("half", (k, last), face)
-        for change, image in zip(changes, images, strict=True):
-            moved = change(face)
-            for ray in sector.rays:
-                for other in image[ray]:
-                    yield ("half", (k, ray), face), ("half", (k, other), moved)
 
 
 def _ends(explorer: Explorer, flags: Iterable[Flag]) -> Iterator[Flag]:

@@ -61,6 +61,8 @@ def dependent_rays(
     branches = Branches(point, sorted(active))
     found: list[Ray] = []
     for y, held in branches.double():
+        if any(_contains(ray, held, branches.frame @ y) for ray in found):
+            continue
         curve = dependent_at(point, held)
         if curve is None:
             yield held
@@ -72,7 +74,7 @@ def dependent_rays(
                 yield held
             continue
         along = there.active()
-        if along is None or along == active or _known(found, along, there.q, distance):
+        if along is None or along == active or _known(point, found, along, there.q, distance):
             continue
         here = point.quotient.at(there.q)
         if len(here.basis(along)) == branches.full - 1:
@@ -111,12 +113,12 @@ def branched_rays(
         along = None if there is None else _along(there, active)
         if there is None:
             branches.unclear.append(held)
-        elif along and along != active and not _known(rays, along, there.q, distance):
+        elif along and along != active and not _known(point, rays, along, there.q, distance):
             rays.append(Ray(way, along, Sample.of(there), distance))
     for found in dependent_rays(point, active, distance):
         if not isinstance(found, Ray):
             branches.unclear.append(found)
-        elif not _known(rays, found.active, found.sample.q, distance):
+        elif not _known(point, rays, found.active, found.sample.q, distance):
             rays.append(found)
     explained = [ray.active for ray in rays if ray.dependent]
     return rays, [held for held in branches.unclear if held not in explained]
@@ -152,10 +154,17 @@ def _is_same(ray: Ray, other: Ray) -> bool:
     return ray.active == other.active and bool(ray.direction @ other.direction > 1 - STRAIGHT)
 
 
-def _known(rays: list[Ray], active: frozenset[int], q: Array, distance: float) -> bool:
-    """Whether an edge of given functions goes through a point."""
-    near = ALIKE * distance
-    return any(ray.active == active and abs(ray.sample.q - q).max() < near for ray in rays)
+def _contains(ray: Ray, held: frozenset[int], way: Array) -> bool:
+    """Whether a dependent edge is the only curve in a direction on which some functions vanish."""
+    return held <= ray.active and bool(ray.direction @ way > 1 - STRAIGHT)
+
+
+def _known(
+    point: EvaluatedPoint, rays: list[Ray], active: frozenset[int], q: Array, distance: float
+) -> bool:
+    """Whether an edge of given functions goes through a point at a distance from the corner."""
+    near = ALIKE * distance * point.quotient.polyhedron.manifold.scale_array
+    return any(ray.active == active and (abs(ray.sample.q - q) < near).all() for ray in rays)
 
 
 def _placed(
@@ -268,6 +277,7 @@ class _Arcs:
         point = SingularPoint(self.link, point.q, sorted(ray.active))
         found = fold_figure(point, ray.active, rank, full, BESIDE)
         if found is not None:
+            self.lost += len(found.notes)
             return found.rays
         if len(ray.active) < full - 1:
             self.lost += 1

@@ -23,15 +23,15 @@ one relation leave ``k`` dimensions.
 
 import math
 from collections.abc import Iterator
-from functools import partial
-from itertools import combinations, islice
+from functools import cached_property, partial
+from itertools import combinations
 from math import comb
 
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.skeletons.dependence import curvature
+from polycorner.skeletons.dependence import unit_hessians
 from polycorner.skeletons.points import EvaluatedPoint, projected
 from polycorner.skeletons.quadrics import FLAT, common_zeros
 from polycorner.skeletons.sign_changes import sign_change
@@ -87,6 +87,11 @@ class Branches:
         self.scale = 1 / sphere.radius if isinstance(sphere, Link) else 1.0
         self.unclear: list[frozenset[int]] = []
 
+    @cached_property
+    def bends(self) -> Array:
+        """Hessians of the functions in the quotient, ``(m, full, full)``, of unit slope."""
+        return np.asarray(self.frame.T @ unit_hessians(self.point, self.rows) @ self.frame)
+
     def simple(self, least: int = 1) -> Iterator[Branch]:
         """Yield the directions of branches with independent gradients, of both signs.
 
@@ -117,8 +122,10 @@ class Branches:
     def double(self) -> Iterator[Branch]:
         """Yield the null directions of semidefinite forms, of both signs."""
         least = len(self.rows) - self.full + 1
-        for opened in self._with_one_relation(range(least, least + self.free + OPENING)):
+        for opened in self._semidefinite(least + self.free + OPENING - 1):
             held, some = self._held(opened)
+            if len(opened) < least:
+                continue
             values, axes = _positive(self._forms(held, some)[0])
             if values[1] > max(FLAT, CLEAR * values[-1]) and abs(values[0]) <= FLAT:
                 for d in (axes[:, 0], -axes[:, 0]):
@@ -138,13 +145,34 @@ class Branches:
         rest = float(away * np.sign(np.trace(form)))
         return rest > ROUNDING or (len(form) > 2 and rest < -ROUNDING)
 
-    def _with_one_relation(self, sizes: range) -> Iterator[tuple[int, ...]]:
-        """Yield what opens where the others have one relation.
+    def _semidefinite(self, most: int) -> Iterator[tuple[int, ...]]:
+        """Yield sets of up to ``most`` functions without which there is one relation.
 
-        Weights of what opens in the relations then have rank ``s - 1``: it lies in the span of some
-        ``s - 1`` of the functions.
+        Only those whose form is semidefinite: opening more functions leaves more directions, on
+        which an indefinite form stays so.  Too many sets are unclear.
         """
-        lost, spans = self.relations.shape[1] - 1, set()
+        lost = self.relations.shape[1] - 1
+        for span in self._spans(lost):
+            level = {some for some in combinations(span, lost) if self._leaves_one(some)}
+            tried = 0
+            while level and tried <= MAX_SETS:
+                kept = [opened for opened in sorted(level) if self._is_semidefinite(opened)]
+                tried += len(level)
+                yield from kept
+                small = (opened for opened in kept if len(opened) < most)
+                level = {
+                    tuple(sorted((*opened, j))) for opened in small for j in span if j not in opened
+                }
+            if level:
+                self.unclear.append(frozenset())
+
+    def _spans(self, lost: int) -> list[tuple[int, ...]]:
+        """Return the largest sets of functions whose weights span ``lost`` relations.
+
+        Weights of what opens in the relations have this rank if one relation is left: they lie in
+        the span of those of some ``lost`` of the functions.
+        """
+        spans = set()
         for base in combinations(range(len(self.rows)), lost):
             axes = self.relations[list(base)]
             if lost and rank(axes, RANK_TOLERANCE) < lost:
@@ -152,12 +180,18 @@ class Branches:
             across = null_space(axes, RANK_TOLERANCE) if lost else np.eye(1)
             inside = abs(self.relations @ across).max(axis=1) <= RANK_TOLERANCE
             spans.add(tuple(np.flatnonzero(inside).tolist()))
-        for span in sorted(spans):
-            sets = (some for size in sizes for some in combinations(span, size))
-            for opened in islice(sets, MAX_SETS):
-                weights = self.relations[list(opened)]
-                if not lost or rank(weights[abs(weights).max(axis=1) > FLAT], FLAT) == lost:
-                    yield opened
+        return sorted(spans)
+
+    def _leaves_one(self, opened: tuple[int, ...]) -> bool:
+        """Whether one relation is left without some functions, as few as relations are lost."""
+        weights = self.relations[list(opened)]
+        clear = weights[abs(weights).max(axis=1, initial=0.0) > FLAT]
+        return not opened or rank(clear, FLAT) == len(opened)
+
+    def _is_semidefinite(self, opened: tuple[int, ...]) -> bool:
+        """Whether the form of what is left is nowhere negative, or nowhere positive."""
+        values = _positive(self._forms(*self._held(opened))[0])[0]
+        return bool(values.min(initial=0.0) >= -FLAT)
 
     def _held(self, opened: tuple[int, ...]) -> tuple[list[int], Rows]:
         """Return the functions that stay zero, and their gradients."""
@@ -165,10 +199,9 @@ class Branches:
         return [self.rows[i] for i in left], Rows(self.slopes[left], RANK_TOLERANCE)
 
     def _forms(self, held: list[int], some: Rows) -> Array:
-        k = some.null_space.shape[1]
-        forms = [curvature(self.point, held, w, some.null_space) for w in some.relations.T]
-        every = np.array(forms).reshape(-1, k, k)
-        return every * self.scale
+        rows = [self.rows.index(i) for i in held]
+        sums = np.tensordot(some.relations.T, self.bends[rows], 1)
+        return np.asarray(some.null_space.T @ sums @ some.null_space * self.scale)
 
     def _is_explained(self, forms: Array, held: list[int], some: Rows) -> bool:
         """Whether there is one double zero, or the functions leave more than curves.

@@ -94,23 +94,27 @@ class DependentSet(Polyhedron):
         return self._extended
 
 
-def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
-    """Return the weighted sum of the Hessians of unit-slope functions on a subspace.
+def unit_hessians(point: EvaluatedPoint, rows: list[int]) -> Array:
+    """Return the scaled Hessians ``(m, n, n)`` of functions, each divided by its slope.
 
-    Equations count with the multipliers that cancel what is left of the weighted gradients.
+    Equations count with the multipliers that cancel what is left of sums of gradients.
     """
     quotient = point.quotient
     polyhedron, solved = quotient.polyhedron, list(quotient.equations)
     scales = polyhedron.manifold.scale_array
-    frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
     sizes = np.linalg.norm(point.gradients[rows], axis=1)
     sizes[sizes == 0] = 1.0  # a vanishing gradient is a relation by itself
-    factors = weights / sizes
-    left = factors @ point.gradients[rows]
-    multipliers = np.linalg.lstsq(point.gradients[solved].T, -left, rcond=None)[0]
+    units = point.gradients[rows] / sizes[:, None]
+    multipliers = np.linalg.lstsq(point.gradients[solved].T, -units.T, rcond=None)[0]
     hessians = polyhedron.bundle.evaluate(point.q, 2)[2] * np.outer(scales, scales)
-    total = np.einsum("i,ijk->jk", [*factors, *multipliers], hessians[[*rows, *solved]])
-    return np.asarray(frame.T @ total @ frame)
+    own = hessians[rows] / sizes[:, None, None]
+    return np.asarray(own + np.tensordot(multipliers.T, hessians[solved], 1))
+
+
+def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
+    """Return the weighted sum of the Hessians of unit-slope functions on a subspace."""
+    frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
+    return np.asarray(frame.T @ np.tensordot(weights, unit_hessians(point, rows), 1) @ frame)
 
 
 def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoint, Array] | None:

@@ -52,6 +52,9 @@ from polycorner.spaces.manifold import Array
 # Distances in scale units at which the edges are looked for.
 DISTANCES = (3e-3, 1e-3, 3e-4)
 
+# Parts of these at which dependent edges are looked for as well: some of them are short.
+PARTS = (1.0, 0.1, 0.01)
+
 # Distance of held functions from zero, in scale units, up to which a relation persists.
 PERSISTS = 1e-11
 
@@ -183,7 +186,7 @@ class _Fold:
                     return None
                 found[(k,), side] = ray
         for opening in tuple(self.dependent):
-            ray, rest = self._dependent_ray(opening, distance)
+            ray, rest = self._nearest_dependent(opening, distance)
             if ray is not None:
                 found[opening, 0] = ray
             elif rest > PERSISTS:
@@ -203,6 +206,14 @@ class _Fold:
         if sample is None or sample.active() != held:
             return None
         return Ray(way, held, Sample.of(sample), distance)
+
+    def _nearest_dependent(self, opening: Opening, distance: float) -> tuple[Ray | None, float]:
+        """Return what :meth:`_dependent_ray` does, at a part of the distance if need be."""
+        for part in PARTS:
+            ray, rest = self._dependent_ray(opening, part * distance)
+            if ray is not None or rest > PERSISTS:
+                break
+        return ray, rest
 
     def _dependent_ray(self, opening: Opening, distance: float) -> tuple[Ray | None, float]:
         """Return the ray of a dependent edge, or None, and what the weighted sum is along it."""

@@ -13,12 +13,15 @@ from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.incidences import Flag
+from polycorner.skeletons.insides import add_inner_corners
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
 from polycorner.spaces.arguments import reals
-from polycorner.workers import opened
+from polycorner.workers import Workers, opened
 
+UNFINISHED = (Completeness.BUDGET, Completeness.INTERRUPTED)
 EXTENT = 1000.0
 BUDGET = 100_000
 
@@ -136,12 +139,82 @@ def resume(
     return _run(Explorer.resumed(state), budget, executor, progress)
 
 
+def examine_faces(
+    skeleton: Skeleton,
+    *,
+    budget: int | Budget = BUDGET,
+    executor: Any = None,
+    progress: Progress | None = None,
+) -> Skeleton:
+    """Look for corners inside the two-dimensional faces of a finished skeleton.
+
+    Where another function touches zero inside a face, no edge need lead to the corner: see
+    :mod:`polycorner.skeletons.touching`.  One straight walk crosses every face from one of its
+    corners, and Newton's method looks for minima that are zero beside it; faces along which
+    gradients are dependent are left out.  From corners that are found the search goes on.  It does
+    not prove that there are no others.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The result of a search that is finished; it stays as it is.
+    budget : int or Budget, optional
+        As for :func:`skeleton`, for the search from the corners that are found.
+    executor, progress
+        As for :func:`skeleton`.
+
+    Returns
+    -------
+    Skeleton
+        The same corners, edges and faces, and more.
+
+    Raises
+    ------
+    ValueError
+        If the search is not finished.
+    """
+    state = checks.instance("skeleton", skeleton, Skeleton, "polycorner.skeleton").state
+    checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
+    if skeleton.complete in UNFINISHED:
+        checks.refuse("skeleton", "the result of a finished search", skeleton.complete.value)
+    explorer, limits = Explorer.resumed(state), _limits(budget, progress)
+    if executor is None:
+        return _examined(explorer, skeleton.complete, limits, progress or silent, None)
+    with opened(executor) as workers:
+        return _examined(explorer, skeleton.complete, limits, progress or silent, workers)
+
+
+def _examined(
+    explorer: Explorer,
+    complete: Completeness,
+    limits: Budget,
+    progress: Progress,
+    workers: Workers | None,
+) -> Skeleton:
+    """Examine faces and go on from what is found, until nothing more is."""
+    examined: set[Flag] = set()
+    try:
+        while add_inner_corners(explorer, examined, progress, workers):
+            complete = explorer.run(limits, progress, workers)
+            if complete in UNFINISHED:
+                break
+    except KeyboardInterrupt:
+        complete = Completeness.INTERRUPTED
+    if complete not in UNFINISHED and explorer.registry.lost:
+        complete = Completeness.GAPS
+    return assembled(explorer, complete)
+
+
+def _limits(budget: int | Budget, progress: Progress | None) -> Budget:
+    if progress is not None and not callable(progress):
+        checks.refuse("progress", "a callable or None", progress, TypeError)
+    return budget if isinstance(budget, Budget) else Budget(budget)
+
+
 def _run(
     explorer: Explorer, budget: int | Budget, executor: Any, progress: Progress | None
 ) -> Skeleton:
-    limits = budget if isinstance(budget, Budget) else Budget(budget)
-    if progress is not None and not callable(progress):
-        checks.refuse("progress", "a callable or None", progress, TypeError)
+    limits = _limits(budget, progress)
     if executor is None:
         complete = explorer.run(limits, progress or silent)
     else:

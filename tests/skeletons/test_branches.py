@@ -81,17 +81,19 @@ def test_ranks_of_sets_from_the_relations_of_all(seed):
 # ------------------------------------------------------------------------------------------ corners
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
 @given(weight, weight)
 @few
-def test_two_relations_on_one_flap(p, q):
+def test_two_relations_on_one_flap(scale, p, q):
     """``p y_3 = t^2 - a`` and ``q y_4 = t^2 - b`` besides ``a``, ``b``, and ``c``, which is free.
 
     On an edge two of the first four open, one of each sum, at ``+t`` and ``-t``: but ``a`` opens
     alone of its sum where ``y_3`` stays zero.  With ``c``, which opens by itself at ``t = 0``, both
     relations persist.
     """
-    D = Polyhedron(FOUR, [a, b, (t**2 - a) / p, (t**2 - b) / q, c])
-    point, active = corner(D)
+    M = Manifold.euclidean("t a b c", scale=scale)
+    t, a, b, c = (symbol / scale for symbol in M.symbols)
+    point, active = corner(Polyhedron(M, [a, b, (t**2 - a) / p, (t**2 - b) / q, c]))
     figure = branched_figure(point, active, *corner_rank(point, active))
     expected = Counter({(frozenset(pair), False): 2 for pair in ((0, 1), (0, 3), (1, 2), (2, 3))})
     expected[frozenset([4]), True] = 1
@@ -111,6 +113,16 @@ def test_edges_at_folds_are_those_that_their_table_gives(p, sign, mixed):
     rank, full = corner_rank(point, active)
     expected, figure = (make(point, active, rank, full) for make in (fold_figure, branched_figure))
     assert opened(figure, active) == opened(expected, active)
+    assert not figure.notes
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-4])
+def test_dependent_edges_that_are_short(length):
+    """Of the edge along ``c``, on which the relation persists, the end is near."""
+    D = Polyhedron(FOUR, [a, b, c, t**2 - a - b, length - c])
+    point, active = corner(D)
+    figure = fold_figure(point, active, *corner_rank(point, active))
+    assert opened(figure, active)[frozenset([2]), True] == 1
     assert not figure.notes
 
 

@@ -1,0 +1,90 @@
+"""Incidences of a search: which beginnings of edges and faces belong to one face."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from polycorner.polyhedra.symmetry import generators
+from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.flags import Flag as NamedFlag
+from polycorner.skeletons.masks import Renaming, mask_of
+from polycorner.skeletons.partitions import Partition
+from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.sectors import Sector
+
+# An edge or an apex, as in :data:`~polycorner.skeletons.flags.Flag`, and the functions that vanish
+# on a face beside it, as bits.
+Flag = tuple[str, Any, int]
+
+
+def groups_of(sets: Partition, flags: Iterable[Flag]) -> list[list[Flag]]:
+    """Return flags by class, in the order they come."""
+    found: dict[int, list[Flag]] = {}
+    for flag in flags:
+        found.setdefault(sets[flag], []).append(flag)
+    return list(found.values())
+
+
+def flags_of(explorer: Explorer) -> Iterator[Flag]:
+    """Yield the flags of faces beside the ends of edges at corners, apexes and closed edges."""
+    for k, record in enumerate(explorer.records):
+        for s, sector in enumerate(record.figure.sectors):
+            face = mask_of(sector.held)
+            for i in sector.rays:
+                yield ("half", (k, i), face)
+            # Modulo relabellings, a face around a corner is counted by edges that it has elsewhere.
+            if not sector.rays and not explorer.symmetry.relabels:
+                yield ("apex", (k, s), face)
+    for k, curve in enumerate(explorer.curves):
+        if curve.start is None:
+            for beside in explorer.faces_beside(k):
+                yield masked(explorer, explorer.flag(k, beside))
+
+
+def joins_of(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
+    """Yield flags that belong to one boundary curve of one face."""
+    for k, record in enumerate(explorer.records):
+        yield from _joins_at(explorer, k, record)
+    beside = [_sectors_by_ray(record) for record in explorer.records]
+    for curve in explorer.curves:
+        if curve.start is not None:
+            along = Renaming(explorer.polyhedron.names, curve.relabelled)
+            for sector in beside[curve.start[0]].get(curve.start[1], ()):
+                face = mask_of(sector.held)
+                yield ("half", curve.start, face), ("half", curve.stop, along(face))
+
+
+def masked(explorer: Explorer, flag: NamedFlag) -> Flag:
+    """Return a flag with the bits of its functions in place of their names."""
+    kind, where, names = flag
+    return kind, where, mask_of(map(explorer.polyhedron.names.index, names))
+
+
+def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
+    found: dict[int, list[Sector]] = {}
+    for sector in record.figure.sectors:
+        for ray in dict.fromkeys(sector.rays):
+            found.setdefault(ray, []).append(sector)
+    return found
+
+
+def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tuple[Flag, Flag]]:
+    """Yield flags at one corner that one sector has, or that a relabelling exchanges."""
+    active = [mask_of(ray.active) for ray in record.figure.rays]
+    alike: dict[int, list[int]] = {}
+    for i, edge in enumerate(active):
+        alike.setdefault(edge, []).append(i)
+    # What generators join, all products of them join as well.
+    names = explorer.polyhedron.names
+    changes = [Renaming(names, p) for p in generators(record.stabiliser)]
+    images = [[alike.get(change(edge), []) for edge in active] for change in changes]
+    for sector in record.figure.sectors:
+        if not sector.rays:
+            continue
+        face = mask_of(sector.held)
+        first, last = sector.rays
+        yield ("half", (k, first), face), ("half", (k, last), face)
+        for change, image in zip(changes, images, strict=True):
+            moved = change(face)
+            for ray in sector.rays:
+                for other in image[ray]:
+                    yield ("half", (k, ray), face), ("half", (k, other), moved)
