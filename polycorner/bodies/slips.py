@@ -267,12 +267,13 @@ def _along_tangents(n: "Point", velocity: "Point") -> "tuple[sympy.Expr, sympy.E
 
     x, y, z = map(sympy.sympify, n)
     known = bool(x.is_number and y.is_number and z.is_number)
-    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=known)
+    steady = bool(z.is_number)
+    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=steady)
 
     def product(*factors: "sympy.Expr") -> "sympy.Expr":
         return sympy.Mul(*factors, evaluate=known)
 
-    a = -1 / (side + z) if known else sympy.Pow(-side - z, -1, evaluate=False)
+    a = sympy.Pow(-side - z, -1, evaluate=steady)
     b = product(x, y, a)
     one = (1 + product(side, x, x, a), product(side, b), product(-1, side, x))
     two = (b, side + product(y, y, a), -y)
