@@ -1,5 +1,6 @@
 """Sign changes and dips of a function along a step."""
 
+import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -29,13 +30,16 @@ def may_vanish(
 
 
 def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
-    """Whether the cubic through values and slopes at both ends comes near zero in between."""
-    m0, m1 = h * slope0, h * slope1
-    curve = [f0, m0, 3 * (f1 - f0) - 2 * m0 - m1, 2 * (f0 - f1) + m0 + m1]
-    flat = np.roots([3 * curve[3], 2 * curve[2], curve[1]])
-    lowest = flat.real[(abs(flat.imag) < 1e-6) & (flat.real > 0) & (flat.real < 1.01)]
-    values = np.polyval(curve[::-1], lowest)
-    return bool((values < 0.25 * min(f0, f1) + 1e-9).any())
+    """Whether the cubic through values and slopes at both ends comes near zero in between.
+
+    It falls first and rises at the end, so that it has one minimum there: where its slope, ``c +
+    b t + a t^2`` with ``c < 0 <= a + b + c``, grows through zero.
+    """
+    c, last = h * slope0, h * slope1
+    a, b = 3 * (2 * (f0 - f1) + c + last), 6 * (f1 - f0) - 4 * c - 2 * last
+    t = -2 * c / (b + math.sqrt(max(b * b - 4 * a * c, 0.0)))
+    lowest = f0 + t * (c + t * (b / 2 + t * a / 3))
+    return lowest < 0.25 * min(f0, f1) + 1e-9
 
 
 def sign_change(
