@@ -104,6 +104,9 @@ class EventTable(Sequence[Event]):
             bodies = (i,) if j < 0 else (i, j)
             yield Event(time, EventKind(kind), bodies, contact, impulse)
 
+    def __repr__(self) -> str:
+        return f"EventTable({list(self)!r})"
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sequence) and list(self) == list(other)
 

@@ -167,7 +167,7 @@ def test_threads_and_strips_go_around_the_box():
     a = Arrangement({"D": disc(1.0)}, walls, orientations="all", period=[width, None])
     system = a.system(gravity=[0, -10.0], friction=0.3, rolling=0.05, count=side**2)
     rows, columns = np.divmod(np.arange(side**2), side)
-    places = np.stack([2.1 * columns + 1.05 * (rows % 2) - 10, 1.01 + 1.9 * rows], axis=-1)
+    places = np.stack([2.1 * columns + 1.05 * (rows % 2) - 10, 1.01 + 1.71 * rows], axis=-1)
     state = system.state(np.column_stack([places, 0 * rows]))
     engines = [
         start(system, state, 5e-3, solver=Solver(tolerance=1e-4, crowd_sweeps=6, threads=n))
