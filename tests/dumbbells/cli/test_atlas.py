@@ -24,7 +24,11 @@ PAIRS = {
 }
 
 
-@pytest.mark.parametrize("arguments", PAIRS, ids=" ".join)
+@pytest.mark.parametrize(
+    "arguments",
+    [a if a == ("--plane",) else pytest.param(a, marks=pytest.mark.slow) for a in PAIRS],
+    ids=" ".join,
+)
 def test_pair_is_the_librarys(arguments):
     pair, heading = PAIRS[arguments]
     found = answer("dyad", *arguments)
