@@ -108,6 +108,8 @@ def main() -> None:
     parser.add_argument("--save", type=Path, help="file of one atlas, resumed if it exists")
     parser.add_argument("--faces", action="store_true", help="with --save: examine faces as well")
     given = parser.parse_args()
+    if given.save is None and given.faces:
+        parser.error("--faces: expected a file with --save; got none")
     if given.save is None:
         compare(given.counts)
     else:

@@ -267,13 +267,12 @@ def _along_tangents(n: "Point", velocity: "Point") -> "tuple[sympy.Expr, sympy.E
 
     x, y, z = map(sympy.sympify, n)
     known = bool(x.is_number and y.is_number and z.is_number)
-    steady = bool(z.is_number)
-    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=steady)
+    side = sympy.Piecewise((1, _at_most(0, z)), (-1, True), evaluate=bool(z.is_number))
 
     def product(*factors: "sympy.Expr") -> "sympy.Expr":
         return sympy.Mul(*factors, evaluate=known)
 
-    a = sympy.Pow(-side - z, -1, evaluate=steady)
+    a = _reciprocal(-side - z)
     b = product(x, y, a)
     one = (1 + product(side, x, x, a), product(side, b), product(-1, side, x))
     two = (b, side + product(y, y, a), -y)

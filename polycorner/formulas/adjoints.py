@@ -61,7 +61,7 @@ class Reverse:
 
     def __init__(self, graph: Graph, held: Iterable[int] = ()) -> None:
         self.graph, self.held = graph, frozenset(held)
-        self._fixed = graph.variables_among(self.held)
+        self._fixed = sum(graph.supports[a] for a in self.held if graph.nodes[a][0] == "var")
         self._rows: dict[int, Row] = {}
 
     def row(self, node: int) -> Row:
@@ -86,7 +86,7 @@ class Reverse:
                 self._add_branches(found, a, w)
             else:
                 for child, slope in g.partials(a):
-                    if not g.support(child) & ~self._fixed:
+                    if not g.supports[child] & ~self._fixed:
                         continue
                     if child not in adjoints:
                         heapq.heappush(waiting, -child)

@@ -25,7 +25,7 @@ class Graph:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self._supports: list[int] = []
+        self.supports: list[int] = []  # the variables that a node depends on, one bit each
         self._index: dict[Node, int] = {}
         self._derivatives: dict[tuple[int, int], int] = {}
         self._zero = -1
@@ -33,7 +33,7 @@ class Graph:
     def copy(self) -> "Graph":
         """Return a graph with the same nodes, to which others can be added."""
         other = Graph()
-        other.nodes, other._supports = self.nodes.copy(), self._supports.copy()
+        other.nodes, other.supports = self.nodes.copy(), self.supports.copy()
         other._index, other._zero = self._index.copy(), self._zero
         return other
 
@@ -43,7 +43,7 @@ class Graph:
         if key not in self._index:
             self._index[key] = len(self.nodes)
             self.nodes.append(key)
-            self._supports.append(self._support(op, args))
+            self.supports.append(self._support(op, args))
         return self._index[key]
 
     def _support(self, op: str, args: tuple[Payload, ...]) -> int:
@@ -54,16 +54,8 @@ class Graph:
             return 0
         support = 0
         for child in args:
-            support |= self._supports[int(child)]
+            support |= self.supports[int(child)]
         return support
-
-    def support(self, a: int) -> int:
-        """Return the variables that a node depends on, one bit each."""
-        return self._supports[a]
-
-    def variables_among(self, nodes: Iterable[int]) -> int:
-        """Return which variables are among nodes, one bit each."""
-        return sum(self._supports[a] for a in nodes if self.nodes[a][0] == "var")
 
     def const(self, value: Fraction | int | str) -> int:
         """Return a constant node: an exact fraction, or ``"pi"`` or ``"e"``."""
@@ -210,7 +202,7 @@ class Graph:
 
     def derivative(self, a: int, variable: int) -> int:
         """Return the partial derivative of node ``a`` by variable number ``variable``."""
-        if not self._supports[a] >> variable & 1:
+        if not self.supports[a] >> variable & 1:
             return self.const(0)
         key = (a, variable)
         if key not in self._derivatives:
@@ -238,7 +230,7 @@ class Graph:
     def partials(self, a: int) -> list[tuple[int, int]]:
         """Return the slope of an operation other than ``select`` by each argument that varies."""
         op, args = self.nodes[a]
-        pair = [self._arg(a, k) for k in range(len(args))] if self._supports[a] else []
+        pair = [self._arg(a, k) for k in range(len(args))] if self.supports[a] else []
         one, zero = self.const(1), self.const(0)
         if len(pair) == 1:
             return [(pair[0], self._chain(op, a, pair[0], one))]
@@ -246,7 +238,7 @@ class Graph:
         return [
             (child, self._binary_rule(op, a, pair, unit))
             for child, unit in zip(pair, units, strict=False)
-            if self._supports[child]
+            if self.supports[child]
         ]
 
     def _binary_rule(self, op: str, a: int, children: list[int], slopes: list[int]) -> int:

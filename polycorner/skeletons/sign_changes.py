@@ -39,7 +39,7 @@ def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
     a, b = 3 * (2 * (f0 - f1) + c + last), 6 * (f1 - f0) - 4 * c - 2 * last
     t = -2 * c / (b + math.sqrt(max(b * b - 4 * a * c, 0.0)))
     lowest = f0 + t * (c + t * (b / 2 + t * a / 3))
-    return lowest < 0.25 * min(f0, f1) + 1e-9
+    return bool(lowest < 0.25 * min(f0, f1) + 1e-9)
 
 
 def sign_change(
