@@ -69,7 +69,7 @@ def dry(friction: float) -> System:
 def oiled() -> System:
     """Return the top on oil, whose forces are derivatives of half the power of the drag."""
     top = dry(1.0)
-    half = DRAG / 2 * sum(slip**2 for slip in top.friction[0].slip)
+    half = DRAG / 2 * sum(slip**2 for slip in top.friction[0].formulas)
     rates = zip(top.manifold.names, velocities(top.manifold), strict=True)
     return replace(top, friction=(), forces={name: -sympy.diff(half, v) for name, v in rates})
 

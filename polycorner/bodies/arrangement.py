@@ -239,7 +239,7 @@ class Arrangement(Value):
         friction : float, (float, float), or mapping from str to these, optional
             Coulomb's coefficient, or a static and a dynamic one, for all contacts or by name; needs
             ``orientations="all"``.  The name of the contacts among repeated bodies is
-            ``"between"``.  It takes a minute to compile for a polyhedron on another.
+            ``"between"``.
         rolling : the same, optional
             Coefficients of rolling resistance: the torque across the normal is at most
             ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
@@ -285,7 +285,7 @@ class Arrangement(Value):
         return System(
             smooth(Polyhedron(self.manifold, lone or AllOf(*self.contacts(excluded=False)))),
             *laws,
-            friction_of(self.placements, touches, walls, friction, rolling),
+            friction_of(self.manifold, touches, walls, friction, rolling),
             restitution=restitution,
             count=count,
             between=family,

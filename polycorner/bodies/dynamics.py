@@ -3,30 +3,32 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
-from polycorner.bodies.frames import Frame, symbols
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.neighbours import pairs
 from polycorner.bodies.pairs import Member, Touch, distances
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import carried, turned
-from polycorner.bodies.slips import rolling, rolling_at_wall, slip, slip_at_wall
-from polycorner.bodies.walls import Wall
+from polycorner.bodies.slips import ROLLING, SLIDING, AtWall, slips_at_wall, slips_of
 from polycorner.checks import refuse
-from polycorner.formulas.compositions import Term, composition
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.formulas.fusion import written_out
 from polycorner.motion.bodies import RUBBING
 from polycorner.motion.contacts import (
     PAIR,
     ContactFamily,
     Friction,
     PairFriction,
+    motions,
     time_symbol,
     velocities,
 )
@@ -40,8 +42,6 @@ if TYPE_CHECKING:
     import sympy
 
 SAME = 1e-9  # relative deviation that counts as none
-AtWall = tuple[str, Wall, Member, Array]  # label of the gap, wall, part, point
-Law = Callable[[], "tuple[sympy.Expr, ...]"]
 Coefficient = float | tuple[float, float]  # static and dynamic
 Coefficients = Coefficient | Mapping[str, Coefficient]
 
@@ -201,36 +201,40 @@ def _rotation(p: Placement, mass: Mass, rates: "tuple[sympy.Symbol, ...]") -> "s
 
 
 def friction_of(
-    placements: tuple[Placement, ...],
+    manifold: Manifold,
     touches: list[Touch],
     walls: list[AtWall],
     sliding: Coefficients,
     rolls: Coefficients,
 ) -> tuple[Friction, ...]:
     """Return dry friction and rolling resistance where a coefficient is positive."""
-    named = {p.name: p for p in placements}
-    d = placements[0].body.dimension
-    found = []
-    for argument, given, kind, verb, at_body, at_wall in (
-        ("friction", sliding, "sliding", "slips", slip, slip_at_wall),
-        ("rolling", rolls, "rolling", "rolls", rolling, rolling_at_wall),
+    space = motions(manifold)
+    rubbing: dict[str, list[Member]] = {t.gap.name: [t.one, t.two] for t in touches}
+    rubbing |= {label: [member] for label, _, member, _ in walls}
+    slips: dict[str, Callable[[str], tuple[SmoothFunction, ...]]] = {
+        t.gap.name: partial(slips_of, space, t) for t in touches
+    }
+    slips |= {touch[0]: partial(slips_at_wall, space, touch) for touch in walls}
+    laws, rows = [], []
+    for argument, given, kind, verb in (
+        ("friction", sliding, SLIDING, "slips"),
+        ("rolling", rolls, ROLLING, "rolls"),
     ):
-        laws: dict[str, tuple[Law, list[Member]]] = {
-            t.gap.name: (partial(at_body, named, t), [t.one, t.two]) for t in touches
-        }
-        for label, wall, member, point in walls:
-            laws[label] = (partial(at_wall, named, wall, member, point), [member])
-        by_name = given if isinstance(given, Mapping) else dict.fromkeys(laws, given)
-        checks.names(argument, by_name, laws)
+        by_name = given if isinstance(given, Mapping) else dict.fromkeys(slips, given)
+        checks.names(argument, by_name, slips)
         for label, value in by_name.items():
             static, dynamic = _both(argument, value)
             if static == 0:
                 continue
-            law, rubbing = laws[label]
-            _check_turning(argument, rubbing, value)
-            sets = _set(static, d), _set(dynamic, d)
-            found.append(Friction(f"{label} {verb}", law(), sets[0], label, sets[1], kind))
-    return tuple(found)
+            _check_turning(argument, rubbing[label], value)
+            d = rubbing[label][0].part.dimension
+            laws.append((f"{label} {verb}", _set(static, d), label, _set(dynamic, d), kind))
+            rows.append(slips[label](kind))
+    shared = iter(together(chain.from_iterable(rows)))
+    return tuple(
+        Friction(name, tuple(islice(shared, len(components))), *law)  # type: ignore[arg-type]
+        for (name, *law), components in zip(laws, rows, strict=True)
+    )
 
 
 def _both(argument: str, given: Any) -> tuple[float, float]:
@@ -268,18 +272,19 @@ def between(
     space = pair[0].manifold * pair[1].manifold
     meeting = pairs(lattice, tuple(pair), {})
     touches = [t for parts in meeting for t in distances(space, *parts)]
-    gaps, definitions = _written([t.gap for t in touches])
-    named, laws = {some.name: some for some in pair}, []
-    for argument, given, law, kind in (
-        ("friction", mu, slip, RUBBING),
-        ("rolling", rolls, rolling, "rolling"),
+    definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
+    both, laws = motions(space), []
+    for argument, given, kind, cause in (
+        ("friction", mu, SLIDING, RUBBING),
+        ("rolling", rolls, ROLLING, ROLLING),
     ):
         static, dynamic = _both(argument, given)
         if static == 0:
             continue
         _check_turning(argument, [*meeting[0]], given)
         sets = _set(static, p.body.dimension), _set(dynamic, p.body.dimension)
-        laws.append(PairFriction({t.gap.name: law(named, t) for t in touches}, *sets, kind))
+        slips = {t.gap.name: slips_of(both, t, kind) for t in touches}
+        laws.append(PairFriction(slips, *sets, cause))
     return ContactFamily(
         gaps,
         2 * p.body.size / p.manifold.scales[0],
@@ -288,22 +293,6 @@ def between(
         restitution=restitution,
         definitions=definitions,
     )
-
-
-def _written(
-    gaps: list[SmoothFunction],
-) -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
-    """Return gaps and their definitions in the coordinates, with parameters as numbers."""
-    import sympy
-
-    terms = {}
-    for gap in gaps:
-        family, read = gap.family, [gap.manifold.symbols[i] for i in gap.reads]
-        formal = symbols([*family.variables, *family.parameters])
-        places = dict(zip(formal, [*read, *map(sympy.Float, gap.parameters)], strict=True))
-        terms[gap.name] = Term(family, gap.member_name, places)
-    definitions, expressions = composition(terms)
-    return expressions, definitions
 
 
 def _renamed(p: Placement, name: str) -> Manifold:

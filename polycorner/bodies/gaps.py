@@ -95,6 +95,24 @@ def points_of(family: Family, *, both: bool) -> list[str]:
     return [name for name in family.parameters if name.rstrip("0123456789_") in letters]
 
 
+def given(name: str, d: int) -> "Point":
+    """Return a vector that is a parameter; in the plane the third coordinate is zero."""
+    return Frame.FIXED.vector("", symbols(numbers(name, Frame.FIXED, d)), d)
+
+
+def beside(p: "Point", corners: "list[Point]", normal: "Point") -> "list[sympy.Expr]":
+    """Return on which side of each edge of a face a point is, positive outside."""
+    return [
+        dot(minus(p, a), cross(minus(b, a), normal))
+        for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
+    ]
+
+
+def harmonics(count: int) -> "list[tuple[sympy.Expr, ...]]":
+    """Return order, amplitude and phase of each wave, which are parameters."""
+    return [tuple(symbols([f"k{j}", f"z{j}", f"o{j}"])) for j in range(count)]
+
+
 def _at(name: str, role: str, frame: Frame, d: int) -> "Point":
     return frame.point(role, symbols(numbers(name, frame, d)), d)
 
@@ -218,26 +236,19 @@ def _hull(
         definitions[name] = expression
         return symbols([name])[0]
 
-    def given(letter: str, i: int) -> "Point":
-        some = symbols([f"{letter}{i}_{k}" for k in range(d)])
-        return (some[0], some[1], some[2] if d == 3 else sympy.S.Zero)
-
     inner = two.into(SECOND, _at("p", FIRST, one, d), d)
     p = tuple(define(f"inner{k}", x) if k < d else x for k, x in enumerate(inner))
     heights, over = [], []
     for f, face in enumerate(faces):
-        normal = given("n", f)
-        height = define(f"height{f}", dot(normal, minus(p, given("v", face[0]))))
+        normal = given(f"n{f}_", d)
+        height = define(f"height{f}", dot(normal, minus(p, given(f"v{face[0]}_", d))))
         heights.append(height)
         if d == 3:
-            sides = [
-                dot(minus(p, given("v", i)), cross(minus(given("v", j), given("v", i)), normal))
-                for i, j in zip(face, (*face[1:], face[0]), strict=True)
-            ]
+            sides = beside(p, [given(f"v{i}_", d) for i in face], normal)
             over.append((height, sympy.And(height >= 0, *(side <= 0 for side in sides))))
     away = []
     for k, (i, j) in enumerate(edges):
-        a, b = given("v", i), given("v", j)
+        a, b = given(f"v{i}_", d), given(f"v{j}_", d)
         along = minus(b, a)
         at = define(f"foot{k}", clamped(foot(p, a, b, 1 / dot(along, along))))
         away.append(define(f"away{k}", distance_from(p, a, b, at)))
@@ -332,8 +343,7 @@ def _hollow(one: Frame, d: int, count: int) -> "Formulas":
     if not count:
         return {}, {"gap": (s**2 - squared) / (2 * s)}
     (azimuth,) = symbols(["azimuth"])
-    terms = [tuple(symbols([f"k{j}", f"z{j}", f"o{j}"])) for j in range(count)]
-    outward, slope = waves(azimuth, terms)
+    outward, slope = waves(azimuth, harmonics(count))
     definitions = {"azimuth": sympy.atan2(dot(away, f), dot(away, e)), "t": s + outward}
     (t,) = symbols(["t"])
     return definitions, {"gap": (t**2 - squared) / (2 * sympy.sqrt(t**2 + slope**2))}

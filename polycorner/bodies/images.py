@@ -1,7 +1,8 @@
-"""Gaps of images: of the nearest one of another body, and of a body to an image of itself.
+"""Gaps and slips of images: of the nearest one of another body, and of a body's own image.
 
-The images of a body are displaced by whole numbers of periods.  Gaps depend on the displacement
-``w`` of two bodies alone, so that a family of gaps becomes one of images when ``w`` is replaced:
+The images of a body are displaced by whole numbers of periods.  Gaps and slips depend on the
+displacement ``w`` of two bodies alone, so that a family becomes one of images when ``w`` is
+replaced:
 
 - for two bodies by its representative in ``(-T/2, T/2]``, ``T`` a multiple of the period: the
   formula is ``T / 2 pi`` times the angle of ``w``, smooth except where it jumps by ``T``;
@@ -66,7 +67,7 @@ def nearest_image(
     axes: tuple[int, ...],
     eccentric: tuple[bool, bool],
 ) -> Family:
-    """Return the gaps of a family to the nearest image.
+    """Return the functions of a family for the nearest image.
 
     Further parameters: the middles ``first`` and ``second`` of bodies that are ``eccentric``, by
     whose displacement the nearest image is meant, in coordinates of the body; ``shift`` of the
@@ -139,23 +140,29 @@ def wrapped(turn: "sympy.Expr", period: "sympy.Expr | float") -> "sympy.Expr":
 
 @lru_cache(maxsize=256)
 def own(family: Family, frame: Frame, d: int) -> Family:
-    """Return the gaps of a family between a body and an image of itself.
+    """Return the functions of a family for a body and an image of itself.
 
     Further parameters: ``shift`` of the first against the second.
     """
     parameters = (*family.parameters, *_numbered("shift", d))
-    variables = frame.variables(FIRST, d)[d:]
+    placed = frame.variables(FIRST, d)[:d]
+    variables = tuple(n for n in family.variables if FIRST in n and n not in placed)
+    held = tuple(n for n in family.stationary if n in variables or n not in family.variables)
     key = repr((cache.source_key(__name__), family.key, "own"))
-    formulas = partial(_own, family, frame, d)
-    return Family(family.names, variables, parameters, formulas, key, stationary=family.stationary)
+    return Family(
+        family.names, variables, parameters, partial(_own, family, placed), key, stationary=held
+    )
 
 
-def _own(family: Family, frame: Frame, d: int) -> "Formulas":
+def _own(family: Family, placed: tuple[str, ...]) -> "Formulas":
+    """Let both bodies be the same one: the origin of the first is at the shift, the second at 0."""
     import sympy
 
-    first, second = (symbols(frame.variables(role, d)) for role in (FIRST, SECOND))
-    shifts = symbols(_numbered("shift", d))
-    places: dict[sympy.Symbol, sympy.Expr] = dict(zip(first[:d], shifts, strict=True))
-    places |= dict.fromkeys(second[:d], sympy.S.Zero)
-    places |= dict(zip(second[d:], first[d:], strict=True))
+    both = [name for name in family.variables if SECOND in name]
+    places: dict[sympy.Symbol, sympy.Expr] = dict(
+        zip(symbols(both), symbols([n.replace(SECOND, FIRST) for n in both]), strict=True)
+    )
+    shifts = symbols(_numbered("shift", len(placed)))
+    places |= dict(zip(symbols(placed), shifts, strict=True))
+    places |= dict.fromkeys(symbols([n.replace(FIRST, SECOND) for n in placed]), sympy.S.Zero)
     return substituted(family.formulas(), places)

@@ -18,6 +18,7 @@ import numpy as np
 from polycorner.bodies import gaps
 from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
+from polycorner.bodies.gaps import FIRST, SECOND
 from polycorner.bodies.images import Image, nearest_image, own
 from polycorner.bodies.lattices import middle
 from polycorner.bodies.poses import Placement
@@ -92,40 +93,43 @@ def members(name: str, body: Body, placement: Placement | None) -> list[Member]:
     ]
 
 
-def gap(
+def function_of(
     manifold: Manifold,
     family: Family,
     one: Member,
     two: Member | None,
     parameters: list[float],
     label: str,
-    name: str = "gap",
+    member: str = "gap",
 ) -> SmoothFunction:
-    """Return a member of a family as a function of the coordinates of two bodies."""
-    reads = one.coordinates + (two.coordinates if two is not None else ())
+    """Return a member of a family as a function of what it reads of two bodies."""
     if two is not None and (one.image or two.image):
-        family, further, reads = _imaged(family, one, two)
+        family, further = _imaged(family, one, two)
         parameters = parameters + further
+    reads = [
+        name.replace(FIRST, one.body)
+        if two is None or FIRST in name
+        else name.replace(SECOND, two.body)
+        for name in family.variables
+    ]
     return SmoothFunction.member(
-        family, name, manifold, parameters=parameters, reads=reads, label=label
+        family, member, manifold, parameters=parameters, reads=reads, label=label
     )
 
 
-def _imaged(
-    family: Family, one: Member, two: Member
-) -> tuple[Family, list[float], tuple[str, ...]]:
-    """Return the family of gaps of images, its further parameters, and what it reads."""
+def _imaged(family: Family, one: Member, two: Member) -> tuple[Family, list[float]]:
+    """Return the family of functions of images, and its further parameters."""
     d = one.part.dimension
     image, sign = (one.image, 1.0) if one.image else (two.image, -1.0)
     assert image is not None, two.name
     shift = (sign * image.shift).tolist()
     if one.body == two.body:
-        return own(family, one.frame, d), shift, one.coordinates[d:]
+        return own(family, one.frame, d), shift
     lengths = image.periods[list(image.axes)].tolist()
     eccentric = (bool(one.middle.any()), bool(two.middle.any()))
     middles = [x for m in (one, two) if m.middle.any() for x in m.numbers(m.middle)]
     made = nearest_image(family, one.frame, two.frame, d, image.axes, eccentric)
-    return made, [*middles, *shift, *lengths], one.coordinates + two.coordinates
+    return made, [*middles, *shift, *lengths]
 
 
 def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True) -> Tree:
@@ -177,7 +181,7 @@ def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
     if len(a) == len(b) == 1:
         numbers = [*one.numbers(a[0]), *two.numbers(b[0]), radius]
         family = gaps.points(one.frame, two.frame, d)
-        function = gap(manifold, family, one, two, numbers, f"{one.name}-{two.name}")
+        function = function_of(manifold, family, one, two, numbers, f"{one.name}-{two.name}")
         yield Touch(function, one, a, two, b)
         return
     if d == 3 and len(a) > 1 and len(b) > 1:
@@ -198,7 +202,7 @@ def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -
     family = gaps.segment(one.frame, two.frame, one.part.dimension)
     for i, p in enumerate(one.part.points):
         numbers = [*one.numbers(p), *two.numbers(*two.part.points), radius]
-        function = gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+        function = function_of(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
         yield Touch(function, one, p[None], two, two.part.points)
 
 
@@ -213,7 +217,7 @@ def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> I
     shape = [*vertices.ravel().tolist(), *facets.normals.ravel().tolist()]
     for i, p in enumerate(one.part.points):
         numbers = [*one.numbers(p), *shape, radius]
-        function = gap(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
+        function = function_of(manifold, family, one, two, numbers, f"{one.vertex(i)}-{two.name}")
         yield Touch(function, one, p[None], two, two.part.points)
 
 
@@ -222,7 +226,7 @@ def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterat
     family = gaps.segments(one.frame, two.frame)
     for (i, first), (j, second) in product(_edges(one), _edges(two)):
         numbers = [*one.numbers(*first), *two.numbers(*second), radius]
-        function = gap(manifold, family, one, two, numbers, f"{one.name}{i}-{two.name}{j}")
+        function = function_of(manifold, family, one, two, numbers, f"{one.name}{i}-{two.name}{j}")
         yield Touch(function, one, first, two, second)
 
 
@@ -276,7 +280,7 @@ def _outside(manifold: Manifold, one: Member, two: Member, face: _Face) -> Tree:
     label = f"{two.name}.{face.name}-{one.name}"
     lowest = nearest(one, face.normal, turning=two.frame.turns)
     some = [
-        gap(manifold, family, one, two, [*one.numbers(p), *numbers], f"{label}.v{i + 1}")
+        function_of(manifold, family, one, two, [*one.numbers(p), *numbers], f"{label}.v{i + 1}")
         for i, p in lowest
     ]
     return some[0] if len(some) == 1 else AllOf(*some)
@@ -311,7 +315,7 @@ def _by_edges(manifold: Manifold, one: Member, two: Member) -> Iterator[Tree]:
             labels = [label, *(f"{label} {name}" for name in conditions[1:])]
             yield AllOf(
                 *(
-                    gap(manifold, family, one, two, numbers, *some)
+                    function_of(manifold, family, one, two, numbers, *some)
                     for some in zip(labels, conditions, strict=True)
                 )
             )

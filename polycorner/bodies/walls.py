@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.bodies import gaps
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.pairs import Member, gap, nearest
+from polycorner.bodies.pairs import Member, function_of, nearest
 from polycorner.bodies.waves import checked_waves, depth
 from polycorner.checks import refuse
 from polycorner.formulas.families import Family
@@ -59,6 +59,11 @@ class HalfSpace(Value):
     def numbers(self, radius: float) -> list[float]:
         """Return its parameters, for a part of a given radius."""
         return [*self.point.tolist(), *self.normal.tolist(), radius]
+
+    @property
+    def angular_velocity(self) -> Array:
+        """Zero, ``(3,)``."""
+        return np.zeros(3)
 
     def fixed_by(self) -> tuple[Array, Array]:
         """Return vectors ``(k, d)``, ``(m, d)`` that a motion of the wall onto itself keeps.
@@ -133,6 +138,12 @@ class Cylinder(Value):
         terms = [x for k, (a, p) in self.waves.items() for x in (float(k), a, p)]
         return [*self.point.tolist(), *axis.tolist(), self.radius - radius, *around, *terms]
 
+    @property
+    def angular_velocity(self) -> Array:
+        """That of the wall, ``(3,)``, in rad/s."""
+        axis = np.array([0.0, 0.0, 1.0]) if self.axis is None else self.axis
+        return self.spin * axis
+
     @cached_property
     def around(self) -> Array:
         """The directions of the azimuths 0 and a quarter turn, ``(2, d)``."""
@@ -196,7 +207,9 @@ def within(
     found = []
     for i, p in points:
         label = f"{member.vertex(i)}-{name}"
-        function = gap(manifold, family, member, None, [*member.numbers(p), *numbers], label)
+        function = function_of(
+            manifold, family, member, None, [*member.numbers(p), *numbers], label
+        )
         found.append((function, p))
     return found
 

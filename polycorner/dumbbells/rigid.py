@@ -142,7 +142,7 @@ class RigidDumbbells(Value):
         factor = uneven_factor(
             sympy.atan2(x, -z), y, amplitude, np.reshape(modes, (-1, 3)).tolist()
         )
-        return replace(friction, slip=tuple(factor * s for s in friction.slip))
+        return replace(friction, slip=tuple(factor * s for s in friction.formulas))
 
     def state(self, q: ArrayLike) -> State:
         """Return the state at the time 0 of dumbbells that lie on the drum, at rest on it.

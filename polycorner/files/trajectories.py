@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ from polycorner.files.motions import (
     read_motion,
     save_dataset,
 )
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.system import System
 from polycorner.motion.trajectory import Trajectory
 
@@ -170,7 +173,7 @@ def _told(system: System) -> dict[str, Any]:
     manifold, polyhedron = system.manifold, system.polyhedron
     friction = {
         f.name: [
-            [text(slip) for slip in f.slip],
+            [*map(_slip, f.slip)],
             f.load if isinstance(f.load, str) else [text(load) for load in f.load],
             f"{f.static}, {f.moving}",
         ]
@@ -193,7 +196,7 @@ def _told(system: System) -> dict[str, Any]:
         "gaps": {name: text(gap) for name, gap in system.between.gaps.items()},
         "friction": [
             [
-                {name: [text(s) for s in slip] for name, slip in law.slip.items()},
+                {name: [*map(_slip, slip)] for name, slip in law.slip.items()},
                 f"{law.static}, {law.moving}",
             ]
             for law in system.between.friction
@@ -201,6 +204,25 @@ def _told(system: System) -> dict[str, Any]:
         "restitution": system.between.restitution,
     }
     return told | {"count": system.count, "between": between}
+
+
+def _slip(component: Any) -> Any:
+    """Return a component of a slip as text; a function that is shared as a digest and numbers."""
+    import sympy
+
+    if not isinstance(component, SmoothFunction):
+        return formula_text(sympy.sympify(component))
+    return [
+        _digest(component.family),
+        component.member_name,
+        *component.reads,
+        *component.parameters,
+    ]
+
+
+@lru_cache(maxsize=64)
+def _digest(family: Family) -> str:
+    return family.program().digest()
 
 
 def _read(content: "xr.Dataset", system: System) -> "str | Trajectory":

@@ -68,4 +68,9 @@ def composition(terms: Mapping[str, Term]) -> "Formulas":
 
 def stationary(families: Iterable[Family]) -> tuple[str, ...]:
     """Return the stationary definitions of a :func:`composition` of functions of families."""
-    return tuple(f"{d}_{k}" for k, family in enumerate(families) for d in family.stationary)
+    return tuple(
+        f"{d}_{k}"
+        for k, family in enumerate(families)
+        for d in family.stationary
+        if d not in family.variables
+    )

@@ -1,6 +1,6 @@
 """Smooth functions on a manifold: one SymPy expression gives value, gradient and Hessian."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -288,7 +288,7 @@ class _Sum(SmoothFunction):
             for parameter, value in term.parameter_values.items():
                 values.setdefault(parameter, set()).add(value)
         shared = {p: found for p, (found, *others) in values.items() if not others}
-        written = sympy.Add(*[_with_numbers(term, shared) for term in self._terms])
+        written = sympy.Add(*[with_numbers(term, shared) for term in self._terms])
         family = Family.of({self.name: written}, self.manifold.names, shared, unit=self.unit)
         numbers = tuple(shared.values())
         return SmoothFunction.member(family, self.name, self.manifold, parameters=numbers)
@@ -336,7 +336,7 @@ class _Sum(SmoothFunction):
         return np.array(slopes, dtype=np.float64).reshape(points.shape)
 
 
-def _with_numbers(function: SmoothFunction, shared: Mapping[str, float]) -> "sympy.Expr":
+def with_numbers(function: SmoothFunction, shared: Container[str] = ()) -> "sympy.Expr":
     """Return an expression with numbers in place of all parameters but those that are shared."""
     import sympy
 

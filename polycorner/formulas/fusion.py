@@ -6,7 +6,7 @@ absolute values: equal ones become one parameter, opposite ones share its produc
 from the formulas.  Functions of other numbers that are equal in the same places share the kernel.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -131,3 +131,18 @@ def _sources() -> str:
 
 def _formulas(bound: tuple[_Bound, ...]) -> "Formulas":
     return composition({f"f{k}": b.term for k, b in enumerate(bound)})
+
+
+def written_out(
+    functions: Mapping[str, SmoothFunction],
+) -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+    """Return definitions and expressions of functions, with numbers in place of parameters."""
+    import sympy
+
+    terms = {}
+    for name, f in functions.items():
+        read = [f.manifold.names[i] for i in f.reads]
+        places = {symbol(x): symbol(y) for x, y in zip(f.family.variables, read, strict=True)}
+        places |= {symbol(x): sympy.Float(y) for x, y in f.parameter_values.items()}
+        terms[name] = Term(f.family, f.member_name, places)
+    return composition(terms)

@@ -19,6 +19,7 @@ from polycorner.values import Value
 MOST_MODES = 4096  # that are examined
 ALIKE = 1e-6  # difference of accelerations, relative to the largest, up to which they are the same
 SOLVED, UNBOUNDED = 0, 3  # of linear programmes
+TURN = 1e-3  # scaled displacement over which the turn of slips is differentiated
 FAR = 1e12  # distance from which the projection onto a set is the force that opposes most
 
 
@@ -286,12 +287,15 @@ class _Problem:
 
 
 def _turns(system: System, state: State) -> Array:
-    """Return the rates of the slips at constant velocity."""
-    if not system.friction:
-        return np.empty(0)
-    at, numbers = np.concatenate([state.q, state.v]), np.array([*system.parameters, 0.0])
-    _, slopes = system.formulation.slip.kernel.at(at, numbers.ctypes.data, 1)
-    return np.asarray(slopes[:, : len(state.q)] @ state.v)
+    """Return the rates of the slips at constant velocity, by differences of the fourth order."""
+    q, v, law = state.q, state.v, system.formulation
+    speed = np.abs(v / system.manifold.scale_array).max(initial=0.0)
+    if not (system.friction and speed > 0):
+        return np.zeros(law.slips)
+    h = TURN / speed
+    at = [np.concatenate([q + k * h * v, v]) for k in (-2, -1, 1, 2)]
+    slips, _ = law.slip_velocities(system.parameters, np.array(at))
+    return np.asarray((slips[0] - 8 * slips[1] + 8 * slips[2] - slips[3]) / (12 * h))
 
 
 def _least(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from polycorner.checks import instance, mapping, names, real, refuse
 from polycorner.formulas.expressions import written
 from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction, with_numbers
+from polycorner.formulas.fusion import written_out
 from polycorner.motion.bodies import RUBBING, PairContacts, PairLaw
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import TIME, dotted
@@ -25,6 +27,12 @@ PAIR = (1, 2)  # numbers of the two bodies of a pair in names of coordinates
 def velocities(manifold: Manifold) -> "Symbols":
     """Return the velocities as real SymPy symbols: ``x_dot`` for the coordinate ``x``."""
     return _symbols(dotted(name) for name in instance("manifold", manifold, Manifold).names)
+
+
+def motions(manifold: Manifold) -> Manifold:
+    """Return coordinates and then velocities as one space, on which slips are functions."""
+    known = instance("manifold", manifold, Manifold).names
+    return Manifold.euclidean([*known, *map(dotted, known)])
 
 
 def time_symbol() -> "sympy.Symbol":
@@ -87,9 +95,10 @@ class Friction(FrictionLaw):
     ----------
     name : str
         Name of the contact.
-    slip : sequence of sympy.Expr
+    slip : sequence of sympy.Expr or SmoothFunction
         One or two components of the slip velocity, affine in the velocities ``x_dot``.  A
-        substrate that moves is a term without velocities.
+        substrate that moves is a term without velocities.  Functions on :func:`motions` share
+        their formulas with those of other contacts.
     static : ConvexSet
         Forces per unit load that may hold it, of as many dimensions as ``slip``.
     load : str, sympy.Expr or sequence of sympy.Expr
@@ -107,7 +116,7 @@ class Friction(FrictionLaw):
     """
 
     name: str
-    slip: "tuple[sympy.Expr, ...]"
+    slip: "tuple[sympy.Expr | SmoothFunction, ...]"
     static: ConvexSet
     load: "str | tuple[sympy.Expr, ...]"
     dynamic: ConvexSet | None = None
@@ -122,6 +131,16 @@ class Friction(FrictionLaw):
             components = f"{self.static.dimension} components for friction {self.name!r}"
             refuse("slip", f"{components}, as its set has", len(self.slip))
         super().__post_init__()
+
+    @property
+    def formulas(self) -> "tuple[sympy.Expr, ...]":
+        """The components of the slip as formulas, whether or not they are functions."""
+        return tuple(with_numbers(s) if isinstance(s, SmoothFunction) else s for s in self.slip)
+
+
+def slip_text(component: Any) -> str:
+    """Return a component of a slip as text; of a function that is shared, its name."""
+    return component.name if isinstance(component, SmoothFunction) else written(component)
 
 
 def check_set(argument: str, shape: object) -> ConvexSet:
@@ -151,7 +170,7 @@ class PairFriction(FrictionLaw):
 
     Parameters
     ----------
-    slip : mapping from str to sequence of sympy.Expr
+    slip : mapping from str to sequence of sympy.Expr or SmoothFunction
         One or two components of the slip velocity at each gap, affine in the velocities of both
         bodies (:func:`pair_velocities`).
     static, dynamic : ConvexSet
@@ -167,7 +186,7 @@ class PairFriction(FrictionLaw):
         Naming the parameter, what was expected and what came.
     """
 
-    slip: "Mapping[str, tuple[sympy.Expr, ...]]"
+    slip: "Mapping[str, tuple[sympy.Expr | SmoothFunction, ...]]"
     static: ConvexSet
     dynamic: ConvexSet | None = None
     kind: str = RUBBING
@@ -254,7 +273,7 @@ class ContactFamily(Value):
         told: dict[str, Any] = {f"gap {name}": written(gap) for name, gap in self.gaps.items()}
         told |= {f"definition {name}": written(e) for name, e in self.definitions.items()}
         told["friction between bodies"] = [
-            {**{name: [*map(written, rows)] for name, rows in law.slip.items()}, **law.told()}
+            {**{name: [*map(slip_text, rows)] for name, rows in law.slip.items()}, **law.told()}
             for law in self.friction
         ]
         return told | {"restitution between bodies": self.restitution, "reach": self.reach}
@@ -284,8 +303,11 @@ class ContactFamily(Value):
 
     def _slips(self, gap: str, variables: tuple[str, ...]) -> Family:
         """Return the slip velocities at a gap, law after law."""
-        rows = [row for law in self.friction for row in law.slip[gap]]
-        return Family.of({f"s{i}": row for i, row in enumerate(rows)}, variables)
+        rows = {f"s{i}": s for i, s in enumerate(s for law in self.friction for s in law.slip[gap])}
+        shared = {name: s for name, s in rows.items() if isinstance(s, SmoothFunction)}
+        definitions, expressions = written_out(shared)
+        held = variables[: len(variables) // 2]
+        return Family.of(rows | expressions, variables, definitions=definitions, stationary=held)
 
 
 def position_of(

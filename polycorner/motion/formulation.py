@@ -1,24 +1,26 @@
-"""Equations of motion, derived from energies in SymPy and compiled.
-
-From a kinetic energy ``T = v . M(q) v / 2``, a potential ``V(q)`` and applied forces ``Q(q, v)``
-Lagrange's equations give ``M v' = F`` with ``F = Q - dV/dq + dT/dq - (dM/dt) v`` ([Lanczos] ch. 5).
-"""
+"""Equations of motion from energies in SymPy, compiled; see :mod:`polycorner.motion.lagrange`."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.formulas.bundles import Bundle, Call
+from polycorner.formulas.cache import source_key
 from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.motion import lagrange
 from polycorner.motion.degrees import degree
+from polycorner.motion.lagrange import EquationsOfMotion
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import sympy
 
 
+SAME = 1e-9  # relative change of a derivative that is none
 TIME = "time"  # name of the symbol of the time in applied forces
 
 
@@ -37,7 +39,7 @@ class Laws:
         ``T(q, v)``, quadratic in the velocities, and ``V(q)``.
     forces : mapping from str to sympy.Expr
         Applied generalised forces, by coordinate; they may depend on the time.
-    slips : tuple of sympy.Expr
+    slips : tuple of sympy.Expr or SmoothFunction
         Slip velocities ``s(q, v)``, affine in the velocities.
     loads : tuple of sympy.Expr
         Known normal forces ``N(q)``.
@@ -46,7 +48,7 @@ class Laws:
     kinetic: "sympy.Expr"
     potential: "sympy.Expr"
     forces: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
-    slips: "tuple[sympy.Expr, ...]" = ()
+    slips: "tuple[sympy.Expr | SmoothFunction, ...]" = ()
     loads: "tuple[sympy.Expr, ...]" = ()
 
 
@@ -64,6 +66,8 @@ class Formulation:
         Numbers of slip velocities and of known loads.
     key : str
         Identifies the laws across processes.
+    shared : mapping from int to SmoothFunction
+        Slips, by number, that share formulas with those of other contacts.
     """
 
     coordinates: tuple[str, ...]
@@ -72,6 +76,7 @@ class Formulation:
     slips: int
     loads: int
     key: str = ""
+    shared: Mapping[int, SmoothFunction] = field(default_factory=dict)
 
     @classmethod
     def of(cls, coordinates: Sequence[str], parameters: Sequence[str], laws: Laws) -> "Formulation":
@@ -84,12 +89,13 @@ class Formulation:
         symbols = [sympy.sympify(force).free_symbols for force in laws.forces.values()]
         driven = sympy.Symbol(TIME, real=True) in set().union(*symbols)
         known = (*parameters, TIME) if driven else tuple(parameters)
-        found = cls(tuple(coordinates), known, lambda: laws, len(laws.slips), len(laws.loads))
+        shared = {i: s for i, s in enumerate(laws.slips) if isinstance(s, SmoothFunction)}
+        sizes = len(laws.slips), len(laws.loads)
+        found = cls(tuple(coordinates), known, lambda: laws, *sizes, shared=shared)
         found.check()
-        digest = repr([f.program().digest() for f in (found.forces, found.slip, found.energies)])
-        return cls(
-            found.coordinates, found.parameters, found.laws, found.slips, found.loads, digest
-        )
+        digests = [f.program().digest() for f in (found.forces, found.slip, found.energies)]
+        digests += [f"{s.family.key} {s.reads} {s.parameters}" for s in shared.values()]
+        return replace(found, key=repr(digests))
 
     @property
     def time_parameter(self) -> int:
@@ -108,13 +114,58 @@ class Formulation:
         mass = [f"M{i}_{j}" for i in range(k) for j in range(i, k)]
         rest = [f"{letter}{i}" for letter in "FQ" for i in range(k)]
         names = (*mass, *rest, *(f"N{i}" for i in range(self.loads)))
-        return self._family(names, self._forces)
+
+        def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+            from sympy import sympify
+
+            laws = self.laws()
+            applied = [laws.forces.get(name, 0) for name in self.coordinates]
+            given = [laws.kinetic, laws.potential, *applied, *laws.loads]
+            written = zip(("T", "V", *names[-k - self.loads :]), map(sympify, given), strict=True)
+            return {}, dict(written)
+
+        key = repr((source_key(lagrange.__name__), self.key)) if self.key else ""
+        return EquationsOfMotion(names, self.variables, self.parameters, formulas, key)
 
     @cached_property
     def slip(self) -> Family:
-        """The slip velocities; of their derivatives those by velocities, others are left zero."""
-        names = tuple(f"s{i}" for i in range(self.slips))
-        return self._family(names, lambda: list(self.laws().slips), held=self.coordinates)
+        """The slip velocities but for shared ones; only the derivatives by velocities are found."""
+        own = [i for i in range(self.slips) if i not in self.shared]
+        names = tuple(f"s{i}" for i in own)
+        return self._family(
+            names, lambda: [self.laws().slips[i] for i in own], held=self.coordinates
+        )
+
+    @cached_property
+    def slip_calls(self) -> list[Call]:
+        """Kernels of all slip velocities; that of :attr:`slip` reads the own parameters."""
+        own = tuple(i for i in range(self.slips) if i not in self.shared)
+        calls = []
+        if own:
+            everything = tuple(range(len(self.variables)))
+            calls.append(Call(self.slip, everything, np.empty(0), own, tuple(range(len(own)))))
+        if self.shared:
+            rows, functions = [*self.shared], [*self.shared.values()]
+            shared = Bundle(functions[0].manifold, functions).calls
+            calls += [replace(c, rows=tuple(rows[i] for i in c.rows)) for c in shared]
+        return calls
+
+    def slip_velocities(self, parameters: Array, at: Array) -> tuple[Array, Array]:
+        """Return slips ``(N, slips)`` and derivatives ``(N, slips, 2k)`` at ``(q, v)`` ``(N, 2k)``.
+
+        Those by coordinates may be left zero.
+        """
+        numbers = np.array([*parameters, 0.0])
+        slips = np.zeros((len(at), self.slips))
+        slopes = np.zeros((*slips.shape, len(self.variables)))
+        for call in self.slip_calls:
+            given = numbers if call.family is self.slip else call.parameters
+            inputs = np.ascontiguousarray(at[:, call.reads])
+            values, gradients = call.family.kernel.over(inputs, given.ctypes.data, 1)
+            slips[:, call.rows] = values[:, call.columns]
+            rows, reads = np.array(call.rows)[:, None], np.array(call.reads)
+            slopes[:, rows, reads] = gradients[:, call.columns]
+        return slips, slopes
 
     @cached_property
     def energies(self) -> Family:
@@ -136,56 +187,23 @@ class Formulation:
         key = repr((self.key, names, held)) if self.key else ""
         return Family(names, self.variables, self.parameters, formulas, key, stationary=held)
 
-    def _symbols(self) -> "tuple[list[sympy.Symbol], list[sympy.Symbol]]":
-        import sympy
-
-        q = [sympy.Symbol(name, real=True) for name in self.coordinates]
-        return q, [sympy.Symbol(dotted(name), real=True) for name in self.coordinates]
-
-    def _mass(self) -> "sympy.Matrix":
-        import sympy
-
-        _, v = self._symbols()
-        return sympy.hessian(sympy.sympify(self.laws().kinetic), v)
-
-    def _forces(self) -> "list[sympy.Expr]":
-        import sympy
-
-        laws = self.laws()
-        q, v = self._symbols()
-        k, mass, velocity = len(q), self._mass(), sympy.Matrix(v)
-        change = sum((mass.diff(x) * y for x, y in zip(q, v, strict=True)), sympy.zeros(k, k))
-        inertial = (
-            sympy.Matrix([sympy.diff(sympy.sympify(laws.kinetic), x) for x in q])
-            - change * velocity
-        )
-        applied = [sympy.sympify(laws.forces.get(name, 0)) for name in self.coordinates]
-        total = [
-            applied[i] - sympy.diff(sympy.sympify(laws.potential), q[i]) + inertial[i]
-            for i in range(k)
-        ]
-        upper = [mass[i, j] for i in range(k) for j in range(i, k)]
-        return [*upper, *total, *applied, *(sympy.sympify(load) for load in laws.loads)]
-
     def check(self) -> None:
         """Raise ValueError for laws that are not of the stated form, naming the first."""
         import sympy
 
         laws = self.laws()
-        _, v = self._symbols()
-        kinetic = sympy.sympify(laws.kinetic)
-        still = dict.fromkeys(v, 0)
-        lower = [kinetic.subs(still), *(sympy.diff(kinetic, x).subs(still) for x in v)]
-        curved = self._mass().free_symbols & set(v)
-        if curved or any(sympy.simplify(term) != 0 for term in lower):
-            msg = f"kinetic: expected a quadratic form in {', '.join(map(str, v))}; got {kinetic}"
+        v = [sympy.Symbol(dotted(name), real=True) for name in self.coordinates]
+        if not _is_quadratic(sympy.sympify(laws.kinetic), v):
+            names = ", ".join(map(str, v))
+            msg = f"kinetic: expected a quadratic form in {names}; got {laws.kinetic}"
             raise ValueError(msg)
         time = sympy.Symbol(TIME, real=True)
+        own_slips = [s for i, s in enumerate(laws.slips) if i not in self.shared]
         steady = {
             "kinetic": [laws.kinetic],
             "potential": [laws.potential],
             "load": laws.loads,
-            "slip": laws.slips,
+            "slip": own_slips,
         }
         for name, expressions in steady.items():
             for expression in expressions:
@@ -199,17 +217,49 @@ class Formulation:
                         f"{name}: expected no time in it, only forces may have it; got {expression}"
                     )
                     raise ValueError(msg)
-        for slip in laws.slips:
+        for slip in own_slips:
             given = sympy.sympify(slip)
             if degree(given, v) <= 1:
                 continue
             if sympy.simplify(sympy.hessian(given, v)) != sympy.zeros(len(v), len(v)):
                 msg = f"slip: expected an affine function of the velocities; got {slip}"
                 raise ValueError(msg)
+        self._check_shared()
         unknown = sorted(set(laws.forces) - set(self.coordinates))
         if unknown:
             msg = f"forces: expected the coordinates {', '.join(self.coordinates)}; got {unknown}"
             raise ValueError(msg)
+
+    def _check_shared(self) -> None:
+        """Raise ValueError for functions of other coordinates, or not affine in the velocities."""
+        for function in self.shared.values():
+            if function.manifold.names != self.variables:
+                names = ", ".join(function.manifold.names)
+                msg = f"slip: expected functions of {', '.join(self.variables)}; got one of {names}"
+                raise ValueError(msg)
+        if not self.shared:
+            return
+        k = len(self.coordinates)
+        draws = np.random.default_rng(0).normal(size=(3, 2 * k))
+        draws[:, :k] = draws[0, :k]
+        slopes = self.slip_velocities(np.zeros(len(self.parameters)), draws)[1][:, :, k:]
+        sizes = np.abs(slopes).max(axis=(0, 2))
+        for row, function in self.shared.items():
+            if np.abs(np.diff(slopes[:, row], axis=0)).max() > SAME * sizes[row]:
+                msg = f"slip: expected an affine function of the velocities; got {function.name!r}"
+                raise ValueError(msg)
+
+
+def _is_quadratic(kinetic: "sympy.Expr", v: "list[sympy.Symbol]") -> bool:
+    """Whether a formula is a quadratic form in some symbols, first by how it is written."""
+    import sympy
+
+    if degree(kinetic, v) <= 2 <= degree(kinetic, v, least=True):
+        return True
+    still = dict.fromkeys(v, 0)
+    lower = [kinetic.subs(still), *(sympy.diff(kinetic, x).subs(still) for x in v)]
+    curved = sympy.hessian(kinetic, v).free_symbols & set(v)
+    return not curved and all(sympy.simplify(term) == 0 for term in lower)
 
 
 @dataclass(frozen=True)
@@ -245,11 +295,8 @@ def moment(formulation: Formulation, parameters: Array, q: Array, v: Array) -> M
     mass[upper] = values[: len(upper[0])]
     mass = mass + np.triu(mass, 1).T
     rest = values[len(upper[0]) :]
-    if formulation.slips:
-        slips, gradients = formulation.slip.kernel.at(at, numbers.ctypes.data, 1)
-        matrix = gradients[:, k:]
-    else:
-        slips, matrix = np.empty(0), np.empty((0, k))
+    (slips,), (slopes,) = formulation.slip_velocities(parameters, at[None])
+    matrix = slopes[:, k:]
     return Moment(mass, rest[:k], rest[k : 2 * k], rest[2 * k :], matrix, slips - matrix @ v)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from polycorner.formulas.bundles import Bundle
 from polycorner.motion.mechanics import OVERLAP
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
@@ -73,9 +74,8 @@ def bends(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array] | None:
     """Return the gradients ``(k, n)`` and Hessians ``(k, n, n)`` of the equations, if any."""
     if not polyhedron.equations:
         return None
-    _, gradients, hessians = polyhedron.bundle.evaluate(q, 2)
-    first = len(polyhedron.functions)
-    return gradients[first:], hessians[first:]
+    _, gradients, hessians = Bundle(polyhedron.manifold, polyhedron.equations).evaluate(q, 2)
+    return gradients, hessians
 
 
 def onto_equations(polyhedron: Polyhedron, q: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.checks import instance, mapping, names, real, refuse, whole
 from polycorner.formulas.expressions import written
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
-from polycorner.motion.contacts import ContactFamily, Friction, position_of
+from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
 from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
@@ -293,9 +293,8 @@ class System(MechanicalSystem):
         """Return for each friction contact whether its slip is zero, ``(..., F)``."""
         if not self.friction:
             return np.empty((*q.shape[:-1], 0), dtype=np.bool_)
-        numbers = np.array([*self.parameters, 0.0])
-        at = np.ascontiguousarray(np.concatenate([q, v], axis=-1)).reshape(-1, 2 * q.shape[-1])
-        (slips,) = self.formulation.slip.kernel.over(at, numbers.ctypes.data, 0)
+        at = np.concatenate([q, v], axis=-1).reshape(-1, 2 * q.shape[-1])
+        slips, _ = self.formulation.slip_velocities(self.parameters, at)
         starts = np.cumsum([0, *(len(f.slip) for f in self.friction)]).tolist()
         still = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
         return np.asarray(still.reshape(*q.shape[:-1], len(self.friction)))
@@ -339,7 +338,11 @@ class System(MechanicalSystem):
         told |= {f"gap {f.name}": written(f.expression) for f in self.polyhedron.functions}
         told |= {f"equation {h.name}": written(h.expression) for h in self.polyhedron.equations}
         told |= {
-            f"friction {f.name}": {"slip": [*map(written, f.slip)], "load": str(f.load), **f.told()}
+            f"friction {f.name}": {
+                "slip": [*map(slip_text, f.slip)],
+                "load": str(f.load),
+                **f.told(),
+            }
             for f in self.friction
         }
         if between is not None:

@@ -24,6 +24,28 @@ def minus(p: "Point", q: "Point") -> "Point":
     return (p[0] - q[0], p[1] - q[1], p[2] - q[2])
 
 
+def plus(p: "Point", u: "Point") -> "Point":
+    """Return the sum."""
+    return (p[0] + u[0], p[1] + u[1], p[2] + u[2])
+
+
+def scaled(u: "Point", factor: "sympy.Expr") -> "Point":
+    """Return a vector times a number."""
+    return (factor * u[0], factor * u[1], factor * u[2])
+
+
+def beyond(p: "Point", u: "Point", at: "sympy.Expr") -> "Point":
+    """Return ``p + at u``."""
+    return plus(p, scaled(u, at))
+
+
+def zero() -> "Point":
+    """Return the zero vector."""
+    import sympy
+
+    return (sympy.S.Zero,) * 3
+
+
 def dot(u: "Point", v: "Point") -> "sympy.Expr":
     """Return the scalar product."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]

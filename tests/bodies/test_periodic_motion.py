@@ -106,7 +106,7 @@ def rough(kind):
     a = Arrangement(BODIES[kind], orientations="all", period=[0.95, 1.2])
     system = a.system(friction=0.3)
     symbols = [*a.manifold.symbols, *velocities(a.manifold)]
-    slips = {f.load: sympy.lambdify(symbols, f.slip[0]) for f in system.friction}
+    slips = {f.load: sympy.lambdify(symbols, f.formulas[0]) for f in system.friction}
     return a, system.polyhedron, slips
 
 

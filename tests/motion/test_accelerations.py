@@ -3,6 +3,7 @@
 import itertools
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -188,3 +189,18 @@ def test_what_cannot_be_answered_is_refused():
         accelerations("rod", falling)
     with pytest.raises(TypeError, match="state"):
         accelerations(rod, [0.0, 0.0, 0.0])
+
+
+@given(st.floats(-3, 3), st.floats(-2, 2), st.floats(-2, 2))
+def test_a_skate_turns_its_velocity(heading, along, turning):
+    """It does not slip sideways: the acceleration is ``u omega`` across, as the blade turns."""
+    M = Manifold(("x", "y", "theta"), (math.inf, math.inf, math.tau), (1.0, 1.0, 1.0))
+    (x, _, theta), (vx, vy, omega) = M.symbols, velocities(M)
+    sideways = sympy.cos(theta) * vy - sympy.sin(theta) * vx
+    blade = Friction("blade", [sideways], Interval(10.0), sympy.Float(10.0))
+    skate = System(Polyhedron(M, [x + 100]), (vx**2 + vy**2 + omega**2) / 2, friction=[blade])
+    way = np.array([math.cos(heading), math.sin(heading), 0.0])
+    state = skate.state([0, 0, heading], along * way + [0, 0, turning])
+    found = accelerations(skate, replace(state, sticking=np.ones_like(state.sticking)))
+    expected = along * turning * np.array([-way[1], way[0], 0.0])
+    np.testing.assert_allclose(found.values, [expected], rtol=0, atol=1e-9)

@@ -74,7 +74,10 @@ class Model(NamedTuple):
     dimension: Annotated[Any, whole()]  # k
     lanes: Annotated[Any, whole()]  # K: coordinates of a body, and zeros up to whole vectors
     force_kernel: Annotated[Any, whole()]  # address: upper triangle of M, F, applied forces, loads
-    slip_kernel: Annotated[Any, whole()]  # address: slip velocities
+    slip_kernels: Annotated[Any, whole()]  # kernels of a body's slips; as those of its gaps
+    slip_calls: Annotated[Any, whole("* 6")]
+    slip_reads: Annotated[Any, whole("*")]  # coordinates, then velocities
+    slip_places: Annotated[Any, whole("*")]
     contact_room: Annotated[Any, whole()]  # C: contacts between bodies for which there is room
     neighbour_room: Annotated[Any, whole()]  # P: pairs of neighbours
     event_room: Annotated[Any, whole()]  # E: events
@@ -93,7 +96,7 @@ class Model(NamedTuple):
     gap_kernels: Annotated[Any, whole()]  # kernels of a body's gaps
     gap_calls: Annotated[Any, whole("* 6")]  # address, sizes in and out; first read, row, parameter
     gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call
-    gap_rows: Annotated[Any, whole("*")]  # gap of each output, or -1
+    gap_places: Annotated[Any, whole("*")]  # gap of each output, or -1
     restitution: Annotated[Any, real("m")]  # of a body's contacts with its surroundings
     unilateral: Annotated[Any, whole()]  # number of these contacts; further gaps are equations
     pair_kernel: Annotated[Any, whole()]  # address: gaps of a pair, or 0

@@ -61,9 +61,7 @@ def random_impulse(model, i, c, h, time, index):
 @compiled
 def evaluate_body(model, state, work, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, F = model.dimension, model.frictions
-    scratch, f0 = work.scratch, 2 * k
-    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    k, F, scratch = model.dimension, model.frictions, work.scratch
     for c in range(k):
         work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         work.kick[i, c] = 0.0
@@ -83,19 +81,43 @@ def evaluate_body(model, state, work, i, h, time, index):
             if model.load_sources[f, j]:
                 load += scratch[at + j]
         work.load[i, f] = max(0.0, h * load)
-    if F > 0:
-        S = model.slip_start[F]
-        call_kernel(model.slip_kernel, start, base, start + 8 * f0, start + 8 * (f0 + S), start)
-        for r in range(S):
-            value = scratch[f0 + r]
+    evaluate_slips(model, state, work, i)
+    evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+
+
+@compiled
+def evaluate_slips(model, state, work, i):
+    """Evaluate the slips of a body at the midpoint: derivatives by velocities, and what is left."""
+    k, scratch = model.dimension, work.scratch
+    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    for call in range(model.slip_kernels):
+        address, n, m = (
+            model.slip_calls[call, 0],
+            model.slip_calls[call, 1],
+            model.slip_calls[call, 2],
+        )
+        r0, w0, p0 = model.slip_calls[call, 3], model.slip_calls[call, 4], model.slip_calls[call, 5]
+        for a in range(n):
+            c = model.slip_reads[r0 + a]
+            scratch[a] = work.q_mid[i, c] if c < k else state.v[i, c - k]
+        j0 = n + m
+        call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
+        for o in range(m):
+            r = model.slip_places[w0 + o]
+            if r < 0:
+                continue
+            value = scratch[n + o]
             size = abs(value)
             for c in range(k):
-                slope = scratch[f0 + S + r * 2 * k + k + c]
-                work.slip_rows[i, r, c] = slope
-                value -= slope * state.v[i, c]
-                size += abs(slope * state.v[i, c])
+                work.slip_rows[i, r, c] = 0.0
+            for a in range(n):
+                c = model.slip_reads[r0 + a] - k
+                if c >= 0:
+                    slope = scratch[j0 + o * n + a]
+                    work.slip_rows[i, r, c] = slope
+                    value -= slope * state.v[i, c]
+                    size += abs(slope * state.v[i, c])
             work.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
-    evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
 
 
 @compiled
@@ -182,7 +204,7 @@ def evaluate_gaps(model, work, i, q, gap, gradient):
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
-            g = model.gap_rows[w0 + o]
+            g = model.gap_places[w0 + o]
             if g >= 0:
                 gap[i, g] = scratch[n + o]
                 for c in range(model.dimension):

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from polycorner.formulas.bundles import Call
+from polycorner.formulas.families import Family
 from polycorner.motion.bodies import Body, IdenticalBodies
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.allocation import filled
@@ -68,7 +69,8 @@ def model_of(
         **_dependence(body),
         **_signals(body, parameters),
         **_friction(bodies, sets),
-        **_gaps(body.gaps, len(body.contacts), parameters),
+        **_calls("slip", formulation.slip_calls, parameters, formulation.slip),
+        **_calls("gap", body.gaps, parameters),
         **_pairs(bodies, parameters, sets),
         **sets.values(),
     }
@@ -116,7 +118,6 @@ def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:
     for source, contact in zip(sources, contacts, strict=True):
         source[list(contact.loads)] = 1
     return {
-        "slip_kernel": formulation.slip.kernel.compiled(1).point if contacts else 0,
         "frictions": len(contacts),
         "slip_start": np.cumsum([0, *(contact.rows for contact in contacts)]),
         "friction_sets": [[sets.add(c.static), sets.add(c.dynamic)] for c in contacts],
@@ -126,27 +127,33 @@ def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:
     }
 
 
-def _gaps(calls: Sequence[Call], rows: int, parameters: list[float]) -> dict[str, Any]:
-    """Return the entries of a body's gaps; their parameters are appended."""
+def _calls(
+    what: str, calls: Sequence[Call], parameters: list[float], own: Family | None = None
+) -> dict[str, Any]:
+    """Return the entries of a body's gaps or slips; their parameters are appended.
+
+    Those of the family ``own`` are the first ones.
+    """
     table: list[tuple[int, ...]] = []
     reads: list[int] = []
     places: list[int] = []
     for call in calls:
         kernel = call.family.kernel
-        if len(set(call.columns)) != len(call.columns) or max(call.rows) >= rows:
+        if len(set(call.columns)) != len(call.columns):
             msg = "polyhedron: expected each gap once; got one that occurs twice"
             raise ValueError(msg)
         row_of = dict(zip(call.columns, call.rows, strict=True))
         entry = (kernel.compiled(1).point, kernel.variables, kernel.outputs)
-        table.append((*entry, len(reads), len(places), len(parameters)))
+        first = 0 if call.family is own else len(parameters)
+        table.append((*entry, len(reads), len(places), first))
         reads += call.reads
         places += [row_of.get(column, -1) for column in range(kernel.outputs)]
         parameters += call.parameters.tolist()
     return {
-        "gap_kernels": len(table),
-        "gap_calls": table,
-        "gap_reads": [*reads, 0],
-        "gap_rows": [*places, 0],
+        f"{what}_kernels": len(table),
+        f"{what}_calls": table,
+        f"{what}_reads": [*reads, 0],
+        f"{what}_places": [*places, 0],
     }
 
 

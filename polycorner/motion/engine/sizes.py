@@ -47,7 +47,8 @@ class Sizes(NamedTuple):
         if bodies.contacts is not None:
             families += [bodies.contacts.gaps, *(slip for slip, _, _ in bodies.contacts.slips)]
         shapes = [(len(f.names), len(f.variables)) for f in families]
-        shapes += [(len(call.family.names), len(call.reads)) for call in body.gaps]
+        calls = [*body.gaps, *body.formulation.slip_calls]
+        shapes += [(len(call.family.names), len(call.reads)) for call in calls]
         kernels = [m * (1 + k) + k for m, k in shapes]
         lanes = -(-k // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
@@ -71,7 +72,7 @@ class Sizes(NamedTuple):
             B=blocks,
             E=EVENTS + 4 * contacts,
             S=max(contacts, pairs, 1),
-            W=max([*kernels, R * (1 + 2 * k) + 2 * k]) + 16,
+            W=max(kernels) + 16,
             Q=entries,
             M=(N + 2 * entries) * lanes * lanes,
             Z=STRIPS,
