@@ -7,10 +7,14 @@ skeleton; SymPy's own work on the user's formulas comes before.  For blocks, a r
 ``n`` corners that falls on a rounded brick, with friction, it runs from the bodies to the end of
 ten steps.  ``warm`` is the median of the same search repeated in that process,
 up to seven times in about two seconds.
+
+Before that, the processor time of small programs that do one thing for the first time, with an
+empty cache and with that of the run before.
 """
 
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -30,6 +34,25 @@ CASES = {
     "half-planes, skeleton": (50, 500),
     "discs, all distances": (10, 20),
     "blocks": (4, 8),
+}
+
+
+DISC = """
+from polycorner import Manifold, Polyhedron, minimise
+from polycorner.proofs import stationary_points
+M = Manifold.euclidean("x y")
+x, y = M.symbols
+disc = Polyhedron(M, {"disc": 36 - x**2 - y**2})
+"""
+PROGRAMS = {
+    "minimisation": DISC + "minimise(disc, (x - 1)**2 + y**2, [0.5, 0.5])",
+    "complete list": DISC + "stationary_points(disc, x + y**2, box=[(-7, 7), (-7, 7)])",
+    "motion of a ball": """
+from polycorner import simulate
+from polycorner.models.textbook import bouncing_ball
+ball = bouncing_ball(0.7)
+simulate(ball, ball.state([1.0]), 0.1, 1e-3)
+""",
 }
 
 
@@ -134,24 +157,53 @@ def timed(make: Callable[[], object], search: Callable[[], object]) -> None:
     print(json.dumps({"first": cold, "warm": statistics.median(repeated)}))
 
 
-def measured(case: str, n: int) -> dict[str, float]:
-    """Return the times of one case in a fresh process with an empty cache."""
-    command = [sys.executable, __file__, case, str(n)]
+def run(*arguments: str, **environment: str) -> str:
+    """Return what a fresh interpreter prints."""
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     done = subprocess.run(
-        command,
+        [sys.executable, *arguments],
         check=True,
         stdout=subprocess.PIPE,
         text=True,
         cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": path},
+        env=os.environ | {"PYTHONPATH": path} | environment,
     )
-    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return done.stdout
+
+
+def measured(case: str, n: int) -> dict[str, float]:
+    """Return the times of one case in a fresh process with an empty cache."""
+    found: dict[str, float] = json.loads(run(__file__, case, str(n)).splitlines()[-1])
+    return found
+
+
+def processor_times(program: str) -> list[float]:
+    """Return the processor times of a program with an empty cache, and with its own."""
+
+    def used() -> float:
+        times = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return times.ru_utime + times.ru_stime
+
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(2):
+            begun = used()
+            run("-c", program, POLYCORNER_CACHE_DIR=folder)
+            found.append(used() - begun)
     return found
 
 
 def main() -> None:
-    rows, figures = [], {}
+    rows: list[Any] = []
+    figures: dict[str, Any] = {}
+    for name, program in PROGRAMS.items():
+        runs = [processor_times(program) for _ in range(ROUNDS)]
+        first, again = (statistics.median(times) for times in zip(*runs, strict=True))
+        rows.append((name, round(first, 1), round(again, 1)))
+        figures[f"first {name}"] = {"empty_s": round(first, 2), "kept_s": round(again, 2)}
+        print(rows[-1], flush=True)
+    print_table("Processor time", ["first", "empty cache (s)", "its own (s)"], rows)
+    rows = []
     for case, sizes in CASES.items():
         for n in sizes:
             runs = [measured(case, n) for _ in range(ROUNDS)]
