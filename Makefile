@@ -44,14 +44,14 @@ test cores thorough: export OPENBLAS_NUM_THREADS = 1
 test cores thorough: export OMP_NUM_THREADS = 1
 
 test: .venv/.dev ## tests and doctests, without those marked slow
-	@$(PYTEST) -n auto -m "not slow"
+	@$(PYTEST) -n auto --dist worksteal -m "not slow"
 
 cores: .venv/.dev ## geometry again, with the linear algebra of an older processor (x86 only)
-	@OPENBLAS_CORETYPE=Haswell HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto -q -m "not slow" \
+	@OPENBLAS_CORETYPE=Haswell HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "not slow" \
 	    tests/polyhedra tests/skeletons/test_skeleton.py tests/minimisation
 
 thorough: .venv/.dev ## all tests, with many more generated inputs
-	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto
+	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto --dist worksteal
 
 intermediate: .venv/.dev ## intermediate code anew, after a change of what is compiled
 	@for package in minimisation.descent proofs.lists motion.engine; do \
