@@ -3,7 +3,7 @@
 PYTEST := .venv/bin/python -m pytest
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad paper test cores thorough engine lint format types imports docs links bench trials constraints clean
+.PHONY: help env env-pip dyad paper test cores thorough intermediate lint format types imports docs links bench trials constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,17 +44,18 @@ test cores thorough: export OPENBLAS_NUM_THREADS = 1
 test cores thorough: export OMP_NUM_THREADS = 1
 
 test: .venv/.dev ## tests and doctests, without those marked slow
-	@$(PYTEST) -n auto -m "not slow"
+	@$(PYTEST) -n auto --dist worksteal -m "not slow"
 
 cores: .venv/.dev ## geometry again, with the linear algebra of an older processor (x86 only)
-	@OPENBLAS_CORETYPE=Haswell HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto -q -m "not slow" \
+	@OPENBLAS_CORETYPE=Haswell HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "not slow" \
 	    tests/polyhedra tests/skeletons/test_skeleton.py tests/minimisation
 
 thorough: .venv/.dev ## all tests, with many more generated inputs
-	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto
+	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto --dist worksteal
 
-engine: .venv/.dev ## the engine's intermediate code anew, after a change of polycorner/motion/engine
-	@.venv/bin/python -m polycorner.motion.engine.intermediate
+intermediate: .venv/.dev ## intermediate code anew, after a change of what is compiled
+	@for package in minimisation.descent proofs.lists motion.engine; do \
+	    .venv/bin/python -m polycorner.$$package.intermediate || exit; done
 
 lint: .venv/.dev ## ruff: rules and format
 	@.venv/bin/ruff check .

@@ -7,11 +7,15 @@ skeleton; SymPy's own work on the user's formulas comes before.  For blocks, a r
 ``n`` corners that falls on a rounded brick, with friction, it runs from the bodies to the end of
 ten steps.  A second process does the same with the cache that the first has filled.  ``warm`` is
 the median of the same search repeated in a process, up to seven times in about two seconds.
+
+Before that, unless only some ``--cases`` are asked for, the processor time of small programs that
+do one thing for the first time, with an empty cache and with that of the run before.
 """
 
 import argparse
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -31,6 +35,25 @@ CASES = {
     "half-planes, skeleton": (50, 500),
     "discs, all distances": (10, 20),
     "blocks": (4, 8),
+}
+
+
+DISC = """
+from polycorner import Manifold, Polyhedron, minimise
+from polycorner.proofs import stationary_points
+M = Manifold.euclidean("x y")
+x, y = M.symbols
+disc = Polyhedron(M, {"disc": 36 - x**2 - y**2})
+"""
+PROGRAMS = {
+    "minimisation": DISC + "minimise(disc, (x - 1)**2 + y**2, [0.5, 0.5])",
+    "complete list": DISC + "stationary_points(disc, x + y**2, box=[(-7, 7), (-7, 7)])",
+    "motion of a ball": """
+from polycorner import simulate
+from polycorner.models.textbook import bouncing_ball
+ball = bouncing_ball(0.7)
+simulate(ball, ball.state([1.0]), 0.1, 1e-3)
+""",
 }
 
 
@@ -133,31 +156,62 @@ def timed(make: Callable[[], object], search: Callable[[], object]) -> None:
     print(json.dumps({"first": cold, "warm": statistics.median(repeated)}))
 
 
+def run(*arguments: str, **environment: str) -> str:
+    """Return what a fresh interpreter prints."""
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": path} | environment,
+    )
+    return done.stdout
+
+
 def measured(case: str, n: int) -> dict[str, float]:
     """Return the times of one case in a fresh process with an empty cache, and in the next one."""
-    command = [sys.executable, __file__, case, str(n)]
-    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    with tempfile.TemporaryDirectory() as folder:
+        first, again = (
+            json.loads(run(__file__, case, str(n), POLYCORNER_CACHE_DIR=folder).splitlines()[-1])
+            for _ in range(2)
+        )
+    return {**first, "again": again["first"]}
+
+
+def processor_times(program: str) -> list[float]:
+    """Return the processor times of a program with an empty cache, and with its own."""
+
+    def used() -> float:
+        times = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return times.ru_utime + times.ru_stime
+
     found = []
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(2):
-            done = subprocess.run(
-                command,
-                check=True,
-                stdout=subprocess.PIPE,
-                text=True,
-                cwd=ROOT,
-                env=os.environ | {"PYTHONPATH": path, "POLYCORNER_CACHE_DIR": folder},
-            )
-            found.append(json.loads(done.stdout.splitlines()[-1]))
-    first, again = found
-    return {**first, "again": again["first"]}
+            begun = used()
+            run("-c", program, POLYCORNER_CACHE_DIR=folder)
+            found.append(used() - begun)
+    return found
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", nargs="+", choices=CASES, default=[*CASES])
-    rows, figures = [], {}
-    for case in parser.parse_args().cases:
+    parser.add_argument("--cases", nargs="+", choices=CASES)
+    cases = parser.parse_args().cases
+    rows: list[Any] = []
+    figures: dict[str, Any] = {}
+    for name, program in () if cases else PROGRAMS.items():
+        runs = [processor_times(program) for _ in range(ROUNDS)]
+        first, again = (statistics.median(times) for times in zip(*runs, strict=True))
+        rows.append((name, round(first, 1), round(again, 1)))
+        figures[f"first {name}"] = {"empty_s": round(first, 2), "kept_s": round(again, 2)}
+        print(rows[-1], flush=True)
+    if rows:
+        print_table("Processor time", ["first", "empty cache (s)", "its own (s)"], rows)
+    rows = []
+    for case in cases or CASES:
         for n in CASES[case]:
             runs = [measured(case, n) for _ in range(ROUNDS)]
             keys = ("first", "again", "warm")

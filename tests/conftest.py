@@ -57,10 +57,9 @@ def kernels_elsewhere(tmp_path_factory):
 def own_searches(tmp_path_factory):
     """Keep the unfinished searches of one module in a cache of its own; share what is compiled."""
     own = tmp_path_factory.mktemp("cache")
-    for name in ("kernels", "numba"):
-        shared = cache_folder() / name
-        shared.mkdir(exist_ok=True)
-        (own / name).symlink_to(shared, target_is_directory=True)
+    shared = cache_folder() / "kernels"
+    shared.mkdir(exist_ok=True)
+    (own / "kernels").symlink_to(shared, target_is_directory=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("POLYCORNER_CACHE_DIR", str(own))
         yield

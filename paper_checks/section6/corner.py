@@ -284,7 +284,7 @@ CLAIMS = (
         "The heading on $\\delta_R$ is $\\arctan(r/\\ell)$, on $\\delta_L$ its negative.",
         Means.PROOF,
         heading_is,
-        partial(heading_is, plane_formula()),
+        lambda: heading_is(plane_formula()),  # seconds of algebra, not for every import
         figure="heading_length",
     ),
     Claim(

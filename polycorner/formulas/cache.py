@@ -20,6 +20,7 @@ from pathlib import Path
 from polycorner.atomic import write_atomically
 
 VARIABLE = "POLYCORNER_CACHE_DIR"
+COMPILING = ("compilation.py", "intermediate.py", "linking.py", "records.py")  # what Numba is told
 
 
 def cache_folder() -> Path:
@@ -93,11 +94,13 @@ def source_key(*modules: str) -> str:
     return digest.hexdigest()
 
 
-def sources_digest(package: str, *, without: tuple[str, ...] = ()) -> str:
+def sources_digest(
+    package: str, *, only: tuple[str, ...] = (), without: tuple[str, ...] = ()
+) -> str:
     """Return SHA-256 over names and text of a package's own Python files, and of the linker's.
 
-    Subpackages are not included, nor are files that are not compiled: ``without``.  Ends of lines
-    do not matter.
+    Subpackages are not included.  ``only`` names the files that are compiled, or ``without`` those
+    that are not.  Ends of lines do not matter.
     """
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:
@@ -105,11 +108,9 @@ def sources_digest(package: str, *, without: tuple[str, ...] = ()) -> str:
         raise ValueError(msg)
     folders = map(Path, spec.submodule_search_locations)
     files = sorted(file for folder in folders for file in folder.glob("*.py"))
+    chosen = [file for file in files if file.name in (only or {file.name} - {*without})]
     digest = hashlib.sha256()
-    here = Path(__file__)
-    for file in (here.with_name("compilation.py"), here.with_name("linking.py"), *files):
-        if file.name in without:
-            continue
+    for file in (*map(Path(__file__).with_name, COMPILING), *chosen):
         content = file.read_bytes().replace(b"\r\n", b"\n")
         digest.update(f"{file.name} {len(content)}\n".encode() + content)
     return digest.hexdigest()

@@ -7,12 +7,14 @@ calls, which is optimised once.
 """
 
 import ctypes
+from collections.abc import Iterable
 from typing import Any
 
-from llvmlite.binding import Linkage
+from llvmlite.binding import Linkage, parse_assembly
 from numba import njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.runtime import rtsys
 
 # Returns a null pointer without an exception: where Python calls a linked function all the same, it
 # raises a SystemError.
@@ -26,19 +28,26 @@ def linked(**options: Any) -> Any:
     )
 
 
-def whole_module(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str]:
-    """Return a linked function, with all that it calls, as a module of its own, and its name there.
+def whole_module(
+    functions: Iterable[Any], arguments: tuple[Any, ...], memory: str
+) -> tuple[Any, list[str]]:
+    """Return linked functions, with all that they call, as one module, and their names there.
 
-    The function can be called from outside by the name, all others cannot.
+    They can be called from outside by these names, all others cannot.  ``memory`` is intermediate
+    code of what Numba allocates arrays with.
     """
-    function.compile(arguments)
-    overload = function.overloads[arguments]
-    module: Any = overload.library.whole_module()
-    name: str = overload.fndesc.llvm_func_name
+    module, names = parse_assembly(memory), []
+    for function in functions:
+        function.compile(arguments)
+        overload = function.overloads[arguments]
+        names.append(overload.fndesc.llvm_func_name)
+        whole = overload.library.whole_module()
+        whole.get_function(names[-1]).linkage = Linkage.external  # others, if they are called
+        module.link_in(whole)
     for part in (*module.functions, *module.global_variables):
         if not part.is_declaration:
-            part.linkage = Linkage.external if part.name == name else Linkage.internal
-    return module, name
+            part.linkage = Linkage.external if part.name in names else Linkage.internal
+    return module, names
 
 
 # Numba has no types, so its classes are Any to mypy.
@@ -59,7 +68,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     @property
     def codegen(self) -> Any:
-        """The code generator, which waits for the machine code before it sets environments."""
+        """The code generator."""
         return _Codegen(self._codegen)
 
     def finalize(self) -> None:
@@ -92,20 +101,22 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         return whole
 
     def _called(self, known: dict[Any, None]) -> dict[Any, None]:
-        """Add this library and all that it calls, directly or not, to those known."""
+        """Add this library and all that it calls, directly or not, to those known.
+
+        Numba's allocation of arrays is not among them: who links the whole adds it, or another.
+        """
         known[self] = None
         for library in self._linking_libraries:
-            if library not in known:
+            if library not in known and library is not rtsys.library:
                 known[library] = None
                 if isinstance(library, LinkedLibrary):
                     library._called(known)
         return known
 
 
-_environments: dict[str, Any] = {}  # of linked functions, until there is machine code of them
-
-
 class _Codegen:
+    """A code generator that sets no environments: only machine code has them."""
+
     def __init__(self, codegen: Any) -> None:
         self._codegen = codegen
 
@@ -113,12 +124,4 @@ class _Codegen:
         return getattr(self._codegen, name)
 
     def set_env(self, name: str, environment: Any) -> None:
-        _environments[name] = environment
-
-
-def set_environments(codegen: Any) -> None:
-    """Give linked functions that have become machine code their environments."""
-    for name, environment in list(_environments.items()):
-        if codegen._engine.is_symbol_defined(name):
-            codegen.set_env(name, environment)
-            del _environments[name]
+        """Do nothing."""

@@ -69,11 +69,11 @@ def _run_passes(parsed: Any, target: Any, options: Any) -> None:
 
 @lru_cache(maxsize=1)
 def _prepare() -> None:
-    """Set up code generation for this machine, and say where the C mathematics library is."""
+    """Set up code generation for this machine, and say where functions of the C library are."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "ucrtbase")
-    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY, "sqrt", "floor", "ceil"):
+    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY, "sqrt", "floor", "ceil", "malloc", "free"):
         function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
         llvm.add_symbol(name, function.value)
 

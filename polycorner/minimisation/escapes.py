@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import null_space
@@ -129,9 +130,7 @@ def escape(problem: Problem, piece: Piece, start: Array) -> Escape:
 
 
 def _trace(problem: Problem, piece: Piece, origin: Array) -> Trace:
-    from polycorner.minimisation.descent import sqp
-
-    q, status, energy = origin, sqp.STALLED, problem.energy.value(origin)
+    q, status, energy = origin, statuses.STALLED, problem.energy.value(origin)
     size = max(float(abs(x[-1]).max()) for x in problem.evaluate(origin, 2))
     points: list[Array] = []
     gone: list[float] = []
@@ -151,12 +150,12 @@ def _trace(problem: Problem, piece: Piece, origin: Array) -> Trace:
             energies.append(energy)
         if (
             idle
-            or status in {sqp.CONVERGED, sqp.LEVEL, sqp.UNEVEN}
+            or status in {statuses.CONVERGED, statuses.LEVEL, statuses.UNEVEN}
             or far > BEYOND
             or energy < -DEEP * size
         ):
             break
-    level, converged = status in {sqp.LEVEL, sqp.UNEVEN}, status == sqp.CONVERGED
+    level, converged = status in {statuses.LEVEL, statuses.UNEVEN}, status == statuses.CONVERGED
     ended = np.array(points), np.array(gone), np.array(energies)
     return Trace(*ended, size, q, energy, level, converged)
 

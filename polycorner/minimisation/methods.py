@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.domain_edges import domain_edge
 from polycorner.minimisation.escapes import escape
 from polycorner.minimisation.feasibility import approach
@@ -238,19 +239,19 @@ def _lower_branch(problem: Problem, end: Endpoint, descent: Descent, limit: int)
 
 
 def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
-    from polycorner.minimisation.descent import sqp
-
     status, iterations, point, multipliers = problem.descend(piece, q, limit)
-    if status in {sqp.STALLED, sqp.UNEVEN}:
+    if status in {statuses.STALLED, statuses.UNEVEN}:
         status, iterations, point = rescaled(
             problem, piece, limit, (status, iterations, point, multipliers)
         )
     failures = {
-        sqp.INFEASIBLE: Verdict.INFEASIBLE,
-        sqp.UNBOUNDED: Verdict.UNBOUNDED,
-        sqp.STALLED: Verdict.NOT_CONVERGED,
+        statuses.INFEASIBLE: Verdict.INFEASIBLE,
+        statuses.UNBOUNDED: Verdict.UNBOUNDED,
+        statuses.STALLED: Verdict.NOT_CONVERGED,
     }
-    return Endpoint(point, iterations, failures.get(status), flat=status in {sqp.LEVEL, sqp.UNEVEN})
+    return Endpoint(
+        point, iterations, failures.get(status), flat=status in {statuses.LEVEL, statuses.UNEVEN}
+    )
 
 
 def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:

@@ -21,16 +21,11 @@ from polycorner.values import Value
 if TYPE_CHECKING:
     import sympy
 
+    from polycorner.minimisation.descent.intermediate import Laid
+
     Energy: TypeAlias = SmoothFunction | sympy.Expr
 
 T = TypeVar("T")
-Flat = tuple[
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-]
 
 MOST_NUMBERS = 20_000_000  # second derivatives that are kept as a full array
 TOO_MANY = 1_000_000_000  # of them, that are not even tried: 8 GB
@@ -153,11 +148,16 @@ class Problem(Value):
         return SparseRows.of(self.energy.terms, self.dimension)
 
     @cached_property
-    def flat(self) -> tuple[Flat, int]:
-        """The problem as arrays for the compiled descent, and its scratch size."""
-        table: list[tuple[int, ...]] = []
+    def _laid(self) -> "Laid":
+        """The problem as arrays for the compiled descent."""
+        return self._lay_out(self.scales)
+
+    def _lay_out(self, scales: Array) -> "Laid":
+        from polycorner.minimisation.descent.intermediate import Laid
+
+        calls: list[tuple[int, ...]] = []
         reads: list[int] = []
-        rows: list[int] = []
+        outputs: list[int] = []
         parameters: list[float] = []
         size = 1
         for call in self._bundle.calls:
@@ -165,19 +165,21 @@ class Problem(Value):
             k, m = kernel.variables, kernel.outputs
             curved, straight = kernel.compiled(2).point, kernel.compiled(1).point
             for where in _layers(call.columns, call.rows):
-                table.append((curved, straight, k, m, len(reads), len(rows), len(parameters)))
+                calls.append((curved, straight, k, m, len(reads), len(outputs), len(parameters)))
                 reads += call.reads
-                rows += [where.get(column, -1) for column in range(m)]
+                outputs += [where.get(column, -1) for column in range(m)]
                 parameters += call.parameters.tolist()
             size = max(size, k + m * (1 + k + k * k))
-        arrays = (
-            np.array(table, dtype=np.int64),
-            np.array(reads, dtype=np.int64),
-            np.array(rows, dtype=np.int64),
-            np.array([*parameters, 0.0]),
-            self.scales,
+        return Laid.of(
+            calls=np.reshape(calls, (-1, 7)),
+            reads=reads,
+            outputs=outputs,
+            parameters=[*parameters, 0.0],
+            scales=scales,
+            inequalities=self.inequalities,
+            rows=self.rows,
+            size=size,
         )
-        return arrays, size
 
     @cached_property
     def _everything(self) -> NDArray[np.bool_]:
@@ -201,51 +203,35 @@ class Problem(Value):
         status, iterations, point, multipliers
             As of the compiled ``descend``.
         """
-        from polycorner.minimisation.descent import entry_points
+        from polycorner.minimisation.descent import intermediate as descent
 
-        flat, size = self.flat
-        if scales is None:
-            scales = self.scales
-        else:
-            flat = (*flat[:4], scales)
-        status, iterations, u, lam = entry_points.descend(
-            flat, self.mask(piece), self.inequalities, self.rows, q / scales, size, limit
-        )
-        return status, iterations, u * scales, lam
+        laid = self._laid if scales is None else self._lay_out(scales)
+        units = self.scales if scales is None else scales
+        status, iterations, u, lam = descent.descend(laid, self.mask(piece), q / units, limit)
+        return status, iterations, u * units, lam
 
     def restore(self, piece: Piece, q: Array) -> tuple[bool, Array]:
         """Project ``q`` onto a piece by repeated linearisation; return success and the point."""
-        from polycorner.minimisation.descent import entry_points
+        from polycorner.minimisation.descent import intermediate as descent
 
-        flat, size = self.flat
-        reached, u = entry_points.restore(
-            flat, self.mask(piece), self.inequalities, self.rows, q / self.scales, size
-        )
+        reached, u = descent.restore(self._laid, self.mask(piece), q / self.scales)
         return reached, u * self.scales
 
     def on_face(self, active: Piece, q: Array) -> tuple[Array, float]:
         """Apply Newton's method on a face; return the point and the length of the last step."""
-        from polycorner.minimisation.descent import entry_points
+        from polycorner.minimisation.descent import intermediate as descent
 
-        flat, size = self.flat
-        u, _, step = entry_points.on_face(
-            flat, self.mask(active), self.inequalities, self.rows, q / self.scales, size
-        )
+        u, step = descent.on_face(self._laid, self.mask(active), q / self.scales)
         return u * self.scales, step
 
     def probe(
         self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
     ) -> float:
         """Return the change of the energy along directions on the face of ``strong``."""
-        from polycorner.minimisation.descent import entry_points
+        from polycorner.minimisation.descent import intermediate as descent
 
-        flat, size = self.flat
         masks = self.mask(strong), self.mask(piece)
-        ways = np.ascontiguousarray(directions), np.ascontiguousarray(held)
-        change: float = entry_points.probe(
-            flat, *masks, self.inequalities, self.rows, q / self.scales, *ways, steps, size
-        )
-        return change
+        return descent.probe(self._laid, masks, q / self.scales, directions, held, steps)
 
     def with_independent_equations(self, piece: Piece, points: Iterable[Array]) -> "Problem":
         """Return the problem in one piece, of the equations there that imply the others.

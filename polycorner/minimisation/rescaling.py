@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.printing import number
@@ -33,19 +34,17 @@ def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int,
         Of the first descent that converges to a point as low, otherwise those given; iterations
         are those of all.
     """
-    from polycorner.minimisation.descent import sqp
-
     status, spent, q, multipliers = end
-    if status == sqp.STALLED and spent >= limit and limit < PATIENCE:
+    if status == statuses.STALLED and spent >= limit and limit < PATIENCE:
         return status, spent, q
     for scales in estimated_scales(problem, q, multipliers):
         even = np.ptp(np.log(scales / problem.scales)) < np.log(UNEVEN)
-        if even and status == sqp.UNEVEN:
+        if even and status == statuses.UNEVEN:
             break
         ended, more, point, _ = problem.descend(piece, q, limit, scales)
         spent += more
         lower = problem.energy.value(point) <= problem.energy.value(q)
-        if lower and ended in (sqp.CONVERGED, sqp.LEVEL, sqp.UNEVEN):
+        if lower and ended in (statuses.CONVERGED, statuses.LEVEL, statuses.UNEVEN):
             return ended, spent, point
     return status, spent, q
 

@@ -1,52 +1,73 @@
-"""Entry points of the compiled descent, cached under a key over the sources of all stages."""
-
-from typing import Any
+"""Entry points of the compiled descent, which are given the addresses of records."""
 
 import numpy as np
-from numba import njit
 
-from polycorner.formulas.cache import sources_digest
-from polycorner.minimisation.descent import flat_directions, newton, sqp
+from polycorner.formulas.intermediate import intermediate_code
+from polycorner.formulas.records import RecordType, reader
+from polycorner.minimisation.descent import flat_directions, newton, records, sqp
 from polycorner.minimisation.descent.feasibility import project
+from polycorner.minimisation.descent.jit import compiled
 
 RESTORATIONS = np.int64(100)  # linearisations with which a point is restored
 
-
-def _entry_points(sources: str) -> tuple[Any, ...]:
-    """Return the compiled functions; each reads ``sources``, which puts it into its cache key."""
-
-    @njit(cache=True)
-    def descend(problem, use, m, rows, u, size, limit):
-        """Descend inside a piece; see ``sqp.descend``."""
-        _ = sources
-        return sqp.descend(problem, use, m, rows, u, size, limit)
-
-    @njit(cache=True)
-    def restore(problem, use, m, rows, u, size):
-        """Project a copy of ``u`` onto a piece; return success and the point."""
-        _ = sources
-        n = u.size
-        F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
-        v = u.copy()
-        return project(problem, use, m, v, F, J, H, size, RESTORATIONS), v
-
-    @njit(cache=True)
-    def on_face(problem, on, m, rows, u, size):
-        """Apply Newton's method on a face to a copy of ``u``; see ``newton.polish``."""
-        _ = sources
-        n = u.size
-        F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
-        v = u.copy()
-        lam, step = newton.polish(problem, on, m, np.zeros((0, n)), v, F, J, H, size)
-        return v, lam, step
-
-    @njit(cache=True)
-    def probe(problem, on, use, m, rows, u, directions, held, steps, size):
-        """Follow directions along a face; see ``flat_directions.probe``."""
-        _ = sources
-        return flat_directions.probe(problem, on, use, m, rows, u, directions, held, steps, size)
-
-    return descend, restore, on_face, probe
+problem_at, descend_at, restore_at, face_at, probe_at = (
+    reader(RecordType(f"descent.{name}", getattr(records, name).declared))
+    for name in ("PROBLEM", "DESCEND", "RESTORE", "ON_FACE", "PROBE")
+)
 
 
-descend, restore, on_face, probe = _entry_points(sources_digest(__package__))
+@compiled
+def arrays(p):
+    """Return the arrays of a problem."""
+    return p.calls, p.reads, p.outputs, p.parameters, p.scales
+
+
+@compiled
+def descend(problem, call):
+    """Move ``u`` inside a piece, see ``sqp.descend``; return status and iterations."""
+    p, c = problem_at(problem), descend_at(call)
+    status, iterations, u, lam = sqp.descend(
+        arrays(p), c.use, p.inequalities, p.rows, c.u, p.size, c.limit
+    )
+    for j in range(u.size):
+        c.u[j] = u[j]
+    for i in range(lam.size):
+        c.multipliers[i] = lam[i]
+    return float(status), float(iterations)
+
+
+@compiled
+def restore(problem, call):
+    """Project ``u`` onto a piece; return success."""
+    p, c = problem_at(problem), restore_at(call)
+    rows, n = p.rows, c.u.size
+    F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
+    reached = project(arrays(p), c.use, p.inequalities, c.u, F, J, H, p.size, RESTORATIONS)
+    return 1.0 if reached else 0.0, 0.0
+
+
+@compiled
+def on_face(problem, call):
+    """Apply Newton's method on a face to ``u``, see ``newton.polish``; return the last step."""
+    p, c = problem_at(problem), face_at(call)
+    rows, n = p.rows, c.u.size
+    F, J, H = np.zeros(rows), np.zeros((rows, n)), np.zeros((rows, n, n))
+    held = np.zeros((0, n))
+    _, step = newton.polish(arrays(p), c.on, p.inequalities, held, c.u, F, J, H, p.size)
+    return step, 0.0
+
+
+@compiled
+def probe(problem, call):
+    """Follow directions along a face; see ``flat_directions.probe``."""
+    p, c = problem_at(problem), probe_at(call)
+    change = flat_directions.probe(
+        arrays(p), c.on, c.use, p.inequalities, p.rows, c.u, c.directions, c.held, c.steps, p.size
+    )
+    return change, 0.0
+
+
+def made() -> str:
+    """Return the entry points as intermediate code."""
+    functions = {"descend": descend, "restore": restore, "on_face": on_face, "probe": probe}
+    return intermediate_code(functions, arguments=2)

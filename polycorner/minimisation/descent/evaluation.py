@@ -17,8 +17,8 @@ def evaluate(problem, u, F, J, H, size, second):
     work = np.empty(size)
     start, base = work.ctypes.data, parameters.ctypes.data
     for call in range(table.shape[0]):
-        curved, straight, k, m, r0, w0, p0 = table[call]
-        address = curved if second else straight
+        address, k, m = table[call, 0 if second else 1], table[call, 2], table[call, 3]
+        r0, w0, p0 = table[call, 4], table[call, 5], table[call, 6]
         for i in range(k):
             c = reads[r0 + i]
             work[i] = u[c] * scales[c]

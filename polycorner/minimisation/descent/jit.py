@@ -2,4 +2,4 @@
 
 from polycorner.formulas.linking import linked
 
-compiled = linked()
+compiled = linked(error_model="numpy")

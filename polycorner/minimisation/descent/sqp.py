@@ -23,9 +23,15 @@ from polycorner.minimisation.descent.stationarity import (
     leave_flat,
     leave_saddle,
 )
+from polycorner.minimisation.descent.statuses import (
+    CONVERGED,
+    INFEASIBLE,
+    LEVEL,
+    STALLED,
+    UNBOUNDED,
+    UNEVEN,
+)
 
-# LEVEL: converged, but flat; UNEVEN: the same, and curvatures ask for very different scales.
-CONVERGED, INFEASIBLE, UNBOUNDED, STALLED, LEVEL, UNEVEN = 0, 1, 2, 3, 4, 5
 CURVELESS = 1e-14  # diagonal entry, relative to the largest, below which a coordinate is flat
 SPREAD = 1e3  # ratio of scales beyond which they are uneven
 FIRST_CAP = 0.5  # longest first step, in scale units

@@ -144,7 +144,9 @@ def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
     evaluate(problem, v, F, J, H, size, False)
     energy = min(energy, F[F.size - 1])
     along = np.zeros((1, v.size))
-    along[0] = direction / length(direction)
+    whole = length(direction)
+    for i in range(direction.size):
+        along[0, i] = direction[i] / whole
     for k in range(48):
         step = 0.1 * 0.5 ** (k // 4) * (1.0 - 2.0 * (k % 2))
         trial = plus(v, step, direction)
@@ -202,8 +204,10 @@ def leave_flat(problem, use, on, m, v, ways, F, J, H, size, energy):
             along[0, i] = ways[j, i] if j < count else 0.0
             for c in range(count if j >= count else 0):
                 along[0, i] += np.cos(1.0 + j * np.sqrt(2.0 + c)) * ways[c, i]
-        way = along[0] / length(along[0])
-        along[0] = way
+        whole = length(along[0])
+        for i in range(v.size):
+            along[0, i] /= whole
+        way = along[0]
         if k % 4 == 0:
             constant = is_constant(problem, v, way, values, slopes, F, J, H, size)
         if constant:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.errors import SolverError
+from polycorner.formulas.tables import Layout
 from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.engine.allocation import allocate, restored
 from polycorner.motion.engine.arrays import (
@@ -112,8 +113,8 @@ class Engine:
             contact_room=sizes.C, neighbour_room=sizes.P, event_room=sizes.E
         )
         self._works = [self.work, *copies(self.work, sizes, self.model.threads)]
-        shared = [table_of(record) for record in (self.model, self.motion, self.log)]
-        own = [table_of(work) for work in self._works]
+        shared = [_table_of(record) for record in (self.model, self.motion, self.log)]
+        own = [_table_of(work) for work in self._works]
         self._tables = shared + own  # kept as long as they are used
         model, motion, log = (table.ctypes.data for table in shared)
         self._addresses = [np.array([model, motion, work.ctypes.data, log]) for work in own]
@@ -238,16 +239,7 @@ class Engine:
         return own
 
 
-def table_of(record: Any) -> NDArray[np.int64]:
-    """Return the table by which compiled code finds a record: numbers, addresses and lengths.
-
-    Arrays have to be kept as long as it is used.
-    """
-    entries: list[int] = []
-    for name, declared in declarations(record).items():
-        value = getattr(record, name)
-        if declared.shape:
-            entries += [value.ctypes.data, *value.shape]
-        else:
-            entries.append(int(np.array(value, dtype=declared.kind).view(np.int64)))
-    return np.array(entries, dtype=np.int64)
+def _table_of(record: Any) -> NDArray[np.int64]:
+    """Return the table by which compiled code finds a record, whose arrays have to be kept."""
+    table, _ = Layout(declarations(record)).table(record)
+    return np.frombuffer(table, dtype=np.int64)

@@ -1,11 +1,6 @@
 """Entry point of the engine, and its intermediate code."""
 
-import re
-
-from numba import types
-
-from polycorner.formulas.linking import whole_module
-from polycorner.formulas.machine_code import portable_code
+from polycorner.formulas.intermediate import intermediate_code
 from polycorner.motion.engine.arrays import DONE, EVENTS_FULL, STEPS
 from polycorner.motion.engine.codes import STOP
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
@@ -14,8 +9,6 @@ from polycorner.motion.engine.records import readers
 from polycorner.motion.engine.refinement import step
 from polycorner.motion.engine.signals import write
 from polycorner.motion.engine.sleep import stays_asleep
-
-NEW = r" (captures|range)\([^)]*\)"  # properties of arguments that older versions do not know
 
 
 @compiled
@@ -37,14 +30,11 @@ def advance(model, state, work, log, steps):
     return DONE, steps, count
 
 
-def intermediate_code(entry: str, dimension: int) -> str:
-    """Return the engine as intermediate code for any processor, all stages linked into one.
+def made(dimension: int) -> str:
+    """Return the engine as intermediate code.
 
     It is for bodies of ``dimension`` coordinates, or of any number if that is 0.  Called for less
     than zero steps, it assists the thread that advances.
-
-    Words that only one version of LLVM knows are left out: once code is optimised, they matter
-    little.
     """
     model_at, state_at, work_at, log_at = readers(dimension)
 
@@ -57,11 +47,4 @@ def intermediate_code(entry: str, dimension: int) -> str:
         write(work_at(work).signals, STOP, ONE)
         return done
 
-    module, name = whole_module(enter, (types.int64,) * 5)
-    text = portable_code(str(module).replace(name, entry))
-    for words in (r"^(attributes #|source_filename|; ModuleID|target ).*\n", r" #\d+(?=\s|$)", NEW):
-        text = re.sub(words, "", text, flags=re.MULTILINE)
-    if ".const." in text:
-        msg = "the engine raises an exception, which holds the path of a file"
-        raise ValueError(msg)
-    return text
+    return intermediate_code({"advance": enter}, arguments=5)

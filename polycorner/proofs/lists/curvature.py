@@ -21,7 +21,7 @@ Nothing is asked of the signs of multipliers, so that those that nearly vanish d
 """
 
 from polycorner.formulas.linking import linked
-from polycorner.proofs.lists.directions import TINY, UNIT
+from polycorner.proofs.lists.entries import TINY, UNIT
 
 compiled = linked()
 

@@ -25,10 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.intervals.boxes import BoxFunctions
+from polycorner.proofs.lists.entries import TINY, UNIT
 from polycorner.spaces.manifold import Array
 
-UNIT = 2.0**-52
-TINY = 2.0**-1000
 LARGE = 2.0**200
 MOST_DEFECT = 0.99
 SHIFT = 1e-10  # of the squares of gradients that are inverted, relative to their sum

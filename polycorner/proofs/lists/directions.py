@@ -19,12 +19,11 @@ their magnitudes, underflow excluded, which a summand of ``2^-1000`` covers ([Hi
 import numpy as np
 
 from polycorner.formulas.linking import linked
+from polycorner.proofs.lists.entries import TINY, UNIT
 
 compiled = linked()
 
 MOST_ROUNDS = np.int64(400)
-UNIT = 2.0**-52
-TINY = 2.0**-1000
 LEAST_WIDTH = 1e-4  # of enclosures along a coordinate, relative to the widest
 LEAST_RADIUS = 1e-9  # relative to the gradient: nearer than this 0 counts as in the hull
 

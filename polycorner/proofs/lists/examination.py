@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.contraction import narrowed
-from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.images import dropped
+from polycorner.proofs.lists.intermediate import covered, directions
 from polycorner.proofs.lists.known import Known
 from polycorner.proofs.lists.saddles import without_minima
 from polycorner.proofs.lists.settings import Setting
@@ -98,7 +98,7 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
     where, masks = items(setting.conj, v_hi[:, :m] < 0, v_lo[:, :m] > 0)
     where, masks = where[meets[where]], masks[meets[where]]
     units = setting.domain.units
-    found, v, weights = directions(g_lo, g_hi, where, masks, k, units, -1.0)
+    found, v, weights = directions((g_lo, g_hi), where, masks, k, units, -1.0)
     left = np.flatnonzero(~found)
     if sharp and left.size:
         which = np.unique(where[left])
@@ -106,7 +106,7 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
             boxes.lower[which], boxes.upper[which]
         )
         found[left], v[left], weights[left] = directions(
-            g_lo, g_hi, where[left], masks[left], k, units, -1.0
+            (g_lo, g_hi), where[left], masks[left], k, units, -1.0
         )
     continuous = setting.functions.continuous(boxes.lower, boxes.upper)
     smooth: Mask = np.all(continuous[where, :m] | ~masks, axis=1)
@@ -141,7 +141,10 @@ def reconsider(
     at = rest.items[examined.open_items]
     if at.size and len(known.regions) > regions:
         inside = covered(
-            boxes.lower, boxes.upper, examined.where[at], examined.masks[at], *known.sides(regions)
+            (boxes.lower, boxes.upper),
+            examined.where[at],
+            examined.masks[at],
+            *known.sides(regions),
         )
         examined.done[at[inside]] = True
     z = list(setting.reads)
@@ -155,8 +158,7 @@ def reconsider(
         at = rest.items[left]
         if at.size:
             into, u, _ = directions(
-                rest.low[left],
-                rest.high[left],
+                (rest.low[left], rest.high[left]),
                 np.arange(len(left)),
                 examined.masks[at],
                 setting.equations,

@@ -19,7 +19,7 @@ from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.domains import Domain
-from polycorner.proofs.lists.entry_points import carried
+from polycorner.proofs.lists.intermediate import carried
 from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
@@ -206,20 +206,15 @@ def dropped(
     signs = np.array([g.signs for g in motions], dtype=np.float64)
     back = np.zeros(signs.shape)  # w . (g q) = back . q + w . shifts
     np.put_along_axis(back, orders, weights * signs, axis=1)
-    found: NDArray[np.bool_] = carried(
-        lower,
-        upper,
-        orders,
-        signs,
-        np.array([g.shifts(manifold) for g in motions]),
-        back - weights,
+    shifts = np.array([g.shifts(manifold) for g in motions])
+    sides = np.maximum(domain.lower, -half), np.minimum(domain.upper, half)
+    return carried(
+        (lower, upper),
+        (orders, signs, shifts, back - weights),
         weights,
-        np.array(manifold.periods),
-        np.maximum(domain.lower, -half),
-        np.minimum(domain.upper, half),
+        (np.array(manifold.periods), *sides),
         MARGIN,
     )
-    return found
 
 
 def weights(domain: Domain) -> Array:

@@ -133,14 +133,10 @@ class Known:
         known = (*self.loci, *self.missed)
         return any((z >= p.lower).all() and (z <= p.upper).all() for p in known)
 
-    def sides(self, since: int = 0) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def sides(self, since: int = 0) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
         """Return lower and upper ends ``(R, n)`` and active functions ``(R, m)`` of regions.
 
         Of all but the first ``since``.
         """
         found, n = self._all.array[since:], self._dimension
-        return (
-            np.ascontiguousarray(found[:, :n]),
-            np.ascontiguousarray(found[:, n : 2 * n]),
-            found[:, 2 * n :] > 0,
-        )
+        return (found[:, :n], found[:, n : 2 * n]), found[:, 2 * n :] > 0

@@ -42,8 +42,8 @@ from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.attempts import WIDER, Starts
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.candidates import active_sets
-from polycorner.proofs.lists.entry_points import covered, directions
 from polycorner.proofs.lists.examination import Examined
+from polycorner.proofs.lists.intermediate import covered, directions
 from polycorner.proofs.lists.known import Known
 from polycorner.proofs.lists.operators import BITS
 from polycorner.proofs.lists.settings import Setting
@@ -106,7 +106,7 @@ def _candidates(setting: Setting, known: Known, e: Examined) -> Iterator[int]:
         return
     items = e.rest.items[left]
     anything = np.zeros((len(left), e.masks.shape[1]), dtype=np.bool_)
-    chosen = covered(e.boxes.lower, e.boxes.upper, e.where[items], anything, *known.sides())
+    chosen = covered((e.boxes.lower, e.boxes.upper), e.where[items], anything, *known.sides())
     holding = active_sets(e.rest.weights[left], e.rest.pulls[left]).sum(axis=1)
     chosen |= (holding > top) & (e.boxes.since[e.where[items]] == 0)
     for item in items[chosen][:MOST_ITEMS].tolist():
@@ -126,7 +126,7 @@ def _smooth(setting: Setting, e: Examined, item: int) -> bool:
 def largest_sets(setting: Setting, known: Known, e: Examined, item: int) -> Mask:
     """Return the largest sets of functions that no region around the box has, ``(T, m)``."""
     lower, upper = e.boxes.lower[e.where[item]], e.boxes.upper[e.where[item]]
-    left, right, active = known.sides()
+    (left, right), active = known.sides()
     within = (left < lower) & (upper < right) | (left == right)
     around = active[within.all(axis=1)]
     rows = np.flatnonzero(e.masks[item]).tolist()
@@ -143,9 +143,11 @@ def largest_sets(setting: Setting, known: Known, e: Examined, item: int) -> Mask
 
 def _directions(setting: Setting, e: Examined, box: int, sets: Mask) -> tuple[Mask, Array]:
     lower, upper = e.boxes.lower[[box]], e.boxes.upper[[box]]
-    gradients = setting.functions.gradients(lower, upper)[2:]
+    _, _, low, high = setting.functions.gradients(lower, upper)
     where = np.zeros(len(sets), dtype=np.intp)
-    found, v, _ = directions(*gradients, where, sets, setting.equations, setting.domain.units, -1.0)
+    found, v, _ = directions(
+        (low, high), where, sets, setting.equations, setting.domain.units, -1.0
+    )
     return found, v
 
 

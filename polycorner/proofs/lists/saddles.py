@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.branches import Mask
-from polycorner.proofs.lists.entry_points import bent
+from polycorner.proofs.lists.intermediate import bent
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
 
@@ -54,10 +54,7 @@ def _bent(setting: Setting, bounds: tuple[Array, ...]) -> tuple[NDArray[np.bool_
     values, vectors = np.linalg.eigh(0.5 * (bent_form + bent_form.transpose(0, 2, 1)))
     likely = np.flatnonzero(values[:, 0] < 0)
     at, start = at[likely], (vectors[likely, :, 0] * units).astype(np.float32).astype(np.float64)
-    found[at] = bent(
-        *(np.ascontiguousarray(side[at]) for side in (g_lo, g_hi, h_lo, h_hi)),
-        np.ascontiguousarray(left[likely] * units),
-        np.ascontiguousarray(start),
-    )
+    sides = tuple(side[at] for side in (g_lo, g_hi, h_lo, h_hi))
+    found[at] = bent(sides, left[likely] * units, start)
     directions[at[:, None], free] = start
     return found, directions

@@ -6,10 +6,11 @@ from collections import Counter
 import numpy as np
 import pytest
 from atlas_commands import answer, fits_together, same_atlas
+from atlases import kept_atlas
 from oracles import CONTACTS, gaps
 
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.statics.skeleton import long_rod_length, pair_atlas
+from polycorner.dumbbells.statics.skeleton import long_rod_length
 
 ANSWER = {"components", "corners", "edges", "faces", "euler_characteristic", "complete"}
 CORNER = {"name", "kind", "active", "rank", "dimension", "local_type", "chirality"}
@@ -32,7 +33,7 @@ PAIRS = {
 def test_pair_is_the_librarys(arguments):
     pair, heading = PAIRS[arguments]
     found = answer("dyad", *arguments)
-    atlas = pair_atlas(pair, heading=math.radians(heading))
+    atlas = kept_atlas(pair, math.radians(heading))
     assert set(found) >= ANSWER
     same_atlas(found, atlas.skeleton)
     for key, counts in (

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from atlases import kept_atlas
 from drawn_pairs import LONG, circles, depths, lit, texts
 from matplotlib.colors import same_color
 from matplotlib.patches import FancyBboxPatch, PathPatch
@@ -11,17 +12,16 @@ from matplotlib.patches import FancyBboxPatch, PathPatch
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.atlas_graph import draw_atlas
 from polycorner.dumbbells.pictures.symbols import HANDS
-from polycorner.dumbbells.statics.skeleton import pair_atlas
 
 
 @pytest.fixture(scope="module")
 def long():
-    return pair_atlas(LONG)
+    return kept_atlas(LONG)
 
 
 @pytest.fixture(scope="module")
 def short():
-    return pair_atlas(DumbbellPair(7, 3, 1.5))
+    return kept_atlas(DumbbellPair(7, 3, 1.5))
 
 
 @pytest.fixture(scope="module")

@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from atlases import kept_atlas
 from drawn_pairs import LONG, circles, depths, lit
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.motion_strips import draw_motions
-from polycorner.dumbbells.statics.skeleton import pair_atlas
 
 
 @pytest.fixture(scope="module")
 def strips():
-    return draw_motions(pair_atlas(LONG))
+    return draw_motions(kept_atlas(LONG))
 
 
 def strips_of(figure):
@@ -81,7 +81,7 @@ def test_all_frames_of_a_strip_have_one_scale_and_hold_the_bodies(strips):
 
 def test_in_the_drum_the_axis_stays_upright():
     pair = DumbbellPair(16, 3, 1.5, 125)
-    atlas = pair_atlas(pair, heading=0.3)
+    atlas = kept_atlas(pair, 0.3)
     for row in strips_of(draw_motions(atlas)):
         for axes in row:
             (four,), _ = circles(axes)

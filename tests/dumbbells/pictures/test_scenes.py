@@ -6,11 +6,12 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from atlases import kept_atlas
 from hypothesis import given
 from hypothesis import strategies as st
 
 from polycorner import minimise
-from polycorner.dumbbells import DumbbellDrum, DumbbellPair, pair_atlas
+from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 from polycorner.dumbbells.pictures import bodies as scene_bodies
 from polycorner.dumbbells.pictures import scenes
 from polycorner.dumbbells.pictures.placements import forbidden_solid
@@ -135,7 +136,7 @@ def test_a_tube_is_closed_and_as_thick_as_it_should_be():
 
 @pytest.fixture(scope="module")
 def atlas():
-    return pair_atlas(DumbbellPair(7, 3, 1.5))  # the rods are short: eight corners
+    return kept_atlas(DumbbellPair(7, 3, 1.5))  # the rods are short: eight corners
 
 
 def test_an_atlas_has_its_solid_edges_and_corners(atlas):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from atlases import kept_atlas
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.placements import (
@@ -20,7 +21,6 @@ from polycorner.dumbbells.pictures.solid import (
     solid_facts,
     write_solid,
 )
-from polycorner.dumbbells.statics.skeleton import pair_atlas
 
 CASES = {
     "plane": (math.inf, 16.0, None),
@@ -33,7 +33,7 @@ CASES = {
 def atlas(request):
     drum, length, heading = CASES[request.param]
     pair = DumbbellPair(length=length, ball_radius=3, rod_radius=1.5, drum_radius=drum)
-    return pair_atlas(pair, heading=heading or 0.0)
+    return kept_atlas(pair, heading or 0.0)
 
 
 def period(atlas):

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from atlases import kept_atlas
 
 from polycorner import certify, minimise
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
-from polycorner.dumbbells.statics.skeleton import corner_kind, pair_atlas
+from polycorner.dumbbells.statics.skeleton import corner_kind
 from polycorner.proofs import corners, stationary_points
 
 SIZES = (16.0, 3.0, 1.5)
@@ -104,7 +105,7 @@ def test_all_corners_in_the_plane_are_those_of_the_search():
     model = RelativePlacements(pair)
     found = corners(model.polyhedron, box={**model.box, "alpha": 0.0}, symmetry=model.rotations)
     assert found.complete
-    walked = pair_atlas(pair)
+    walked = kept_atlas(pair)
     kinds = [corner_kind(p.active, pair.chirality(model.placement(p.point))) for p in found]
     assert sorted(kinds) == sorted(map(walked.kind, walked.skeleton.corners))
     assert {frozenset(p.active) for p in found} == {

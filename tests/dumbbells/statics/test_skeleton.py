@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from atlases import kept_atlas
 
 from polycorner import skeleton
 from polycorner.dumbbells import DumbbellPair
@@ -21,17 +22,17 @@ HEADING = 0.3
 
 @pytest.fixture(scope="module")
 def long():
-    return pair_atlas(LONG)
+    return kept_atlas(LONG)
 
 
 @pytest.fixture(scope="module")
 def short():
-    return pair_atlas(SHORT)
+    return kept_atlas(SHORT)
 
 
 @pytest.fixture(scope="module")
 def section():
-    return pair_atlas(DRUM, heading=HEADING)
+    return kept_atlas(DRUM, HEADING)
 
 
 @pytest.fixture(params=["long", "short", "section"])

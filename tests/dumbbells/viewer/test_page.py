@@ -11,9 +11,10 @@ import chromium
 import numpy as np
 import pytest
 import trimesh
+from atlases import kept_atlas
 
 from polycorner import stratum_at
-from polycorner.dumbbells import DumbbellPair, pair_atlas
+from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.film import (
     HANDS,
     pair_film,
@@ -213,7 +214,7 @@ def test_a_browser_without_webgl_says_so_and_shows_the_numbers(file, tmp_path):
 
 
 def test_an_atlas_is_a_page_of_its_own(tab, tmp_path):
-    atlas = pair_atlas(DumbbellPair(7, 3, 1.5))
+    atlas = kept_atlas(DumbbellPair(7, 3, 1.5))
     page = atlas_page(atlas, resolution=16)
     file = write_page(page, tmp_path / "atlas.html")
     tab.open(file, width=360)
@@ -248,7 +249,7 @@ def test_lines_along_the_drum_turn_with_it_and_stay_on_the_wall(tab, way, tmp_pa
 
 
 def test_an_atlas_stands_upright_as_in_the_figures(tab, tmp_path):
-    atlas = pair_atlas(DumbbellPair(7, 3, 1.5))
+    atlas = kept_atlas(DumbbellPair(7, 3, 1.5))
     tab.open(write_page(atlas_page(atlas, resolution=16), tmp_path / "atlas.html"), width=800)
     tab.wait(READY)
     # The camera follows a key with the next frame; perspective leaves a little slant.

@@ -10,15 +10,7 @@ import pytest
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.motion.engine import driver
-from polycorner.motion.engine.intermediate import (
-    ANY,
-    COMMON,
-    ENTRY,
-    HEAD,
-    compiled_advance,
-    engine_sources,
-    shipped_code,
-)
+from polycorner.motion.engine.intermediate import ANY, SHIPPED, compiled_advance
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import start
 
@@ -36,19 +28,6 @@ def test_room_for_contacts_grows(monkeypatch):
         narrow.advance(1)
         np.testing.assert_allclose(narrow.motion.q, ample.motion.q, atol=1e-4)
     assert narrow.capacity > 16
-
-
-@pytest.mark.parametrize("dimension", [ANY, *COMMON])
-def test_the_package_contains_the_engine_as_it_is(dimension):
-    """After a change of a stage, `make engine` makes it anew."""
-    assert shipped_code(dimension).startswith(HEAD + engine_sources() + "\n")
-
-
-@pytest.mark.parametrize("dimension", [ANY, *COMMON])
-def test_what_the_package_contains_names_no_file(dimension):
-    code = shipped_code(dimension)
-    assert "/" not in code
-    assert f"@{ENTRY}(" in code
 
 
 def advanced(system, state, noise, seconds):
@@ -76,16 +55,16 @@ RUN = """
 import sys
 from polycorner.models.textbook import bouncing_ball
 from polycorner.motion import simulate
-from polycorner.motion.engine import intermediate
+from polycorner.formulas.shipped import Shipped
 if len(sys.argv) > 1:
-    intermediate.shipped_code = lambda dimension: sys.argv[1]
+    Shipped.text = sys.argv[1]
 ball = bouncing_ball(0.7)
 print(simulate(ball, ball.state([1.0]), 2.0, 1e-2).q.tobytes().hex())
 """
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shipped", ["", HEAD + engine_sources() + "\nwords of another version"])
+@pytest.mark.parametrize("shipped", ["", SHIPPED[ANY].head + "words of another version"])
 def test_without_it_numba_makes_the_same_engine(tmp_path, shipped):
     """The file may be missing, and another version of LLVM may not understand it."""
     results = []

@@ -12,12 +12,13 @@ import numpy as np
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import scatter
 from polycorner.motion import Noise
-from polycorner.motion.engine import intermediate, records
+from polycorner.formulas.shipped import Shipped
+from polycorner.motion.engine import records
 from polycorner.motion.simulation import start
 
 if sys.argv[1] != "0":
     records.UNTOLD = int(sys.argv[1])
-    intermediate.shipped_code = lambda dimension: ""
+    Shipped.text = ""
 drum = DumbbellDrum(count=20, floor=True)
 places = scatter(drum, np.random.default_rng(0), width=0.2, height=80.0, tries=1000)
 kicks = {"phi": 3000.0, "eta": 25.0, "theta": 25.0}

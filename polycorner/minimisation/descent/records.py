@@ -1,0 +1,26 @@
+"""What the compiled descent is given: a problem, and the arguments of each call."""
+
+from polycorner.formulas.tables import Layout
+
+PROBLEM = Layout.of(
+    calls="whole * 7",
+    reads="whole *",
+    outputs="whole *",
+    parameters="real *",
+    scales="real n",
+    inequalities="whole",
+    rows="whole",
+    size="whole",
+)
+# Where `u` starts it also ends.
+DESCEND = Layout.of(use="flag m", u="real n", multipliers="real M", limit="whole")
+RESTORE = Layout.of(use="flag m", u="real n")
+ON_FACE = Layout.of(on="flag m", u="real n")
+PROBE = Layout.of(
+    on="flag m",
+    use="flag m",
+    u="real n",
+    directions="real * n",
+    held="real * n",
+    steps="real *",
+)
