@@ -28,7 +28,8 @@ class Solver(Value):
         contacts, after which its step is taken as it is.  It is counted in ``Effort.unconverged``,
         and ``Effort.residual`` says how much is missing.  Forces spread only so far in a step, so
         that heaps are a little soft and friction creeps.  Bodies that overlap by more than 0.1 % of
-        their size are moved apart.  Default 0: islands are solved, whatever their size.
+        their size are moved apart.  Not for bodies that turn in space, unless they are balls.
+        Default 0: islands are solved, whatever their size.
     threads : int, optional
         How many threads do a step together; default 1.  Results are the same, bit for bit, for any
         number.  It pays for islands of many bodies, or many islands, and on idle processors.

@@ -32,7 +32,14 @@ def model_of(
     """Return the model constants of bodies in motion."""
     body, formulation = bodies.body, bodies.body.formulation
     parameters = list(body.parameters)
-    sets = _Sets()
+    sets, dependence = _Sets(), _dependence(body)
+    if solver.crowd_sweeps and body.equations and not dependence["constant_mass"]:
+        msg = (
+            f"solver: expected crowd_sweeps=0 for bodies that turn in space and are no balls, or "
+            f"obey equations and have a mass matrix that varies: sweeps do not follow their "
+            f"rotation; got {solver.crowd_sweeps}"
+        )
+        raise NotImplementedError(msg)
     values = {
         "bodies": bodies.count,
         "dimension": bodies.dimension,
@@ -66,7 +73,7 @@ def model_of(
         "step": step,
         "time_parameter": body.formulation.time_parameter,
         "follows_time": body.formulation.time_parameter >= 0 and not body.slow_signals,
-        **_dependence(body),
+        **dependence,
         **_signals(body, parameters),
         **_friction(bodies, sets),
         **_calls("slip", formulation.slip_calls, parameters, formulation.slip),

@@ -8,7 +8,7 @@ import sympy
 from scipy.spatial import cKDTree
 
 from polycorner import Friction, Manifold, Polyhedron, System, velocities
-from polycorner.bodies import Arrangement, HalfSpace, disc
+from polycorner.bodies import Arrangement, HalfSpace, Mass, disc, sphere
 from polycorner.motion import ContactFamily, Disc, pair_coordinates
 from polycorner.motion.checkpoints import Checkpoint
 from polycorner.motion.engine.arrays import CONTACTS, Work, declarations
@@ -322,3 +322,31 @@ def test_friction_of_two_rows_obeys_its_law_in_a_crowd():
     moved = ~motion.rests.astype(bool)  # others have exactly the velocity of rest
     assert moved.sum() > 50
     np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-12)
+
+
+def pile_in_space(body, **settings):
+    """Return system and state of a cube of bodies that touch, all of which spin."""
+    floor, n = {"floor": HalfSpace([0, 0, 1], [0, 0, 0])}, 7
+    centres = 2 * np.stack(np.meshgrid(*[np.arange(n)] * 3), axis=-1).reshape(-1, 3) + [0, 0, 1]
+    placed = np.column_stack([centres, np.tile([1.0, 0, 0, 0], (n**3, 1))])
+    piled = Arrangement({"B": body}, floor, orientations="all")
+    system = piled.system(gravity=[0, 0, -10.0], friction=MU, count=n**3, **settings)
+    return system, system.state(placed, np.tile([0, 0, 0, 0, 0, 0, 0.5], (n**3, 1)))
+
+
+def test_balls_in_space_are_swept():
+    engine = start(*pile_in_space(sphere(1.0)), DT, solver=Solver(tolerance=1e-4, crowd_sweeps=20))
+    engine.advance(20)
+    assert crowds(engine)
+    norms = np.linalg.norm(engine.motion.q[:, 3:], axis=1)
+    np.testing.assert_allclose(norms, 1.0, atol=1e-4)
+    assert engine.motion.q[:, 2].min() > 1 - 5 * TOLERATED
+
+
+def test_other_bodies_in_space_are_not_swept():
+    """Their mass matrix turns with them within a step, which sweeps ignore."""
+    top = {"B": Mass(1.0, [0, 0, 0], [1.0, 1.0, 0.5])}
+    pile = pile_in_space(sphere(1.0), masses=top)
+    with pytest.raises(NotImplementedError, match="solver: expected crowd_sweeps=0 for bodies"):
+        start(*pile, DT, solver=Solver(crowd_sweeps=20))
+    start(*pile, DT, solver=Solver())
