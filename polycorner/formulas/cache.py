@@ -1,4 +1,4 @@
-"""The one cache folder: compiled kernels, Numba's machine code, unfinished searches.
+"""The one cache folder: machine code of formulas and algorithms, unfinished searches.
 
 It is ``POLYCORNER_CACHE_DIR`` or the user's cache folder; where neither can be written, a
 temporary folder that ends with the process, announced by one warning.

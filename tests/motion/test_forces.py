@@ -205,7 +205,7 @@ def test_a_mass_that_ceases_to_be_positive_stops_the_run():
 def test_a_speed_that_becomes_infinite_stops_the_run():
     """A mass that vanishes at 1, where it would arrive after 2/3 s."""
     system = free(LINE, (1 - S) * VS**2 / 2)
-    with pytest.raises(SolverError, match=r"velocities after t = 0\.6.* are not finite") as stop:
+    with pytest.raises(SolverError, match=r"(velocities after|mass matrix at) t = 0\.6") as stop:
         simulate(system, system.state([0.0], [1.0]), 5.0, 1e-2)
     assert 0.9 < stop.value.state.q[0] < 1
 

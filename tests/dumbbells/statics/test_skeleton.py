@@ -443,7 +443,7 @@ class TestStrataOfTheDrum:
 
 def test_the_atlas_is_that_of_its_pair(long):
     assert isinstance(long, PairAtlas)
-    assert long.pair is LONG
+    assert long.pair == LONG
     assert long.heading is None
 
 
