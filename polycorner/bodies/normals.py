@@ -1,4 +1,4 @@
-"""Where two parts touch: nearest points and the normal there, as formulas.
+"""Nearest points of two parts that touch, and the normal there, as formulas.
 
 Quantities in between are *defined*: to SymPy they are symbols, so that formulas stay short however
 many faces and edges there are.

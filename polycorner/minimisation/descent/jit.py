@@ -1,4 +1,4 @@
-"""How the stages of the descent are compiled."""
+"""Compilation options of the stages of the descent."""
 
 from polycorner.formulas.linking import linked
 

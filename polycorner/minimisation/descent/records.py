@@ -1,4 +1,4 @@
-"""What the compiled descent is given: a problem, and the arguments of each call."""
+"""Layouts of the problem and of the arguments that the compiled descent is given."""
 
 from polycorner.formulas.tables import Layout
 

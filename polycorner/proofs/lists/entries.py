@@ -1,4 +1,4 @@
-"""What the compiled tests of boxes are given, and bounds of rounding errors."""
+"""Layouts of what the compiled tests of boxes are given, and bounds of rounding errors."""
 
 from polycorner.formulas.tables import Layout
 
