@@ -215,7 +215,8 @@ def friction_of(
         t.gap.name: partial(slips_of, space, t) for t in touches
     }
     slips |= {touch[0]: partial(slips_at_wall, space, touch) for touch in walls}
-    laws, rows = [], []
+    laws: list[Callable[..., Friction]] = []
+    rows: list[tuple[SmoothFunction, ...]] = []
     for argument, given, kind, verb in (
         ("friction", sliding, SLIDING, "slips"),
         ("rolling", rolls, ROLLING, "rolls"),
@@ -228,12 +229,14 @@ def friction_of(
                 continue
             _check_turning(argument, rubbing[label], value)
             d = rubbing[label][0].part.dimension
-            laws.append((f"{label} {verb}", _set(static, d), label, _set(dynamic, d), kind))
+            sticks, slides = _set(static, d), _set(dynamic, d)
+            law = partial(Friction, f"{label} {verb}", static=sticks, load=label, dynamic=slides)
+            laws.append(partial(law, kind=kind))
             rows.append(slips[label](kind))
     shared = iter(together(chain.from_iterable(rows)))
     return tuple(
-        Friction(name, tuple(islice(shared, len(components))), *law)  # type: ignore[arg-type]
-        for (name, *law), components in zip(laws, rows, strict=True)
+        law(slip=tuple(islice(shared, len(components))))
+        for law, components in zip(laws, rows, strict=True)
     )
 
 

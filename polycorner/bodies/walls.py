@@ -206,10 +206,8 @@ def within(
         points = nearest(member, wall.normal, turning=False)
     found = []
     for i, p in points:
-        label = f"{member.vertex(i)}-{name}"
-        function = function_of(
-            manifold, family, member, None, [*member.numbers(p), *numbers], label
-        )
+        given, label = [*member.numbers(p), *numbers], f"{member.vertex(i)}-{name}"
+        function = function_of(manifold, family, member, None, given, label)
         found.append((function, p))
     return found
 
