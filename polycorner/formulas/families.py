@@ -146,7 +146,12 @@ class Family(Value):
     def kernel(self) -> "Kernel":
         """The compiled functions."""
         sizes = len(self.variables), len(self.parameters), len(self.names)
-        return shared_kernel(self.key, self.program, *sizes)
+        return shared_kernel(self.identity, self.program, *sizes)
+
+    @cached_property
+    def identity(self) -> str:
+        """The key; without one, a hash of the program of the formulas."""
+        return self.key or self.program().digest()
 
     def expression(self, name: str) -> "sympy.Expr":
         """Return one function with all definitions written out."""

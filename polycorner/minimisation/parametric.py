@@ -178,8 +178,7 @@ def lifted_family(
     if not lifted:
         return family
     names = tuple(name for name in family.names if name in used)
-    source = family.key or family.program().digest()
-    key = repr(("parameters are variables", names, source, lifted))
+    key = repr(("parameters are variables", names, family.identity, lifted))
     rest = tuple(p for p in family.parameters if p not in lifted)
     symbols, held = family.variables + lifted, family.stationary
     return Family(names, symbols, rest, family.formulas, key, family.unit, stationary=held)

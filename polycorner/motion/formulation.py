@@ -237,15 +237,15 @@ class Formulation:
                 names = ", ".join(function.manifold.names)
                 msg = f"slip: expected functions of {', '.join(self.variables)}; got one of {names}"
                 raise ValueError(msg)
-        if not self.shared:
+        functions, k = [*self.shared.values()], len(self.coordinates)
+        if not functions:
             return
-        k = len(self.coordinates)
         draws = np.random.default_rng(0).normal(size=(3, 2 * k))
         draws[:, :k] = draws[0, :k]
-        slopes = self.slip_velocities(np.zeros(len(self.parameters)), draws)[1][:, :, k:]
-        sizes = np.abs(slopes).max(axis=(0, 2))
-        for row, function in self.shared.items():
-            if np.abs(np.diff(slopes[:, row], axis=0)).max() > SAME * sizes[row]:
+        slopes = Bundle(functions[0].manifold, functions).evaluate(draws, 1)[1][:, :, k:]
+        sizes, changes = (np.abs(a).max(axis=(0, 2)) for a in (slopes, np.diff(slopes, axis=0)))
+        for function, size, change in zip(functions, sizes, changes, strict=True):
+            if change > SAME * size:
                 msg = f"slip: expected an affine function of the velocities; got {function.name!r}"
                 raise ValueError(msg)
 

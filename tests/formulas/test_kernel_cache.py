@@ -16,6 +16,7 @@ from polycorner import Manifold, SmoothFunction
 from polycorner.formulas import shapes
 from polycorner.formulas.bundles import resolve
 from polycorner.formulas.cache import cache_folder, cache_size, clear_cache, one_at_a_time
+from polycorner.formulas.families import Family
 
 ROOT = Path(polycorner.__file__).parents[1]
 LINE = Manifold.euclidean("x")
@@ -101,6 +102,16 @@ def test_a_forgotten_kernel_leaves_the_others_alone(tmp_path, monkeypatch):
     del other
     gc.collect()
     assert kept.value([0.5]) == before
+
+
+def test_families_without_a_key_are_told_apart_by_their_formulas():
+    x, y = sp.symbols("x y", real=True)
+    families = [
+        Family(("f",), ("x", "y"), (), lambda f=f: ({}, {"f": f})) for f in (x + y, x - y, x + y)
+    ]
+    sums = [f.kernel.over(np.array([[3.0, 2.0]]), 0, 0)[0].item() for f in families]
+    assert sums == [5.0, 1.0, 5.0]
+    assert families[0].kernel is families[2].kernel
 
 
 def test_the_folder_can_be_chosen(tmp_path, monkeypatch):
