@@ -5,6 +5,7 @@ No instruction may be reordered or contracted, so one lane and eight lanes give 
 
 from collections.abc import Callable
 from fractions import Fraction
+from functools import lru_cache
 from math import factorial
 from typing import Any
 
@@ -28,6 +29,7 @@ SINE_TERMS = [(-1) ** k / factorial(2 * k + 1) for k in range(1, 8)]
 COSINE_TERMS = [(-1) ** k / factorial(2 * k) for k in range(2, 9)]
 
 
+@lru_cache(maxsize=8)
 def lane_type(lanes: int) -> ir.Type:
     """Return the type of a number in every lane."""
     return F64 if lanes == 1 else ir.VectorType(F64, lanes)
@@ -35,6 +37,13 @@ def lane_type(lanes: int) -> ir.Type:
 
 def splat(value: float, lanes: int) -> ir.Constant:
     """Return one constant in every lane."""
+    return _splat(float(value).hex(), lanes)  # as text, 0.0 and -0.0 are told apart
+
+
+@lru_cache(maxsize=4096)
+def _splat(text: str, lanes: int) -> ir.Constant:
+    """Return a constant, whose text in intermediate code is long and is made once."""
+    value = float.fromhex(text)
     return ir.Constant(lane_type(lanes), value if lanes == 1 else [value] * lanes)
 
 

@@ -83,7 +83,8 @@ class IntervalKernel:
         self.origin = "compiled" if code is None else "loaded"
         if code is None:
             LOG.debug("compiling enclosures of %d results", sum(self.sizes))
-            code = machine_code(str(self._module(used, kept, name)))
+            # Each node is emitted once and simplified before, so that LLVM's passes find nothing.
+            code = machine_code(str(self._module(used, kept, name)), optimise=False)
             write_code(name, code)
         self._engine, (address,) = load_code(code, [name])
         pointers = [ctypes.c_void_p] * (2 + len(self._widths()))

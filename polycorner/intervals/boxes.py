@@ -63,6 +63,7 @@ class BoxFunctions:
         self.rounding = rounding
         self.graph = Graph()
         self._kernels: dict[tuple[int, str], IntervalKernel] = {}
+        self._continuities: dict[int, tuple[IntervalKernel, list[int]]] = {}
         self._making = RLock()  # of kernels, for which threads write into the one graph
 
     def values(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
@@ -138,7 +139,7 @@ class BoxFunctions:
 
     def _are_continuous(self, lo: ArrayLike, hi: ArrayLike, order: int) -> NDArray[np.bool_]:
         low, high = self._boxes(lo, hi)
-        kernel, entries = self._continuity[order]
+        kernel, entries = self._continuity(order)
         found = np.zeros((len(low), len(entries)))
         kernel.fill(low, high, [found])
         result = np.ones((len(low), len(self.functions) * self.dimension**order), dtype=np.bool_)
@@ -170,21 +171,16 @@ class BoxFunctions:
                 self._kernels[order, form] = IntervalKernel(*known, form=form, kind=self.rounding)
             return self._kernels[order, form]
 
-    @property
-    def _continuity(self) -> "list[tuple[IntervalKernel, list[int]]]":
+    def _continuity(self, order: int) -> tuple[IntervalKernel, list[int]]:
+        """Return the kernel for derivatives of an order, and which are not zero."""
         with self._making:
-            return self._continuity_kernels
-
-    @cached_property
-    def _continuity_kernels(self) -> "list[tuple[IntervalKernel, list[int]]]":
-        """The kernels for values and for first derivatives, and which are not zero."""
-        kernels = []
-        for level in self._levels(1):
-            entries = [e for e, a in enumerate(level) if a is not None]
-            known = self.graph, self.dimension, [[level[e] for e in entries]]
-            kernel = IntervalKernel(*known, continuity=True, kind=self.rounding)
-            kernels.append((kernel, entries))
-        return kernels
+            if order not in self._continuities:
+                level = self._levels(order)[order]
+                entries = [e for e, a in enumerate(level) if a is not None]
+                known = self.graph, self.dimension, [[level[e] for e in entries]]
+                kernel = IntervalKernel(*known, continuity=True, kind=self.rounding)
+                self._continuities[order] = kernel, entries
+            return self._continuities[order]
 
     @property
     def _mean_value(self) -> tuple[IntervalKernel, list[int]]:
