@@ -22,7 +22,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # The first call of a kernel compiles it, so a deadline would measure the compiler.
 settings.register_profile(
     "fast",
-    max_examples=25,
+    max_examples=15,
     deadline=None,
     derandomize=bool(os.environ.get("CI")),
     suppress_health_check=[HealthCheck.too_slow],

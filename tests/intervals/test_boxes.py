@@ -74,8 +74,16 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("model", "kind"),
+    [
+        pytest.param(model, kind, marks=pytest.mark.slow)
+        if (model, kind) == ("drum", "stepped") and len(KINDS) > 1
+        else (model, kind)
+        for model in MODELS
+        for kind in KINDS
+    ],
+)
 def test_functions_of_the_library_lie_in_their_enclosures(model, kind):
     members, manifold, reach = MODELS[model]()
     rng = np.random.default_rng(3)

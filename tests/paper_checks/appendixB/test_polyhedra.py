@@ -50,8 +50,8 @@ def test_strata_around_points_are_those_of_points_near_them():
             continue
         point = next(p for p in spot.example.points if stratum_at(D, p) == spot.stratum)
         met = set()
-        for direction in rng.normal(size=(300, D.dimension)) * rng.integers(
-            0, 2, size=(300, D.dimension)
+        for direction in rng.normal(size=(100, D.dimension)) * rng.integers(
+            0, 2, size=(100, D.dimension)
         ):
             near = point + 1e-3 * direction
             if D.contains(near, tolerance=1e-12):

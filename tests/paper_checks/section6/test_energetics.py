@@ -78,6 +78,7 @@ def test_a_heading_that_is_right_in_the_drum_only_nearly_is_not_called_exact():
     assert corner.heading_is(shifted).verdict is Verdict.CORRECTED
 
 
+@pytest.mark.slow
 def test_each_way_of_missing_a_rest_locus_is_noticed():
     for named in (frozenset({"G"}), energetics.NAMED | {"crossed"}):
         assert energetics.only_loci(named, energetics.OTHERS[:1]).verdict is Verdict.REFUTED

@@ -87,10 +87,8 @@ def test_a_neighbourhood_without_the_corner_is_not_taken_for_one():
     assert not range_of_sizes.only_contacts(NEARBY * 100, CELL)
 
 
-@pytest.mark.parametrize(
-    ("rod", "saddles"),
-    [(1.7, [("A1B1",), ("A1B1", "aB1")]), pytest.param(1.75, [], marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("rod", "saddles"), [(1.7, [("A1B1",), ("A1B1", "aB1")]), (1.75, [])])
 def test_two_saddles_vanish_as_rods_grow_thicker(rod, saddles):
     model = RelativePlacements(DumbbellPair(length=14, ball_radius=3, rod_radius=rod))
     box = [(4.25, 4.4), (5.4, 5.6), (2.44, 2.5), (1.55, 1.59)]

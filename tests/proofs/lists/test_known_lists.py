@@ -11,7 +11,7 @@ from benchmarks.trials.planar import Energy, PlanarProblem, disc, line, separabl
 from polycorner.proofs import stationary_points
 
 pytestmark = pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
-SEED, EACH, MANY = 11, 3, 25
+SEED, EACH, MANY = 11, 2, 25
 IDENTITY = ((Q(1), Q(0)), (Q(0), Q(1)))
 HERE = (Q(0), Q(0))
 
