@@ -3,13 +3,15 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from polycorner.formulas.adjoints import derivatives
+from polycorner.formulas.adjoints import LEAVES, derivatives
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph
+from polycorner.formulas.ranges import arguments
 from polycorner.minimisation.series import Ring, ring
 from polycorner.spaces.manifold import Array
 
@@ -32,21 +34,50 @@ def function_series(
     NotAnalyticError
         Where a formula has no power series.
     """
-    done: dict[tuple[int, tuple[int, ...], tuple[float, ...]], _Evaluation] = {}
-    results = []
-    for f in functions:
-        graph, values, gradients = _nodes(f.family)
-        key = id(f.family), f.reads, f.parameters
-        if key not in done:
-            done[key] = _Evaluation(graph, [q[i] for i in f.reads], f.parameters, domain)
-        row, k = f.family.names.index(f.member_name), len(f.reads)
-        series = [done[key].value(values[row])]
-        if slopes:
-            partial = dict(zip(f.reads, gradients[row * k : (row + 1) * k], strict=True))
-            zero = domain.constant(0.0)
-            series += [done[key].value(partial[i]) if i in partial else zero for i in range(len(q))]
-        results.append(series)
+    grouped: dict[tuple[int, tuple[int, ...], tuple[float, ...]], list[int]] = {}
+    for position, f in enumerate(functions):
+        grouped.setdefault((id(f.family), f.reads, f.parameters), []).append(position)
+    results: list[list[Array]] = [[] for _ in functions]
+    for (_, reads, parameters), positions in grouped.items():
+        family = functions[positions[0]].family
+        plan = _plan(family, tuple([functions[i].member_name for i in positions]), slopes)
+        series = _evaluated(plan.steps, [q[i] for i in reads], parameters, domain)
+        for position, targets in zip(positions, plan.targets, strict=True):
+            found = results[position]
+            found.append(series[targets[0]])
+            if slopes:
+                partial = dict(zip(reads, targets[1:], strict=True))
+                zero = domain.constant(0.0)
+                found += [series[partial[i]] if i in partial else zero for i in range(len(q))]
     return results
+
+
+class _Plan(NamedTuple):
+    """Operations in order, and for each function the nodes of its value and its derivatives."""
+
+    steps: list[tuple[int, str, tuple[Any, ...]]]
+    targets: list[list[int]]
+
+
+@lru_cache(maxsize=256)
+def _plan(family: Family, members: tuple[str, ...], slopes: bool) -> _Plan:
+    """Return what some functions of a family need, each node once, after its arguments."""
+    graph, values, gradients = _nodes(family)
+    rows, k = [family.names.index(name) for name in members], len(family.variables)
+    targets = [
+        [values[row], *(gradients[row * k : (row + 1) * k] if slopes else ())] for row in rows
+    ]
+    needed, stack = set[int](), [node for some in targets for node in some]
+    while stack:
+        top = stack.pop()
+        if top not in needed:
+            needed.add(top)
+            stack += arguments(graph, top)
+    steps = []
+    for node in sorted(needed):
+        op, args = graph.nodes[node]
+        steps.append((node, op, args if op in LEAVES else tuple(arguments(graph, node))))
+    return _Plan(steps, targets)
 
 
 @lru_cache(maxsize=256)
@@ -56,59 +87,38 @@ def _nodes(family: Family) -> tuple[Graph, list[int], list[int]]:
     return program.graph, values, gradients
 
 
-class _Evaluation:
-    """The nodes of one graph evaluated in a ring, each at most once."""
+def _evaluated(
+    steps: Sequence[tuple[int, str, tuple[Any, ...]]],
+    q: Sequence[Array],
+    parameters: Sequence[float],
+    domain: Ring,
+) -> dict[int, Array]:
+    """Return the series of every node of a plan."""
+    series: dict[int, Array] = {}
+    with np.errstate(all="ignore"):
+        for node, op, args in steps:
+            if op == "var":
+                series[node] = q[args[0]]
+            elif op in LEAVES:
+                series[node] = _number(parameters[args[0]] if op == "par" else args[0], domain)
+            else:
+                try:
+                    series[node] = _RULES[op](domain, *[series[a] for a in args])
+                except (KeyError, ZeroDivisionError, OverflowError, ValueError) as error:
+                    msg = f"{op} has no power series there"
+                    raise NotAnalyticError(msg) from error
+    if not np.isfinite([*series.values()]).all():
+        msg = "an operation has no power series there"
+        raise NotAnalyticError(msg)
+    return series
 
-    def __init__(
-        self, graph: Graph, q: Sequence[Array], parameters: tuple[float, ...], domain: Ring
-    ) -> None:
-        self.graph, self.q, self.parameters, self.ring = graph, q, parameters, domain
-        self._done: dict[int, Array] = {}
 
-    def value(self, node: int) -> Array:
-        """Return the series of a node."""
-        needed, stack = set[int](), [node]
-        while stack:
-            top = stack.pop()
-            if top not in needed and top not in self._done:
-                needed.add(top)
-                stack += self._children(top)
-        found = []
-        with np.errstate(all="ignore"):
-            for k in sorted(needed):  # a node comes after its arguments
-                self._done[k] = self._operate(k)
-                found.append(self._done[k])
-        if found and not np.isfinite(found).all():
-            for k in needed:
-                del self._done[k]
-            msg = "an operation has no power series there"
-            raise NotAnalyticError(msg)
-        return self._done[node]
-
-    def _children(self, node: int) -> list[int]:
-        op, args = self.graph.nodes[node]
-        leaf = op in {"const", "var", "par"}
-        return [] if leaf else [a for a in args if isinstance(a, int)]
-
-    def _operate(self, node: int) -> Array:
-        op, args = self.graph.nodes[node]
-        if op in {"var", "par"} and isinstance(args[0], int):
-            return self.q[args[0]] if op == "var" else self._inexact(self.parameters[args[0]])
-        if op == "const":
-            named = {"pi": math.pi, "e": math.e}
-            exact = args[0]
-            return self._inexact(named[exact] if isinstance(exact, str) else float(exact))
-        series = [self._done[k] for k in self._children(node)]
-        try:
-            return _RULES[op](self.ring, *series)
-        except (KeyError, ZeroDivisionError, OverflowError, ValueError) as error:
-            msg = f"{op} has no power series there"
-            raise NotAnalyticError(msg) from error
-
-    def _inexact(self, value: float) -> Array:
-        series = self.ring.constant(value)
-        series[1, 0] = 0.0 if value.is_integer() else abs(value)
-        return series
+def _number(exact: Any, domain: Ring) -> Array:
+    """Return a constant with a bound of its rounding error."""
+    value = {"pi": math.pi, "e": math.e}[exact] if isinstance(exact, str) else float(exact)
+    series = domain.constant(value)
+    series[1, 0] = 0.0 if value.is_integer() else abs(value)
+    return series
 
 
 # --------------------------------------------------------------- rules
