@@ -77,9 +77,7 @@ MODELS = {
 @pytest.mark.parametrize(
     ("model", "kind"),
     [
-        pytest.param(model, kind, marks=pytest.mark.slow)
-        if (model, kind) == ("drum", "stepped") and len(KINDS) > 1
-        else (model, kind)
+        pytest.param(model, kind, marks=pytest.mark.slow) if model == "drum" else (model, kind)
         for model in MODELS
         for kind in KINDS
     ],
