@@ -4,6 +4,7 @@ from math import comb, cos, hypot, sin
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from paper_checks.appendixB import near as strata_near
 from paper_checks.appendixB import polyhedra
@@ -50,9 +51,8 @@ def test_strata_around_points_are_those_of_points_near_them():
             continue
         point = next(p for p in spot.example.points if stratum_at(D, p) == spot.stratum)
         met = set()
-        for direction in rng.normal(size=(100, D.dimension)) * rng.integers(
-            0, 2, size=(100, D.dimension)
-        ):
+        size = max(100, settings.default.max_examples), D.dimension
+        for direction in rng.normal(size=size) * rng.integers(0, 2, size=size):
             near = point + 1e-3 * direction
             if D.contains(near, tolerance=1e-12):
                 met.add(stratum_at(D, near).dimension)

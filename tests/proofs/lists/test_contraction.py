@@ -74,7 +74,7 @@ numbers = st.integers(-6, 6).map(lambda k: sympy.Rational(k, 2))
     union=st.booleans(),
     seed=st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=max(10, settings.default.max_examples // 2), deadline=None)
 def test_no_point_of_the_set_is_cut_off(terms, union, seed):
     """By the definition, on a grid in each box."""
     forms = [

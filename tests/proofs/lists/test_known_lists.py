@@ -4,6 +4,7 @@ from fractions import Fraction as Q
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from benchmarks.trials import falsified, known_lists
 from benchmarks.trials.known import complaints
@@ -11,7 +12,8 @@ from benchmarks.trials.planar import Energy, PlanarProblem, disc, line, separabl
 from polycorner.proofs import stationary_points
 
 pytestmark = pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
-SEED, EACH, MANY = 11, 2, 25
+SEED, MANY = 11, 25
+EACH = max(2, settings.default.max_examples // 300)
 IDENTITY = ((Q(1), Q(0)), (Q(0), Q(1)))
 HERE = (Q(0), Q(0))
 
