@@ -109,12 +109,7 @@ class CompiledKernel:
         ]
 
     def _code(
-        self,
-        emitted: Callable[..., Any],
-        name: str,
-        entries: tuple[str, ...],
-        *,
-        optimise: bool = True,
+        self, emitted: Callable[..., Any], name: str, entries: tuple[str, ...]
     ) -> tuple[Any, list[int], str]:
         """Return an engine with machine code, the addresses in it, and where it came from."""
         code, kernel = read_code(name), self.kernel
@@ -125,7 +120,7 @@ class CompiledKernel:
             )
             module = ir.Module(name=name)
             emitted(module, kernel.program, self.order, name)
-            code = machine_code(str(module), optimise=optimise)
+            code = machine_code(str(module))
             write_code(name, code)
         return *load_code(code, [f"{name}_{entry}" for entry in entries]), origin
 
@@ -137,8 +132,7 @@ class CompiledKernel:
             return None
         if read_code(name) is None and isinstance(self.kernel.program, Polynomial):
             return None
-        # Vectors are written out, so that LLVM's passes take time and gain none.
-        engine, (batch,), _ = self._code(emit_lanes, name, ("batch",), optimise=False)
+        engine, (batch,), _ = self._code(emit_lanes, name, ("batch",))
         call = ctypes.CFUNCTYPE(None, ctypes.c_int64, *[ctypes.c_void_p] * 5)(batch)
         return engine, call
 
