@@ -1,6 +1,7 @@
 """Shared configuration: a silent plotting back end, the amount of generated input, a browser.
 
-``HYPOTHESIS_PROFILE=thorough`` asks for more examples than the default profile ``fast``.
+``HYPOTHESIS_PROFILE=thorough`` asks for more examples than the default profile ``fast``, and
+``--disturbed 1`` runs the tests on linear algebra with other last bits (`linear_algebra`).
 """
 
 import os
@@ -10,6 +11,7 @@ import chromium
 import matplotlib as mpl
 import pytest
 from hypothesis import HealthCheck, settings
+from linear_algebra import Disturbed
 
 from polycorner.formulas.cache import cache_folder
 
@@ -35,6 +37,21 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fast"))
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--disturbed",
+        type=int,
+        metavar="SEED",
+        help="round linear algebra as another processor might",
+    )
+
+
+def pytest_configure(config):
+    seed = config.getoption("--disturbed")
+    if seed is not None:
+        Disturbed(seed).install(pytest.MonkeyPatch())
 
 
 @pytest.fixture(scope="module")

@@ -33,11 +33,15 @@ def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
     """Whether the cubic through values and slopes at both ends comes near zero in between.
 
     It falls first and rises at the end, so that it has one minimum there: where its slope, ``c +
-    b t + a t^2`` with ``c < 0 <= a + b + c``, grows through zero.
+    b t + a t^2`` with ``c < 0 <= a + b + c``, grows through zero.  The root is computed without
+    cancellation: for ``b < 0``, where ``a >= -b - c > 0``, by a formula of its own.
     """
-    c, last = h * slope0, h * slope1
+    f0, f1, c, last = float(f0), float(f1), float(h * slope0), float(h * slope1)
+    if not c < 0:  # it was so small that it vanishes
+        return False
     a, b = 3 * (2 * (f0 - f1) + c + last), 6 * (f1 - f0) - 4 * c - 2 * last
-    t = -2 * c / (b + math.sqrt(max(b * b - 4 * a * c, 0.0)))
+    root = math.hypot(b, 2 * math.sqrt(-a * c)) if a >= 0 else math.sqrt(max(b * b - 4 * a * c, 0))
+    t = (root - b) / (2 * a) if b < 0 else -2 * c / (b + root)
     lowest = f0 + t * (c + t * (b / 2 + t * a / 3))
     return bool(lowest < 0.25 * min(f0, f1) + 1e-9)
 

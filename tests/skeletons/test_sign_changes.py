@@ -17,3 +17,23 @@ def test_a_dip_is_where_the_cubic_is_lowest(f0, f1, fall, rise, h):
     bound = 0.25 * min(f0, f1)
     assume(abs(lowest - bound) > 1e-4 * max(f0, f1, h * fall, h * rise))
     assert dips(f0, f1, -fall, rise, h) == (lowest < bound)
+
+
+@given(
+    st.floats(-1e3, 1e3),
+    st.floats(1e-3, 1e3),
+    st.floats(1e-3, 1 - 1e-3),
+    st.floats(0, 1e3),
+    st.sampled_from([0.0, 1e-320, 1e-200, 1e-17, 1.0, 1e150]),
+)
+def test_every_cubic_has_an_answer_without_a_warning(f0, fall, turn, bend, size):
+    """The slope is ``(t - turn) (bend t + fall / turn)``; sizes from 0 to overflow follow."""
+    p, q, r = bend, fall / turn - bend * turn, -fall
+    f1 = f0 + r + q / 2 + p / 3
+    lowest = f0 + turn * (r + turn * (q / 2 + turn * p / 3))
+    assume(abs(lowest - 0.25 * min(f0, f1)) > 1e-6 * max(abs(f0), fall, bend, 1.0))
+    exact = np.array([f0, f1, -fall, p + q + r])
+    scaled = np.array([size * value for value in exact.tolist()])
+    with np.errstate(all="raise"):
+        assert dips(*exact, 1.0) == (lowest < 0.25 * min(f0, f1))
+        assert dips(*scaled, 1.0) in {True, False}

@@ -1,66 +1,138 @@
-"""Linear algebra that rounds differently: what another processor or LAPACK may return."""
+"""Linear algebra that rounds differently: what another processor or LAPACK may return.
+
+A backward stable implementation returns the exact result for a matrix that differs in its last
+bits, up to last bits of the result; signs and null bases that the definition leaves open are its
+own.  Here all these are drawn from a table, at a place that the bits of the arguments and a seed
+determine: equal arguments give equal results, in every thread and process, as they do on a real
+processor.  Entries that are zero stay zero.
+"""
+
+import math
+import zlib
+from functools import wraps
 
 import numpy as np
 
 EPSILON = np.finfo(np.float64).eps
+TABLE = 1 << 14
+ARGUMENTS = ("matrix_rank", "slogdet", "eigvalsh", "eigvals", "det", "cond")  # results follow
+BOTH = ("solve", "inv", "pinv", "lstsq", "cholesky", "eig")
+RESULTS = ("norm",)
+SCIPY = ("null_space", "orth", "solve", "lstsq", "svd", "qr", "eigh", "cholesky", "norm")
+LAPACK = ("dgeqrf", "dorgqr", "dormqr", "dtrtrs")
 
 
 class Disturbed:
-    """Factorisations of NumPy with other signs, other null bases and other last bits.
+    """Functions of ``numpy.linalg``, ``scipy.linalg`` and LAPACK with other last bits.
 
-    Every result is one that a backward stable implementation may return for the same matrix.
+    Parameters
+    ----------
+    seed : int
+        Which other processor it is.
     """
 
     def __init__(self, seed):
-        self.rng = np.random.default_rng(seed)
-        self.svd_, self.qr_, self.eigh_ = np.linalg.svd, np.linalg.qr, np.linalg.eigh
-        self.solve_, self.inv_, self.det_ = np.linalg.solve, np.linalg.inv, np.linalg.det
+        self.seed = seed
+        self.table = np.clip(np.random.default_rng(seed).standard_normal(TABLE), -3, 3)
+        self.orthonormal = np.linalg.qr
 
     def install(self, monkeypatch):
-        """Put the disturbed functions in place of NumPy's."""
-        for name in ("svd", "qr", "eigh", "solve", "inv", "det"):
-            monkeypatch.setattr(np.linalg, name, getattr(self, name))
+        """Put the disturbed functions in place of those of NumPy and SciPy."""
+        import scipy.linalg
+        from scipy.linalg import lapack
+
+        plans = [
+            (np.linalg, ("svd",), self.svd),
+            (np.linalg, ("qr",), self.qr),
+            (np.linalg, ("eigh",), self.eigh),
+            (np.linalg, ARGUMENTS, self.of_noisy),
+            (np.linalg, BOTH, lambda function: self.noisily(self.of_noisy(function))),
+            (np.linalg, RESULTS, self.noisily),
+            (scipy.linalg, SCIPY, self.noisily),
+            (lapack, LAPACK, self.noisily),
+        ]
+        for module, names, disturb in plans:
+            for name in names:
+                monkeypatch.setattr(module, name, disturb(getattr(module, name)))
         return self
 
-    def noisy(self, array):
-        size = abs(array).max(initial=0.0)
-        return array + 2 * EPSILON * size * self.rng.standard_normal(np.shape(array))
+    def draw(self, shape, array, turn=0):
+        """Return random numbers that the bits of an array determine."""
+        place = zlib.crc32(array.tobytes(), self.seed + turn) % (TABLE // 2)
+        size = math.prod(shape)
+        if size <= TABLE // 2:
+            return self.table[place : place + size].reshape(shape)
+        return self.table.take(np.arange(place, place + size), mode="wrap").reshape(shape)
 
-    def signs(self, count):
-        return self.rng.choice([-1.0, 1.0], count)
+    def noisy(self, found):
+        """Return numbers whose last bits are others: arrays, floats, or tuples of such."""
+        if isinstance(found, tuple):
+            parts = [self.noisy(part) for part in found]
+            return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
+        if isinstance(found, float):
+            return type(found)(self.noisy(np.array([found]))[0])
+        if isinstance(found, np.ndarray) and found.dtype.kind == "f" and found.size:
+            return found * (1 + 2 * EPSILON * self.draw(found.shape, found))
+        return found
+
+    def noisily(self, function):
+        """Return a function with noisy results."""
+        return wraps(function)(lambda *given, **options: self.noisy(function(*given, **options)))
+
+    def of_noisy(self, function):
+        """Return a function of a matrix that is noisy."""
+
+        @wraps(function)
+        def disturbed(matrix, *others, **options):
+            return function(self.matrix(matrix), *others, **options)
+
+        return disturbed
+
+    def matrix(self, given):
+        array = np.asarray(given)
+        return self.noisy(array.astype(float) if array.dtype.kind in "iu" else array)
+
+    def signs(self, array):
+        """Return signs, one for each column of an array."""
+        return np.where(self.draw((array.shape[-1],), array, 1) < 0, -1.0, 1.0)
 
     def turned(self, rows):
         """Return another orthonormal basis of the space that some rows span."""
-        if not len(rows):
-            return rows
-        return self.qr_(self.rng.standard_normal((len(rows), len(rows))))[0] @ rows
+        k = len(rows)
+        return self.orthonormal(self.draw((k, k), rows, 2))[0] @ rows if k else rows
 
-    def svd(self, matrix, *_, **options):
-        if options or np.ndim(matrix) != 2:
-            return self.svd_(matrix, *_, **options)
-        left, singular, right = self.svd_(self.noisy(matrix))
-        k = len(singular)
-        signs = self.signs(k)
-        left[:, :k] *= signs
-        right[:k] *= signs[:, None]
-        right[k:] = self.turned(right[k:])
-        left[:, k:] = self.turned(left[:, k:].T).T
-        return left, singular, right
+    def svd(self, function):
+        @wraps(function)
+        def disturbed(matrix, full_matrices=True, compute_uv=True):
+            matrix = self.matrix(matrix)
+            found = function(matrix, full_matrices, compute_uv)
+            if not compute_uv or not matrix.size:
+                return found
+            left, singular, right = map(np.copy, found)
+            k = singular.shape[-1]
+            signs = self.signs(left[..., :k])
+            left[..., :k] *= signs
+            right[..., :k, :] *= signs[:, None]
+            if matrix.ndim == 2:
+                right[k:] = self.turned(right[k:])
+                left[:, k:] = self.turned(left[:, k:].T).T
+            return type(found)(left, singular, right)
 
-    def qr(self, matrix, **options):
-        q, r = self.qr_(self.noisy(matrix), **options)
-        signs = self.signs(q.shape[-1])
-        return q * signs, r * signs[:, None]
+        return disturbed
 
-    def eigh(self, matrix):
-        values, axes = self.eigh_(self.noisy(matrix))
-        return values, axes * self.signs(axes.shape[-1])
+    def qr(self, function):
+        @wraps(function)
+        def disturbed(matrix, mode="reduced"):
+            found = function(self.matrix(matrix), mode)
+            signs = self.signs(found[0])
+            return type(found)(found[0] * signs, found[1] * signs[:, None])
 
-    def solve(self, matrix, right):
-        return self.noisy(self.solve_(matrix, right))
+        return disturbed
 
-    def inv(self, matrix):
-        return self.noisy(self.inv_(matrix))
+    def eigh(self, function):
+        @wraps(function)
+        def disturbed(matrix, UPLO="L"):
+            found = function(self.matrix(matrix), UPLO)
+            return type(found)(found[0], found[1] * self.signs(found[1]))
 
-    def det(self, matrix):
-        return self.det_(self.noisy(matrix))
+        return disturbed

@@ -92,10 +92,10 @@ def decompressed(
         if mean < APART * expected:
             expected = min(expected / (1 - DEFLATED), WIDEST)
             inflation *= 1 + expected
-        elif last or mean <= overlap:
+        elif last:
             break
-        else:
-            share = min(DEFLATED, 1 - overlap / mean)
+        else:  # where they overlap little enough, they have only to be balanced
+            share = min(DEFLATED, max(1 - overlap / mean, 0.0))
             inflation *= 1 - share * excess(overlaps)
             expected = max((1 - DEFLATED) * mean, overlap)
     return centres
