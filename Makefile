@@ -1,9 +1,10 @@
 # `make` lists the targets.  A target that needs the environment builds it first.
 
 PYTEST := .venv/bin/python -m pytest
+NUMERICAL := $(addprefix tests/, polyhedra skeletons minimisation proofs bodies models motion spaces intervals)
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad paper test cores thorough intermediate lint format types imports docs links bench trials constraints clean
+.PHONY: help env env-pip dyad paper test disturbed cores thorough intermediate lint format types imports docs links bench trials constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -40,15 +41,18 @@ paper: .venv/.runtime ## every claim of the paper checked, slow ones too; the re
 # ----------------------------------------------------------------------------------------- check
 
 # The workers already use every core; threads inside the linear algebra would only compete.
-test cores thorough: export OPENBLAS_NUM_THREADS = 1
-test cores thorough: export OMP_NUM_THREADS = 1
+test disturbed cores thorough: export OPENBLAS_NUM_THREADS = 1
+test disturbed cores thorough: export OMP_NUM_THREADS = 1
 
 test: .venv/.dev ## tests and doctests, without those marked slow
 	@$(PYTEST) -n auto --dist worksteal -m "not slow"
 
-cores: .venv/.dev ## geometry again, with the linear algebra of an older processor (x86 only)
-	@OPENBLAS_CORETYPE=Haswell HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "not slow" \
-	    tests/polyhedra tests/skeletons/test_skeleton.py tests/minimisation
+disturbed: .venv/.dev ## what rests on linear algebra, again with other last bits
+	@HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "not slow" --disturbed 1 $(NUMERICAL)
+
+cores: .venv/.dev ## `make test` with the linear algebra of each kind of processor (x86 only; hours)
+	@set -e; for core in Prescott Haswell Zen SkylakeX; do echo "$$core"; \
+	    OPENBLAS_CORETYPE=$$core $(PYTEST) -n auto --dist worksteal -q -m "not slow"; done
 
 thorough: .venv/.dev ## all tests, with many more generated inputs
 	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto --dist worksteal

@@ -96,3 +96,18 @@ def test_no_imports_form_a_circle_not_even_for_type_checking():
     assert len(arrows) > 200
     circles = [c for c in nx.strongly_connected_components(arrows) if len(c) > 1]
     assert not circles
+
+
+UNDEFINED = """
+import warnings, numpy, polycorner
+for name in ("polycorner.motion.anywhere", "mine"):
+    with warnings.catch_warnings(record=True) as heard:
+        exec("numpy.array([1.0, 0.0]) / 0", {"__name__": name, "numpy": numpy})
+    print(name, len(heard))
+"""
+
+
+def test_warnings_of_numpy_are_those_of_a_users_own_lines():
+    command = [sys.executable, "-c", UNDEFINED]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[:2] == ["polycorner.motion.anywhere 0", "mine 2"]
