@@ -131,8 +131,8 @@ class Disturbed:
 
     def eigh(self, function):
         @wraps(function)
-        def disturbed(matrix, UPLO="L"):
-            found = function(self.matrix(matrix), UPLO)
+        def disturbed(matrix, *others):
+            found = function(self.matrix(matrix), *others)
             return type(found)(found[0], found[1] * self.signs(found[1]))
 
         return disturbed
