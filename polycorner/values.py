@@ -1,10 +1,29 @@
 """Immutable values: pickled by their content alone, with read-only arrays."""
 
+import functools
 from collections.abc import Mapping
-from functools import cache, cached_property
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from functools import cached_property as cached_property  # noqa: PLC0414 - for all to import
+else:
+
+    class cached_property(functools.cached_property):  # noqa: N801 - as the one of Python
+        """A property that is computed once, and keeps the first value that any thread computes.
+
+        Addresses of what such a value owns are in tables of compiled code: it must not be
+        replaced by that of a slower thread, as Python's own does from 3.12 on.  Before, that one
+        holds a lock for all instances while it computes, so that threads may wait for each other.
+        """
+
+        def __get__(self, instance: Any, owner: Any = None) -> Any:
+            """Return the value; later accesses find it among the attributes."""
+            if instance is None:
+                return self
+            return vars(instance).setdefault(self.attrname, self.func(instance))
 
 
 class Value:

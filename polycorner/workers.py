@@ -12,11 +12,12 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 from polycorner.checks import refuse, whole
 from polycorner.errors import WorkersError
+from polycorner.values import cached_property
 
 AHEAD = 3  # batches, or calls, in flight for each worker
 LARGEST = 200  # points in a batch

@@ -4,12 +4,11 @@ import copy
 import pickle
 import threading
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pytest
 
-from polycorner.values import Value, read_only
+from polycorner.values import Value, cached_property, read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,3 +58,19 @@ def test_the_array_of_a_caller_stays_writable():
     own[0] = 1.0
     assert seen[0] == 1.0
     assert read_only(seen) is seen
+
+
+def test_a_cached_property_keeps_the_value_that_a_thread_finds_first():
+    found = []
+
+    class Slow:
+        @cached_property
+        def made(self):
+            if threading.current_thread() is threading.main_thread():
+                quick.start()
+                quick.join(30)
+            return object()
+
+    slow = Slow()
+    quick = threading.Thread(target=lambda: found.append(slow.made))
+    assert [slow.made, slow.made] == found * 2

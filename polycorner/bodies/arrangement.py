@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, reduce
+from functools import reduce
 from operator import mul
 from typing import Any, Literal
 
@@ -35,7 +35,7 @@ from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 ORIENTATIONS = ("needed", "all", "none")
 BETWEEN = "between"  # the name of the contacts among repeated bodies

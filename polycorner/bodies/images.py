@@ -10,7 +10,7 @@ replaced:
 """
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from polycorner.formulas import cache
 from polycorner.formulas.compositions import substituted
 from polycorner.formulas.families import Family
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

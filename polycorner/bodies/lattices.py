@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations, product
 from typing import Any
 
@@ -15,7 +14,7 @@ from polycorner.bodies.facets import FLAT
 from polycorner.bodies.shapes import Body, Part
 from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 # The gap of two bodies jumps where their displacement is half a multiple of the period; they are
 # no longer than this part of it, so that the gap is well above zero there.

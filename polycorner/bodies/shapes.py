@@ -7,7 +7,6 @@ ball about one point, a capsule about two, a convex polygon or polyhedron, round
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from polycorner import checks
 from polycorner.bodies.facets import FLAT, Facets, facets
 from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 Turn = float | Rotation
 

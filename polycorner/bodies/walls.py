@@ -6,7 +6,6 @@ inside is convex.  The outside of a cylinder, a sphere or a box is that of a fix
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from polycorner.checks import refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 ALONG = 1e-6  # 1 minus the cosine of the angle to x up to which an axis counts as along it
 

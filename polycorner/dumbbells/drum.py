@@ -9,7 +9,6 @@ g mm^2/s^2 = nJ.
 
 import math
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, Pai
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     from polycorner.motion.trajectory import Trajectory

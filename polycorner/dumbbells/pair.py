@@ -6,7 +6,6 @@ non-overlapping placements out of ``M x M``; the energy is the height of the bal
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -20,7 +19,7 @@ from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 Chirality = Literal["L", "R"]
 

@@ -12,7 +12,6 @@ time but the direction of gravity.  Sliding friction and rolling resistance act 
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +27,7 @@ from polycorner.motion.mechanics import State
 from polycorner.motion.system import System
 from polycorner.spaces.arguments import reals
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 BALLS = ("D.1-drum", "D.2-drum")  # contacts of the balls with the drum
 

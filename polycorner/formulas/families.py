@@ -4,14 +4,14 @@ import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.expressions import kinks
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

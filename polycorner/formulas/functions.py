@@ -1,7 +1,6 @@
 """Smooth functions on a manifold: one SymPy expression gives value, gradient and Hessian."""
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from polycorner.formulas.families import Family
 from polycorner.formulas.periodicity import check_function
 from polycorner.spaces.arguments import finite, reals, scalar
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

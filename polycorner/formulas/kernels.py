@@ -8,7 +8,8 @@ import ctypes
 import hashlib
 import logging
 from collections.abc import Callable
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from polycorner.formulas.cache import read_code, source_key, write_code
 from polycorner.formulas.machine_code import load_code, machine_code, machine_key
 from polycorner.formulas.programs import Polynomial, Program
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 LOG = logging.getLogger("polycorner.compilation")
 MANY = 64  # points from which on they are evaluated in lanes
@@ -53,6 +55,7 @@ class Kernel:
         self.key, self._program = key, program
         self.variables, self.parameters, self.outputs = variables, parameters, outputs
         self._compiled: dict[int, CompiledKernel] = {}
+        self._compiling = Lock()
 
     @cached_property
     def program(self) -> Program | Polynomial:
@@ -60,9 +63,14 @@ class Kernel:
         return self._program()
 
     def compiled(self, order: int) -> "CompiledKernel":
-        """Return the machine code for derivatives up to ``order`` (0, 1 or 2)."""
+        """Return the machine code for derivatives up to ``order`` (0, 1 or 2).
+
+        It stays the same as long as the kernel lives, for its address is in tables.
+        """
         if order not in self._compiled:
-            self._compiled[order] = CompiledKernel(self, order)
+            with self._compiling:
+                if order not in self._compiled:
+                    self._compiled[order] = CompiledKernel(self, order)
         return self._compiled[order]
 
     def at(self, q: Array, parameters: int, order: int) -> tuple[Array, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import llvmlite
 from llvmlite import binding as llvm
+from llvmlite.binding.ffi import ObjectRef
 
 from polycorner.formulas import emit
 from polycorner.formulas.cache import source_key
@@ -64,7 +65,16 @@ def load_code(code: bytes, entries: list[str]) -> tuple[Any, list[int]]:
 
 def _run_passes(parsed: Any, target: Any, options: Any) -> None:
     builder = llvm.create_pass_builder(target, options)
-    builder.getModulePassManager().run(parsed, builder)
+    passes = builder.getModulePassManager()
+    passes.run(parsed, builder)
+    # In some versions of llvmlite passes inherit what frees nothing before what frees them, and
+    # every kernel that is compiled would leave 0.1 MB.
+    kinds: tuple[Any, ...] = type(passes).__mro__
+    for kind in kinds:
+        if "_dispose" in vars(kind) and kind is not ObjectRef:
+            kind._dispose(passes)  # noqa: SLF001 - nothing public frees them
+            passes.detach()
+            break
 
 
 @lru_cache(maxsize=1)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from polycorner.formulas.programs import Polynomial, Program
 from polycorner.formulas.translate import Translator, representable
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 # Kernels in use, by the key of their shape.
 _KERNELS: "WeakValueDictionary[str, Kernel]" = WeakValueDictionary()
+_SHARING = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +69,11 @@ def shared_kernel(
     """Return the kernel of a key: the one in use, if there is one."""
     from polycorner.formulas.kernels import Kernel
 
-    kernel = _KERNELS.get(key)
-    if kernel is None:
-        kernel = Kernel(key, program, variables=variables, parameters=parameters, outputs=outputs)
-        _KERNELS[key] = kernel
+    with _SHARING:
+        kernel = _KERNELS.get(key)
+        if kernel is None:
+            sizes = {"variables": variables, "parameters": parameters, "outputs": outputs}
+            kernel = _KERNELS[key] = Kernel(key, program, **sizes)
     return kernel
 
 

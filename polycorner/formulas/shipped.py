@@ -13,7 +13,6 @@ import lzma
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from typing import Any
 from polycorner.atomic import write_atomically
 from polycorner.formulas.cache import one_at_a_time, read_code, sources_digest, write_code
 from polycorner.formulas.machine_code import load_code, machine_code, machine_key
+from polycorner.values import cached_property
 
 LOG = logging.getLogger("polycorner.compilation")
 HEAD = "; made from "

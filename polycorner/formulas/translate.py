@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from functools import cached_property, partial, reduce
+from functools import partial, reduce
 from typing import TYPE_CHECKING
 
 from polycorner.formulas.programs import Graph, Program
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy

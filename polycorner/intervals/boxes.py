@@ -6,7 +6,7 @@ searches that look at millions of boxes.
 """
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from threading import RLock
 
 import numpy as np
@@ -20,6 +20,7 @@ from polycorner.formulas.interval_kernels import IntervalKernel
 from polycorner.formulas.programs import Graph, Program
 from polycorner.intervals.enclosures import exact_program, written
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import cached_property
 
 
 class BoxFunctions:

@@ -11,7 +11,6 @@ first order              ``dE = sum lam_i df_i + sum mu_j dh_j``
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
@@ -44,7 +43,7 @@ from polycorner.printing import (
     units,
 )
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy

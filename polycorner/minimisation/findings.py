@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -14,7 +13,7 @@ from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 T = TypeVar("T")
 Higher = Literal["series", "followed", "none"]  # how orders beyond the second are seen

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 
 from polycorner.checks import instance, refuse
 from polycorner.errors import SolverError
+from polycorner.minimisation.convex import ONE_AT_A_TIME, solve
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, stratum_at
@@ -247,20 +248,16 @@ class _Local:
             return np.zeros(count), np.inf
         forms = np.array([span.T @ bend @ span for bend in self.bends])
         forms = np.tensordot(relations.T, forms, axes=1)
-        x, top = cp.Variable(relations.shape[1]), cp.Variable()
-        total = sum(x[j] * (form + form.T) / 2 for j, form in enumerate(forms))
-        weights = relations @ x
-        limits = [weights[:k] >= 0, cp.sum(weights[:k]) <= 1, cp.abs(x) <= 1]
-        limits.append(top * np.eye(span.shape[1]) - total >> 0)
-        problem = cp.Problem(cp.Minimize(top), limits)
-        try:
-            problem.solve(solver=cp.CLARABEL)
-        except cp.error.SolverError as error:
-            msg = "Clarabel found no solution of a small semidefinite programme"
-            raise SolverError(msg) from error
-        if weights.value is None:
-            msg = f"Clarabel found no solution of a small semidefinite programme: {problem.status}"
-            raise SolverError(msg)
+        with ONE_AT_A_TIME:
+            x, top = cp.Variable(relations.shape[1]), cp.Variable()
+            total = sum(x[j] * (form + form.T) / 2 for j, form in enumerate(forms))
+            weights = relations @ x
+            limits = [weights[:k] >= 0, cp.sum(weights[:k]) <= 1, cp.abs(x) <= 1]
+            limits.append(top * np.eye(span.shape[1]) - total >> 0)
+            problem = cp.Problem(cp.Minimize(top), limits)
+            if not solve(problem):
+                msg = "Clarabel found no solution of a small semidefinite programme"
+                raise SolverError(msg)
         return np.asarray(weights.value), float(top.value)
 
     def _candidates(self, span: Array, inner: Array, weights: Array) -> Iterator[Array]:

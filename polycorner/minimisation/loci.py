@@ -15,7 +15,6 @@ separated by a wall or a barrier thinner than the samples' distance may be count
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 SAME = 1e-6  # distance of invariants, in scale units, up to which two points are one
 LEVEL = 1e-9  # relative difference up to which energies are equal

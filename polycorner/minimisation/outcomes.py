@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import overload
 
 from polycorner.minimisation.abundance import Richness, richness
@@ -10,7 +9,7 @@ from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.printing import Printed, Sheet, listed, names, number, titled
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 
 @dataclass(frozen=True, eq=False, repr=False)

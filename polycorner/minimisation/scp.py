@@ -4,13 +4,13 @@ Each step minimises a convex model of the energy over the linearised polyhedron 
 region ([BV] ch. 4, [NW] ch. 18).
 """
 
-import warnings
 from dataclasses import dataclass
 
 import cvxpy as cp
 import numpy as np
 
 from polycorner.errors import SolverError
+from polycorner.minimisation.convex import ONE_AT_A_TIME, solve
 from polycorner.minimisation.polishing import Endpoint, polished
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import unit_rows
@@ -70,14 +70,8 @@ class Model:
         if cp.CLARABEL not in cp.installed_solvers():
             msg = "cvxpy does not find the solver Clarabel; install the package clarabel"
             raise SolverError(msg)
-        with warnings.catch_warnings():
-            # An inaccurate step does no harm: it is accepted only if the merit decreases.
-            warnings.simplefilter("ignore", UserWarning)
-            try:
-                self.programme.solve(solver=cp.CLARABEL)
-            except cp.error.SolverError:
-                return None  # numerical failure on this step's data
-        if self.step.value is None:
+        # An inaccurate step does no harm: it is accepted only if the merit decreases.
+        if not solve(self.programme):
             return None
         duals = np.zeros(0) if self.contacts is None else np.asarray(self.contacts.dual_value)
         return np.asarray(self.step.value), duals
@@ -100,7 +94,8 @@ def sequential_convex(
     """
     kept = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     count, scales = len(piece), problem.scales
-    model = Model.stated(problem.dimension, count, len(kept) - count)
+    with ONE_AT_A_TIME:
+        model = Model.stated(problem.dimension, count, len(kept) - count)
     values, gradients, hessians = problem.evaluate(q, 2)
     size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
     duals = np.zeros(count)

@@ -6,13 +6,14 @@ rounding errors in units of the machine's precision, propagated to first order: 
 arithmetic, [Higham] sec. 3.3 for running error bounds).
 """
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 EPSILON = float(np.finfo(np.float64).eps)
 

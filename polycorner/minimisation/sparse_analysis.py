@@ -1,7 +1,6 @@
 """Analysis of the optimality conditions at a point of a large sparse polyhedron."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from polycorner.minimisation.sparse.optimality import (
 )
 from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ Its sides are straight or circular walls; some of the arcs bulge into the region
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 SIDES = (
     Wall("AB", (0.2, -1.6), (1, 12), 0.4),

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from polycorner.motion import lagrange
 from polycorner.motion.degrees import degree
 from polycorner.motion.lagrange import EquationsOfMotion
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy

@@ -5,6 +5,7 @@ A body turns with ``a' = a (0, omega) / 2``, ``omega`` in its own axes, so that
 """
 
 from collections.abc import Sequence
+from threading import Lock
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import sympy
 
 FRAMES = ("body", "space")
+_RECOGNISING = Lock()  # of numbers: SymPy sets the precision of mpmath, which all threads share
 
 
 def angular_velocity(
@@ -86,7 +88,8 @@ def rotational_energy(
         refuse("inertia", "three positive moments, or a positive symmetric 3 x 3 matrix", inertia)
     _, v = _quaternion(manifold, name)
     omega = angular_velocity(manifold, name)
-    tensor = sympy.Matrix(3, 3, [sympy.nsimplify(x) for x in matrix.ravel().tolist()])
+    with _RECOGNISING:
+        tensor = sympy.Matrix(3, 3, [sympy.nsimplify(x) for x in matrix.ravel().tolist()])
     mean = tensor.trace() / 3
     deviation = tensor - mean * sympy.eye(3)
     return sympy.expand((omega.T * deviation * omega)[0] / 2 + 2 * mean * v.dot(v))

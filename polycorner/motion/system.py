@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy

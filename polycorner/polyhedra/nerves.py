@@ -12,7 +12,6 @@ pieces, which is a linear programme.
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +22,7 @@ from polycorner.polyhedra.persistence import Bar, bars
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
 from itertools import islice
 from typing import Any, Union
 
@@ -18,7 +17,7 @@ from polycorner.polyhedra.normalisation import normalisations
 from polycorner.printing import Printed, Sheet
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 # A model's remark on a point.
 Annotation = Callable[[Array], str | None]

@@ -14,7 +14,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.functions import SmoothFunction
@@ -26,6 +25,7 @@ from polycorner.intervals.tapes import Box, needed
 from polycorner.polyhedra.symmetry import vector_field
 from polycorner.proofs.polynomials import Polynomial, TooLargeError, product, total
 from polycorner.spaces.manifold import Manifold
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy

@@ -19,7 +19,6 @@ Since ``J`` is convex and all its matrices are regular, the inertia of the KKT m
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import (
@@ -35,6 +34,7 @@ from polycorner.intervals.balls import (
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import SUBJECT, Linear, System
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball, Matrix

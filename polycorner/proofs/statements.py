@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from polycorner.intervals.balls import bounds, decimals
@@ -12,6 +11,7 @@ from polycorner.proofs.exact import ExactPoint, implied, recognised
 from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import System
 from polycorner.proofs.krawczyk import Enclosure
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball

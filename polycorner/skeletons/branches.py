@@ -23,7 +23,7 @@ one relation leave ``k`` dimensions.
 
 import math
 from collections.abc import Iterator
-from functools import cached_property, partial
+from functools import partial
 from itertools import combinations
 from math import comb
 
@@ -37,6 +37,7 @@ from polycorner.skeletons.quadrics import FLAT, common_zeros
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.spheres_about import Link
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 # Least eigenvalue of a semidefinite form relative to the largest that counts as positive.
 CLEAR = 1e-3

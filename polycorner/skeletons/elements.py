@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.walks import End
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import networkx as nx

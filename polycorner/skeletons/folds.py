@@ -36,7 +36,6 @@ Clusters of spheres that are rigid to second order only are of these kinds, and 
 """
 
 from collections.abc import Iterator
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -48,6 +47,7 @@ from polycorner.skeletons.points import EvaluatedPoint, Sample, projected
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 # Distances in scale units at which the edges are looked for.
 DISTANCES = (3e-3, 1e-3, 3e-4)

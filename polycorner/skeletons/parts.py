@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cached_property
 
 from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.skeletons.arcs import arc_length
@@ -11,7 +10,7 @@ from polycorner.skeletons.indices import face_euler_characteristic
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 
 class Completeness(Enum):

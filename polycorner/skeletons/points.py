@@ -7,7 +7,6 @@ symmetry.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 # Sizes of Newton steps in scale units: one that is rounding, and one whose square is.
 EXACT = 1e-13

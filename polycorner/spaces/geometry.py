@@ -4,7 +4,6 @@ These maps are for algorithms: they do not check that points lie on spheres.
 """
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.spaces.arguments import finite, reals
 from polycorner.spaces.embedding import Array
 from polycorner.spaces.factors import NEAR, Factors, factors
-from polycorner.values import Value, read_only
+from polycorner.values import Value, cached_property, read_only
 
 
 class Geometry(Value):

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from polycorner.spaces.arguments import (
 from polycorner.spaces.embedding import rotation_matrix
 from polycorner.spaces.factors import factors
 from polycorner.spaces.geometry import Geometry
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy

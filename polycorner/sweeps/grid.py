@@ -3,13 +3,13 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.checks import instance, refuse
+from polycorner.values import cached_property
 
 Scalar: TypeAlias = bool | int | float | str
 RESERVED = ("status", "message", "seconds", "rng")

@@ -9,7 +9,6 @@ import shlex
 import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property
 from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
@@ -19,6 +18,7 @@ from polycorner import __version__
 from polycorner.errors import PolycornerError
 from polycorner.formulas.families import Family
 from polycorner.sweeps.grid import Grid
+from polycorner.values import cached_property
 
 FORMAT = 2
 

@@ -5,18 +5,23 @@ import os
 import subprocess
 import sys
 import threading
+import weakref
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
+from llvmlite.binding import ffi
 
 import polycorner
-from polycorner import Manifold, SmoothFunction
-from polycorner.formulas import shapes
+from polycorner import Manifold, Polyhedron, SmoothFunction, minimise
+from polycorner.formulas import kernels, shapes
 from polycorner.formulas.bundles import resolve
 from polycorner.formulas.cache import cache_folder, cache_size, clear_cache, one_at_a_time
 from polycorner.formulas.families import Family
+from polycorner.formulas.machine_code import machine_code
+from polycorner.minimisation import problem
 
 ROOT = Path(polycorner.__file__).parents[1]
 LINE = Manifold.euclidean("x")
@@ -24,6 +29,8 @@ LINE = Manifold.euclidean("x")
 KERNEL = """
 import sympy
 from polycorner.formulas.families import Family
+from polycorner.formulas.machine_code import machine_code
+from polycorner.minimisation import problem
 x = sympy.Symbol("x", real=True)
 kernel = Family.of({"f": sympy.sin(x) + x**2}, ("x",)).kernel
 print(*(kernel.compiled(order).origin for order in range(3)))
@@ -216,3 +223,79 @@ def test_the_size_counts_what_clearing_deletes(tmp_path, monkeypatch):
     assert clear_cache() == (files, size)
     assert cache_size() == (0, 0)
     assert made()[1] == "compiled"
+
+
+def test_threads_that_ask_for_code_at_once_are_given_the_same(monkeypatch):
+    make, found, threads = kernels.CompiledKernel, [], []
+
+    def slow(kernel, order):
+        if not threads:  # another thread asks while this one compiles
+            threads.append(threading.Thread(target=lambda: found.append(kernel.compiled(order))))
+            threads[0].start()
+            threads[0].join(0.3)
+        return make(kernel, order)
+
+    monkeypatch.setattr(kernels, "CompiledKernel", slow)
+    shapes.forget()
+    kernel = Family.of({"f": sp.sin(sp.Symbol("x", real=True))}, ("x",)).kernel
+    code = kernel.compiled(1)
+    threads[0].join(30)
+    assert found == [code]
+    assert kernel.compiled(1) is code
+
+
+def test_equal_formulas_of_threads_share_one_kernel(monkeypatch):
+    make, found, threads = kernels.Kernel, [], []
+
+    def shared():
+        return shapes.shared_kernel("a key", lambda: None, 1, 0, 1)
+
+    def slow(*arguments, **sizes):
+        if not threads:
+            threads.append(threading.Thread(target=lambda: found.append(shared())))
+            threads[0].start()
+            threads[0].join(0.3)
+        return make(*arguments, **sizes)
+
+    monkeypatch.setattr(kernels, "Kernel", slow)
+    kernel = shared()
+    threads[0].join(30)
+    assert found == [kernel]
+    assert shared() is kernel
+
+
+def test_code_goes_with_its_polyhedron(monkeypatch):
+    engines, load = weakref.WeakSet(), kernels.load_code
+
+    def noted(code, entries):
+        engine, addresses = load(code, entries)
+        engines.add(engine)
+        return engine, addresses
+
+    monkeypatch.setattr(kernels, "load_code", noted)
+    plane = Manifold.euclidean("x y")
+    x, y = plane.symbols
+    for k in range(3):
+        bowl = Polyhedron(plane, {"bowl": y - sp.cosh(x + sp.Rational(k, 7)) ** (k + 2)})
+        assert minimise(bowl, y + sp.sin(x) ** (k + 2), [0.1, 9.0]).verdict
+        assert engines
+        del bowl
+        problem._posed.cache_clear()
+        gc.collect()
+        assert not engines
+
+
+def test_compiling_leaves_nothing_behind(monkeypatch):
+    counts = Counter()
+    for name in ("buildPerModuleDefaultPipeline", "DisposeNewModulePassManger"):
+        call = getattr(ffi.lib, f"LLVMPY_{name}")
+
+        def counted(*arguments, call=call, name=name):
+            counts[name] += 1
+            return call(*arguments)
+
+        monkeypatch.setitem(ffi.lib._fntab, f"LLVMPY_{name}", counted)
+    for _ in range(3):
+        assert machine_code("define double @twice(double %x) { ret double %x }")
+    gc.collect()
+    assert [*counts.values()] == [3, 3]

@@ -7,7 +7,6 @@ some forty have left at the top, as right-handed dyads.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
 COUNT = 60

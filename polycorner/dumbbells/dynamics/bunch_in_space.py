@@ -6,7 +6,6 @@ place of dumbbells that lie on a developed drum.
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import simulate
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 LAYER = 1.0  # of a ball's radius: dumbbells that are lifted less lie on the drum
 

@@ -8,7 +8,6 @@ occur ([GMBN] sec. 7); nothing is fitted.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +21,7 @@ from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 Start = tuple[Chirality, float]
 SOLVER = Solver(tolerance=1e-6, sweeps=300)

@@ -18,7 +18,6 @@ All angles are in radians.
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -31,7 +30,7 @@ from polycorner.dumbbells.statics.keel_formulas import force_ratio
 from polycorner.formulas import kernels
 from polycorner.spaces.arguments import reals, scalar
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 BISECTIONS = 60  # these bracket an azimuth in a quarter turn to one unit in the last place
 

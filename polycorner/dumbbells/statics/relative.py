@@ -44,7 +44,6 @@ of them holds strictly, so that corners are made of contacts alone.
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,7 +58,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.spaces import distances
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

@@ -4,7 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from polycorner.skeletons.orbits import Orbits, orbits
 from polycorner.skeletons.parts import Corner
 from polycorner.skeletons.search import BUDGET, skeleton
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 PLACEMENTS = 6
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descen
 from polycorner.minimisation import Certificate, Verdict, certify
 from polycorner.polyhedra.strata import LocalType
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 DRUM = 125.0 / 16.0  # ratio of drum radius to length for a pair that starts in the plane
 FRAMES = 150  # most frames of a descent

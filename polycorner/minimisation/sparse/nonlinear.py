@@ -1,7 +1,6 @@
 """Sparse nonlinear programmes: a sum of energies on a set of functions of few coordinates each."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -9,7 +8,7 @@ from scipy.sparse import csr_array, diags_array
 from polycorner.formulas.rows import Indices, SparseRows
 from polycorner.minimisation.sparse.factorisation import lengths
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 
 @dataclass(frozen=True, eq=False)

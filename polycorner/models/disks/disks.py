@@ -5,7 +5,6 @@ one (a regular hexagon with opposite sides identified) has area ``sqrt(3)/2`` ([
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import combinations, product
 from typing import Any, Literal
 
@@ -23,7 +22,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.progress import Progress
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 Lattice = Literal["square", "hexagonal"]
 

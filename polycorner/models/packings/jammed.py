@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from polycorner.minimisation.verdicts import Verdict
 from polycorner.models.packings.contacts import gaps_polyhedron, neighbours
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

@@ -18,7 +18,6 @@ Capture times without noise are given here in closed form, escape times with noi
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from polycorner.minimisation import Entrapment
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.arguments import reals, scalar
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy

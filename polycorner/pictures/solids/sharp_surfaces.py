@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +14,7 @@ from polycorner.pictures.solids.edge_flips import flipped
 from polycorner.pictures.solids.grids import Bounds, Indices, Mask
 from polycorner.pictures.solids.meshes import Isosurface, closed_mesh, isosurface
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,6 @@ Let ``[G]`` enclose the gradients of ``r`` functions on a box ``X`` with the mid
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.proofs.lists.entries import TINY, UNIT
 from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
 
 LARGE = 2.0**200
 MOST_DEFECT = 0.99

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from polycorner.minimisation import Certificate, certify
@@ -14,7 +13,7 @@ from polycorner.proofs.lists.records import Record, save
 from polycorner.proofs.lists.search import Search, Tally
 from polycorner.proofs.parameter_boxes import Interval, shown_box
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import os
