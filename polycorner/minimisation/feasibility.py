@@ -108,10 +108,13 @@ class _Violation:
         if not np.isfinite(self.residuals(u)).all() or not np.isfinite(self.jacobian(u)).all():
             return u, np.inf
         least: Any = {"ftol": 1e-15, "xtol": 1e-15, "gtol": 1e-15}
-        with np.errstate(all="ignore"):
-            end = least_squares(
-                self.residuals, u, self.jacobian, x_scale="jac", max_nfev=EVALUATIONS, **least
-            )
+        try:
+            with np.errstate(all="ignore"):
+                end = least_squares(
+                    self.residuals, u, self.jacobian, x_scale="jac", max_nfev=EVALUATIONS, **least
+                )
+        except ValueError:  # on the way, derivatives were not finite or overflowed in products
+            return u, np.inf
         return end.x, float(np.sqrt(2 * end.cost))
 
     def refined(self, u: Array) -> Array:

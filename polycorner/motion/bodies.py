@@ -205,6 +205,24 @@ class IdenticalBodies(Value):
             found += [self.contacts.gaps.key, *slips]
         return found
 
+    def check_places(self, q: Array, v: Array, dt: float) -> None:
+        """Raise ValueError where a body, now or a step later, is farther than numbers resolve gaps.
+
+        That is where the next number is farther than the unit of gaps, or nowhere.
+        """
+        with np.errstate(all="ignore"):
+            far = (abs(q) + dt * abs(v)) * self.body.units
+            lost = np.argwhere(~(np.spacing(far) < self.body.gap_unit))
+        if len(lost):
+            i, c = lost[0].tolist()
+            name = self.body.formulation.coordinates[c]
+            msg = (
+                f"state: expected coordinates that numbers resolve to {self.body.gap_unit:g}, the "
+                f"unit of gaps, also a step later; got {name} = {q[i, c]:.6g} of body {i} with the "
+                f"velocity {v[i, c]:.6g}"
+            )
+            raise ValueError(msg)
+
     def least_pair_gap(self, q: Array) -> tuple[float, tuple[int, int], str]:
         """Return the least gap between two bodies, the bodies, and the contact.
 

@@ -150,7 +150,8 @@ def simulate(
     noise = Noise() if noise is None else instance("noise", noise, Noise)
     solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
     instance("state", state, State, "system.state(q, v)")
-    end = real("t_end", t_end, least=state.time, most=LONGEST, unit="s")
+    begin = real("state.time", state.time, unit="s")
+    end = real("t_end", t_end, least=begin, most=LONGEST, unit="s")
     steps, step = _steps(end - state.time, real("dt", dt, above=0, unit="s"))
     engine = start(system, state, step, noise=noise, solver=solver)
     stride = max(1, steps // FRAMES) if every is None else whole("every", every, least=1)
@@ -282,9 +283,11 @@ def start(
     frictions = len(bodies.body.friction)
     if state.sticking.size != shape[0] * frictions:
         refuse("state", f"one of {frictions} friction contacts a body", state.sticking.shape)
-    _check_mass(bodies, state.q.reshape(shape), state.v.reshape(shape))
-    system.check_placement(state.q)
     real("dt", dt, least=SHORTEST_STEP, unit="s")
+    placed = state.q.reshape(shape), state.v.reshape(shape)
+    bodies.check_places(*placed, dt)
+    _check_mass(bodies, *placed)
+    system.check_placement(state.q)
     largest, why = system.largest_step(state)
     if dt > largest:
         msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
@@ -294,16 +297,7 @@ def start(
     if noise.kicks and noise.kick_time:
         real("kick_time", noise.kick_time, least=dt / MOST_KICKS, unit="s")
     sticking = np.reshape(state.sticking, (bodies.count, -1))
-    return Engine(
-        bodies,
-        state.q.reshape(shape),
-        state.v.reshape(shape),
-        sticking,
-        dt,
-        start=state.time,
-        noise=noise,
-        solver=solver,
-    )
+    return Engine(bodies, *placed, sticking, dt, start=state.time, noise=noise, solver=solver)
 
 
 def _check_mass(bodies: IdenticalBodies, q: Array, v: Array) -> None:

@@ -7,6 +7,7 @@ from polycorner.minimisation.descent.jit import compiled
 from polycorner.minimisation.descent.linear_algebra import length
 
 FEASIBLE = 1e-10  # scaled constraint violation allowed during the descent
+HUGE = 1e250  # derivatives beyond overflow in products
 
 
 @compiled
@@ -51,7 +52,7 @@ def violation(F, J, use, m):
             return np.inf
         if miss > 0.0:
             size = length(J[i])
-            worst = max(worst, miss / size if size > 0.0 else np.inf)
+            worst = max(worst, miss / size if 0.0 < size < np.inf else np.inf)
     return worst
 
 
@@ -72,7 +73,16 @@ def normalised_rows(F, J, use, m):
         for k in range(J.shape[1]):
             A[j, k] = J[keep[j], k] / sizes[j]
         b[j] = F[keep[j]] / sizes[j]
-    return A, b, keep, sizes
+    return A, b, keep[:count].copy(), sizes
+
+
+@compiled
+def equations_among(keep, m):
+    """Return how many of some rows are equations, the last ones: those without gradient are not."""
+    count = 0
+    for row in keep:
+        count += 1 if row >= m else 0
+    return count
 
 
 @compiled

@@ -5,6 +5,7 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import (
     FEASIBLE,
+    equations_among,
     evaluate,
     normalised_rows,
     violation,
@@ -35,15 +36,15 @@ def least_violation(A, b, equations):
 def project(problem, use, m, u, F, J, H, size, limit):
     """Project ``u`` onto the set by repeated linearisation, in place; return success."""
     never_inline()
-    n, equations = u.size, F.size - 1 - m
+    n = u.size
     eye, zero = identity(n), np.zeros(n)
     evaluate(problem, u, F, J, H, size, False)
     worst = violation(F, J, use, m)
     for _ in range(limit):
         if worst <= FEASIBLE:
             return True
-        A, b, _, _ = normalised_rows(F, J, use, m)
-        count = min(equations, b.size)
+        A, b, keep, _ = normalised_rows(F, J, use, m)
+        count = equations_among(keep, m)
         feasible, d, _ = solve_quadratic(eye, zero, A, b, count)
         if not feasible:
             d = least_violation(A, b, count)
@@ -72,7 +73,7 @@ def project(problem, use, m, u, F, J, H, size, limit):
 def crosses_wall(problem, use, m, u, d, F, J, H, size):
     """Whether the segment ``u`` to ``u + d`` leaves the set, sampled half a scale unit apart."""
     never_inline()
-    samples = min(64, int(np.ceil(2.0 * largest(d))))
+    samples = int(min(64.0, np.ceil(2.0 * largest(d))))
     for k in range(1, samples):
         evaluate(problem, plus(u, k / samples, d), F, J, H, size, False)
         if not violation(F, J, use, m) <= 0.5:

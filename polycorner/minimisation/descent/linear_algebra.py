@@ -47,23 +47,28 @@ def length(v):
 
 
 @compiled
+def magnitude(x):
+    """Return the absolute value; infinite for what is no number, which comparisons would hide."""
+    return np.inf if np.isnan(x) else abs(x)
+
+
+@compiled
 def largest(a):
-    """Return the largest absolute entry of a vector."""
+    """Return the largest absolute entry of a vector; infinite if one is no number."""
     never_inline()
     top = 0.0
     for x in a:
-        top = max(top, abs(x))
+        top = max(top, magnitude(x))
     return top
 
 
 @compiled
 def largest_entry(A):
-    """Return the largest absolute entry of a matrix."""
+    """Return the largest absolute entry of a matrix; infinite if one is no number."""
     never_inline()
     top = 0.0
     for i in range(A.shape[0]):
-        for j in range(A.shape[1]):
-            top = max(top, abs(A[i, j]))
+        top = max(top, largest(A[i]))
     return top
 
 

@@ -107,7 +107,7 @@ def solve_quadratic(L, g, A, b, equations):
             known = count
             rest, r, _ = project_out(Q, R, count, W[p])
             size = length(rest)
-            independent = size > 1e-10 * length(W[p])
+            independent = count < n and size > 1e-10 * length(W[p])
             step, drop = np.inf, -1
             for j in range(count):
                 a = active[j]
@@ -116,7 +116,7 @@ def solve_quadratic(L, g, A, b, equations):
             full = np.inf
             if independent:
                 full = -sign[p] * slack(A, b, x, p) / (size * size)
-            if not independent and drop < 0:
+            if drop < 0 and not full < np.inf:
                 failed = True
                 break
             move = min(step, full)

@@ -5,7 +5,9 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import (
     FEASIBLE,
+    HUGE,
     all_finite,
+    equations_among,
     evaluate,
     lagrangian_hessian,
     normalised_rows,
@@ -36,7 +38,6 @@ CURVELESS = 1e-14  # diagonal entry, relative to the largest, below which a coor
 SPREAD = 1e3  # ratio of scales beyond which they are uneven
 FIRST_CAP = 0.5  # longest first step, in scale units
 PATIENCE = 20  # steps after which convexification may use the active inequalities, too
-HUGE = 1e250  # derivatives beyond overflow in products
 FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
 
 
@@ -55,7 +56,7 @@ def convexified(B, g, A, L):
     across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g))
     if shift < 1e-300:
         shift = 1e-300 if shift > 0.0 else 1.0
-    while True:
+    while shift < HUGE:
         C = B.copy()
         for i in range(n):
             C[i, i] += shift
@@ -68,6 +69,7 @@ def convexified(B, g, A, L):
             across = 10.0 * n * largest_entry(B)
         else:
             shift *= 8.0
+    return False
 
 
 @compiled
@@ -134,7 +136,7 @@ def descend(problem, use, m, rows, u, size, limit):
         for j in range(b.size):
             if abs(b[j]) < FEASIBLE:
                 b[j] = 0.0
-        _, d, mult = solve_quadratic(L, g, A, b, rows - 1 - m)
+        _, d, mult = solve_quadratic(L, g, A, b, equations_among(keep, m))
         for i in range(rows - 1):
             lam[i] = 0.0
         for i in range(m):

@@ -5,6 +5,7 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.minimisation.descent.evaluation import (
     FEASIBLE,
+    HUGE,
     evaluate,
     lagrangian_hessian,
     normalised_rows,
@@ -37,7 +38,8 @@ MIXTURES = 4  # mixtures of flat directions to follow, per direction, where ther
 def least_curvatures(F, J, H, lam, on, m):
     """Return the least relative curvature along the face and the directions of least curvature.
 
-    The first direction has the least curvature; more follow if it vanishes in several.
+    The first direction has the least curvature; more follow if it vanishes in several.  It is not a
+    number where derivatives are not finite, or huge.
     """
     never_inline()
     n, total = H.shape[1], lam.size
@@ -49,6 +51,8 @@ def least_curvatures(F, J, H, lam, on, m):
         cut = RANK * largest(s)
     L = lagrangian_hessian(H, lam)
     reference = max(largest_entry(L), largest_entry(H[total])) + 1e-300
+    if not reference < HUGE:
+        return np.nan, np.zeros((1, n))
     M = np.zeros((n, n))
     for a in range(n):
         for c in range(n):
@@ -68,7 +72,7 @@ def least_curvatures(F, J, H, lam, on, m):
                 values[j] += W[a, j] * M[a, c] * W[c, j]
         values[j] = values[j] / reference - 2.0 * n
         first = values[j] < least
-        if not first and abs(values[j]) > CURVED:
+        if not (first or abs(values[j]) <= CURVED):
             continue
         k = 0 if first else count
         if first and abs(least) <= CURVED:
@@ -91,7 +95,8 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
     -------
     outcome
         ``MINIMUM``, ``FLAT`` (its second order vanishes in a direction), ``SADDLE``, ``MOVING``
-        (not stationary) or ``REJECTED`` (not reached, outside the set, or not below ``energy``).
+        (not stationary) or ``REJECTED`` (not reached, outside the set, not below ``energy``, or
+        without finite derivatives).
     v, multipliers, directions
         The point, its multipliers and the directions of least curvature.
     """
@@ -124,6 +129,8 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
         # A contact without a multiplier does not constrain descent: it may open.
         rows[i] = rows[i] and lam[i] * length(J[i]) > 1e-9 * reference
     least, directions = least_curvatures(F, J, H, lam, rows, m)
+    if not np.isfinite(least):
+        return REJECTED, v, lam, directions
     if least < -CURVED:
         return SADDLE, v, lam, directions
     return MINIMUM if least > CURVED else FLAT, v, lam, directions

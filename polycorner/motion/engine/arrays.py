@@ -80,7 +80,7 @@ class Model(NamedTuple):
     slip_places: Annotated[Any, whole("*")]
     contact_room: Annotated[Any, whole()]  # C: contacts between bodies for which there is room
     neighbour_room: Annotated[Any, whole()]  # P: pairs of neighbours
-    event_room: Annotated[Any, whole()]  # E: events
+    event_room: Annotated[Any, whole()]  # events after which no step begins, nor a part of one
     parameters: Annotated[Any, real("*")]  # of all kernels
     loads: Annotated[Any, whole()]  # number of known loads
     frictions: Annotated[Any, whole()]  # F: friction contacts of a body with its surroundings

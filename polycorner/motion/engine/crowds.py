@@ -56,7 +56,7 @@ def place_of(model, work, i, axis):
 def extent_of(model, state, work, axis):
     """Return the least component of all positions, and by how much the largest exceeds it.
 
-    Where positions repeat, that is a period.
+    Where positions repeat, that is a period.  Where one is not finite, it is infinite.
     """
     if model.period[axis] < np.inf:
         return -0.5 * model.period[axis], model.period[axis]
@@ -64,6 +64,8 @@ def extent_of(model, state, work, axis):
     for i in range(model.bodies):
         if state.alive[i]:
             x = place_of(model, work, i, axis)
+            if not np.isfinite(x):
+                return 0.0, np.inf
             least, largest = min(least, x), max(largest, x)
     return least, largest - least
 

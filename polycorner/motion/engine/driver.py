@@ -109,9 +109,7 @@ class Engine:
         """Allocate the workspace, and tell compiled code where everything is."""
         sizes = self._sizes
         self.work, self.log = allocate(Work, sizes), allocate(Log, sizes)
-        self.model = self.model._replace(
-            contact_room=sizes.C, neighbour_room=sizes.P, event_room=sizes.E
-        )
+        self.model = self.model._replace(contact_room=sizes.C, neighbour_room=sizes.P)
         self._works = [self.work, *copies(self.work, sizes, self.model.threads)]
         shared = [_table_of(record) for record in (self.model, self.motion, self.log)]
         own = [_table_of(work) for work in self._works]
@@ -154,12 +152,29 @@ class Engine:
                 why, done, count = advance(first, steps)
             events.append(self._read(count))
             steps -= done
-            if why == CONTACTS_FULL:
-                self.capacity *= 2
-                self.load(self.save())
-            elif why == NOT_FINITE:
+            if why == NOT_FINITE:
                 raise SolverError(self._what_is_not_finite())
+            if why == CONTACTS_FULL:
+                self._make_room()
+            elif not done and not count:
+                msg = f"the step after t = {self.time:.6g} cannot be begun: events have no room"
+                raise SolverError(msg)
         return joined(events, self.bodies.contact_names)
+
+    def _make_room(self) -> None:
+        """Double the room for contacts, unless there was enough for all that there can be."""
+        pairs = self.bodies.count * (self.bodies.count - 1) // 2
+        if self.capacity >= 2 * pairs * len(
+            self.bodies.pair_contacts
+        ):  # those of sleepers are kept
+            msg = f"the step after t = {self.time:.6g} finds more contacts than there can be"
+            raise SolverError(msg)
+        self.capacity *= 2
+        try:
+            self.load(self.save())
+        except ValueError as error:
+            msg = f"{error}, at t = {self.time:.6g}"
+            raise SolverError(msg) from error
 
     def __reduce__(self) -> NoReturn:
         msg = "an engine cannot be copied or pickled: load what it saves into another"
@@ -204,6 +219,7 @@ class Engine:
         arrays = {"rank": order, "body_of_rank": order, **arrays}
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
+        self.bodies.check_places(arrays["q"], arrays["v"], self.dt)
         self.motion = restored(State, self._sizes, arrays)
         self._allocate()
 

@@ -15,9 +15,8 @@ from polycorner.motion.engine.sleep import stays_asleep
 def advance(model, state, work, log, steps):
     """Advance by several steps; return why it stopped, and how many steps and events."""
     count = ZERO
-    most = 2 * model.contact_room + model.bodies * (3 + model.restitution.size)
     for done in range(steps):
-        if count + most > model.event_room:
+        if count > model.event_room:
             return EVENTS_FULL, done, count
         why, count = step(model, state, work, log, count)
         if why != DONE:

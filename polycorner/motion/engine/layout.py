@@ -11,7 +11,7 @@ from polycorner.motion.bodies import Body, IdenticalBodies
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.allocation import filled
 from polycorner.motion.engine.arrays import Model
-from polycorner.motion.engine.sizes import Sizes
+from polycorner.motion.engine.sizes import EVENTS, Sizes
 from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
@@ -44,7 +44,8 @@ def model_of(
         "bodies": bodies.count,
         "dimension": bodies.dimension,
         "lanes": sizes.K,
-        **dict.fromkeys(("contact_room", "neighbour_room", "event_room"), 0),  # not yet known
+        **dict.fromkeys(("contact_room", "neighbour_room"), 0),  # not yet known
+        "event_room": EVENTS,
         "force_kernel": formulation.forces.kernel.compiled(0).point,
         "loads": formulation.loads,
         "units": body.units,

@@ -103,10 +103,9 @@ def refine(model, state, work, log, root, index, count):
     """Do what is left of a step for the bodies of a cluster, in parts; return why it stopped."""
     H, begin = model.step, index * model.step
     gather(model, state, work, root, begin + 0.5 * H, index)
-    room = 2 * model.contact_room + model.bodies * (3 + model.restitution.size)
     next_length, exact, parts, tried, spent = H, True, 0, 0, state.counts[SWEEPS]
     while state.elapsed[root] < H:
-        if count + room > model.event_room:
+        if count > model.event_room:
             return EVENTS_FULL, count
         work.located[0] = 1 if exact else 0  # what is left is done as a whole step is
         rest, time = H - state.elapsed[root], begin + state.elapsed[root]

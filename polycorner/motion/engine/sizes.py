@@ -8,7 +8,7 @@ WIDTH = 4  # reals in a vector
 MOST_ENTRIES = 48  # of a body above the diagonal of the matrix, on average, at most
 AT_ONCE = 256  # bodies, pairs, contacts or blocks that a thread does at once
 STRIPS = 128  # into which a crowd is divided, at most
-EVENTS = 4096  # events recorded, at least, before the engine returns
+EVENTS = 4096  # events after which no step begins before the engine returns
 
 
 class Sizes(NamedTuple):
@@ -29,7 +29,7 @@ class Sizes(NamedTuple):
     C: int  # contacts between bodies for which there is room
     P: int  # pairs of neighbours for which there is room
     B: int  # blocks
-    E: int  # events
+    E: int  # events: those, and as many as one step can have
     S: int  # keys to be sorted
     W: int  # numbers that go in and come out of a kernel
     Q: int  # entries of the matrix above the diagonal: pairs of bodies
@@ -70,7 +70,7 @@ class Sizes(NamedTuple):
             C=contacts,
             P=pairs,
             B=blocks,
-            E=EVENTS + 4 * contacts,
+            E=EVENTS + 2 * contacts + N * (3 + m),
             S=max(contacts, pairs, 1),
             W=max(kernels) + 16,
             Q=entries,

@@ -7,12 +7,15 @@ import sys
 import numpy as np
 import pytest
 
+from polycorner import Manifold, Polyhedron, System, velocities
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
-from polycorner.motion.engine import driver
+from polycorner.errors import SolverError
+from polycorner.motion.engine import driver, layout, sizes
+from polycorner.motion.engine.arrays import CONTACTS_FULL, DONE, EVENTS_FULL
 from polycorner.motion.engine.intermediate import ANY, SHIPPED, compiled_advance
 from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import start
+from polycorner.motion.simulation import simulate, start
 
 
 def test_room_for_contacts_grows(monkeypatch):
@@ -28,6 +31,47 @@ def test_room_for_contacts_grows(monkeypatch):
         narrow.advance(1)
         np.testing.assert_allclose(narrow.motion.q, ample.motion.q, atol=1e-4)
     assert narrow.capacity > 16
+
+
+def points_in_a_pail(count, walls=24):
+    """Points that fall onto the walls of a polygon, and touch nothing else."""
+    plane = Manifold.euclidean("x y")
+    (x, y), (u, v) = plane.symbols, velocities(plane)
+    turns = np.linspace(0, 2 * np.pi, walls, endpoint=False)
+    sides = {f"w{k}": 1 - np.cos(a) * x - np.sin(a) * y for k, a in enumerate(turns)}
+    return System(Polyhedron(plane, sides), (u**2 + v**2) / 2, 10 * y, count=count, restitution=0.5)
+
+
+def test_the_log_has_room_for_all_events_of_a_step():
+    """Hundreds of bodies with dozens of gaps each have the events that each has alone."""
+    starts = np.random.default_rng(0).uniform(-0.6, 0.6, (400, 2))
+    many, one = points_in_a_pail(400), points_in_a_pail(1)
+    together = simulate(many, many.state(starts), 0.5, 1e-2).events
+    alone = simulate(one, one.state(starts[7]), 0.5, 1e-2).events
+    told = [(e.time, e.kind, e.contact) for e in together if e.bodies == (7,)]
+    assert told == [(e.time, e.kind, e.contact) for e in alone]
+    assert len(together) > len(starts) / 2
+
+
+@pytest.mark.parametrize("events", [0, 1, 30])
+def test_a_small_log_changes_nothing(monkeypatch, events):
+    drum = DumbbellDrum(count=9, floor=True)
+    state = drum.state(bunch(drum, np.random.default_rng(3)))
+    ample = simulate(drum, state, 0.3, 1e-3)
+    for module in (layout, sizes):
+        monkeypatch.setattr(module, "EVENTS", events)
+    narrow = simulate(drum, state, 0.3, 1e-3)
+    assert narrow.events == ample.events
+    np.testing.assert_array_equal(narrow.q, ample.q)
+
+
+@pytest.mark.parametrize("why", [DONE, CONTACTS_FULL, EVENTS_FULL])
+def test_the_driver_says_so_when_nothing_goes_on(monkeypatch, why):
+    drum = DumbbellDrum(count=3, floor=True)
+    engine = start(drum, drum.state(bunch(drum, np.random.default_rng(3))), 1e-3)
+    monkeypatch.setattr(driver, "compiled_advance", lambda _: lambda *_: [why, 0, 0])
+    with pytest.raises(SolverError, match="the step after t = 0 "):
+        engine.advance(1)
 
 
 def advanced(system, state, noise, seconds):
