@@ -21,7 +21,8 @@ def refuse(
     argument: str, expected: str, got: object, kind: type[Exception] = ValueError
 ) -> NoReturn:
     """Raise an error that names the argument, what was expected and what came."""
-    msg = f"{argument}: expected {expected}; got {got!r}"
+    shown = " ".join(line.strip() for line in repr(got).splitlines())  # arrays have several lines
+    msg = f"{argument}: expected {expected}; got {shown}"
     raise kind(msg)
 
 

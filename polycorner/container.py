@@ -32,6 +32,8 @@ JSON = (b' "polycorner": "', b'"}\n')
 XML = (b"<!-- polycorner ", b" -->\n")
 BINARY = (b"\npolycorner ", b"\n")
 _SEAL = re.compile(rb"(?P<name>[a-z ]+) (?P<version>\d+) sha256 (?P<digest>[0-9a-f]{64})")
+# What is raised where entries are not those that were written.
+DAMAGE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _WORDS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 
 
@@ -109,7 +111,11 @@ class Kind:
 
     def load_json(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Return the entries that :meth:`save_json` wrote."""
-        entries: dict[str, Any] = json.loads(self.load(path).rstrip().removesuffix(b",") + b"}")
+        content = self.load(path).rstrip().removesuffix(b",") + b"}"
+        try:
+            entries: dict[str, Any] = json.loads(content)
+        except (ValueError, RecursionError) as error:
+            raise self.refusal(path, f"is damaged ({error!r})") from error
         return entries
 
     def save_arrays(self, path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> Path:

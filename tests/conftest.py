@@ -75,7 +75,7 @@ def own_searches(tmp_path_factory):
     """Keep the unfinished searches of one module in a cache of its own; share what is compiled."""
     own = tmp_path_factory.mktemp("cache")
     shared = cache_folder() / "kernels"
-    shared.mkdir(exist_ok=True)
+    shared.mkdir(mode=0o700, exist_ok=True)
     (own / "kernels").symlink_to(shared, target_is_directory=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("POLYCORNER_CACHE_DIR", str(own))

@@ -20,6 +20,7 @@ from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import carried, turned
 from polycorner.bodies.slips import ROLLING, SLIDING, AtWall, slips_at_wall, slips_of
 from polycorner.checks import refuse
+from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.fusion import written_out
 from polycorner.motion.bodies import RUBBING
@@ -150,12 +151,10 @@ def _pull(gravity: Any, dimension: int, turning: Array) -> "tuple[list[float], l
     expected = f"{dimension} finite numbers, or expressions of time_symbol()"
     now = time_symbol()
     try:
-        given = [sympy.sympify(component, strict=True) for component in gravity]
-        free = {symbol for component in given for symbol in component.free_symbols}
-    except (AttributeError, TypeError, sympy.SympifyError):
+        given = [as_expression("gravity", component) for component in gravity]
+    except TypeError:
         refuse("gravity", expected, gravity, TypeError)
-    if not all(isinstance(component, sympy.Expr) for component in given):
-        refuse("gravity", expected, gravity, TypeError)
+    free = set().union(*(component.free_symbols for component in given))
     strange = (sympy.I, sympy.oo, -sympy.oo, sympy.zoo, sympy.nan)
     if len(given) != dimension or free - {now} or any(part.has(*strange) for part in given):
         refuse("gravity", expected, gravity)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from polycorner.bodies.frames import AXES, symbols
 from polycorner.bodies.gaps import beside, given, harmonics
 from polycorner.bodies.waves import waves
+from polycorner.formulas.expressions import as_expression
 from polycorner.spaces.distances import (
     PARALLEL,
     beyond,
@@ -54,9 +55,7 @@ class Definitions:
 
     def number(self, name: str, expression: "sympy.Expr") -> "sympy.Expr":
         """Define a number, and return its symbol; itself if it is known."""
-        import sympy
-
-        expression = sympy.sympify(expression)
+        expression = as_expression(name, expression)
         if expression.is_Number:
             return expression
         self.written[name] = expression

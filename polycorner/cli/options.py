@@ -184,7 +184,7 @@ def _table(file: Path) -> dict[str, Any]:
             table = tomllib.load(stream)
     except OSError as error:
         fail(f"--config: {file} cannot be read ({error.strerror or error})")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         fail(f"--config: {file} is not a TOML file: {error}")
     tell(f"read {file}: {', '.join(table) or 'no keys'}")
     return table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.checks import instance
-from polycorner.container import JSON, Kind, number, read_number
+from polycorner.container import DAMAGE, JSON, Kind, number, read_number
 from polycorner.files.polyhedra import (
     Entries,
     manifold_entry,
@@ -114,7 +114,7 @@ def load_certificate(
         if not differs:
             found = _certificate(content, polyhedron, energy)
             differs = next(_differences(content, found, tolerance), "")
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         raise KIND.refusal(path, f"is damaged ({error!r})") from error
     if differs:
         raise KIND.refusal(path, f"is of another problem, or was not computed here: {differs}")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import instance
-from polycorner.container import XML, Kind, versions
+from polycorner.container import DAMAGE, XML, Kind, versions
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.parts import Corner, Edge
 from polycorner.skeletons.walks import End
@@ -103,7 +103,10 @@ def load_graph(path: str | os.PathLike[str]) -> "nx.MultiGraph":
 
     # Without its header, since networkx parses text, and text must not declare an encoding.
     text = KIND.load(path).decode().removeprefix(HEADER)
-    return nx.parse_graphml(text, force_multigraph=True)
+    try:
+        return nx.parse_graphml(text, force_multigraph=True)
+    except (nx.NetworkXError, SyntaxError, *DAMAGE) as error:  # SyntaxError is also that of XML
+        raise KIND.refusal(path, f"is damaged ({error!r})") from error
 
 
 def _corner(corner: Corner) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from polycorner.container import Kind, versions
+from polycorner.container import DAMAGE, Kind, versions
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import EventKind
 from polycorner.motion.mechanics import MechanicalSystem
@@ -194,5 +194,5 @@ def load_dataset(
     try:
         with xr.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False) as file:
             return read(file.load())
-    except (ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError) as error:
+    except (OSError, *DAMAGE) as error:
         raise kind.refusal(path, f"is damaged ({error})") from error

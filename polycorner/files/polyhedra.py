@@ -138,7 +138,9 @@ def _read_family(entry: Mapping[str, Any]) -> Family:
     known = symbols([*variables, *parameters, *entry["definitions"]])
 
     def read(texts: Mapping[str, str]) -> dict[str, Any]:
-        return {name: read_formula(text, known) for name, text in texts.items()}
+        return {
+            name: read_formula(text, known, f"formula {name!r}") for name, text in texts.items()
+        }
 
     return Family.of(
         read(entry["formulas"]),

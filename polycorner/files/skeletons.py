@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from polycorner.checks import refuse
-from polycorner.container import JSON, Kind, number, read_number
+from polycorner.container import DAMAGE, JSON, Kind, number, read_number
 from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
@@ -126,7 +126,7 @@ def load_skeleton(
             explorer = _explorer(content, d, symmetry or Symmetry())
             differs = next(_differences(content, explorer), "")
         found = None if differs else assembled(explorer, Completeness[content["complete"]])
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         raise KIND.refusal(path, f"is damaged ({error!r})") from error
     if found is None:
         raise KIND.refusal(path, f"is of another polyhedron or symmetry: {differs}")

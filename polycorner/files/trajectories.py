@@ -165,11 +165,7 @@ def _attributes(trajectory: Trajectory, system: System) -> dict[str, Any]:
 
 def _told(system: System) -> dict[str, Any]:
     """Return a system as plain values, formulas as text."""
-    import sympy
-
-    def text(expression: Any) -> str:
-        return formula_text(sympy.sympify(expression))
-
+    text = formula_text
     manifold, polyhedron = system.manifold, system.polyhedron
     friction = {
         f.name: [
@@ -208,10 +204,8 @@ def _told(system: System) -> dict[str, Any]:
 
 def _slip(component: Any) -> Any:
     """Return a component of a slip as text; a function that is shared as a digest and numbers."""
-    import sympy
-
     if not isinstance(component, SmoothFunction):
-        return formula_text(sympy.sympify(component))
+        return formula_text(component)
     return [
         _digest(component.family),
         component.member_name,

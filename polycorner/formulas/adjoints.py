@@ -63,12 +63,26 @@ class Reverse:
         self.graph, self.held = graph, frozenset(held)
         self._fixed = sum(graph.supports[a] for a in self.held if graph.nodes[a][0] == "var")
         self._rows: dict[int, Row] = {}
+        self._inside = 0  # how many branches the one that is being entered is inside of
 
     def row(self, node: int) -> Row:
         """Return the nonzero partial derivatives of a node by variable."""
         if node not in self._rows:
+            if self._inside == DEEP:
+                self._enter(node)
+            self._inside += 1
             self._rows[node] = self._accumulate(node)
+            self._inside -= 1
         return self._rows[node]
+
+    def _enter(self, node: int) -> None:
+        """Find the gradients of all branches below a node, from the innermost on."""
+        reached: set[int] = set()
+        reach(self.graph, node, reached)
+        for a in sorted(reached):
+            for branch in children(self.graph, a)[1:] if self.graph.nodes[a][0] == "select" else ():
+                if branch not in self._rows:
+                    self._rows[branch] = self._accumulate(branch)
 
     def _accumulate(self, node: int) -> Row:
         """Visit the operations from the last to the first; arguments come before their readers."""

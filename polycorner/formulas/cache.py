@@ -1,30 +1,44 @@
 """The one cache folder: machine code of formulas and algorithms, unfinished searches.
 
-It is ``POLYCORNER_CACHE_DIR`` or the user's cache folder; where neither can be written, a
-temporary folder that ends with the process, announced by one warning.
+It is ``POLYCORNER_CACHE_DIR`` or the user's cache folder.  Where that cannot be written, or others
+could write in it, a temporary folder that ends with the process takes its place, announced by one
+warning.
+
+Machine code that is loaded is executed.  Its files begin with a keyed digest of their names and
+contents; the key is random, is kept beside them and can be read by the user alone.  So a file that
+was damaged, exchanged or made by somebody else is compiled anew, also where a folder above is open
+to others.  The names are digests of everything that the code depends on, versions included.
 """
 
 import atexit
 import hashlib
+import hmac
 import os
+import secrets
 import shutil
+import stat
 import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import lru_cache
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from polycorner.atomic import write_atomically
+from polycorner.atomic import PART, write_atomically
 
 VARIABLE = "POLYCORNER_CACHE_DIR"
+KEY = "key"  # the file beside the machine code that holds the key of the digests
+SIZE = 32  # bytes of the key, and of a digest
 COMPILING = ("compilation.py", "intermediate.py", "linking.py", "records.py")  # what Numba is told
 
 
 def cache_folder() -> Path:
-    """Return the cache folder; it exists and can be written."""
+    """Return the cache folder; it exists, and the user can write in it and nobody else.
+
+    A relative one belongs to the working directory at the first call.
+    """
     return _prepared(os.environ.get(VARIABLE, ""))
 
 
@@ -46,30 +60,59 @@ def clear_cache() -> tuple[int, int]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    return (path for path in folder.rglob("*") if path.is_file())
+    return (path for path in folder.rglob("*") if path.is_file() and path.name != KEY)
 
 
-@lru_cache(maxsize=16)
+@cache
 def _prepared(named: str) -> Path:
-    import platformdirs
-
-    folder = Path(named) if named else Path(platformdirs.user_cache_dir("polycorner"))
+    folder = Path(named or "of the user")  # in words, if it is not known
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        _make(folder := folder.absolute() if named else _users())
+        for place in (folder, folder / "kernels"):
+            if place.exists() and not _is_private(place.stat()):
+                msg = f"others own {place} or may write in it"
+                raise PermissionError(msg)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
         substitute = Path(tempfile.mkdtemp(prefix="polycorner-"))
         atexit.register(shutil.rmtree, substitute, ignore_errors=True)
         warnings.warn(
-            f"the cache folder {folder} cannot be written ({error.strerror or error}): compiled "
+            f"the cache folder {folder} cannot be used ({error.strerror or error}): compiled "
             f"code is kept in {substitute} until this process ends; set {VARIABLE} to a folder "
-            "that can be written",
+            "in which you can write and others cannot",
             RuntimeWarning,
             stacklevel=3,
         )
         return substitute
     return folder
+
+
+def _users() -> Path:
+    """Return the user's cache folder, or raise OSError."""
+    import platformdirs
+
+    with suppress(RuntimeError):  # platformdirs raises it, or leaves the ~
+        folder = Path(platformdirs.user_cache_dir("polycorner"))
+        if folder.is_absolute():
+            return folder
+    msg = "no home folder is known"
+    raise FileNotFoundError(msg)
+
+
+def _make(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, for the user alone."""
+    if not folder.is_dir():
+        _make(folder.parent)
+        folder.mkdir(mode=stat.S_IRWXU, exist_ok=True)
+
+
+def _is_private(found: os.stat_result, others: int = stat.S_IWGRP | stat.S_IWOTH) -> bool:
+    """Whether the user owns a file or folder, and others do not have the named permissions.
+
+    Windows has no such permissions; there, folders of a user are closed to others.
+    """
+    return os.name != "posix" or (found.st_uid == os.geteuid() and not found.st_mode & others)
 
 
 @contextmanager
@@ -117,20 +160,22 @@ def sources_digest(
 
 
 def read_code(name: str) -> bytes | None:
-    """Return the machine code kept under a name; None if there is none or it was changed."""
+    """Return the machine code kept under a name; None for none, or if it was not kept by us."""
+    path = _code_file(name)
     try:
-        content = _code_file(name).read_bytes()
+        key, content = _key(path.parent), path.read_bytes()
     except OSError:
         return None
-    digest, code = content[:32], content[32:]
-    return code if hashlib.sha256(code).digest() == digest else None
+    digest, code = content[:SIZE], content[SIZE:]
+    return code if key and hmac.compare_digest(digest, _digest(key, name, code)) else None
 
 
 def write_code(name: str, code: bytes) -> None:
     """Keep machine code under a name; other processes see all of it or nothing."""
     path = _code_file(name)
     try:
-        write_atomically(path, hashlib.sha256(code).digest() + code)
+        _make(path.parent)
+        write_atomically(path, _digest(_some_key(path.parent), name, code) + code)
     except OSError as error:
         warnings.warn(
             f"compiled kernels cannot be kept in {path.parent} ({error.strerror or error}); set "
@@ -142,3 +187,45 @@ def write_code(name: str, code: bytes) -> None:
 
 def _code_file(name: str) -> Path:
     return cache_folder() / "kernels" / f"{name}.o"
+
+
+def _digest(key: bytes, name: str, code: bytes) -> bytes:
+    digest = hashlib.blake2b(name.encode() + b"\0", key=key, digest_size=SIZE)
+    digest.update(code)
+    return digest.digest()
+
+
+def _key(folder: Path) -> bytes:
+    """Return the key of a folder, empty if there is none that only the user can know."""
+    with suppress(FileNotFoundError), (folder / KEY).open("rb") as file:
+        key = file.read(SIZE + 1)
+        if len(key) == SIZE and _is_private(os.fstat(file.fileno()), stat.S_IRWXG | stat.S_IRWXO):
+            return key
+    return b""
+
+
+def _some_key(folder: Path) -> bytes:
+    """Return the key of a folder, made if it has none; of several processes one makes it.
+
+    The key is read anew each time, for another process may have cleared the cache.
+    """
+    if key := _key(folder):
+        return key
+    path, part = folder / KEY, folder / f".{secrets.token_hex(4)}{PART}"
+    try:
+        part.touch(mode=stat.S_IRUSR | stat.S_IWUSR, exist_ok=False)
+        part.write_bytes(secrets.token_bytes(SIZE))
+        if path.exists():  # but is no key, or not a private one
+            part.replace(path)
+        else:
+            os.link(part, path)
+    except FileExistsError:
+        pass  # another process was first
+    except OSError:  # a file system without links
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    if not (key := _key(folder)):
+        msg = f"others may read {path}"
+        raise PermissionError(msg)
+    return key

@@ -4,10 +4,12 @@ import math
 import textwrap
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Number
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.checks import mapping, refuse
 from polycorner.errors import NonsmoothWarning
 from polycorner.spaces.manifold import Manifold
 
@@ -20,6 +22,36 @@ LONGEST = 2000  # symbols, numbers and operations of a formula that is written o
 SAMPLES = 16  # points at which a period is tested
 CHANGE = 1e-7  # relative change over a period that is rounding
 SPREAD = 2.0  # size, in scale units, of the region of the lines that is sampled
+
+
+def as_expression(argument: str, value: object) -> "sympy.Expr":
+    """Return a formula or a number as a SymPy expression, or raise TypeError.
+
+    SymPy's own conversion would execute text as code of Python, also in lists and mappings.
+
+    Examples
+    --------
+    >>> as_expression("kinetic", "x**2")
+    Traceback (most recent call last):
+    TypeError: kinetic: expected a SymPy expression; got 'x**2'
+    """
+    import sympy
+
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    known = isinstance(value, sympy.Basic | Number) or hasattr(value, "_sympy_")
+    result = sympy.sympify(value, strict=True) if known else None
+    if isinstance(result, sympy.core.relational.Relational):
+        refuse(argument, "f, meaning f >= 0, instead of an inequality", result, TypeError)
+    if not isinstance(result, sympy.Expr):
+        refuse(argument, "a SymPy expression", value, TypeError)
+    return result
+
+
+def as_expressions(argument: str, given: "Mapping[str, Any]") -> "dict[str, sympy.Expr]":
+    """Return formulas by name, or raise TypeError with the argument and the name."""
+    found = mapping(argument, given).items()
+    return {name: as_expression(f"{argument}[{name!r}]", e) for name, e in found}
 
 
 def kinks(expressions: "Iterable[sympy.Expr]") -> tuple[str, ...]:
@@ -37,18 +69,16 @@ def kinks(expressions: "Iterable[sympy.Expr]") -> tuple[str, ...]:
     return tuple(dict.fromkeys(map(str, found)))
 
 
-def written(expression: Any) -> str:
+def written(expression: "sympy.Expr") -> str:
     """Return a formula as text; of a long one, which takes long to write, its length."""
-    import sympy
-
     sizes: dict[sympy.Basic, int] = {}
 
-    def size(part: sympy.Basic) -> int:
+    def size(part: "sympy.Basic") -> int:
         if part not in sizes:
             sizes[part] = 1 + sum(map(size, part.args))
         return sizes[part]
 
-    length = size(sympy.sympify(expression))
+    length = size(expression)
     return str(expression) if length <= LONGEST else f"a formula of length {length}"
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from polycorner.formulas.expressions import kinks
+from polycorner.formulas.expressions import as_expression, kinks
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
@@ -108,8 +108,8 @@ class Family(Value):
         variables, parameters = tuple(variables), tuple(parameters)
         _check_new("parameters", parameters, variables)
         _check_new("definitions", tuple(definitions or ()), variables + parameters)
-        given = {name: _sympified(name, e) for name, e in expressions.items()}
-        known = {name: _sympified(name, e) for name, e in (definitions or {}).items()}
+        given = {name: as_expression(name, e) for name, e in expressions.items()}
+        known = {name: as_expression(name, e) for name, e in (definitions or {}).items()}
         written, held = Written(known, given), tuple(stationary)
         family = cls(tuple(given), variables, parameters, written, unit=unit, stationary=held)
         symbols = variables, parameters
@@ -192,23 +192,3 @@ def _check_new(argument: str, names: Sequence[str], taken: Sequence[str]) -> Non
     if hidden:
         msg = f"{argument}: expected names other than {', '.join(taken)}; got {', '.join(hidden)}"
         raise ValueError(msg)
-
-
-def _sympified(name: str, expression: object) -> "sympy.Expr":
-    import sympy
-
-    if isinstance(expression, str):
-        msg = f"{name}: expected a SymPy expression; got the string {expression!r}"
-        raise TypeError(msg)
-    try:
-        result = sympy.sympify(expression, strict=True)
-    except sympy.SympifyError as error:
-        msg = f"{name}: expected a SymPy expression; got {expression!r}"
-        raise TypeError(msg) from error
-    if isinstance(result, sympy.core.relational.Relational):
-        msg = f"{name}: expected f, meaning f >= 0, instead of an inequality; got {result}"
-        raise TypeError(msg)
-    if not isinstance(result, sympy.Expr):
-        msg = f"{name}: expected a SymPy expression; got {type(expression).__name__}"
-        raise TypeError(msg)
-    return result

@@ -3,13 +3,16 @@
 import ctypes
 import ctypes.util
 import os
+import platform
 from functools import lru_cache
+from importlib.metadata import version
 from typing import Any
 
 import llvmlite
 from llvmlite import binding as llvm
 from llvmlite.binding.ffi import ObjectRef
 
+from polycorner import __version__
 from polycorner.formulas import emit
 from polycorner.formulas.cache import source_key
 
@@ -19,7 +22,8 @@ OPTIMISATION = 2
 def machine_key() -> str:
     """Return what machine code depends on, beside the code that it is made from."""
     machine = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
-    return repr((source_key(__name__), llvmlite.__version__, machine))
+    versions = (__version__, platform.python_version(), version("numba"), llvmlite.__version__)
+    return repr((source_key(__name__), versions, machine))
 
 
 def machine_code(text: str, *, optimise: bool = True) -> bytes:

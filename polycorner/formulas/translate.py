@@ -89,14 +89,18 @@ class Translator:
         return rule(e)
 
     def _number(self, e: "sympy.Basic") -> int:
-        exact = _exact(e)
-        if not representable((exact.numerator, exact.denominator)):
+        if e.is_Float:
+            double = float(e)
+            fits = math.isfinite(double) and (double != 0 or e == 0)
+        else:
+            fits = representable((int(e.p), int(e.q)))
+        if not fits:
             msg = (
                 f"{self.subject}: expected numbers that double precision can hold, between "
-                f"4.9e-324 and 1.8e308 in size; got {e.evalf(6)}"
+                f"4.9e-324 and 1.8e308 in size; got {e.evalf(6)!s}"
             )
             raise ValueError(msg)
-        return self.number(exact)
+        return self.number(_exact(e))
 
     @property
     def known(self) -> Iterable[str]:

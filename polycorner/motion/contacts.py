@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import instance, mapping, names, real, refuse
-from polycorner.formulas.expressions import written
+from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction, with_numbers
 from polycorner.formulas.fusion import written_out
@@ -58,6 +58,11 @@ def _symbols(written: Any) -> "Symbols":
     import sympy
 
     return tuple(sympy.Symbol(name, real=True) for name in written)
+
+
+def _component(given: Any) -> "sympy.Expr | SmoothFunction":
+    """Return a component of a slip, or raise TypeError."""
+    return given if isinstance(given, SmoothFunction) else as_expression("slip", given)
 
 
 class FrictionLaw(Value):
@@ -123,9 +128,10 @@ class Friction(FrictionLaw):
     kind: str = "sliding"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "slip", _several(self.slip))
+        object.__setattr__(self, "slip", tuple(map(_component, _several(self.slip))))
         if not isinstance(self.load, str):
-            object.__setattr__(self, "load", _several(self.load))
+            loads = tuple(as_expression("load", load) for load in _several(self.load))
+            object.__setattr__(self, "load", loads)
         self._complete(self.name)
         if len(self.slip) != self.static.dimension:
             components = f"{self.static.dimension} components for friction {self.name!r}"
@@ -192,7 +198,8 @@ class PairFriction(FrictionLaw):
     kind: str = RUBBING
 
     def __post_init__(self) -> None:
-        slip = {name: _several(rows) for name, rows in mapping("slip", self.slip).items()}
+        given = mapping("slip", self.slip).items()
+        slip = {name: tuple(map(_component, _several(rows))) for name, rows in given}
         object.__setattr__(self, "slip", slip)
         self._complete("between bodies")
         for name, rows in slip.items():
@@ -245,10 +252,10 @@ class ContactFamily(Value):
     definitions: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "definitions", dict(mapping("definitions", self.definitions)))
-        if not mapping("gaps", self.gaps):
+        object.__setattr__(self, "definitions", as_expressions("definitions", self.definitions))
+        object.__setattr__(self, "gaps", as_expressions("gaps", self.gaps))
+        if not self.gaps:
             refuse("gaps", "at least one gap of a pair", self.gaps)
-        object.__setattr__(self, "gaps", dict(self.gaps))
         object.__setattr__(self, "reach", real("reach", self.reach, above=0))
         position = (self.position,) if isinstance(self.position, str) else tuple(self.position)
         object.__setattr__(self, "position", position)

@@ -86,7 +86,7 @@ class Formulation:
         """
         import sympy
 
-        symbols = [sympy.sympify(force).free_symbols for force in laws.forces.values()]
+        symbols = [force.free_symbols for force in laws.forces.values()]
         driven = sympy.Symbol(TIME, real=True) in set().union(*symbols)
         known = (*parameters, TIME) if driven else tuple(parameters)
         shared = {i: s for i, s in enumerate(laws.slips) if isinstance(s, SmoothFunction)}
@@ -116,12 +116,12 @@ class Formulation:
         names = (*mass, *rest, *(f"N{i}" for i in range(self.loads)))
 
         def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
-            from sympy import sympify
+            from sympy import S
 
             laws = self.laws()
-            applied = [laws.forces.get(name, 0) for name in self.coordinates]
+            applied = [laws.forces.get(name, S.Zero) for name in self.coordinates]
             given = [laws.kinetic, laws.potential, *applied, *laws.loads]
-            written = zip(("T", "V", *names[-k - self.loads :]), map(sympify, given), strict=True)
+            written = zip(("T", "V", *names[-k - self.loads :]), given, strict=True)
             return {}, dict(written)
 
         key = repr((source_key(lagrange.__name__), self.key)) if self.key else ""
@@ -179,10 +179,7 @@ class Formulation:
         held: tuple[str, ...] = (),
     ) -> Family:
         def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
-            from sympy import sympify
-
-            values = [sympify(expression) for expression in expressions()]
-            return {}, dict(zip(names, values, strict=True))
+            return {}, dict(zip(names, expressions(), strict=True))
 
         key = repr((self.key, names, held)) if self.key else ""
         return Family(names, self.variables, self.parameters, formulas, key, stationary=held)
@@ -193,7 +190,7 @@ class Formulation:
 
         laws = self.laws()
         v = [sympy.Symbol(dotted(name), real=True) for name in self.coordinates]
-        if not _is_quadratic(sympy.sympify(laws.kinetic), v):
+        if not _is_quadratic(laws.kinetic, v):
             names = ", ".join(map(str, v))
             msg = f"kinetic: expected a quadratic form in {names}; got {laws.kinetic}"
             raise ValueError(msg)
@@ -205,23 +202,19 @@ class Formulation:
             "load": laws.loads,
             "slip": own_slips,
         }
-        for name, expressions in steady.items():
-            for expression in expressions:
-                given = sympy.sympify(expression)
+        for name, several in steady.items():
+            for given in several:
                 if name in {"potential", "load"} and degree(given, v):
                     moving = min(map(str, given.free_symbols & set(v)))
                     msg = f"{name}: expected no velocity in it; got {moving}"
                     raise ValueError(msg)
                 if degree(given, [time]):
-                    msg = (
-                        f"{name}: expected no time in it, only forces may have it; got {expression}"
-                    )
+                    msg = f"{name}: expected no time in it, only forces may have it; got {given}"
                     raise ValueError(msg)
         for slip in own_slips:
-            given = sympy.sympify(slip)
-            if degree(given, v) <= 1:
+            if degree(slip, v) <= 1:
                 continue
-            if sympy.simplify(sympy.hessian(given, v)) != sympy.zeros(len(v), len(v)):
+            if sympy.simplify(sympy.hessian(slip, v)) != sympy.zeros(len(v), len(v)):
                 msg = f"slip: expected an affine function of the velocities; got {slip}"
                 raise ValueError(msg)
         self._check_shared()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.checks import real, refuse, whole
+from polycorner.formulas.expressions import as_expression
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def random_signal(
     0.5*cos(14.567*time + 0.2574) + 0.5*cos(16.556*time + 0.1038)
     """
     whole("modes", modes, least=1)
+    time = as_expression("time", time)
     frequencies, phases = signal_modes(band, modes, random_generator(seed))
     turns = [
         2 * math.pi * f * time + p
@@ -90,6 +92,7 @@ def random_field(
     seed : int, optional
     """
     whole("modes", modes, least=1)
+    x, y = as_expression("x", x), as_expression("y", y)
     across, along, phases = field_modes(
         correlation_length, circumference, modes, random_generator(seed)
     )
@@ -101,11 +104,11 @@ def random_field(
     return sum_of_cosines(real("rms", rms, least=0) * math.sqrt(2 / modes), turns)
 
 
-def sum_of_cosines(amplitude: Any, turns: "list[Any]") -> "sympy.Expr":
+def sum_of_cosines(amplitude: float, turns: "list[sympy.Expr]") -> "sympy.Expr":
     """Return ``amplitude`` times the sum of the cosines of some angles."""
     import sympy
 
-    return sympy.sympify(amplitude) * sympy.Add(*(sympy.cos(turn) for turn in turns))
+    return amplitude * sympy.Add(*(sympy.cos(turn) for turn in turns))
 
 
 def random_generator(*seeds: int) -> np.random.Generator:

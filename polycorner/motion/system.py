@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import instance, mapping, names, real, refuse, whole
-from polycorner.formulas.expressions import written
+from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
 from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
@@ -121,6 +121,9 @@ class System(MechanicalSystem):
         if self.polyhedron.is_union:
             expected = "an intersection of inequalities and equations, such as a convex piece"
             refuse("polyhedron", expected, self.polyhedron)
+        object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
+        object.__setattr__(self, "potential", as_expression("potential", self.potential))
+        object.__setattr__(self, "forces", as_expressions("forces", self.forces))
         object.__setattr__(self, "friction", tuple(self.friction))
         for friction in self.friction:
             if not isinstance(friction, Friction):
@@ -144,8 +147,7 @@ class System(MechanicalSystem):
         names(argument, given, self.manifold.names)
         if len(given) > 1:
             refuse(argument, "one coordinate", sorted(given))
-        checked = {name: real(argument, value) for name, value in given.items()}
-        object.__setattr__(self, argument, checked)
+        object.__setattr__(self, argument, {n: real(argument, x) for n, x in given.items()})
 
     @property
     def manifold(self) -> Manifold:
@@ -173,10 +175,8 @@ class System(MechanicalSystem):
         given = self.restitution
         by_name = given if isinstance(given, Mapping) else dict.fromkeys(self.contacts, given)
         names("restitution", by_name, self.contacts)
-        values = [
-            real("restitution", by_name.get(name, 0.0), least=0, most=1) for name in self.contacts
-        ]
-        return np.array(values, dtype=np.float64)
+        every = [by_name.get(name, 0.0) for name in self.contacts]
+        return np.array([real("restitution", e, least=0, most=1) for e in every], dtype=np.float64)
 
     @cached_property
     def _loads(self) -> "tuple[sympy.Expr, ...]":
@@ -203,7 +203,7 @@ class System(MechanicalSystem):
     def formulation(self) -> Formulation:
         """The compiled equations of motion of a body."""
         slips = tuple(e for f in self.friction for e in f.slip)
-        laws = Laws(self.kinetic, self.potential, dict(self.forces), slips, self._loads)
+        laws = Laws(self.kinetic, self.potential, self.forces, slips, self._loads)
         return Formulation.of(self.manifold.names, (), laws)
 
     @cached_property

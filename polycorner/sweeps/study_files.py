@@ -112,7 +112,7 @@ def _content(file: Path) -> dict[str, Any]:
     except OSError as error:
         msg = f"{file} cannot be read ({error.strerror or error})"
         raise ValueError(msg) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         msg = f"{file} is no TOML file: {error}"
         raise ValueError(msg) from error
 

@@ -65,6 +65,8 @@ MISTAKES = {
     'study = "heading"\n[axes]\nlength = [9]\nrod_radius = [1]\n[fixed]\nbal = 1': "fixed: .*bal",
     'study = "climbing"\nseed = -1\n[axes]\nnoise = [1]\ntilt = [1]': "seed: expected",
     "study = ": "is no TOML file",
+    "a = " + "[" * 5000: "is no TOML file",
+    "a = " + "9" * 5000: "is no TOML file",
 }
 
 

@@ -153,7 +153,7 @@ class Store:
             outer = json.loads(content)
             if outer["sha256"] == _digest(outer["search"].encode()):
                 return dict(json.loads(outer["search"]))
-        except (ValueError, LookupError, TypeError, AttributeError):
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
             pass
         raise self._damaged(ROOT)
 

@@ -1,0 +1,207 @@
+"""No argument is executed: text where a formula belongs is refused in one sentence."""
+
+import ast
+import importlib
+import inspect
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import polycorner
+from polycorner import Manifold, Polyhedron, SmoothFunction, certify, minima, minimise, prove
+from polycorner.bodies import Arrangement, disc
+from polycorner.dumbbells.viewer import descent
+from polycorner.files import load_certificate, save_certificate
+from polycorner.formulas.families import Family
+from polycorner.minimisation import stationary_on
+from polycorner.motion import (
+    ContactFamily,
+    Friction,
+    PairFriction,
+    System,
+    random_field,
+    random_signal,
+    velocities,
+)
+from polycorner.motion.friction import Interval
+from polycorner.polyhedra import AllOf, AnyOf, Symmetry, nerve
+from polycorner.proofs import stationary_points
+
+ROOT = Path(polycorner.__file__).parent
+M = Manifold.euclidean("x y")
+x, y = M.symbols
+vx, vy = velocities(M)
+D = Polyhedron(M, {"right": x, "above": y})
+FLAT = Polyhedron(M, {"right": AnyOf(x - 1, y), "above": 2 - y})
+MOVING = (vx**2 + vy**2) / 2
+FIELD = {"rms": 1.0, "correlation_length": 1.0}
+
+
+def pair(**given):
+    """Return a family of contacts with one argument spoilt."""
+    usual = {"gaps": {"g": sp.Symbol("x1", real=True)}, "reach": 1.0}
+    return ContactFamily(**{**usual, **given})
+
+
+def certificate():
+    return certify(D, x**2 + y**2, [0.0, 0.0])
+
+
+# Of every public callable that is given formulas: its name and argument, what the sentence names,
+# and a call with something else in their place.
+CASES = {
+    "Family.of.expressions": ("f", lambda e, _: Family.of({"f": e}, ["x"])),
+    "Family.of.definitions": ("d", lambda e, _: Family.of({"f": x}, ["x"], (), {"d": e})),
+    "SmoothFunction.expression": ("f", lambda e, _: SmoothFunction("f", e, M)),
+    "SmoothFunction.definitions": (
+        "d",
+        lambda e, _: SmoothFunction("f", x, M, definitions={"d": e}),
+    ),
+    "SmoothFunction.quantity.expression": ("f", lambda e, _: SmoothFunction.quantity("f", e, M)),
+    "Polyhedron.parts": ("f", lambda e, _: Polyhedron(M, {"f": e})),
+    "Polyhedron.equations": ("h", lambda e, _: Polyhedron(M, {"f": x}, {"h": e})),
+    "AllOf.parts": ("f1", lambda e, _: Polyhedron(M, AllOf(e, x))),
+    "AnyOf.parts": ("f1", lambda e, _: Polyhedron(M, AnyOf(e, x))),
+    "Symmetry.fields": (
+        "x",
+        lambda e, _: prove(certificate(), symmetry=Symmetry(fields=[{"x": e}])),
+    ),
+    "nerve.height": ("height", lambda e, _: nerve(FLAT, e)),
+    "certify.energy": ("energy", lambda e, _: certify(D, e, [1.0, 1.0])),
+    "minimise.energy": ("energy", lambda e, _: minimise(D, e, [1.0, 1.0])),
+    "minima.energy": ("energy", lambda e, _: minima(D, e, starts=[[1.0, 1.0]])),
+    "stationary_on.energy": ("energy", lambda e, _: stationary_on(D, e, [1.0, 1.0], ["right"])),
+    "stationary_points.energy": (
+        "energy",
+        lambda e, _: stationary_points(D, e, box={"x": (0, 1), "y": (0, 1)}),
+    ),
+    "Proof.enclose.expression": ("expression", lambda e, _: prove(certificate()).enclose(e)),
+    "descent.energy": ("energy", lambda e, _: descent(D, e, [1.0, 1.0])),
+    "load_certificate.energy": (
+        "energy",
+        lambda e, folder: load_certificate(
+            save_certificate(certificate(), folder / "c.json"), D, e
+        ),
+    ),
+    "System.kinetic": ("kinetic", lambda e, _: System(D, e)),
+    "System.potential": ("potential", lambda e, _: System(D, MOVING, e)),
+    "System.forces": ("forces", lambda e, _: System(D, MOVING, forces={"x": e})),
+    "Friction.slip": ("slip", lambda e, _: Friction("f", (e,), Interval(0.5), "right")),
+    "Friction.load": ("load", lambda e, _: Friction("f", (vx,), Interval(0.5), (e,))),
+    "PairFriction.slip": ("slip", lambda e, _: PairFriction({"g": (e,)}, Interval(0.5))),
+    "ContactFamily.gaps": ("gaps", lambda e, _: pair(gaps={"g": e})),
+    "ContactFamily.definitions": ("definitions", lambda e, _: pair(definitions={"d": e})),
+    "random_signal.time": ("time", lambda e, _: random_signal(e, rms=1.0, band=(1.0, 2.0))),
+    "random_field.x": ("x", lambda e, _: random_field(e, y, **FIELD)),
+    "random_field.y": ("y", lambda e, _: random_field(x, e, **FIELD)),
+    "Arrangement.system.gravity": (
+        "gravity",
+        lambda e, _: Arrangement({"disc": disc(1.0)}).system(density=1.0, gravity=[e, -9.81]),
+    ),
+}
+
+DISGUISES = {
+    "text": lambda text: text,
+    "text of NumPy": np.str_,
+    "bytes": str.encode,
+    "list": lambda text: [text],
+    "tuple": lambda text: (text,),
+    "set": lambda text: frozenset([text]),
+    "mapping": lambda text: {"a": text},
+    "mapping of keys": lambda text: {text: 1},
+    "array": lambda text: np.array([text], dtype=object),
+    "array of no dimension": lambda text: np.array(text, dtype=object),
+    "array of text": np.array,
+    "nested": lambda text: [[{"a": (text,)}]],
+}
+
+
+@pytest.mark.parametrize("disguise", DISGUISES.values(), ids=DISGUISES)
+@pytest.mark.parametrize(("named", "call"), CASES.values(), ids=CASES)
+def test_text_is_not_executed(named, call, disguise, tmp_path):
+    canary = tmp_path / "executed"
+    given = disguise(f"__import__('pathlib').Path({str(canary)!r}).touch()")
+    with pytest.raises((TypeError, ValueError)) as caught:
+        call(given, tmp_path)
+    assert not canary.exists()
+    assert re.search(rf"\b{named}\b", str(caught.value)), "the argument is named"
+    assert "\n" not in str(caught.value)
+
+
+FORMULAS = re.compile(r"sympy\.Expr|\bEnergy\b|\bExpressions\b|ForwardRef\('sympy")
+
+
+def public():
+    """Yield the public classes and functions with their names."""
+    for stub in ROOT.rglob("__init__.pyi"):
+        package = importlib.import_module(".".join(stub.parent.relative_to(ROOT.parent).parts))
+        for node in ast.parse(stub.read_text()).body:
+            if isinstance(node, ast.ImportFrom):
+                for name in (alias.asname or alias.name for alias in node.names):
+                    yield name, getattr(package, name)
+
+
+def called():
+    """Yield what a user can call, methods included."""
+    for name, value in public():
+        if callable(value):
+            yield name, value
+        for method, member in inspect.getmembers(value) if inspect.isclass(value) else ():
+            if not method.startswith("_") and callable(member):
+                yield f"{name}.{method}", member
+
+
+def test_every_public_argument_that_is_a_formula_is_tried():
+    found = set()
+    for name, value in called():
+        try:
+            parameters = inspect.signature(value).parameters.values()
+        except (TypeError, ValueError):
+            continue
+        found |= {f"{name}.{p.name}" for p in parameters if FORMULAS.search(str(p.annotation))}
+    # Given by a callable, which is code anyway.
+    assert found - {"Family.formulas"} - CASES.keys() == set()
+
+
+ALLOWED = {
+    "sympify": {"formulas/expressions.py"},
+    "parse_expr": set(),
+    "parse_latex": set(),
+    "S()": set(),
+    "N()": set(),
+    "nsimplify": {"motion/rotations.py"},  # of doubles
+    # Of expressions that have a compiled form in known symbols.
+    "lambdify": {"formulas/expressions.py", "formulas/signs.py"},
+    "eval": set(),
+    "exec": set(),
+    # Of what this process, or the one that started it, has pickled.
+    "pickle.loads": {"workers.py", "formulas/families.py", "formulas/shipped.py"},
+    "pickle.load": set(),
+    "marshal.loads": set(),
+    "yaml.load": set(),
+    "allow_pickle=True": set(),
+}
+
+
+def used(tree):
+    """Yield the names that are called or handed on, and those of arguments."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name | ast.Attribute | ast.keyword):
+            yield ast.unparse(node)
+        elif isinstance(node, ast.Call):
+            yield f"{ast.unparse(node.func)}()"
+        elif isinstance(node, ast.ImportFrom):
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_text_is_read_in_one_place_only():
+    found = {name: set() for name in ALLOWED}
+    for file in ROOT.rglob("*.py"):
+        for word in used(ast.parse(file.read_text(encoding="utf-8"))):
+            for name in ALLOWED:
+                if f".{word}".endswith(f".{name}"):
+                    found[name].add(file.relative_to(ROOT).as_posix())
+    assert found == ALLOWED
