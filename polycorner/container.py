@@ -8,7 +8,8 @@ an entry or a comment, or ignore::
     polycorner trajectory 1 sha256 5f1d...
 
 The digest is that of all bytes before it, kind and version included, and is checked before the
-content is read.  It protects against damage, not against forgery.
+content is read.  It protects against damage, not against forgery: whoever changes a file can give
+it a digest that fits.  So a reader checks every number, and does it within :meth:`Kind.reading`.
 """
 
 import hashlib
@@ -18,7 +19,9 @@ import math
 import os
 import platform
 import re
-from collections.abc import Mapping
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,10 +34,9 @@ from polycorner.atomic import write_atomically
 JSON = (b' "polycorner": "', b'"}\n')
 XML = (b"<!-- polycorner ", b" -->\n")
 BINARY = (b"\npolycorner ", b"\n")
-_SEAL = re.compile(rb"(?P<name>[a-z ]+) (?P<version>\d+) sha256 (?P<digest>[0-9a-f]{64})")
-# What is raised where entries are not those that were written.
-DAMAGE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+_SEAL = re.compile(rb"(?P<name>[a-z ]+) (?P<version>\d{1,9}) sha256 (?P<digest>[0-9a-f]{64})")
 _WORDS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
+SHOWN = 300  # characters of what is wrong with a file
 
 
 @dataclass(frozen=True)
@@ -61,9 +63,23 @@ class Kind:
     def refusal(self, path: str | os.PathLike[str], why: object) -> ValueError:
         """Return the error for a file that is not of this kind, or is damaged."""
         sentence = " ".join(str(why).split())  # what libraries report may have lines
-        return ValueError(
-            f"path: expected a {self.name} that {self.writer} wrote; {path} {sentence}"
-        )
+        shown = sentence if len(sentence) <= SHOWN else f"{sentence[: SHOWN - 3]}..."
+        return FileError(f"path: expected a {self.name} that {self.writer} wrote; {path} {shown}")
+
+    @contextmanager
+    def reading(self, path: str | os.PathLike[str]) -> Iterator[None]:
+        """Turn whatever the content of a file makes a reader raise into one sentence naming it.
+
+        What is wrong may come to light anywhere in the libraries that are used, as an error of any
+        class.
+        """
+        try:
+            yield
+        except FileError:
+            raise
+        except Exception as error:
+            plain = isinstance(error, ValueError | TypeError) and str(error)
+            raise self.refusal(path, f"is damaged ({plain or repr(error)})") from error
 
     def save(self, path: str | os.PathLike[str], body: bytes) -> Path:
         """Write bytes with their last line, atomically.
@@ -112,11 +128,9 @@ class Kind:
     def load_json(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Return the entries that :meth:`save_json` wrote."""
         content = self.load(path).rstrip().removesuffix(b",") + b"}"
-        try:
-            entries: dict[str, Any] = json.loads(content)
-        except (ValueError, RecursionError) as error:
-            raise self.refusal(path, f"is damaged ({error!r})") from error
-        return entries
+        with self.reading(path):
+            entries: dict[str, Any] = json.loads(content, parse_constant=_no_number)
+            return entries
 
     def save_arrays(self, path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> Path:
         """Write arrays as a NumPy archive."""
@@ -126,8 +140,48 @@ class Kind:
 
     def load_arrays(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Return the arrays that :meth:`save_arrays` wrote."""
-        with np.load(io.BytesIO(self.load(path)), allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+        content = self.load(path)
+        with self.reading(path):
+            return read_arrays(content)
+
+
+class FileError(ValueError):
+    """A file that is refused, in a sentence that names it."""
+
+
+def read_arrays(content: bytes) -> dict[str, Any]:
+    """Return the arrays in a NumPy archive that is not compressed, hence no larger than its file.
+
+    Raises
+    ------
+    Exception
+        Of any class, if it is damaged.
+    """
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = archive.infolist()
+        stored = all(entry.compress_type == zipfile.ZIP_STORED for entry in entries)
+        if not stored or sum(entry.file_size for entry in entries) > len(content):
+            msg = "its entries are compressed, or overlap"
+            raise ValueError(msg)
+        return {e.filename.removesuffix(".npy"): _array(archive.read(e)) for e in entries}
+
+
+def _array(content: bytes) -> Any:
+    """Return the array in the format of NumPy, whose size has to be that of its content."""
+    stream = io.BytesIO(content)
+    header = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }[np.lib.format.read_magic(stream)]
+    shape, columns_first, kind = header(stream)
+    if kind.hasobject:
+        msg = "Object arrays cannot be loaded"
+        raise ValueError(msg)
+    values = np.frombuffer(stream.read(), dtype=kind)
+    if values.size != math.prod(shape):
+        msg = f"an array has {values.size} numbers, not the shape {shape}"
+        raise ValueError(msg)
+    return values.reshape(shape, order="F" if columns_first else "C").copy()
 
 
 def _last_line(content: bytes, around: tuple[bytes, bytes]) -> "re.Match[bytes] | None":
@@ -149,6 +203,11 @@ def versions() -> dict[str, str]:
 def number(x: float) -> float | str:
     """Return a number as strict JSON has it: infinities and NaN are words."""
     return float(x) if math.isfinite(x) else str(float(x))
+
+
+def _no_number(word: str) -> float:
+    msg = f"{word} is no number of JSON"
+    raise ValueError(msg)
 
 
 def read_number(written: Any) -> float:

@@ -1,6 +1,8 @@
 """The container: a last line with kind, version and digest, in every format."""
 
+import io
 import json
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -44,6 +46,58 @@ def test_arrays_are_read_back_and_numpy_sees_them(tmp_path):
             np.testing.assert_array_equal(read[name], array, strict=True)
     with pytest.raises(ValueError, match="Object arrays cannot be loaded"):
         kind.load_arrays(kind.save_arrays(path, {"code": np.array([print])}))
+
+
+def header(shape, kind="<f8"):
+    return f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}}}".ljust(117) + "\n"
+
+
+def npy(shape, numbers=b"", kind="<f8"):
+    """Return an array as NumPy writes it, of a declared shape."""
+    text = header(shape, kind).encode()
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + numbers
+
+
+@pytest.mark.parametrize(
+    ("content", "packing"),
+    [
+        (npy("(10**12,)"), zipfile.ZIP_STORED),
+        (npy("(1000000000000,)"), zipfile.ZIP_STORED),
+        (npy("(-1,)", bytes(8)), zipfile.ZIP_STORED),
+        (npy("(3,)", bytes(8)), zipfile.ZIP_STORED),
+        (npy("(1,)", bytes(8), "|O"), zipfile.ZIP_STORED),
+        (npy("(1,)", bytes(8), "V999999999999"), zipfile.ZIP_STORED),
+        (npy("(" * 3000), zipfile.ZIP_STORED),
+        (b"nothing", zipfile.ZIP_STORED),
+        (npy("(1000000,)", bytes(8000000)), zipfile.ZIP_DEFLATED),
+        (npy("(1,)", bytes(8)), zipfile.ZIP_BZIP2),
+    ],
+)
+def test_archives_that_declare_more_than_they_hold_are_refused(tmp_path, content, packing):
+    kind, memory = replace(KIND, around=BINARY), io.BytesIO()
+    with zipfile.ZipFile(memory, "w", packing) as archive:
+        archive.writestr("a.npy", content)
+    path = kind.save(tmp_path / "thing.json", memory.getvalue())
+    with pytest.raises(ValueError, match=REFUSAL + "is damaged"):
+        kind.load_arrays(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b'{"a": ' + b"[" * 100_000 + b"]" * 100_000 + b",",
+        b'{"a": ' + b"9" * 5000 + b",",
+        b'{"a": NaN,',
+        b'{"a": "\xff",',
+        b'{"a": 1, "b",',
+        b"",
+    ],
+)
+def test_json_that_python_cannot_read_is_refused(tmp_path, text):
+    path = KIND.save(tmp_path / "thing.json", text)
+    with pytest.raises(ValueError, match=REFUSAL + "is damaged") as told:
+        KIND.load_json(path)
+    assert len(str(told.value)) < 1000
 
 
 @pytest.mark.parametrize("around", [JSON, XML, BINARY])

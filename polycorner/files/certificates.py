@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.checks import instance
-from polycorner.container import DAMAGE, JSON, Kind, number, read_number
+from polycorner.container import JSON, Kind, number, read_number
 from polycorner.files.polyhedra import (
     Entries,
     manifold_entry,
@@ -17,6 +17,8 @@ from polycorner.files.polyhedra import (
     polyhedron_entry,
     read_polyhedron,
 )
+from polycorner.forms import count, entries, many, optional, text, word
+from polycorner.forms import number as real
 from polycorner.minimisation import Certificate, Verdict
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.strata import check_tolerance
@@ -27,6 +29,16 @@ if TYPE_CHECKING:
 
 KIND = Kind("certificate", "save_certificate", JSON)
 TOLERANCE = 1e-9
+HEADER = entries(
+    {
+        "coordinates": many(entries({"value": real()})),
+        "tolerance": real(above=0, below=1),
+        "rank tolerance": real(above=0, below=1),
+        "method": text,
+        "iterations": count,
+        "search": optional(word(*Verdict.__members__)),
+    }
+)
 SOLVED = 1000  # times the tolerance, for what comes out of linear systems
 
 
@@ -106,7 +118,8 @@ def load_certificate(
     """
     check_tolerance("tolerance", tolerance)
     content = KIND.load_json(path)
-    try:
+    with KIND.reading(path):
+        HEADER("", content)
         if polyhedron is None or energy is None:
             own, its = read_polyhedron(content["problem"])
             polyhedron, energy = polyhedron or own, energy if energy is not None else its
@@ -114,8 +127,6 @@ def load_certificate(
         if not differs:
             found = _certificate(content, polyhedron, energy)
             differs = next(_differences(content, found, tolerance), "")
-    except DAMAGE as error:
-        raise KIND.refusal(path, f"is damaged ({error!r})") from error
     if differs:
         raise KIND.refusal(path, f"is of another problem, or was not computed here: {differs}")
     return found

@@ -5,10 +5,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from polycorner.checks import instance
-from polycorner.container import DAMAGE, XML, Kind, versions
+from polycorner.checks import instance, refuse
+from polycorner.container import XML, Kind, versions
+from polycorner.forms import Form, count, entries, flag, many, mapped, number, position, text, word
+from polycorner.polyhedra.strata import LocalType
 from polycorner.skeletons.elements import Skeleton
-from polycorner.skeletons.parts import Corner, Edge
+from polycorner.skeletons.parts import Completeness, Corner, Edge
 from polycorner.skeletons.walks import End
 
 if TYPE_CHECKING:
@@ -101,12 +103,36 @@ def load_graph(path: str | os.PathLike[str]) -> "nx.MultiGraph":
     """
     import networkx as nx
 
-    # Without its header, since networkx parses text, and text must not declare an encoding.
-    text = KIND.load(path).decode().removeprefix(HEADER)
-    try:
-        return nx.parse_graphml(text, force_multigraph=True)
-    except (nx.NetworkXError, SyntaxError, *DAMAGE) as error:  # SyntaxError is also that of XML
-        raise KIND.refusal(path, f"is damaged ({error!r})") from error
+    content = KIND.load(path)
+    with KIND.reading(path):
+        if b"<!DOCTYPE" in content:  # where entities are defined, which may grow without bound
+            refuse("content", "GraphML alone", "a document type")
+        # Without its header, since networkx parses text, and text must not declare an encoding.
+        graph = nx.parse_graphml(content.decode().removeprefix(HEADER), force_multigraph=True)
+        _check(graph)
+        return graph
+
+
+def _check(graph: "nx.MultiGraph") -> None:
+    """Check that a graph is that of a skeleton: its kinds, counts and places."""
+    kind = word(*(end.name.lower() for end in End))
+    names = many(word(*json.loads(graph.graph["functions"])))
+    word(*Completeness.__members__)("complete", graph.graph["complete"])
+    taken: dict[str, Form] = {"rank": count, "dimension": count, "singular": flag}
+    taken |= {"local_type": word(*LocalType.__members__), "active": _json(names)}
+    for node, about in graph.nodes(data=True):
+        at_corner = about.get("kind") == End.CORNER.name.lower()
+        entries({"kind": kind} | (taken if at_corner else {}))(node, about)
+        place = {name: x for name, x in about.items() if name not in ("kind", "chirality", *taken)}
+        mapped(text, number())(node, place)
+    lengths = {"active": _json(names), "length": number(least=0), "from_kind": kind}
+    edge = entries({"position": position(len(graph.edges)), "to_kind": kind} | lengths)
+    for start, stop, about in graph.edges(data=True):
+        edge(f"edge from {start} to {stop}", about)
+
+
+def _json(form: Form) -> Form:
+    return lambda place, value: form(place, json.loads(text(place, value)))
 
 
 def _corner(corner: Corner) -> dict[str, Any]:

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from polycorner.container import DAMAGE, Kind, versions
+from polycorner import checks, forms
+from polycorner.checks import refuse
+from polycorner.container import Kind, versions
+from polycorner.files.hdf5 import check_structure
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import EventKind
 from polycorner.motion.mechanics import MechanicalSystem
@@ -122,43 +125,67 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
 
 
 def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Array) -> Trajectory:
-    """Return the trajectory in a dataset, given its coordinates and velocities."""
-    at = content.attrs
-    names = json.loads(at["contacts"])
+    """Return the trajectory in a dataset, given its coordinates and velocities.
 
-    def of(name: str) -> Any:
-        return np.array(content[name].values)
+    Raises
+    ------
+    TypeError, ValueError
+        If an array has another shape than the system asks for, or a number is none or not one of
+        such a motion.
+    """
+    at, bodies, T = content.attrs, system.bodies, len(content["time"])
+    names = json.loads(at["contacts"])
+    forms.many(forms.word(*bodies.contact_names))("contacts", names)
+
+    def of(name: str, *shape: int, kind: str = "f", **limits: Any) -> Any:
+        return forms.array(name, np.array(content[name].values), kind, shape, **limits)
 
     def by(name: str) -> dict[str, Any]:
-        return {str(cause): of(name)[:, k] for k, cause in enumerate(of(f"{name}_by"))}
+        causes = [str(cause) for cause in content[f"{name}_by"].values]
+        return dict(zip(causes, of(name, T, len(causes)).T, strict=True))
 
     def table(kind: str, first: str) -> Any:
-        columns = [of(f"{kind}_{name}") for name in (first, *PARTICIPANTS)]
+        columns = [of(f"{kind}_{name}", -1, kind="i") for name in (first, *PARTICIPANTS)]
         return np.stack(columns, axis=1).astype(np.int64)
 
-    touches = {"touch": table("touch", "instant"), "touch_force": of("touch_force")}
-    numbers = np.stack([of("event_time"), of("event_impulse")], axis=1)
+    def flags(name: str) -> Any:
+        return of(name, T, bodies.count, kind="i", least=0, most=1) != 0
+
+    for name, array in (("q", q), ("v", v)):
+        forms.array(name, array, "f", (T, bodies.count, bodies.dimension))
+    times = of("time", T)
+    if not T or (np.diff(times) <= 0).any():
+        refuse("time", "increasing times", times.tolist())
+    touches = {"touch": table("touch", "instant"), "touch_force": of("touch_force", -1)}
+    numbers = np.stack([of("event_time", -1), of("event_impulse", -1)], axis=1)
     events = {"event": table("event", "kind"), "event_numbers": numbers}
-    whole = {name: int(at[f"effort_{name}"]) for name in EFFORT if name != "residual"}
+    whole = {
+        name: checks.whole(f"effort_{name}", at[f"effort_{name}"], least=0)
+        for name in EFFORT
+        if name != "residual"
+    }
     return Trajectory(
         system=system,
-        dt=float(at["dt"]),
-        times=of("time"),
+        dt=checks.real("dt", at["dt"], above=0),
+        times=times,
         q=q,
         v=v,
-        rests=of("rests") != 0,
-        present=of("present") != 0,
-        touching=tuple(read_touches(touches, names, len(content["time"]))),
-        kinetic=of("kinetic"),
-        potential=of("potential"),
+        rests=flags("rests"),
+        present=flags("present"),
+        touching=tuple(read_touches(touches, names, T, bodies.count)),
+        kinetic=of("kinetic", T),
+        potential=of("potential", T),
         dissipated=by("dissipated"),
         work=by("work"),
-        events=read_events(events, names),
-        max_penetration=float(at["max_penetration"]),
-        effort=Effort(**whole, residual=float(at["effort_residual"])),
+        events=read_events(events, names, bodies.count),
+        max_penetration=checks.real("max_penetration", at["max_penetration"], least=0),
+        effort=Effort(
+            **whole,
+            residual=checks.real("effort_residual", at["effort_residual"], least=0, infinite=True),
+        ),
         noise=_noise(at),
-        every=int(at["every"]),
-        t_end=None if math.isnan(at["t_end"]) else float(at["t_end"]),
+        every=checks.whole("every", at["every"], least=1),
+        t_end=None if math.isnan(at["t_end"]) else checks.real("t_end", at["t_end"]),
         steps_per_second=float(at["steps_per_second"]),
     )
 
@@ -187,12 +214,11 @@ def save_dataset(kind: Kind, path: str | os.PathLike[str], content: "xr.Dataset"
 def load_dataset(
     kind: Kind, path: str | os.PathLike[str], read: "Callable[[xr.Dataset], T]"
 ) -> "T":
-    """Return what ``read`` makes of the dataset in a file, after a check of its digest."""
+    """Return what ``read`` makes of the dataset in a file, after checks of digest and structure."""
     import xarray as xr
 
     content = kind.load(path)
-    try:
-        with xr.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False) as file:
+    with kind.reading(path):
+        check_structure(content, io.BytesIO(content))
+        with xr.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_cf=False) as file:
             return read(file.load())
-    except (OSError, *DAMAGE) as error:
-        raise kind.refusal(path, f"is damaged ({error})") from error

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
+from polycorner import forms
 from polycorner.container import number, read_number
 from polycorner.files.formulas import formula_text, read_formula, symbols
 from polycorner.formulas.families import Family
@@ -76,6 +77,17 @@ def polyhedron_entry(polyhedron: Polyhedron, energy: SmoothFunction | None = Non
 
 def read_polyhedron(entry: Entries) -> tuple[Polyhedron, SmoothFunction | None]:
     """Return the polyhedron and the energy of :func:`polyhedron_entry`, without annotations."""
+    one = forms.entries(
+        {
+            "name": forms.text,
+            "family": forms.position(len(entry["families"])),
+            "member": forms.text,
+            "reads": forms.many(forms.text),
+            "parameters": forms.many(forms.number()),
+        }
+    )
+    listed = {"functions": forms.many(one), "equations": forms.many(one)}
+    forms.entries(listed | {"energy": forms.optional(one)})("", entry)
     manifold = read_manifold(entry["coordinates"])
     families = [_read_family(family) for family in entry["families"]]
 
@@ -160,6 +172,7 @@ def _tree_entry(tree: Any) -> Any:
 
 def _read_tree(entry: Any, functions: Sequence[SmoothFunction]) -> Any:
     if isinstance(entry, int):
+        forms.position(len(functions))("tree", entry)
         return functions[entry]
     ((word, children),) = entry.items()
     return {"any": AnyOf, "all": AllOf}[word](*[_read_tree(c, functions) for c in children])

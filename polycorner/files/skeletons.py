@@ -1,15 +1,17 @@
 """Skeletons as JSON, finished or not: a search resumes from them."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from polycorner.checks import refuse
-from polycorner.container import DAMAGE, JSON, Kind, number, read_number
+from polycorner.container import JSON, Kind, number, read_number
 from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
+from polycorner.files.skeleton_forms import HEADER, check_active, check_rays, check_sizes, unlike
+from polycorner.forms import generator_entry, read_generator
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
@@ -25,7 +27,6 @@ from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.walks import End
 
 KIND = Kind("skeleton", "save_skeleton", JSON)
-RANDOM = ("MT19937", "PCG64", "PCG64DXSM", "Philox", "SFC64")
 VALUES = 1e-9  # largest difference of values at corners, relative to the value and the slope
 
 
@@ -58,11 +59,13 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
     if not isinstance(skeleton, Skeleton) or not isinstance(skeleton.state, SearchState):
         refuse("skeleton", "a Skeleton that skeleton returned", skeleton, TypeError)
     explorer = Explorer.resumed(skeleton.state)
+    points = [record.point.q for record in explorer.records]
+    points += [curve.points[0] for curve in explorer.curves]
     entries = {
         "label": label,
         "complete": skeleton.complete.name,
         "polyhedron": polyhedron_entry(skeleton.polyhedron),
-        "symmetry": _symmetry(explorer),
+        "symmetry": _symmetry(explorer.polyhedron, explorer.symmetry, points),
         "tolerance": explorer.quotient.tolerance,
         "extent": number(explorer.quotient.extent),
         "corners": [_corner(explorer, record) for record in explorer.records],
@@ -78,7 +81,7 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
         "sought": list(explorer.sought),
         "notes": explorer.notes,
         "lost": bool(explorer.registry.lost),
-        "random": _listed(explorer.rng.bit_generator.state),
+        "random": generator_entry(explorer.rng),
     }
     return KIND.save_json(path, entries)
 
@@ -113,36 +116,48 @@ def load_skeleton(
         If the file is no skeleton, was changed, or is of another polyhedron or symmetry.
     """
     content = KIND.load_json(path)
+    with KIND.reading(path):
+        HEADER("", content)
     if label is not None and content["label"] != label:
         refuse("path", f"a skeleton called {label!r}", f"{path}, called {content['label']!r}")
     annotations = content["polyhedron"]["annotations"]
     if polyhedron is None and annotations:
         expected = f"that of {path}, whose annotations {', '.join(annotations)} are functions"
         refuse("polyhedron", expected, None)
-    try:
+    with KIND.reading(path):
         d = polyhedron or read_polyhedron(content["polyhedron"])[0]
         differs = mismatch(content["polyhedron"], d)
-        if not differs:
-            explorer = _explorer(content, d, symmetry or Symmetry())
+        explorer = differs or _explorer(content, d, symmetry or Symmetry())
+        if not isinstance(explorer, str):
             differs = next(_differences(content, explorer), "")
-        found = None if differs else assembled(explorer, Completeness[content["complete"]])
-    except DAMAGE as error:
-        raise KIND.refusal(path, f"is damaged ({error!r})") from error
-    if found is None:
-        raise KIND.refusal(path, f"is of another polyhedron or symmetry: {differs}")
+            found = assembled(explorer, Completeness[content["complete"]])
+    if isinstance(explorer, str) or differs:
+        raise KIND.refusal(path, f"is of another polyhedron or symmetry: {differs or explorer}")
     return found
 
 
-def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> Explorer:
+def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> "Explorer | str":
+    """Return the search, or which function differs at a corner."""
     extent, n = read_number(content["extent"]), polyhedron.manifold.size
-    points = [_points(q, n, 1) for _, q in content["starts"]]
-    points += [_points(entry["points"], n, 2)[0] for entry in content["edges"]]
-    points += [_points(corner["point"], n, 1) for corner in content["corners"]]
-    quotient = Quotient.near(polyhedron, symmetry, float(content["tolerance"]), extent, points)
-    explorer = Explorer(quotient, [], _generator(content["random"]))
-    for corner in content["corners"]:
+    check_sizes(content, n, len(polyhedron.functions))
+    starts = [_points(q, n, 1) for _, q in content["starts"]]
+    edges = [_points(entry["points"], n, 2)[0] for entry in content["edges"]]
+    corners = [_points(corner["point"], n, 1) for corner in content["corners"]]
+    written, here = content["symmetry"], _symmetry(polyhedron, symmetry, corners + edges)
+    if written != here:
+        words = [", ".join(f"{k} {v}" for k, v in entry.items()) for entry in (written, here)]
+        return f"symmetry: written {words[0]}, found {words[1]}"
+    points, tolerance = starts + edges + corners, float(content["tolerance"])
+    quotient = Quotient.near(polyhedron, symmetry, tolerance, extent, points)
+    explorer = Explorer(quotient, [], read_generator("random", content["random"]))
+    for k, (corner, q) in enumerate(zip(content["corners"], corners, strict=True)):
         active = frozenset(map(polyhedron.names.index, corner["active"]))
-        explorer.registry.restore(_points(corner["point"], n, 1), active)
+        differs = unlike(quotient, q[None], active)
+        if differs:
+            return differs.replace(":", f" at corner {k}:", 1)
+        check_active(f"corners[{k}].active", quotient, q, active)
+        explorer.registry.restore(q, active)
+    check_rays(content, explorer)
     for record, corner in zip(explorer.records, content["corners"], strict=True):
         record.edges.update(dict(corner["edges"]))
     explorer.curves += [_read_curve(entry, n) for entry in content["edges"]]
@@ -165,11 +180,7 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> E
 
 
 def _differences(content: Entries, explorer: Explorer) -> Iterator[str]:
-    """Yield in what the symmetry, or the functions at the corners, differ from the file."""
-    written, here = content["symmetry"], _symmetry(explorer)
-    if written != here:
-        words = [", ".join(f"{k} {v}" for k, v in entry.items()) for entry in (written, here)]
-        yield f"symmetry: written {words[0]}, found {words[1]}"
+    """Yield in what the functions at the corners differ from the file."""
     names = [*explorer.polyhedron.names, *explorer.polyhedron.equation_names]
     for k, (record, entry) in enumerate(zip(explorer.records, content["corners"], strict=True)):
         values = np.array([read_number(x) for x in entry["values"]])
@@ -179,13 +190,10 @@ def _differences(content: Entries, explorer: Explorer) -> Iterator[str]:
             yield f"{names[i]!r} at corner {k}: written {values[i]:.12g}, found {found[i]:.12g}"
 
 
-def _symmetry(explorer: Explorer) -> Entries:
+def _symmetry(polyhedron: Polyhedron, symmetry: Symmetry, points: Sequence[Any]) -> Entries:
     """Return what is known of a symmetry without its functions."""
-    symmetry = explorer.symmetry
-    points = [record.point.q for record in explorer.records]
-    points += [curve.points[0] for curve in explorer.curves]
     return {
-        "motions": len(symmetry.directions(explorer.manifold, points[0])) if points else None,
+        "motions": len(symmetry.directions(polyhedron.manifold, points[0])) if points else None,
         "elements": len(symmetry.elements),
         "relabels": bool(symmetry.relabels),
     }
@@ -249,28 +257,3 @@ def _flag(flag: Flag) -> list[Any]:
 def _read_flag(written: list[Any]) -> Flag:
     kind, record, names = written
     return kind, tuple(record) if isinstance(record, list) else record, frozenset(names)
-
-
-# -------------------------------------------------------------------------------- random generators
-
-
-def _listed(state: Any) -> Any:
-    """Return the state of a bit generator, some of which have arrays in it, as plain values."""
-    if isinstance(state, Mapping):
-        return {name: _listed(value) for name, value in state.items()}
-    return state.tolist() if isinstance(state, np.ndarray | np.generic) else state
-
-
-def _generator(state: dict[str, Any]) -> np.random.Generator:
-    if state["bit_generator"] not in RANDOM:
-        msg = f"no bit generator is called {state['bit_generator']!r}"
-        raise LookupError(msg)
-    found = getattr(np.random, state["bit_generator"])()
-    found.state = _unlisted(state)
-    return np.random.Generator(found)
-
-
-def _unlisted(state: Any) -> Any:
-    if isinstance(state, dict):
-        return {name: _unlisted(value) for name, value in state.items()}
-    return np.array(state, dtype=np.uint64) if isinstance(state, list) else state

@@ -9,26 +9,27 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from polycorner import forms
 from polycorner.atomic import PART
-from polycorner.checks import real
+from polycorner.checks import instance, real, refuse
 from polycorner.container import BINARY, Kind
 from polycorner.motion.events import joined
 from polycorner.motion.recorder import Recorder
-from polycorner.motion.tables import event_arrays, read_events, read_touches, touch_table
+from polycorner.motion.tables import event_arrays, touch_table
 from polycorner.values import Value
 
 KIND = Kind("checkpoint", "a simulation", BINARY)
 STATE = "state.npz"
+LOCK = ".lock"
 ENGINE = "engine."
 SHOWN = 40  # characters of a value in an error
-DAMAGE = (KeyError, IndexError, ValueError, OSError)
 
 
 @dataclass(frozen=True)
@@ -72,15 +73,47 @@ class Checkpoint(Value):
         super().__post_init__()
 
     def clear(self) -> None:
-        """Remove the saved run, and the folder when nothing else is in it."""
+        """Remove the saved run, and the folder when nothing else is in it.
+
+        Raises
+        ------
+        ValueError
+            If a run is using the folder.
+        """
         folder = Path(self.folder)
         if not folder.is_dir():
             return
-        for pattern in (STATE, "chunk-*.npz", f".state-*{PART}.npz", f".chunk-*{PART}.npz"):
-            for entry in folder.glob(pattern):
-                entry.unlink(missing_ok=True)
+        with _alone(folder):
+            _remove_run(folder)
+            with contextlib.suppress(OSError):  # where an open file cannot be removed
+                (folder / LOCK).unlink()
         with contextlib.suppress(OSError):
             folder.rmdir()
+
+
+def _remove_run(folder: Path) -> None:
+    for pattern in (STATE, "chunk-*.npz", f".state-*{PART}.npz", f".chunk-*{PART}.npz"):
+        for entry in folder.glob(pattern):
+            entry.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; without locks, or where none can be written, all go on."""
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK, thread_local=False)
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        msg = f"checkpoint: expected a folder that no other run is using; {folder} is in use"
+        raise ValueError(msg) from None
+    except (OSError, NotImplementedError):
+        pass
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 class SavedRun:
@@ -91,12 +124,31 @@ class SavedRun:
     checkpoint : Checkpoint
     parameters : mapping
         Everything that the run depends on, by name, as values that JSON can hold.
+    steps, every : int
+        Steps of the whole run, and between two records.
     """
 
-    def __init__(self, checkpoint: Checkpoint, parameters: Mapping[str, Any]) -> None:
+    def __init__(
+        self, checkpoint: Checkpoint, parameters: Mapping[str, Any], steps: int, every: int
+    ) -> None:
         self.checkpoint, self.folder = checkpoint, Path(checkpoint.folder)
+        self.steps, self.every = steps, every
         self.parameters = json.loads(json.dumps(parameters, default=str))
         self._chunks = self._frames = self._events = 0
+
+    @contextlib.contextmanager
+    def alone(self) -> Iterator[None]:
+        """Use the folder, which is created if it does not exist, and keep other runs out of it.
+
+        Raises
+        ------
+        ValueError
+            If another run is using it.
+        """
+        with contextlib.suppress(OSError):  # what cannot be written is said when it is tried
+            self.folder.mkdir(parents=True, exist_ok=True)
+        with _alone(self.folder):
+            yield
 
     def begin(self, recorder: Recorder) -> bool:
         """Bring a fresh recorder to where the run was saved; return whether there was one.
@@ -107,22 +159,25 @@ class SavedRun:
             If the saved run has other parameters, another format, or damaged files.
         """
         if not (self.folder / STATE).exists():
-            self.checkpoint.clear()  # chunks of a run that was killed before its first state
+            _remove_run(self.folder)  # chunks of a run that was killed before its first state
             return False
+        resume = self.checkpoint.resume
         try:
             state = KIND.load_arrays(self.folder / STATE)
-            finished, resume = bool(state["finished"]), self.checkpoint.resume
+            with KIND.reading(self.folder / STATE):
+                finished = bool(forms.array("finished", state["finished"], "b", ()))
+                parameters = instance("parameters", json.loads(str(state["parameters"])), dict)
             if resume or not finished:
-                self._compare(json.loads(str(state["parameters"])), finished=finished)
+                self._compare(parameters, finished=finished)
             if resume:
-                self._fill(recorder, state)
+                self._fill(recorder, state, finished=finished)
         except _RefusedError as error:
             raise ValueError(str(error)) from None
-        except DAMAGE as error:
+        except (ValueError, OSError) as error:
             msg = f"checkpoint: expected a saved run; {self.folder} is damaged ({error})"
             raise ValueError(msg) from error
         if not resume:
-            self.checkpoint.clear()
+            _remove_run(self.folder)
         return resume
 
     def _compare(self, saved: dict[str, Any], *, finished: bool) -> None:
@@ -160,23 +215,30 @@ class SavedRun:
     def _chunk(self, number: int) -> Path:
         return self.folder / f"chunk-{number:06d}.npz"
 
-    def _fill(self, recorder: Recorder, state: dict[str, Any]) -> None:
-        names = recorder.engine.bodies.contact_names
-        for number in range(int(state["chunks"])):
+    def _fill(self, recorder: Recorder, state: dict[str, Any], *, finished: bool) -> None:
+        with KIND.reading(self.folder / STATE):
+            chunks = int(forms.array("chunks", state["chunks"], "i", (), least=1))
+        for number in range(chunks):
             chunk = KIND.load_arrays(self._chunk(number))
-            for name, rows in recorder.columns.items():
-                rows.extend(chunk[name])
-            recorder.left += chunk["left"].tolist()
-            recorder.touching += read_touches(chunk, names, len(chunk["left"]))
-            recorder.events.append(read_events(chunk, names))
-        if len(recorder.left) != int(state["frames"]):
-            msg = f"{int(state['frames'])} instants were saved, {len(recorder.left)} are there"
-            raise ValueError(msg)
-        recorder.gone = float(state["gone"])
-        saved = {name.removeprefix(ENGINE): a for name, a in state.items() if ENGINE in name}
-        recorder.engine.load(saved)
-        self._chunks = int(state["chunks"])
+            with KIND.reading(self._chunk(number)):
+                recorder.extend(chunk)
+        with KIND.reading(self.folder / STATE):
+            self._check_instants(recorder, state, finished=finished)
+            recorder.gone = float(forms.array("gone", state["gone"], "f", ()))
+            saved = {name.removeprefix(ENGINE): a for name, a in state.items() if ENGINE in name}
+            recorder.load(saved)
+        self._chunks = chunks
         self._frames, self._events = len(recorder.left), len(recorder.events)
+
+    def _check_instants(self, recorder: Recorder, state: dict[str, Any], *, finished: bool) -> None:
+        """Check that instants were recorded every so many steps, and whether these are all."""
+        frames, engine = len(recorder.left), recorder.engine
+        forms.array("frames", state["frames"], "i", (), least=max(1, frames), most=frames)
+        steps = np.minimum(self.every * np.arange(frames), self.steps)
+        if finished != (steps[-1] == self.steps):
+            refuse("finished", f"a run of {self.steps} steps", int(steps[-1]))
+        if (np.array(recorder.columns["t"]) != engine.start + steps * engine.dt).any():
+            refuse("t", "the times of the steps", "others")
 
 
 class _RefusedError(Exception):

@@ -4,11 +4,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner import forms
+from polycorner.checks import refuse
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.events import EventKind, EventTable, joined
+from polycorner.motion.saved_states import check_state
+from polycorner.motion.tables import read_events, read_touches
 from polycorner.motion.trajectory import Touch, Trajectory
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from polycorner.motion.mechanics import MechanicalSystem
 
 WORK = ("substrate", "applied", "noise")
@@ -46,6 +52,50 @@ class Recorder:
         self.events.append(happened)
         for event in happened.of_kind(EventKind.EXIT):
             self.gone -= self.engine.energy_of(event.bodies[0])
+
+    def extend(self, chunk: "Mapping[str, Any]") -> None:
+        """Record what was recorded and saved before, after a check of every number.
+
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the array.
+        """
+        bodies = self.engine.bodies
+        N, k, count = bodies.count, bodies.dimension, len(chunk["left"])
+        shapes: dict[str, tuple[str, tuple[int, ...]]] = {
+            "t": ("f", ()),
+            "q": ("f", (N, k)),
+            "v": ("f", (N, k)),
+            "rests": ("b", (N,)),
+            "alive": ("b", (N,)),
+            "energies": ("f", (2,)),
+            "sums": ("f", self.engine.motion.sums.shape),
+        }
+        for name, (kind, shape) in shapes.items() if count else ():  # empty lists have no shape
+            self.columns[name].extend(forms.array(name, chunk[name], kind, (count, *shape)))
+        self.left += forms.array("left", chunk["left"], "f", (count,)).tolist()
+        self.touching += read_touches(chunk, bodies.contact_names, count, N)
+        self.events.append(read_events(chunk, bodies.contact_names, N))
+
+    def load(self, state: "Mapping[str, Any]") -> None:
+        """Bring the engine to a saved state, which has to be that of the last instant.
+
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the array.
+        """
+        engine, columns = self.engine, self.columns
+        for name, first in (("q", engine.motion.q), ("v", engine.motion.v)):
+            if (columns[name][0] != first).any():
+                refuse(name, "the start of the run at first", columns[name][0].tolist())
+        check_state(engine, state, round((columns["t"][-1] - engine.start) / engine.dt))
+        for name in ("q", "v", "rests", "alive", "sums"):
+            if (state[name] != columns[name][-1]).any():
+                refuse(name, "the state at the last instant", "another one")
+        engine.load(dict(state))
+        forms.array("energies", np.array(engine.energies()), "f", (2,))
 
     def trajectory(self, system: "MechanicalSystem", **run: Any) -> Trajectory:
         """Return what was recorded; ``run`` are the arguments of the simulation."""

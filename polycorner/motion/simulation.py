@@ -54,6 +54,7 @@ that end at impacts: :mod:`polycorner.motion.engine.refinement`.
 import math
 import threading
 import time
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -131,7 +132,7 @@ def simulate(
         If a force, a mass or a gap is not finite; ``state`` is the state before.
     TypeError, ValueError
         Naming the argument; for ``dt`` with the largest that is stable at the start, for
-        ``checkpoint`` with the parameter that differs from those of the saved run.
+        ``checkpoint`` with the parameter that differs from the saved run's, or as it is in use.
 
     Examples
     --------
@@ -158,14 +159,15 @@ def simulate(
     recorder, saved = Recorder(engine), None
     if checkpoint is not None:
         told = _parameters(system, state, end, dt, stride, noise, solver)
-        saved = SavedRun(checkpoint, told)
-    if saved is None or not saved.begin(recorder):
-        recorder.instant()
-    try:
-        rate = _follow(recorder, steps, stride, saved, progress)
-    except SolverError as error:
-        error.state = _present(engine, state)
-        raise
+        saved = SavedRun(checkpoint, told, steps, stride)
+    with nullcontext() if saved is None else saved.alone():
+        if saved is None or not saved.begin(recorder):
+            recorder.instant()
+        try:
+            rate = _follow(recorder, steps, stride, saved, progress)
+        except SolverError as error:
+            error.state = _present(engine, state)
+            raise
     return recorder.trajectory(
         system, noise=noise, solver=solver, every=stride, t_end=end, steps_per_second=rate
     )
@@ -301,9 +303,8 @@ def start(
 
 
 def _check_mass(bodies: IdenticalBodies, q: Array, v: Array) -> None:
-    body = bodies.body
     for i in range(bodies.count):
-        mass = moment(body.formulation, body.parameters, q[i], v[i]).mass
+        mass = moment(bodies.body.formulation, bodies.body.parameters, q[i], v[i]).mass
         least = np.linalg.eigvalsh(mass)[0] if np.isfinite(mass).all() else np.nan
         if not least > 0:
             msg = (

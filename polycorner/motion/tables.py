@@ -4,7 +4,9 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from polycorner import forms
 from polycorner.motion.events import Event, EventKind, EventTable
 from polycorner.motion.trajectory import Touch
 
@@ -20,12 +22,14 @@ def touch_table(touching: Sequence[Sequence[Touch]], names: Sequence[str]) -> di
     return {"touch": whole, "touch_force": np.array([row[4] for row in rows], dtype=np.float64)}
 
 
-def read_touches(table: Any, names: Sequence[str], count: int) -> list[tuple[Touch, ...]]:
-    """Return contacts by instant from :func:`touch_table`."""
+def read_touches(
+    table: Any, names: Sequence[str], count: int, bodies: int
+) -> list[tuple[Touch, ...]]:
+    """Return contacts by instant from :func:`touch_table`; ValueError if there is none such."""
+    whole = _positions("touch", table["touch"], (count, bodies, bodies, len(names)), (0, 0, -1, 0))
+    forces = forms.array("touch_force", table["touch_force"], "f", (len(whole),))
     found: list[list[Touch]] = [[] for _ in range(count)]
-    for (index, i, j, which), force in zip(
-        table["touch"].tolist(), table["touch_force"].tolist(), strict=True
-    ):
+    for (index, i, j, which), force in zip(whole.tolist(), forces.tolist(), strict=True):
         found[index].append(((i,) if j < 0 else (i, j), names[which], force))
     return [tuple(touches) for touches in found]
 
@@ -52,14 +56,18 @@ def event_arrays(events: EventTable) -> dict[str, Any]:
     return {"event": events.whole, "event_numbers": events.numbers}
 
 
-def read_events(table: Any, names: Sequence[str]) -> EventTable:
+def read_events(table: Any, names: Sequence[str], bodies: int) -> EventTable:
     """Return events from :func:`event_table`; ValueError if there is no such kind or contact."""
-    events = EventTable(table["event"], table["event_numbers"], names)
-    for kind in np.unique(events.whole[:, 0]):
-        EventKind(kind)
-    if len(events) and not (
-        -1 <= events.whole[:, 3].min() <= events.whole[:, 3].max() < len(names)
-    ):
-        msg = f"there are {len(names)} contacts"
-        raise ValueError(msg)
-    return events
+    sizes = (len(EventKind), bodies, bodies, len(names))
+    whole = _positions("event", table["event"], sizes, (0, 0, -1, -1))
+    numbers = forms.array("event_numbers", table["event_numbers"], "f", (len(whole), 2))
+    return EventTable(whole, numbers, names)
+
+
+def _positions(
+    place: str, table: Any, sizes: tuple[int, ...], least: tuple[int, ...]
+) -> NDArray[np.int64]:
+    """Return a table after a check that each column has positions among so many things."""
+    most = np.array(sizes) - 1
+    whole = forms.array(place, table, "i", (-1, len(sizes)), least=np.array(least), most=most)
+    return np.asarray(whole, dtype=np.int64)

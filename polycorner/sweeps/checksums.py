@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from polycorner.atomic import write_atomically
+from polycorner.checks import refuse
+from polycorner.sweeps.metadata import check_root, reading
 
 ROOT = "zarr.json"
 ZEROS = "0" * 64
@@ -51,8 +53,8 @@ def write_root(path: Path, attributes: dict[str, Any], arrays: Iterable[str]) ->
     )
 
 
-def checked_root(path: Path) -> tuple[dict[str, Any], list[str]]:
-    """Return the attributes of a store and the names of its arrays.
+def checked_root(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the attributes of a store and the metadata of its arrays by name.
 
     Raises
     ------
@@ -75,8 +77,10 @@ def checked_root(path: Path) -> tuple[dict[str, Any], list[str]]:
     blank = b"" if found is None else content.replace(found[1], ZEROS.encode(), 1)
     if found is None or sha256(blank).hexdigest().encode() != found[1]:
         raise _changed(file)
-    document = json.loads(content)
-    return document["attributes"], list(document["consolidated_metadata"]["metadata"])
+    with reading(file):
+        document = json.loads(content)
+        check_root(document)
+    return document["attributes"], document["consolidated_metadata"]["metadata"]
 
 
 def check_store(path: Path) -> dict[str, Any]:
@@ -89,12 +93,16 @@ def check_store(path: Path) -> dict[str, Any]:
     """
     import google_crc32c
 
-    attributes, arrays = checked_root(path)
+    attributes, metadata = checked_root(path)
     checks = json.loads(attributes["checksums"])
-    for name in arrays:
+    for name in metadata:
         file = path / name / ROOT
-        if sha256(_read(file)).hexdigest() != checks["metadata"][name]:
+        content = _read(file)
+        if sha256(content).hexdigest() != checks["metadata"][name]:
             raise _changed(file)
+        with reading(file):
+            if json.loads(content) != metadata[name]:
+                refuse(name, "the metadata in the root", "others")
         files = chunks(path / name)
         for file in files:
             content = _read(file)

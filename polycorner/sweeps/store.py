@@ -24,12 +24,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner import forms
 from polycorner.checks import missing_extra
 from polycorner.sweeps.checksums import ROOT, check_store, checked_root, write_root
-from polycorner.sweeps.grid import Axis, Grid
-from polycorner.sweeps.points import Column
+from polycorner.sweeps.metadata import reading, stored_columns, stored_grid
 from polycorner.sweeps.study import Study, SweepError, difference, versions
 from polycorner.sweeps.tables import (
+    FAILED,
+    PENDING,
     Table,
     Variable,
     coordinate_arrays,
@@ -90,8 +92,8 @@ class Store(Table):
         check_study(self.path, self.study)
         if (self.path / ROOT).exists():
             self.about = check_store(self.path)
-            self.present = checked_root(self.path)[1]
-            self.columns = _columns(self.about)
+            self.present = list(checked_root(self.path)[1])
+            self.columns = stored_columns(self.about)
         else:
             self.about = self.study.attributes()
             write_root(self.path, self.about, [])
@@ -100,7 +102,10 @@ class Store(Table):
                 self._create(new, new.shape)
                 self.arrays[new.name][...] = new.fill
         self.create()
-        self.set_status(np.asarray(self.arrays["status"][...]).reshape(-1))
+        with reading(self.path / "status"):
+            status = np.asarray(self.arrays["status"][...]).reshape(-1)
+            forms.array("status", status, "i", (-1,), least=PENDING, most=FAILED)
+        self.set_status(status)
 
     def create(self) -> None:
         """Make the arrays that do not exist yet; they count once the root lists them."""
@@ -261,25 +266,25 @@ def open_results(path: str | Path) -> "xr.Dataset":
 
     folder = Path(path)
     about = check_store(folder)
-    found: xr.Dataset = xr.open_zarr(folder, consolidated=True, chunks=None, decode_times=False)
-    names = [column.name for column in _columns(about)]
-    ordered = found[[*names, "message", "seconds", "status"]]
+    with reading(folder):  # every value once: what is asked for later can be read
+        found: xr.Dataset = xr.open_zarr(folder, consolidated=True, chunks=None, decode_times=False)
+        for array in found.variables.values():
+            _ = [array[piece].values for piece in _pieces(array)]
+    names = [column.name for column in stored_columns(about)]
+    ordered: xr.Dataset = found[[*names, "message", "seconds", "status"]]
     ordered.attrs = {
         name: value
         for name, value in about.items()
         if name not in ("columns", "checksums", "sha256")
     }
-    return ordered.assign_coords(coordinate_arrays(_grid(json.loads(about["study"]))))
+    return ordered.assign_coords(coordinate_arrays(stored_grid(about)))
 
 
-def _grid(study: dict[str, Any]) -> Grid:
-    return Grid({axis["name"]: Axis(axis["values"], axis["unit"]) for axis in study["axes"]})
-
-
-def _columns(about: dict[str, Any]) -> tuple[Column, ...]:
-    """Return the columns of the results from the attributes of a store."""
-    entries = json.loads(about.get("columns", "[]"))
-    return tuple(Column(**entry | {"shape": tuple(entry["shape"])}) for entry in entries)
+def _pieces(array: Any) -> Iterator[tuple[slice, ...]]:
+    """Yield where the chunks of an array are."""
+    sizes = array.encoding["chunks"]
+    for place in np.ndindex(*(-(-n // size) for n, size in zip(array.shape, sizes, strict=True))):
+        yield tuple(slice(k * size, (k + 1) * size) for k, size in zip(place, sizes, strict=True))
 
 
 def _chunk_shape(grid: tuple[int, ...], new: Variable) -> tuple[int, ...]:

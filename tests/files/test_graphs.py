@@ -11,6 +11,7 @@ from kept_files import same_graph
 from polycorner import Manifold, Polyhedron, skeleton
 from polycorner.dumbbells import DumbbellPair
 from polycorner.files import load_graph, save_graph
+from polycorner.files.graphs import KIND
 from polycorner.models import Pinball, Tutorial
 from polycorner.skeletons import End
 
@@ -102,3 +103,41 @@ def test_coordinates_may_be_called_as_they_like(tmp_path):
 def test_something_else_is_refused(tmp_path):
     with pytest.raises(TypeError, match=r"^skeleton: expected a Skeleton; got str"):
         save_graph("atlas", tmp_path / "a.graphml")
+
+
+@pytest.fixture
+def wedge(tmp_path):
+    found = skeleton(Polyhedron(M, {"a": Y - X, "b": Y + X}), [[0.0, 1.0]], extent=5.0)
+    return save_graph(found, tmp_path / "wedge.graphml")
+
+
+HOSTILE = [
+    lambda text: text.replace("<graphml", '<!DOCTYPE g [<!ENTITY x "y">]><graphml', 1),
+    lambda text: text.replace("corner", "&x;", 1),
+    lambda text: text.replace("<graph ", "<a>" * 100_000 + "<graph ", 1),
+    lambda text: text.replace("QUADRANT", "\x00", 1),
+    lambda text: text[: len(text) // 2],
+    lambda _: "",
+    lambda _: "not XML",
+    lambda text: text.replace(">corner<", ">nobody<", 1),
+    lambda text: text.replace("QUADRANT", "NOTHING", 1),
+    lambda text: text.replace(">2</data>", ">1e5000</data>", 1),
+    lambda text: text.replace(">2</data>", f">{'9' * 5000}</data>", 1),
+    lambda text: text.replace(">2</data>", ">-1</data>", 1),
+    lambda text: text.replace('["a"]', "[" * 100_000, 1),
+    lambda text: text.replace('attr.type="long"', 'attr.type="code"', 1),
+]
+
+
+@pytest.mark.parametrize("k", range(len(HOSTILE)))
+def test_a_hostile_file_is_refused_in_one_sentence_that_names_it(wedge, k):
+    text = KIND.load(wedge).decode()
+    changed = HOSTILE[k](text)
+    assert changed != text
+    KIND.save(wedge, changed.encode())
+    with pytest.raises(
+        ValueError, match=r"^path: expected a graph that save_graph wrote; "
+    ) as told:
+        load_graph(wedge)
+    assert f"{wedge} is damaged" in str(told.value)
+    assert "\n" not in str(told.value)

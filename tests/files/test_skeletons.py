@@ -166,6 +166,55 @@ def code(entries):
     entries["polyhedron"]["families"][0]["formulas"]["in"] = "open('file')"
 
 
+def at(*path):
+    """Return what puts a value at a place of nested entries."""
+
+    def put(entries, value):
+        for key in path[:-1]:
+            entries = entries[key]
+        entries[path[-1]] = value
+
+    return put
+
+
+FAR = [1e30, 1e30]
+FORGED = [
+    *[(at("tolerance"), x) for x in (-1, 0, 1e12, "nan", 10**400)],
+    *[(at("extent"), x) for x in (-1, 0, "nan", 0.1)],
+    *[(at("corners", 0, "point"), x) for x in (FAR, [1e300, 0.0], [1.0], 10**400)],
+    *[(at("corners", 0, "active"), x) for x in ([], ["in"], ["nobody"], 7)],
+    *[(at("corners", 0, "edges", 0), x) for x in ([99, 0], [-1, 0], [0, 99], [0, -1], [0, 10**12])],
+    *[(at("edges", 0, "points", 1), x) for x in (FAR, [0.0, 0.0], ["nan", 0.0], [1])],
+    *[(at("edges", 0, "start"), x) for x in ([-1, 0], [99, 0], [0, 99], [0, -1], None, [1, 0])],
+    *[(at("edges", 0, "stop"), x) for x in ([-1, 0], [0, 10**12], [0, 0, 0], "12")],
+    *[(at("edges", 0, "active"), x) for x in ([], [-1], [99], [0, 10**12])],
+    *[(at("edges", 0, "kinds"), x) for x in (["CORNER"], ["CLOSED", "CORNER"], [1, 2])],
+    *[(at("edges", 0, "relabelled"), x) for x in ({"in": "nobody"}, {"nobody": "in"}, [])],
+    *[(at("pending"), x) for x in ([[0, 99]], [[99, 0]], [[-1, 0]], [[0, -2]], [0], [[0, 0]])],
+    *[(at("starts"), x) for x in ([[0, FAR]], [[-2, [0.0, 1.5]]], [[0, [1.0]]], [[0.5, [1, 1]]])],
+    *[(at("tried"), [[*x, ["in"]]]) for x in (["half", [0, 99]], ["curve", 99], ["apex", [0, 99]])],
+    *[(at("crossings"), [[["curve", -1, []]] * 2]), (at("links"), [[["corner", 99]]])],
+    *[(at("patches"), [[[99], [0.0, 1.5]]]), (at("least"), {"nobody": 1.0})],
+    *[(at("sought"), [-1, 0]), (at("lost"), 2), (at("notes"), [1]), (at("label"), 1)],
+    *[(at("random", "state", "state"), x) for x in (-1, 2**128, 0.5)],
+    (at("polyhedron", "functions", 0, "family"), -1),
+    (at("polyhedron", "tree", "all", 0), -1),
+    (at("polyhedron", "coordinates", 0, "scale"), -1),
+]
+
+
+@pytest.mark.parametrize("k", range(len(FORGED)))
+def test_a_forged_number_is_refused(ring, k):
+    """Whatever becomes an index, a size or a state, though the digest fits."""
+    put, value = FORGED[k]
+    rewritten(KIND, ring, lambda entries: put(entries, value))
+    with pytest.raises(
+        ValueError, match=r"^path: expected a skeleton that save_skeleton wrote; "
+    ) as e:
+        load_skeleton(ring)
+    assert f"{ring} is " in str(e.value)
+
+
 @pytest.mark.parametrize("change", [moved, valued, flat, wild, unfinished, odd, code])
 def test_entries_that_someone_changed_are_refused(ring, change):
     rewritten(KIND, ring, change)

@@ -1,12 +1,16 @@
 """Runs that are saved: interrupted or killed they continue bit for bit, others are refused."""
 
+import errno
 import itertools
 import math
+import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -157,6 +161,108 @@ def test_progress_is_reported_at_every_record():
     np.testing.assert_allclose(told, np.arange(1, 76) * 0.02, atol=1e-12)
 
 
+# ------------------------------------------------------------------------------ runs at one time
+
+
+def test_one_run_at_a_time_uses_a_folder(whole, tmp_path):
+    told = []
+
+    def meanwhile(*_):
+        for use in (partial(followed, tmp_path), Checkpoint(tmp_path).clear):
+            with pytest.raises(ValueError, match=r"^checkpoint: .*no other run.* is in use") as why:
+                use()
+            told.append(str(why.value))
+
+    same(followed(tmp_path, progress=meanwhile), whole)
+    assert all(str(tmp_path) in sentence for sentence in told)
+    assert told
+    same(followed(tmp_path), whole)
+
+
+def test_a_folder_without_locks_is_used_all_the_same(whole, tmp_path, monkeypatch):
+    def missing(*_, **__):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("filelock.FileLock.acquire", missing)
+    same(followed(tmp_path), whole)
+
+
+HOLDING = """
+import sys, time
+sys.path[:0] = {path!r}
+from test_checkpoints import followed
+followed({folder!r}, progress=lambda *_: (print("running", flush=True), time.sleep(60)))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
+def test_a_process_that_is_killed_leaves_its_folder_free(whole, tmp_path):
+    here = Path(__file__).parent
+    path = [str(here), str(here.parent / "support"), str(here.parents[1])]
+    code = HOLDING.format(path=path, folder=str(tmp_path))
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        with pytest.raises(ValueError, match=r"^checkpoint: .* is in use"):
+            followed(tmp_path)
+        process.kill()
+    same(followed(tmp_path), whole)
+
+
+# -------------------------------------------------------------------------------------- forgeries
+
+MOVED = 1e-3
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    """Return the folder of a run that was interrupted."""
+    folder = tmp_path_factory.mktemp("stopped")
+    assert not followed(folder, seconds=1e6, progress=interrupting(1.0)).finished
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        *[("engine.body_of_rank", k) for k in (-1, 4, 10**12)],
+        *[("engine.rank", k) for k in (-1, 4, 10**12)],
+        *[("engine.keys", k) for k in (-1, 10**12)],
+        *[("engine.cluster", k) for k in (0, 10**12)],
+        *[("engine.counts", k) for k in (-1, 10**12)],
+        *[("engine.check_due", k) for k in (-1,)],
+        *[("engine.elapsed", x) for x in (-1e12, 1.0)],
+        *[("engine.q", x) for x in (MOVED, np.nan, 1e300)],
+        *[("engine.touches", k) for k in (2, -1)],
+        *[("frames", k) for k in (-1, 10**12)],
+        *[("chunks", k) for k in (-1, 0, 10**12)],
+        ("finished", True),
+    ],
+)
+def test_a_state_with_a_forged_number_is_refused(stopped, tmp_path, name, number):
+    folder = Path(shutil.copytree(stopped, tmp_path / "run"))
+    arrays = KIND.load_arrays(folder / STATE)
+    array = arrays[name].reshape(-1)
+    array[0] = array[0] + number if number == MOVED else number
+    arrays[name] = array.reshape(arrays[name].shape)
+    KIND.save_arrays(folder / STATE, arrays)
+    with pytest.raises(ValueError, match=r"^checkpoint: expected a saved run; .* is damaged"):
+        followed(folder)
+
+
+@pytest.mark.parametrize("name", ["q", "v", "t", "left", "touch", "event", "event_numbers"])
+@pytest.mark.parametrize("number", [-1, 10**12])
+def test_a_record_with_a_forged_number_is_refused(stopped, tmp_path, name, number):
+    """Of coordinates and velocities the first row is the start, the last one the state."""
+    folder = Path(shutil.copytree(stopped, tmp_path / "run"))
+    path = folder / "chunk-000000.npz"
+    arrays = KIND.load_arrays(path)
+    arrays[name].reshape(-1)[0] = number if name not in ("left", "event_numbers") else np.nan
+    KIND.save_arrays(path, arrays)
+    with pytest.raises(ValueError, match=r"^checkpoint: expected a saved run; .* is damaged"):
+        followed(folder)
+
+
 # ----------------------------------------------------------------------------------- other runs
 
 CHANGES = {
@@ -247,7 +353,7 @@ def recorder(rows):
         columns={"times": [0.1 * k for k in range(rows)]},
         left=[0.0] * rows,
         touching=[(((0,), "left", 1.5),)] * rows,
-        events=[read_events(event_table(happened, names), names)],
+        events=[read_events(event_table(happened, names), names, 1)],
         gone=0.25,
     )
 
@@ -256,7 +362,7 @@ def recorder(rows):
 def saved(tmp_path_factory):
     """Return the files of a run that was saved once."""
     folder = tmp_path_factory.mktemp("saved")
-    SavedRun(Checkpoint(folder), {"count": 1}).save(recorder(3), finished=False)
+    SavedRun(Checkpoint(folder), {"count": 1}, 2, 1).save(recorder(3), finished=False)
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
@@ -270,7 +376,7 @@ def test_a_single_flipped_bit_is_noticed(saved, tmp_path_factory, data):
     for other, content in (saved | {name: bytes(changed)}).items():
         (folder / other).write_bytes(content)
     with pytest.raises(ValueError, match=rf"^checkpoint: .* is damaged .*{name}"):
-        SavedRun(Checkpoint(folder), {"count": 1}).begin(recorder(0))
+        SavedRun(Checkpoint(folder), {"count": 1}, 2, 1).begin(recorder(0))
 
 
 @pytest.mark.parametrize("kind", ["one body", "dumbbells"])

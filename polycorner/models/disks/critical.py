@@ -3,10 +3,12 @@
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from polycorner import checks, forms
 from polycorner.models.disks.configurations import (
     SAME,
     CriticalConfiguration,
@@ -25,6 +27,14 @@ from polycorner.values import Value
 
 STARTS_PER_DISK, ROUNDS = 80, 8
 
+_ENTRY = {"centres": forms.many(forms.number()), "hits": forms.count}
+_RECORD = {
+    "starts": forms.optional(partial(checks.whole, least=1)),
+    "attempts": forms.count,
+    "rounds": forms.count,
+    "stage": forms.many(forms.entries(_ENTRY)),
+    "found": forms.many(forms.entries(_ENTRY)),
+}
 Configurations = tuple[CriticalConfiguration, ...]
 
 
@@ -120,22 +130,22 @@ class CriticalSearch(Value):
         Raises
         ------
         ValueError
-            If a configuration of the record is not critical, or the generator is not PCG64.
+            If a configuration of the record is not critical, a number cannot be one of a search,
+            or the generator is not PCG64.
         """
-        state = record["random"]
-        if state["bit_generator"] != "PCG64":
-            msg = f"record: expected a generator PCG64; got {state['bit_generator']!r}"
-            raise ValueError(msg)
-        bits = np.random.PCG64()
-        bits.state = state
+        forms.entries(_RECORD)("record", record)
+        most = max(model.count + 1, 3)  # where a search for one disk begins
+        disks = checks.whole("record.disks", record["disks"], least=2, most=most)
+        rng = forms.read_generator("record.random", record["random"])
+        checks.instance("record.random", rng.bit_generator, np.random.PCG64)
         return cls(
             model=model,
             starts=record["starts"],
-            rng=np.random.Generator(bits),
-            disks=record["disks"],
+            rng=rng,
+            disks=disks,
             attempts=record["attempts"],
             rounds=record["rounds"],
-            stage=_configurations(model.fewer(record["disks"]), record["stage"]),
+            stage=_configurations(model.fewer(disks), record["stage"]),
             found=_configurations(model, record["found"]),
         )
 

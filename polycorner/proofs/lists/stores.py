@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from polycorner import __version__, checks
 from polycorner.atomic import write_atomically
+from polycorner.container import read_arrays
 from polycorner.formulas.cache import sources_digest
 from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.records import (
@@ -41,6 +42,12 @@ from polycorner.proofs.lists.records import (
     region_from,
 )
 from polycorner.proofs.lists.search import Search, Tally
+from polycorner.proofs.lists.store_forms import (
+    check_boxes,
+    check_leaves,
+    check_progress,
+    check_tree,
+)
 
 FORMAT = ["polycorner-search-of-stationary-points", 1]
 ROOT = "search.json"
@@ -149,12 +156,10 @@ class Store:
         return root
 
     def _parsed(self, content: bytes) -> dict[str, Any]:
-        try:
+        with self._reading(ROOT):
             outer = json.loads(content)
             if outer["sha256"] == _digest(outer["search"].encode()):
                 return dict(json.loads(outer["search"]))
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            pass
         raise self._damaged(ROOT)
 
     def _damaged(self, name: str) -> ValueError:
@@ -162,8 +167,10 @@ class Store:
         return ValueError(msg)
 
     def _restore(self, root: dict[str, Any]) -> None:
-        """Put what was saved into the search."""
-        search = self.search
+        """Put what was saved into the search, after a check of every number."""
+        search, n = self.search, self.search.problem.dimension
+        with self._reading(ROOT):
+            check_progress(root, search)
         for name, digest in root["files"].items():
             try:
                 content = (self.path / name).read_bytes()
@@ -171,22 +178,39 @@ class Store:
                 content = b""
             if _digest(content) != digest:
                 raise self._damaged(name)
-            arrays = np.load(io.BytesIO(content))
-            if name.startswith("tree"):
-                search.tree.extend(arrays)
-            else:
+            with self._reading(name):
+                arrays = read_arrays(content)
+                if name.startswith("tree"):
+                    check_tree(arrays, search.tree, n)
+                    search.tree.extend(arrays)
+                    continue
                 search.waiting = _boxes(arrays, "waiting")
                 search.undecided = [_boxes(arrays, "undecided")]
-        search.tally = Tally(**root["tally"])
-        for data in root["regions"]:
-            search.known.add(region_from(data))
-        search.known.loci += map(locus_from, root["loci"])
-        search.known.missed += map(locus_from, root["missed"])
-        for active, tried in root["failed"]:
-            for *q, widest in tried:
-                search.attempts.failed.add(tuple(active), np.array(q), widest)
+        with self._reading(ROOT):
+            check_boxes("waiting", search.waiting, search)
+            for boxes in search.undecided:
+                check_boxes("undecided", boxes, search)
+            check_leaves(search.tree, [search.waiting, *search.undecided])
+            search.tally = Tally(**root["tally"])
+            for data in root["regions"]:
+                search.known.add(region_from(data))
+            search.known.loci += map(locus_from, root["loci"])
+            search.known.missed += map(locus_from, root["missed"])
+            for active, tried in root["failed"]:
+                for *q, widest in tried:
+                    search.attempts.failed.add(tuple(active), np.array(q), widest)
         self._files, self._marks = dict(root["files"]), search.tree.marks
         self._count = 1 + max(int(name.split("-")[1].split(".")[0]) for name in self._files)
+
+    @contextmanager
+    def _reading(self, name: str) -> Iterator[None]:
+        """Turn whatever the content of a file makes a reader raise into one sentence naming it."""
+        try:
+            yield
+        except Exception as error:
+            words = " ".join(repr(error).split())[:300]
+            msg = f"store: expected files as they were written; {self.path / name} ({words})"
+            raise ValueError(msg) from error
 
 
 # What has to be the same, in words.
