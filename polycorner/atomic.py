@@ -11,6 +11,11 @@ from polycorner.checks import refuse
 PART = ".part"  # in the name of a file that is still being written
 
 
+def is_part(path: Path) -> bool:
+    """Whether a file is one that was not written to its end, which nothing reads."""
+    return path.name.startswith(".") and PART in path.name
+
+
 @contextmanager
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary name in the same folder, and move it to ``path`` if all goes well.

@@ -21,7 +21,10 @@ def refuse(
     argument: str, expected: str, got: object, kind: type[Exception] = ValueError
 ) -> NoReturn:
     """Raise an error that names the argument, what was expected and what came."""
-    shown = " ".join(line.strip() for line in repr(got).splitlines())  # arrays have several lines
+    try:
+        shown = " ".join(line.strip() for line in repr(got).splitlines())  # arrays have several
+    except ValueError:  # of integers of thousands of digits, which Python does not write out
+        shown = "a number that is too long to be shown"
     msg = f"{argument}: expected {expected}; got {shown}"
     raise kind(msg)
 
@@ -112,7 +115,10 @@ def real(
     expected = f"a {'' if infinite or bounds else 'finite '}number{bounds}{unit and f' in {unit}'}"
     if isinstance(value, bool) or not isinstance(value, Real):
         refuse(argument, expected, value, TypeError)
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        refuse(argument, f"{expected} in the range of doubles", value)
     inside = (
         (above is None or number > above)
         and (least is None or number >= least)
@@ -120,6 +126,8 @@ def real(
         and (most is None or number <= most)
         and (infinite or math.isfinite(number))
     )
+    if not inside and math.isinf(number) and most is None and below is None:
+        refuse(argument, expected.replace("a number", "a finite number"), value)
     if not inside or math.isnan(number):
         refuse(argument, expected, value)
     return number

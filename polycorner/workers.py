@@ -3,15 +3,17 @@
 The argument ``executor`` of parameter studies and of searches stands for one of them.
 """
 
+import ctypes
 import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from typing import Any
 
@@ -20,7 +22,9 @@ from polycorner.errors import WorkersError
 from polycorner.values import cached_property
 
 AHEAD = 3  # batches, or calls, in flight for each worker
+RUNNING = "running"  # as Dask says it
 LARGEST = 200  # points in a batch
+DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux
 REFRESH = 5.0  # s between two looks at the number of workers of a cluster
 
 
@@ -73,6 +77,8 @@ class Workers:
         Returns the number of workers.
     largest, ahead : int, optional
         Points in a batch, and batches in flight for each worker, at most.
+    state : callable, optional
+        Returns "running", or in another word why nothing that is submitted is computed.
     """
 
     def __init__(
@@ -82,9 +88,17 @@ class Workers:
         *,
         largest: int = LARGEST,
         ahead: int = AHEAD,
+        state: Callable[[], str] = lambda: RUNNING,
     ) -> None:
         self.executor, self.largest, self.ahead = executor, largest, ahead
+        self._state = state
         self._count, self._looked, self._workers = count, -REFRESH, 1
+
+    @property
+    def loss(self) -> str:
+        """Why nothing that is submitted is computed any more, or an empty text."""
+        state = self._state()
+        return "" if state == RUNNING else f"a client that is {state}"
 
     @property
     def in_flight(self) -> int:
@@ -116,7 +130,7 @@ class Processes(Workers):
     @staticmethod
     def _started(count: int) -> ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")  # nothing is inherited but the code
-        executor = ProcessPoolExecutor(count, mp_context=context, initializer=_serve)
+        executor = ProcessPoolExecutor(count, mp_context=context, initializer=serve)
         try:
             executor.submit(os.getpid).result()
         except BrokenExecutor as error:
@@ -143,12 +157,18 @@ class Processes(Workers):
                 worker.join()
 
 
-def _serve() -> None:
-    """Ignore Ctrl-C, which the parent process handles, and end when the parent ends."""
+def serve() -> None:
+    """Ignore Ctrl-C, which the parent process handles, and end when the parent ends.
+
+    However that ends: a process that is killed has no time to stop those that it started.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_follow, args=(parent,), daemon=True).start()
+    if sys.platform == "linux":  # compiled code may keep the thread from running for long
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(DEATH_SIGNAL, signal.SIGKILL)
 
 
 def _follow(parent: Any) -> None:
@@ -183,7 +203,11 @@ def workers_of(executor: Any) -> Workers:
         kinds = "an Executor of concurrent.futures, a Client of Dask, a number of processes or None"
         refuse("executor", kinds, executor, TypeError)
     threads: Any = executor.nthreads
-    return Workers(executor.get_executor(pure=False), lambda: sum(threads().values()))
+    return Workers(
+        executor.get_executor(pure=False),
+        lambda: sum(threads().values()),
+        state=lambda: str(getattr(executor, "status", RUNNING)),
+    )
 
 
 def is_broken(error: BaseException) -> bool:

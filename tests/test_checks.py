@@ -19,6 +19,8 @@ REFUSED = {
     "real-complex": (checks.real, (1j,), {}, TypeError),
     "real-nan": (checks.real, (math.nan,), {"infinite": True}, ValueError),
     "real-inf": (checks.real, (math.inf,), {}, ValueError),
+    "real-inf-range": (checks.real, (math.inf,), {"above": 0.0}, ValueError),
+    "real-huge": (checks.real, (16**5000,), {}, ValueError),
     "real-open": (checks.real, (0.0,), {"above": 0.0}, ValueError),
     "real-closed": (checks.real, (1.1,), {"most": 1.0}, ValueError),
     "choice": (checks.choice, ("slsq", ["slsqp", "scp"]), {}, ValueError),
@@ -57,3 +59,8 @@ def test_the_sentence_for_a_missing_extra_fits_a_package_and_a_checkout():
     words = str(checks.missing_extra("tornado", "view"))
     assert "polycorner[view]" in words
     assert "'.[view]'" in words
+
+
+def test_an_infinity_in_range_is_said_to_be_none():
+    with pytest.raises(ValueError, match=r"^thing: expected a finite number > 0 in mm; got inf$"):
+        checks.real("thing", math.inf, above=0, unit="mm")

@@ -1,7 +1,6 @@
 """Checks run in separate processes, and their results."""
 
 import os
-import signal
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,6 +14,7 @@ from multiprocessing import active_children, get_context
 from paper_checks.framework.claims import Claim, Finding
 from polycorner import checks
 from polycorner.progress import Progress, silent
+from polycorner.workers import serve
 
 # Each process has a core of its own; threads of the linear algebra would compete for it.
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -200,7 +200,7 @@ class _Lane:
         """Start the check of a claim."""
         if self._executor is None:
             # Forking a process that runs threads is not safe.
-            self._executor = ProcessPoolExecutor(1, get_context("spawn"), _leave_to_parent)
+            self._executor = ProcessPoolExecutor(1, get_context("spawn"), serve)
         self.claim = claim
         self.future = self._executor.submit(_examine, self.catalogue, claim.id)
 
@@ -235,11 +235,6 @@ def _examine(catalogue: str, name: str) -> Examined:
     except Exception as problem:  # every exception is a result of this claim
         finding, error = None, " ".join(f"{type(problem).__name__}: {problem}".split())
     return finding, error, time.perf_counter() - start
-
-
-def _leave_to_parent() -> None:
-    """Leave Ctrl-C to the parent, which ends this process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager

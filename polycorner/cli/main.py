@@ -86,15 +86,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     given = None if arguments is None else list(arguments)
     chosen, start = Verbosity(), perf_counter()
+    closed = _occupied()
     try:
         with notices(chosen):
             code = _answered(given, chosen)
         sys.stdout.flush()
     except OSError as error:
         code = _unwritten(error)
+    if closed and not code:
+        _say("standard output is closed, and the answer is lost")
+        code = NO_OUTPUT
     if chosen.verbose and not chosen.quiet:
         _say(f"exit code {code} after {perf_counter() - start:.2f} s")
     sys.exit(code)
+
+
+def _occupied() -> bool:
+    """Let closed standard streams lead nowhere, so that no other file takes their place.
+
+    Return whether standard output is one of them.
+    """
+    closed = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name) is None]
+    for name in closed:  # in the order of their numbers: the lowest is taken first
+        opened = os.open(os.devnull, os.O_RDWR)
+        os.set_inheritable(opened, True)
+        setattr(sys, name, os.fdopen(opened, "r" if name == "stdin" else "w", encoding="utf-8"))
+    return "stdout" in closed
 
 
 def _answered(given: list[str] | None, chosen: Verbosity) -> int:

@@ -14,6 +14,7 @@ from polycorner.cli.output import (
     deliver,
     fail,
     prepare,
+    remark,
     shown,
     timed,
     unfinished,
@@ -77,10 +78,11 @@ class Kept:
 
         return cache_folder() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
 
-    def check_kept(self) -> None:
-        """End the command where there is nothing to resume."""
-        if not self.state.exists():
-            fail("--resume: expected an unfinished search with the same options; got none")
+    def has_kept(self, *, resume: bool) -> bool:
+        """Whether there is something to resume, as asked; else say that the search begins."""
+        if resume and not self.state.exists():
+            remark(f"nothing to resume in {self.state}; the search starts from the beginning")
+        return resume and self.state.exists()
 
     def keep(self, save: Callable[[], object]) -> None:
         """Save the state; a failure is reported after the answer, which it must not cost."""
@@ -159,7 +161,7 @@ class Search(Kept):
         from polycorner.skeletons import resume as resumed
         from polycorner.skeletons.parts import Completeness
 
-        known = 0
+        known, resume = 0, self.has_kept(resume=resume)
         with (
             self._opened() as executor,
             working(f"searching {self.model}", "edges") as progress,
@@ -212,7 +214,6 @@ class Search(Kept):
     def _load(self, polyhedron: "Polyhedron", symmetry: "Symmetry | None") -> "Skeleton":
         from polycorner.files import load_skeleton
 
-        self.check_kept()
         try:
             return load_skeleton(self.state, polyhedron, symmetry=symmetry, label=self.label)
         except ValueError as error:
@@ -275,6 +276,7 @@ class DiskSearch(Kept):
         from polycorner.container import JSON, Kind
 
         kind = Kind("search of disks", "polycorner atlas disks", JSON)
+        resume = self.has_kept(resume=resume)
         with working(f"searching {self.model}", "rounds") as progress:
             search = self._load(model, kind) if resume else model.critical_search(self.seed)
             try:
@@ -292,7 +294,6 @@ class DiskSearch(Kept):
     def _load(self, model: "TorusDisks", kind: "Kind") -> "CriticalSearch":
         from polycorner.models import CriticalSearch
 
-        self.check_kept()
         try:
             content = kind.load_json(self.state)
             if content["label"] != self.label:

@@ -16,6 +16,7 @@ from polycorner.cli.output import (
     deliver,
     fail,
     prepare,
+    remark,
     shown,
     working,
     write_answer,
@@ -157,12 +158,12 @@ def _plan(file: Path) -> "StudyFile":
 
 
 def _check_store(store: Path, *, resume: bool) -> None:
-    """Refuse to resume an unfinished study unasked, or one that does not exist."""
+    """Refuse to resume an unfinished study unasked; say where there is none."""
     from polycorner.sweeps.store import stored_state
 
     state = stored_state(store)
     if resume and not state:
-        fail(f"--resume: expected a study in {store}; got none")
+        remark(f"nothing to resume in {store}; the study starts from the beginning")
     if state not in ("", "finished") and not resume:
         fail(f"--out: {store} has an unfinished study; --resume computes the missing points")
 
@@ -206,7 +207,7 @@ def _executor(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         fail(str(missing_extra("distributed", "dask")))
     connect: Any = Client
     try:
-        client = connect(scheduler, timeout=10, set_as_default=False)
+        client = connect(scheduler, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         fail(f"--scheduler: expected the address of one that answers; got {scheduler} ({error})")
     with client:

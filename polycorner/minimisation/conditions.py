@@ -124,6 +124,8 @@ def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
             elif abs(target[i]) >= 0.1 * bound:
                 target[i] = -side * np.inf
     centre = np.mean(vertices, axis=0) if vertices else start
+    for some in (lower, upper, centre):
+        some[:k] = np.maximum(some[:k], 0.0)  # as inequalities have it, but for rounding
     return lower * largest, upper * largest, centre * largest
 
 

@@ -84,16 +84,27 @@ def checked_root(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def check_store(path: Path) -> dict[str, Any]:
-    """Read every file of a store and return its attributes.
+    """Read every file of a store, which may be written meanwhile, and return its attributes.
 
     Raises
     ------
     ValueError
         Naming a file that was changed, or an array that lacks chunks.
     """
+    while True:
+        attributes, metadata = checked_root(path)
+        try:
+            _check_files(path, attributes, metadata)
+        except ValueError:
+            if checked_root(path)[0] != attributes:
+                continue  # another process has written; what it wrote is checked instead
+            raise
+        return attributes
+
+
+def _check_files(path: Path, attributes: dict[str, Any], metadata: dict[str, Any]) -> None:
     import google_crc32c
 
-    attributes, metadata = checked_root(path)
     checks = json.loads(attributes["checksums"])
     for name in metadata:
         file = path / name / ROOT
@@ -106,13 +117,14 @@ def check_store(path: Path) -> dict[str, Any]:
         files = chunks(path / name)
         for file in files:
             content = _read(file)
+            if not content and not file.exists():
+                continue  # a retry has removed the messages of failures meanwhile
             if google_crc32c.value(content[:-4]).to_bytes(4, "little") != content[-4:]:
                 raise _changed(file)
         expected = checks.get("chunks", {}).get(name, len(files))
         if len(files) != expected:
             msg = f"store: expected {expected} chunks in {path / name}; found {len(files)}"
             raise ValueError(msg)
-    return attributes
 
 
 def chunks(array: Path) -> list[Path]:

@@ -13,6 +13,7 @@ from polycorner.values import cached_property
 
 Scalar: TypeAlias = bool | int | float | str
 RESERVED = ("status", "message", "seconds", "rng")
+MOST_POINTS = 10**8  # whose results, of a few columns, fill a disk and not quite a memory
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,10 @@ class Grid:
             return grid
         if not isinstance(grid, Mapping) or not grid:
             refuse("grid", "a mapping from names to values", grid, TypeError)
-        return Grid({_name(name): _axis(name, given) for name, given in grid.items()})
+        found = Grid({_name(name): _axis(name, given) for name, given in grid.items()})
+        if found.size > MOST_POINTS:
+            refuse("grid", f"at most {MOST_POINTS:,} points", f"{found.size:,}")
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -52,6 +52,8 @@ class Scheduler:
     def run(self) -> None:
         """Submit points until none is left or until stopped, and wait for those in flight."""
         while True:
+            if self.workers.loss:  # a client that looks for its scheduler takes points all the same
+                raise _gone(self.workers.loss)
             while not self.stopped() and self._submit():
                 pass
             if self.stopped():
@@ -73,7 +75,10 @@ class Scheduler:
 
     def _submit(self) -> bool:
         """Submit a batch if there is one and room for it; suspects one by one and alone."""
-        room = 1 if self.suspects else self.workers.in_flight
+        try:
+            room = 1 if self.suspects else self.workers.in_flight
+        except OSError as error:
+            raise _gone(error) from error
         if len(self.in_flight) >= room:
             return False
         batch = [self.suspects.popleft()] if self.suspects else self._batch()
@@ -162,5 +167,6 @@ def _error(future: "Future[Any]") -> BaseException | None:
         return error
 
 
-def _gone(error: BaseException) -> SweepError:
-    return SweepError(f"executor: expected workers that answer; got {one_line(error)}")
+def _gone(why: BaseException | str) -> SweepError:
+    got = why if isinstance(why, str) else one_line(why)
+    return SweepError(f"executor: expected workers that answer; got {got}")

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner import forms
+from polycorner.atomic import is_part
 from polycorner.checks import missing_extra
 from polycorner.sweeps.checksums import ROOT, check_store, checked_root, write_root
 from polycorner.sweeps.metadata import reading, stored_columns, stored_grid
@@ -90,6 +91,8 @@ class Store(Table):
 
     def _open(self) -> None:
         check_study(self.path, self.study)
+        for part in filter(is_part, self.path.iterdir()):  # of a process that was killed
+            part.unlink()
         if (self.path / ROOT).exists():
             self.about = check_store(self.path)
             self.present = list(checked_root(self.path)[1])
@@ -218,7 +221,7 @@ def check_study(path: Path, study: Study) -> None:
         raise ValueError(msg)
     found = stored_study(path)
     if found is None:
-        if path.is_dir() and any(path.iterdir()):
+        if path.is_dir() and not all(map(is_part, path.iterdir())):
             msg = f"store: expected a new or empty folder, or a store of a sweep; {path} is neither"
             raise ValueError(msg)
         return
@@ -244,6 +247,9 @@ def stored_state(path: Path) -> str:
 def open_results(path: str | Path) -> "xr.Dataset":
     """Return the results in a store, finished or not, after checking every file of it.
 
+    While another process writes it these are the results that were there when it was opened, and
+    values of later ones at points that are still pending by their status.
+
     Parameters
     ----------
     path : path
@@ -268,6 +274,7 @@ def open_results(path: str | Path) -> "xr.Dataset":
     about = check_store(folder)
     with reading(folder):  # every value once: what is asked for later can be read
         found: xr.Dataset = xr.open_zarr(folder, consolidated=True, chunks=None, decode_times=False)
+        found["status"].load()  # first, as it is written last
         for array in found.variables.values():
             _ = [array[piece].values for piece in _pieces(array)]
     names = [column.name for column in stored_columns(about)]

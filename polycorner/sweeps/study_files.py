@@ -13,7 +13,7 @@ import numpy as np
 from polycorner.checks import choice, instance, real, whole
 from polycorner.errors import nearest
 from polycorner.sweeps.execution import check_arguments
-from polycorner.sweeps.grid import Axis, Grid
+from polycorner.sweeps.grid import MOST_POINTS, Axis, Grid
 
 KEYS = ("study", "seed", "axes", "fixed")
 AXIS = ("values", "start", "stop", "count", "spacing", "unit")
@@ -112,8 +112,8 @@ def _content(file: Path) -> dict[str, Any]:
     except OSError as error:
         msg = f"{file} cannot be read ({error.strerror or error})"
         raise ValueError(msg) from error
-    except (ValueError, RecursionError) as error:
-        msg = f"{file} is no TOML file: {error}"
+    except (ValueError, RecursionError) as error:  # numbers may be too long, and tables too deep
+        msg = f"{file} is no TOML file that can be read: {error}"
         raise ValueError(msg) from error
 
 
@@ -192,4 +192,4 @@ def _values(table: dict[str, Any]) -> Any:
         raise ValueError(msg)
     start, stop = real("start", table["start"]), real("stop", table["stop"])
     spacing = SPACINGS[choice("spacing", table.get("spacing", "linear"), SPACINGS)]
-    return spacing(start, stop, whole("count", table["count"], least=1))
+    return spacing(start, stop, whole("count", table["count"], least=1, most=MOST_POINTS))

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -237,6 +238,24 @@ def test_a_full_disk_costs_neither_the_answer_nor_the_old_file(capsys, monkeypat
 def process(*words, **streams):
     command = [sys.executable, "-W", "error", "-m", "polycorner", *words]
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT, **streams)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the shell of other systems closes no streams")
+@pytest.mark.parametrize(
+    ("closed", "code", "said"),
+    [
+        (">&-", 74, "polycorner: standard output is closed, and the answer is lost\n"),
+        (">&- 2>&-", 74, ""),
+        ("<&-", 0, ""),
+        ("2>&-", 0, ""),
+    ],
+)
+@pytest.mark.parametrize("words", ["--version", "dyad --json", "--help"])
+def test_closed_streams_are_no_defect(words, closed, code, said):
+    line = f"exec {shlex.quote(sys.executable)} -m polycorner {words} {closed}"
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert (done.returncode, done.stderr) == (code, said)
+    assert bool(done.stdout) is (code == 0)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full here")

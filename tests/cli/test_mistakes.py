@@ -86,9 +86,6 @@ OTHERS = {
     "atlas disks --count 0": "--count",
     "atlas disks --torus round": "--torus",
     "atlas tutorial --budget 0": "--budget",
-    "atlas spheres --resume --seed 99": "--resume: expected an unfinished search",
-    "atlas tutorial --resume --seed 99": "--resume: expected an unfinished search",
-    "atlas disks --resume --seed 99": "--resume: expected an unfinished search",
     "minima pinball --starts 0": "--starts",
     "atlas tutorial --quiet --verbose": "--quiet: expected no --verbose beside it",
 }

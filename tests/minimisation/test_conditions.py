@@ -144,3 +144,14 @@ def test_a_bent_locus_of_two_dimensions_is_recognised():
     c = certify(far, (x + x * z + y**2 / 4) ** 2, [0, 0, 0])
     assert c.verdict is Verdict.MINIMUM_ALONG_LOCUS
     assert c.signature == (0, 1, 2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ranges_of_multipliers_have_the_signs_of_multipliers(seed):
+    """Of six walls through a point in space some may carry nothing: their least multiplier is 0."""
+    walls = np.random.default_rng(seed).normal((0.0, 0.0, 2.0), size=(6, 3))
+    cone = Polyhedron(M3, [float(a) * x + float(b) * y + float(c) * z for a, b, c in walls])
+    pull = walls[:4].sum(axis=0)
+    found = certify(cone, float(pull[0]) * x + float(pull[1]) * y + float(pull[2]) * z, [0, 0, 0])
+    assert len(found.multiplier_ranges) == 6
+    assert min(low for low, _ in found.multiplier_ranges.values()) == 0.0

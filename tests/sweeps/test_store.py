@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ import pytest
 import sweep_functions
 import xarray as xr
 import zarr
+from disks import Disk, Killed
 from filelock import FileLock
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.sweeps import SweepError, open_results, sweep
+from polycorner.sweeps import SweepError, checksums, open_results, sweep
+from polycorner.sweeps.checksums import write_root
 from polycorner.sweeps.store import Store, _chunk_shape
 from polycorner.sweeps.tables import Variable
 
@@ -186,6 +189,55 @@ def test_stopped_anywhere_the_same_call_comes_to_the_same(tmp_path, monkeypatch,
     xr.testing.assert_identical(plain(found), plain(whole))
     assert len(lines(log)) <= computed + 42 - reported[-1]
     assert found.attrs["complete"] == "finished"
+
+
+@pytest.mark.parametrize("full", [False, True], ids=["killed", "full"])
+def test_stopped_at_any_operation_the_same_call_comes_to_the_same(tmp_path, monkeypatch, full):
+    """At each of the first operations on files, before the root is there too, and some later."""
+    whole = drawn(None, size=(1, 2))
+    for at in (*range(1, 8), 12, 25, 50):
+        store, disk = tmp_path / str(at), Disk(at, full=full)
+        with monkeypatch.context() as patch, disk.used():
+            if not full:
+                unsettled(patch)
+            with suppress(Killed, SweepError):
+                drawn(store, size=(1, 2))
+        found = drawn(store, size=(1, 2))
+        xr.testing.assert_identical(plain(found), plain(whole))
+        assert found.attrs["complete"] == "finished"
+        assert not list(store.glob(".*"))
+
+
+def test_what_is_read_while_more_is_written_is_what_was_there(tmp_path):
+    opened = []
+
+    def look(done, *_):
+        if (tmp_path / "s").exists():
+            opened.append((done, open_results(tmp_path / "s")))
+
+    drawn(tmp_path / "s", progress=look)
+    assert len(opened) > 2
+    for done, found in opened:
+        there = found["status"].values == 1
+        assert there.sum() == done
+        assert not done or np.isfinite(found["x"].values[there]).all()
+
+
+def test_a_store_that_changes_as_it_is_checked_is_checked_anew(tmp_path, monkeypatch):
+    """The root says how many chunks a finished study has; a retry writes others."""
+    drawn(tmp_path / "s")
+    real, calls = checksums.chunks, []
+
+    def changing(array):
+        if not calls:
+            about, names = checksums.checked_root(tmp_path / "s")
+            about = {k: v for k, v in about.items() if k not in ("checksums", "sha256")}
+            write_root(tmp_path / "s", about | {"complete": "unfinished"}, names)
+        calls.append(array)
+        return [] if len(calls) == 1 else real(array)
+
+    monkeypatch.setattr(checksums, "chunks", changing)
+    assert open_results(tmp_path / "s").attrs["complete"] == "unfinished"
 
 
 @pytest.mark.parametrize("at", [1, 2, 3, 7, 20])

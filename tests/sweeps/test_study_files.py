@@ -64,9 +64,17 @@ MISTAKES = {
     'study = "heading"\n[axes]\nlength = {values = [1], unit = 3}': "axes.length: unit: expected",
     'study = "heading"\n[axes]\nlength = [9]\nrod_radius = [1]\n[fixed]\nbal = 1': "fixed: .*bal",
     'study = "climbing"\nseed = -1\n[axes]\nnoise = [1]\ntilt = [1]': "seed: expected",
-    "study = ": "is no TOML file",
-    "a = " + "[" * 5000: "is no TOML file",
-    "a = " + "9" * 5000: "is no TOML file",
+    "study = ": "is no TOML file that can be read",
+    f"x = {'[' * 9999}": "is no TOML file that can be read: .*recursion",
+    f"x = {'9' * 5000}": "is no TOML file that can be read: .*digits",
+    'study = "heading"\n[axes]\nlength = {start = 1, stop = 2, count = 1e12}': "count: expected",
+    'study = "heading"\n[axes]\nlength = {start = 1, stop = 2, count = 1000000000000}': (
+        "axes.length: count: expected a whole number >= 1 and <= 1e+08; got 10"
+    ),
+    f'study = "heading"\n[axes]\nlength = {{start = 1, stop = 0x{"f" * 5000}, count = 2}}': (
+        "axes.length: stop: expected a finite number in the range of doubles; got a number"
+    ),
+    f'study = "heading"\n[axes]\nlength = [{"9" * 400}]': "axes.length: values: expected",
 }
 
 

@@ -140,3 +140,40 @@ class Picky(Inline):
 def test_an_executor_may_say_so_when_it_is_given_the_call():
     with pytest.raises(TypeError, match=r"function: expected one that can be sent.*'socket'"):
         sweep(sweep_functions.mixed, GRID, executor=Picky())
+
+
+class Searching(Inline):
+    """A client that has lost its scheduler looks for it for a while and takes calls meanwhile."""
+
+    status = "running"
+
+    def get_executor(self, pure):
+        assert not pure
+        return self
+
+    def nthreads(self):
+        return {"one": 1}
+
+    def submit(self, fn, /, *args, **kwargs):
+        if self.status == "running":
+            self.status = "connecting"
+            return super().submit(fn, *args, **kwargs)
+        return Future()  # which will never be done
+
+
+def test_a_client_that_has_lost_its_scheduler_is_not_waited_for():
+    client = Searching()
+    with pytest.raises(SweepError, match="workers that answer; got a client that is connecting"):
+        sweep(sweep_functions.mixed, {"a": range(50), "b": [1]}, executor=Dask(client))
+
+
+class Dask:
+    """What is asked of a client of Dask."""
+
+    def __init__(self, executor):
+        self.executor, self.get_executor = executor, executor.get_executor
+        self.nthreads = executor.nthreads
+
+    @property
+    def status(self):
+        return self.executor.status

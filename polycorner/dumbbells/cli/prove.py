@@ -109,6 +109,8 @@ def _region(boxes: tuple[str, ...]) -> dict[str, tuple[float, float]]:
         low, _, high = sides.partition(":")
         if name not in BOXES:
             fail(f"--box: expected t or l, as in t=1.4:1.6; got {written!r}")
+        if BOXES[name] in region:
+            fail(f"--box: expected one for {name}; got another one, {written!r}")
         try:
             region[BOXES[name]] = (float(low), float(high))
         except ValueError:

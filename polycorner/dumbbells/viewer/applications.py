@@ -173,8 +173,12 @@ class _Live(WebSocketHandler):
         self._draw_soon()
 
     def _tell(self, kind: str, content: dict[str, Any]) -> None:
-        with suppress(WebSocketClosedError):  # the page may have been closed meanwhile
-            self.write_message(json.dumps({"kind": kind} | content, allow_nan=False))
+        self._send(json.dumps({"kind": kind} | content, allow_nan=False))
+
+    def _send(self, message: str | bytes) -> None:
+        with suppress(WebSocketClosedError):  # the page may have been closed meanwhile,
+            sent: Any = self.write_message(message, binary=isinstance(message, bytes))
+            sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # or later
 
     def _draw_soon(self) -> None:
         """Compute the solid after ``QUIET`` seconds without messages, if it has changed."""
@@ -189,9 +193,7 @@ class _Live(WebSocketHandler):
         heading = None if pair.is_plane else round(self.board.mean_heading, 3)
         if self.drawn != (pair, heading):
             self.drawn = (pair, heading)
-            content = solid_bytes(pair, mean_heading=heading, resolution=CELLS)
-            with suppress(WebSocketClosedError):
-                self.write_message(content, binary=True)
+            self._send(solid_bytes(pair, mean_heading=heading, resolution=CELLS))
 
 
 # ---------------------------------------------------------------------------------------- servers

@@ -7,13 +7,17 @@ import re
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from tornado.httpserver import HTTPServer
+from tornado.iostream import IOStream
 from tornado.web import Application
 
 LOCAL = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = frozenset({"0.0.0.0", "[::]"})
 LARGEST = 16_384  # most bytes of a request's header, and of its body
+MOST = 64  # connections at a time
+IDLE = 20.0  # s to wait for a request, or for the rest of one
 HOST = re.compile(r"(\[[0-9a-fA-F:.]+\]|[0-9a-zA-Z.-]+)(?::[0-9]{1,5})?")
 TRIES = 50  # ports tried after one that is in use
 
@@ -66,10 +70,34 @@ def serve(application: Application, listener: socket.socket, ready: Callable[[st
         asyncio.run(_serve(application, listener, ready))
 
 
+class Server(HTTPServer):
+    """A server that takes ``MOST`` connections at a time, and waits ``IDLE`` seconds for each."""
+
+    def initialize(self, *arguments: Any, **options: Any) -> None:
+        """Take the arguments of ``HTTPServer``, which asks for this method in place of another."""
+        limits = {"max_body_size": LARGEST, "max_header_size": LARGEST}
+        waits = {"idle_connection_timeout": IDLE, "body_timeout": IDLE}
+        super().initialize(*arguments, **limits | waits | options)
+        self.open = 0  # connections that are not pages, whose number is limited elsewhere
+
+    def handle_stream(self, stream: IOStream, address: Any) -> None:
+        """Serve a connection, or close it at once where there are too many."""
+        if self.open >= MOST:
+            stream.close()
+            return
+        self.open += 1
+        super().handle_stream(stream, address)
+
+    def on_close(self, server_conn: object) -> None:
+        """Note that a connection has ended, or has become that of a page."""
+        self.open -= 1
+        super().on_close(server_conn)
+
+
 async def _serve(
     application: Application, listener: socket.socket, ready: Callable[[str], None]
 ) -> None:
-    server = HTTPServer(application, max_body_size=LARGEST, max_header_size=LARGEST)
+    server = Server(application)
     server.add_sockets([listener])
     host, port = listener.getsockname()[:2]
     ready(f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/")

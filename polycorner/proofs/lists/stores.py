@@ -10,6 +10,8 @@ A store is a folder with
 ``boxes-K.npz``
     the boxes that wait and those that are undecided, at the last time.
 
+Without ``search.json`` nothing was saved to its end, and the search begins anew.
+
 Between two rounds this is all that the search depends on, so that one that goes on from a store
 finds what it would have found without the interruption.
 """
@@ -17,6 +19,7 @@ finds what it would have found without the interruption.
 import io
 import json
 import os
+import re
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -30,7 +33,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from polycorner import __version__, checks
-from polycorner.atomic import write_atomically
+from polycorner.atomic import is_part, write_atomically
 from polycorner.container import read_arrays
 from polycorner.formulas.cache import sources_digest
 from polycorner.proofs.lists.boxes import Boxes, joined
@@ -54,6 +57,7 @@ ROOT = "search.json"
 EVERY = 5.0  # s between two times of saving
 SHARE = 0.05  # of the time at most that saving takes
 BOXES = ("lower", "upper", "nodes", "since")
+PIECES = re.compile(r"(tree|boxes)-\d+\.npz")
 
 
 class Store:
@@ -94,6 +98,10 @@ class Store:
             found = self._found()
             if found is not None:
                 self._restore(found)
+            with _writing(self.path):
+                for file in self.path.iterdir():  # of a process that was killed as it saved
+                    if _is_own(file) and file.name not in self._files:
+                        file.unlink()
             self.save()
         except BaseException:
             self._lock.release()
@@ -143,7 +151,7 @@ class Store:
             msg = f"store: expected a folder; {self.path} is a file"
             raise ValueError(msg)
         if not (self.path / ROOT).exists():
-            if self.path.is_dir() and any(self.path.iterdir()):
+            if self.path.is_dir() and not all(map(_is_own, self.path.iterdir())):
                 kinds = "a new or empty folder, or the store of a search"
                 msg = f"store: expected {kinds}; {self.path} is neither"
                 raise ValueError(msg)
@@ -256,6 +264,11 @@ def _arrays(boxes: Boxes, prefix: str) -> dict[str, NDArray[Any]]:
 def _boxes(arrays: Mapping[str, NDArray[Any]], prefix: str) -> Boxes:
     lower, upper, nodes, since = (arrays[f"{prefix}_{name}"] for name in BOXES)
     return Boxes(lower, upper, nodes, since)
+
+
+def _is_own(file: Path) -> bool:
+    """Whether a file beside the root is one that a store writes."""
+    return is_part(file) or PIECES.fullmatch(file.name) is not None
 
 
 def _digest(content: bytes) -> str:

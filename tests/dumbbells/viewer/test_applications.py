@@ -2,12 +2,13 @@
 
 import asyncio
 import contextlib
+import gc
 import json
 
 import pytest
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.httpserver import HTTPServer
-from tornado.websocket import websocket_connect
+from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.viewer import applications
@@ -185,3 +186,26 @@ def test_headers_keep_the_page_to_itself(application):
             assert (await client.fetch(posted, raise_error=False)).code == 405
 
     asyncio.run(look())
+
+
+def test_a_page_that_was_closed_meanwhile_leaves_no_trace():
+    """The message is on its way as the page closes: its future fails, and nobody waits for it."""
+    said = []
+
+    class Page(applications._Live):
+        def __init__(self):
+            pass
+
+        def write_message(self, _message, **_options):
+            sent = asyncio.get_running_loop().create_future()
+            sent.set_exception(WebSocketClosedError())
+            return sent
+
+    async def tell():
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: said.append(context))
+        Page()._send("hello")
+        await asyncio.sleep(0)
+        gc.collect()
+
+    asyncio.run(tell())
+    assert not said

@@ -105,25 +105,47 @@ def test_terminal(done):
     assert run_text(found, quiet=True).count("\n") == 0
 
 
-def test_interrupted_processes_end_and_what_was_found_is_kept(tmp_path):
-    script = tmp_path / "interrupted.py"
+def stopped_by(number, folder):
+    """Run checks in a process; stop it in the last one, and return it with what it then prints.
+
+    Its output ends when the last process has that inherited it.
+    """
+    script = folder / "interrupted.py"
     script.write_text(INTERRUPTED, encoding="utf-8")
     root = TESTS.parents[1]
     with subprocess.Popen(
         [sys.executable, str(script)],
         stdout=subprocess.PIPE,
         text=True,
-        cwd=tmp_path,
+        cwd=folder,
         env={"PYTHONPATH": f"{root}:{TESTS}", "PATH": ""},
     ) as process:
         assert process.stdout is not None
         for line in process.stdout:
             if line.split() == ["3", "S1"]:
-                process.send_signal(signal.SIGINT)
+                process.send_signal(number)
                 break
-        rest, _ = process.communicate(timeout=60)
+        rest, _ = process.communicate(timeout=300)
+    return process, rest
+
+
+def test_interrupted_processes_end_and_what_was_found_is_kept(tmp_path):
+    process, rest = stopped_by(signal.SIGINT, tmp_path)
     assert process.returncode == 0
     assert rest.split() == ["found", "A1", "A4", "B1", "missed", "S1"]
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGKILL,
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (signal.SIGTERM, signal.SIGHUP)),
+    ],
+)
+def test_killed_it_leaves_no_process(number, tmp_path):
+    """That of the last check would sleep for ten minutes, and the other one wait for ever."""
+    process, rest = stopped_by(number, tmp_path)
+    assert (process.returncode, rest) == (-number, "")
 
 
 def ids(claims):

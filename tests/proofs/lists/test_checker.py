@@ -532,7 +532,7 @@ def stated(nodes, outputs, **more):
     empty = {name: [] for name in ("regions", "loci", "symmetries", "fixed", "parameters")}
     data = {"format": problem.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
     data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
-    data["minima_only"] = False
+    data |= {"minima_only": False, "functions": ["E"], "weights": [(0.0).hex()] * 2}
     return Proof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
 
 

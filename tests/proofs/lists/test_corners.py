@@ -366,7 +366,7 @@ def another_branch(data):
         (turn_relation, "not isolated"),
         (claim_critical, "does not vanish|singular"),
         (shift_box, "no single common zero"),
-        (another_branch, "is no corner|leaf|is not listed|are active"),
+        (another_branch, "is none of the corners|leaf|is not listed|are active"),
     ],
 )
 def test_corrupted_files_are_refused(change, why, tmp_path):

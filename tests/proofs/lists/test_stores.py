@@ -1,5 +1,6 @@
 """Stores of searches: an interrupted search finds what one that was never interrupted finds."""
 
+import itertools
 import json
 import os
 import signal
@@ -7,11 +8,13 @@ import subprocess
 import sys
 import time
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy
+from disks import Disk, Killed
 
 from polycorner import Manifold, Polyhedron, Symmetry
 from polycorner.polyhedra.symmetry import Element
@@ -26,7 +29,7 @@ RUN = """
 import sys, time
 from polycorner.proofs.lists import stores
 from test_stores import problem, stationary_points
-stores.EVERY, stores.SHARE = 0.0, 1.0
+stores.EVERY, stores.SHARE = 0.0, float("inf")
 def note(done, total, words):
     with open(sys.argv[2], "a") as log:
         log.write(f"{done:.0f}\\n")
@@ -64,8 +67,9 @@ def same(found, other, folder):
 
 
 def started(store, log):
-    here = str(Path(__file__).parent)
-    path = os.pathsep.join([here, str(Path.cwd()), os.environ.get("PYTHONPATH", "")])
+    here = Path(__file__).parent
+    folders = here, here.parents[1] / "support", Path.cwd(), os.environ.get("PYTHONPATH", "")
+    path = os.pathsep.join(map(str, folders))
     return subprocess.Popen(
         [sys.executable, "-c", RUN, str(store), str(log)],
         env={**os.environ, "PYTHONPATH": path},
@@ -99,6 +103,22 @@ def test_killed_twice_the_search_is_that_of_one_never_stopped(whole, tmp_path):
         assert running.returncode == -signal.SIGKILL
         assert int(log.read_text().split()[-1]) <= boxes(store) < whole.tally.boxes
     same(stationary_points(**problem(), store=store, workers=2), whole, tmp_path)
+
+
+@pytest.mark.parametrize("full", [False, True], ids=["killed", "full"])
+def test_stopped_at_any_operation_the_same_call_finds_the_same(full, tmp_path):
+    """Also at those of the first save, when nothing is there to go on with; and of the last."""
+    simple = {"energy": X**2 + Y**2}
+    whole = small(None, **simple)
+    for at in itertools.count(1):
+        store, disk = tmp_path / str(at) / "store", Disk(at, full=full)
+        with disk.used(), suppress(Killed, OSError):
+            small(store, **simple)
+        if not disk.failed:
+            break
+        same(small(store, **simple), whole, tmp_path)
+        assert {file.name for file in store.iterdir()} == {stores.ROOT, *saved(store)["files"]}
+    assert at > 20
 
 
 def test_ctrl_c_returns_what_was_found_and_the_search_goes_on(whole, tmp_path):

@@ -23,6 +23,6 @@ the point of a region only, or has independent gradients and too few of them for
 subset of the first two kinds.  Regions have one common zero of as many functions as there are
 coordinates, by Krawczyk's operator, or one that second order isolates.
 
-What is shown is about the problem that the file states.  That its symmetries preserve this problem
-is tested at random points and not proved.
+What is shown is about the problem that the file states.  That its symmetries, and turns by the
+periods of its coordinates, preserve this problem is tested at random points and not proved.
 """

@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"NOT VERIFIED: the file cannot be read: {error}")
         return 1
-    except Exception as error:  # what a file of any content makes libraries raise
+    except Exception as error:  # whatever goes wrong, nothing is verified
         print(f"NOT VERIFIED: the file is malformed: {error!r}")
         return 1
     return 0

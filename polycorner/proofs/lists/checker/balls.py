@@ -7,6 +7,7 @@ from typing import Any
 from flint import arb, arb_mat, fmpq
 
 BITS, STEPS = 128, 60
+BESIDE = 2.0**-40  # to which points beyond a side are listed: wider than enclosures in doubles
 ZERO, NAN = arb(0), arb("nan")
 
 
@@ -17,6 +18,16 @@ class RefusedError(Exception):
 def need(condition: object, message: str) -> None:
     if not condition:
         raise RefusedError(message)
+
+
+def places(numbers: Any, count: int, message: str) -> list[int]:
+    """Return numbers of things of which there are ``count``."""
+    need(all(type(i) is int and 0 <= i < count for i in numbers), message)
+    return list(numbers)
+
+
+def different(records: Sequence[Any], message: str) -> None:
+    need(len({repr(record) for record in records}) == len(records), f"{message} twice")
 
 
 def nothing(x: arb) -> bool:

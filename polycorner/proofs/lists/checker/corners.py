@@ -5,10 +5,10 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import ZERO, dot, hull, need, nothing, number
+from .balls import ZERO, different, dot, hull, need, nothing, number
 from .problem import Problem
 from .proof import Proof
-from .symmetries import POINTS, Symmetry
+from .symmetries import POINTS, symmetries
 from .vertices import Vertex
 
 SHIFT = 2.0**-30
@@ -21,10 +21,11 @@ class CornerProof(Proof):
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = Problem(data)
-        self.vertices = [Vertex(p, r) for r in data["regions"]]
-        self.loci, self.tested = [], sum(vertex.tested for vertex in self.vertices)
+        different(data["regions"], "a region is stated")
+        self.regions = [Vertex(p, r) for r in data["regions"]]
+        self.tested = sum(vertex.tested for vertex in self.regions)
         self.related = [Relation(p, r).rows for r in data["relations"]]
-        self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
+        self.symmetries = symmetries(p, data)
 
     def shown(self, lo: list[float], hi: list[float], _: list[list[arb]]) -> bool:
         """Whether a box is closed rightly."""
@@ -48,7 +49,7 @@ class CornerProof(Proof):
         some = sorted(frozenset().union(*p.open_sets(signs)))
         if not p.open_sets(signs):
             return True
-        around = [v for v in self.vertices if v.holds(box.lo, box.hi)]
+        around = [v for v in self.regions if v.holds(box.lo, box.hi)]
         zeros = {tuple(sorted(v.active)) for v in around}
         criticals = {(i,) for v in around for i in v.critical}
         top, level = len(p.free) - p.k, {tuple[int, ...]()}
@@ -69,19 +70,9 @@ class CornerProof(Proof):
             }
         return bool(top >= 0)
 
-    def check_list(self, data: dict[str, Any]) -> None:
-        """Check that all regions with corners are listed, each corner once."""
-        claimed = [self.vertices[point["region"]] for point in data["points"]]
-        for k, v in enumerate(claimed):
-            need(v.inside and v.active <= v.matter and not v.outside, f"{v.name}: is no corner")
-            active = sorted(v.matter)
-            need(active == data["points"][k]["active"], f"{v.name}: {active} are active")
-            need(all(v.same(w) is False for w in claimed[:k]), f"{v.name}: is listed twice")
-        named = claimed + [self.vertices[k] for k in data["open_points"]]
-        for v in self.vertices:
-            absent = not v.inside or not (v.active <= v.matter or v.critical & v.matter)
-            known = v.outside or absent or any(v.same(w) for w in named)
-            need(known, f"{v.name}: is not listed")
+    def compare(self, vertex: Any, point: dict[str, Any]) -> None:
+        active = sorted(vertex.matter)
+        need(active == point["active"], f"{vertex.name}: {active} are active")
 
 
 class Relation:

@@ -4,7 +4,7 @@ from typing import Any
 
 from flint import acb_mat, arb, arb_mat
 
-from .balls import ZERO, definite, dot, hull, moved, need, nothing, shown, sides, turn, zero
+from .balls import BESIDE, ZERO, definite, dot, hull, moved, need, nothing, shown, sides, turn, zero
 from .problem import Problem
 
 HALVINGS = 6  # of a region, in whose parts multipliers are enclosed
@@ -19,7 +19,8 @@ class Face:
     def __init__(self, p: Problem, record: dict[str, Any], places: list[int], active: Any) -> None:
         self.p, self.places, self.active = p, places, frozenset(active or ())
         self.name = f"{'locus' if active is None else 'region'} {record}"
-        need(self.active <= set(range(p.m)) and set(places) <= set(p.free), self.name)
+        fine = self.active <= set(range(p.m)) and set(places) <= set(p.free)
+        need(fine and len({*places}) == len(places), self.name)
         self.rows = [*sorted(self.active), *range(p.m, p.m + p.k + 1)]
         count = p.n if active is not None else len(places)
         self.lower, self.upper = sides(record, ("lower", "upper"), count)
@@ -50,9 +51,8 @@ class Face:
         self.index = index
         need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
         self.point = self.at(self.unknowns)
-        whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
-        stated = zip(self.places, *sharp, strict=False)  # what meets the domain is listed
-        self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
+        self.outside = p.is_outside(self.point, self.places)
+        self.far = p.is_outside(self.point, self.places, BESIDE)
         v = p.values(self.point)
         signs = p.signs(v)
         self.zeros = given | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
@@ -62,7 +62,9 @@ class Face:
         sure = any(u <= self.zeros for u in branches)
         self.stationary = sure and all(self.active <= u for u in branches)
         self.free = any(u <= self.active for u in branches)  # all others are positive in one
+        self.listable = self.stationary and not (p.minima_only and self.index != 0)
         self.absent = not branches or any(u < self.active for u in branches)
+        self.absent |= p.minima_only and bool(self.index) and self.free
 
     def at(self, unknowns: list[arb], middle: bool = False) -> list[arb]:
         """Return all coordinates; others may be anywhere in the domain, or are in its middle."""
@@ -170,6 +172,8 @@ class Face:
         """Whether the sample, with the coordinates of the locus instead, is in the set."""
         sample = sides(record, ("sample", "sample"), self.p.n)[0]
         moved = set(self.p.free) - set(self.places)
+        if self.p.is_outside([arb(x) for x in sample], sorted(moved)):
+            return False
         q = [arb(x) if i in moved else self.point[i] for i, x in enumerate(sample)]
         signs = self.p.signs(self.p.values(q))
         return any(all(signs[i] > 0 for i in branch) for branch in self.p.branches)

@@ -44,6 +44,17 @@ def angle(y: arb, x: arb, r: arb) -> tuple[arb, ...]:
 
 
 ALIKE = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "erf")  # fmt: skip  # noqa: E501
+LOGICAL = ("lt", "le", "not", "and", "or")  # operations whose values are truths
+
+
+def arity(op: str) -> list[bool]:
+    """Return for each argument of an operation whether it is a truth."""
+    if op == "select":
+        return [True, False, False]
+    single = op in {*ALIKE, "square", "abs", "not", "var"}
+    return [op in {"not", "and", "or"}] * (1 if single else 2)
+
+
 # fmt: off
 VALUES: dict[str, Callable[..., Any]] = {
     **{name: getattr(arb, name) for name in ALIKE}, "square": square, "abs": abs,

@@ -5,8 +5,8 @@ from typing import Any
 
 from flint import arb, ctx
 
-from .balls import BITS, NAN, ZERO, dot, hull, need, number, sides
-from .operations import SLOPES, VALUES, chain, ordered, unite
+from .balls import BITS, NAN, ZERO, different, dot, hull, need, number, places, sides, turn
+from .operations import LOGICAL, SLOPES, VALUES, arity, chain, ordered, unite
 
 FORMAT, CORNERS = ["polycorner-stationary-list", 1], ["polycorner-corner-list", 1]
 
@@ -17,28 +17,35 @@ class Problem:
     def __init__(self, data: dict[str, Any]) -> None:
         ctx.prec = BITS
         need(data["format"] in (FORMAT, CORNERS), f"the format is {data['format']}, not {FORMAT}")
-        self.n, self.m, self.k = (len(data["coordinates"]), data["inequalities"], data["equations"])
-        need(self.m >= 0 and self.k >= 0, "numbers of functions")
+        self.names: list[str] = data["coordinates"]
+        different(self.names, "a coordinate is named")
+        need(all(name.isidentifier() for name in self.names), "names of coordinates")
+        self.n, self.m, self.k = len(self.names), data["inequalities"], data["equations"]
+        fine = all(type(i) is int and i >= 0 for i in (self.m, self.k))
+        need(fine and len(data["functions"]) == self.m + self.k + 1, "numbers of functions")
         self.nodes: list[tuple[str, list[Any]]] = []
         self.known: dict[int, arb] = {}
-        self.positive: set[int] = set()
+        self.positive, self.truths = set[int](), set[int]()
         for op, *args in data["nodes"]:
             self.add(op, args)
-        self.outputs: list[int] = data["outputs"]
+        self.outputs = places(data["outputs"], len(self.nodes), "outputs")
         need(len(self.outputs) == self.m + self.k + 1, "there is one output for each function")
+        need(self.truths.isdisjoint(self.outputs), "functions have numbers for values")
         self.needs = [self.needed(output) for output in self.outputs]
-        self.branches = {frozenset(branch) for branch in data["branches"]}
-        need(all(0 <= i < self.m for branch in self.branches for i in branch), "branches")
+        self.branches = {frozenset(places(b, self.m, "branches")) for b in data["branches"]}
         self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
         self.anywhere = hull(self.lower, self.upper)
         self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]
         moving = [i for i in range(self.n) if self.widths[i] > 0]
         need(data["fixed"] == [i for i in range(self.n) if i not in moving], "fixed coordinates")
-        need(set(data["parameters"]) <= set(moving), "parameters")
-        self.parameters: list[int] = data["parameters"]
+        self.parameters = places(data["parameters"], self.n, "parameters")
+        need(set(self.parameters) <= set(moving), "parameters")
         self.free = [i for i in moving if i not in self.parameters]
         self.minima_only: bool = data["minima_only"]
-        self.periods = [number(p) if p else None for p in data["periods"]]
+        need(type(self.minima_only) is bool, "minima_only is true or false")
+        self.periods = [None if p is None else number(p) for p in data["periods"]]
+        fine = all(period is None or period > 0 for period in self.periods)
+        need(fine and len(self.periods) == self.n, "periods")
 
     def add(self, op: str, args: list[Any]) -> None:
         place = len(self.nodes)
@@ -46,8 +53,11 @@ class Problem:
             self.known[place] = number(args[0])
         else:
             need(op in {"var", *VALUES}, f"the operation {op}")
-            bound = self.n if op == "var" else place
-            need(all(type(a) is int and 0 <= a < bound for a in args), f"{op} of {args}")
+            places(args, self.n if op == "var" else place, f"{op} of {args}")
+            truths = [a in self.truths for a in args] if op != "var" else [False]
+            need(truths == arity(op), f"{op} of {args}")
+        if op in LOGICAL:
+            self.truths.add(place)
         if op == "mul" and args[0] == args[1]:
             op, args = "square", args[:1]
         sums = op in {"add", "mul", "div"} and self.positive.issuperset(args)
@@ -121,6 +131,26 @@ class Problem:
             if s * self.values(corner)[self.outputs[row]] > lost:
                 return s
         return 0
+
+    def is_outside(self, point: Sequence[arb], some: Sequence[int], room: float = 0.0) -> bool:
+        """Whether a point is shown to lie beyond a side, or farther than what is rounded."""
+        for i in some:
+            x, a, b = point[i], self.lower[i], self.upper[i]
+            more, period = room * (1 + abs(x)), self.periods[i]
+            x += turn(x, a, b, period)
+            whole = period is not None and self.widths[i] >= period
+            if not whole and (x < a - more or x > b + more):
+                return True
+        return False
+
+    def where(self) -> str:
+        """Return the domain in words; numbers as they are."""
+        ends = list(zip(self.names, self.lower, self.upper, strict=True))
+        box = [f"{name} from {a} to {b}" for i, (name, a, b) in enumerate(ends) if i in self.free]
+        said = [f"in the box {' and '.join(box)}"] if box else []
+        said += [f"with {name} = {a}" for name, a, b in ends if a == b]
+        said += [f"for all {ends[i][0]} from {ends[i][1]} to {ends[i][2]}" for i in self.parameters]
+        return ", ".join(said)
 
     def open_sets(self, signs: list[int], zeros: frozenset[int] = frozenset()) -> list[Any]:
         """Return the functions that have to hold in each branch and may vanish; least sets only."""

@@ -1,17 +1,17 @@
 """Proof in a file: why each of its boxes is closed."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from math import comb
 from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import NAN, ZERO, dot, hull, moved, need, sides
+from .balls import NAN, ZERO, different, dot, hull, moved, need, places, sides
 from .faces import Face
 from .pinned import Pinned
 from .problem import Problem
-from .symmetries import Symmetry
+from .symmetries import symmetries
 
 PIECES = 4000  # into which a box is bisected at most
 MOST_SETS = 500  # of functions that are looked at in a box
@@ -21,12 +21,16 @@ class Proof:
     """The problem of a file, with regions, loci and symmetries."""
 
     kind = "stationary points"  # that are listed
-    tested = 0  # properties at points that are tested, but not shown
+    related: Sequence[frozenset[int]] = ()  # functions with linear relations, tested
+    loci: Sequence[Face] = ()
+    ways: Sequence[list[float]] = ()
+    counted = open = beside = 0  # points; those that may be; those beyond a side by rounding
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = Problem(data)
         self.kind = "local minima" if p.minima_only else self.kind
-        self.regions = [
+        different(data["regions"], "a region is stated")
+        self.regions: list[Any] = [
             Pinned(p, r) if "corner" in r else Face(p, r, p.free, r["active"])
             for r in data["regions"]
         ]
@@ -34,7 +38,7 @@ class Proof:
             sides(r, ("way", "way"), p.n)[0] if "way" in r else [] for r in data["regions"]
         ]
         self.loci = [Face(p, r, r["z"], None) for r in data["loci"]]
-        self.symmetries = [Symmetry(p, g, data["weights"]) for g in data["symmetries"]]
+        self.symmetries = symmetries(p, data)
         self.tested = sum(region.tested for region in self.regions)
 
     def closed(self, lower: list[float], upper: list[float], hints: list[Any]) -> bool:
@@ -174,18 +178,51 @@ class Proof:
             changed.append([x + change.get(i, ZERO) for i, x in enumerate(w)])
         return changed
 
+    def compare(self, face: Any, point: dict[str, Any]) -> None:
+        need(face.index == point["index"], f"{face.name}: the index is {face.index}")
+
+    def is_absent(self, number: int) -> bool:
+        """Whether the point of a region is shown to be none that is listed."""
+        face = self.regions[number]
+        way = self.ways[number] if self.ways and self.p.minima_only else []
+        return bool(face.outside or face.absent or (way and self.is_saddle(face, way)))
+
     def check_list(self, data: dict[str, Any]) -> None:
-        """Check that all regions with stationary points are listed, each point once."""
-        claimed = [self.regions[point["region"]] for point in data["points"]]
-        for k, face in enumerate(claimed):
-            need(face.stationary and not face.outside, f"{face.name}: is no stationary point")
-            need(
-                face.index == data["points"][k]["index"], f"{face.name}: the index is {face.index}"
-            )
-            need(all(face.same(f) is False for f in claimed[:k]), f"{face.name}: is listed twice")
-        named = claimed + [self.regions[k] for k in data["open_points"]]
-        for face, way in zip(self.regions, self.ways, strict=True):
-            known = face.outside or face.absent or any(face.same(f) for f in named)
-            known |= self.p.minima_only and bool(face.index) and face.free
-            known |= self.p.minima_only and bool(way) and self.is_saddle(face, way)
+        """Check that all regions with points are listed, each point once; count the points.
+
+        Of those that may be, the ones are counted as points, or not at all, that are decided here.
+        """
+        count, points = len(self.regions), data["points"]
+        listed = places([point["region"] for point in points], count, "listed regions")
+        open_ = places(data["open_points"], count, "open points")
+        different([*listed, *open_], "a region is listed")
+        claimed = list[Any]()
+        for number, point in zip(listed, points, strict=True):
+            face = self.regions[number]
+            need(face.listable and not face.far, f"{face.name}: is none of the {self.kind}")
+            self.compare(face, point)
+            need(all(face.same(f) is False for f in claimed), f"{face.name}: is listed twice")
+            claimed.append(face)
+        named, sure = list(claimed), len(claimed)
+        for number in open_:
+            face, alike = self.regions[number], [self.regions[number].same(f) for f in named]
+            if self.is_absent(number) or True in alike:
+                continue
+            sure += bool(face.listable and not any(x is None for x in alike))
+            named.append(face)
+        for number, face in enumerate(self.regions):
+            known = self.is_absent(number) or any(face.same(f) for f in named)
             need(known, f"{face.name}: is not listed")
+        self.counted, self.open = sure, len(named) - sure
+        self.beside = sum(face.outside for face in claimed)
+
+    def distinct(self) -> list[Face]:
+        """Return loci that are not beside the domain, of minima if only these are listed, once."""
+        found = list[Face]()
+        for place in self.loci:
+            alike = [place.same(other) for other in found]
+            need(None not in alike, f"{place.name}: may be another one")
+            minimum = place.index == 0 or not self.p.minima_only
+            if minimum and not place.outside and True not in alike:
+                found.append(place)
+        return found

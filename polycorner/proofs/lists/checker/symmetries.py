@@ -1,12 +1,13 @@
 """Symmetries of a problem, tested at random points."""
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from typing import Any
 
 from flint import arb
 
-from .balls import dot, hull, need, number, turn
+from .balls import different, dot, hull, need, number, turn
 from .problem import Problem
 
 POINTS = 20
@@ -15,17 +16,18 @@ POINTS = 20
 class Symmetry:
     """A map ``q -> signs * q[order] + shifts * periods``."""
 
-    def __init__(self, p: Problem, record: dict[str, Any], weights: list[str]) -> None:
-        self.p, self.name, self.order, self.signs = (
-            p,
-            f"symmetry {record}",
-            *(record[key] for key in ("order", "signs")),
-        )
+    def __init__(
+        self, p: Problem, record: dict[str, Any], weights: list[str], name: str = ""
+    ) -> None:
+        self.p, self.name = p, name or f"symmetry {record}"
+        self.order, self.signs = record["order"], record["signs"]
         need(sorted(self.order) == [*range(p.n)] and set(self.signs) <= {1, -1}, self.name)
         pairs = [(p.periods[i], period) for i, period in zip(self.order, p.periods, strict=True)]
         need(all(a is b or (a and b and a.overlaps(b)) for a, b in pairs), self.name)
-        shifts = zip(record["shifts"], p.periods, strict=True)
+        shifts = list(zip(record["shifts"], p.periods, strict=True))
         self.shifts = [number(shift) * (period or 0) for shift, period in shifts]
+        parts = [Fraction(shift) % 1 if period else 0 for shift, period in shifts]
+        self.key = (self.order, self.signs, parts)
         self.weights = [arb(float.fromhex(w)) for w in weights]
         self.growth = [-w for w in self.weights]
         for w, s, i in zip(self.weights, self.signs, self.order, strict=True):
@@ -48,6 +50,11 @@ class Symmetry:
         added = [a + b for a, b in zip(self.shifts, turns, strict=True)]
         return dot(self.growth, box) + dot(self.weights, added) > 0
 
+    @property
+    def is_identity(self) -> bool:
+        order, signs, parts = self.key
+        return order == [*range(self.p.n)] and set(signs) <= {1} and not any(parts)
+
     def test(self) -> None:
         """Check at random points that functions go to functions and the set to itself."""
         p, draw, pairs = self.p, random.Random(1), []
@@ -69,3 +76,21 @@ class Symmetry:
         kept &= all(max(first(1, i, h), first(1, i, h, -1)) >= 0 for i in h)
         sets = [{frozenset(first(side, i, m) for i in b) for b in p.branches} for side in (0, 1)]
         need(kept and sets[0] == sets[1], f"{self.name}: changes the problem")
+
+
+def periodic(p: Problem, weights: list[str]) -> Iterator[Symmetry]:
+    """Yield the turns by whole periods, which have to preserve the problem."""
+    for i, name in enumerate(p.names):
+        if p.periods[i] is not None:
+            shifts = ["1" if k == i else "0" for k in range(p.n)]
+            turns = {"order": [*range(p.n)], "signs": [1] * p.n, "shifts": shifts}
+            yield Symmetry(p, turns, weights, f"period of {name}")
+
+
+def symmetries(p: Problem, data: dict[str, Any]) -> list[Symmetry]:
+    """Return the symmetries of a file, each once; see that coordinates have their periods."""
+    list(periodic(p, data["weights"]))
+    found = [Symmetry(p, record, data["weights"]) for record in data["symmetries"]]
+    different([g.key for g in found], "a symmetry is stated")
+    need(not any(g.is_identity for g in found), "the identity is listed as a symmetry")
+    return found

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import random
 import sys
 import time
@@ -10,6 +11,9 @@ from array import array
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
+from multiprocessing import parent_process
+from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from .balls import moved, need
@@ -18,11 +22,14 @@ from .problem import CORNERS, Problem
 from .proof import Proof
 
 CHUNK = 500  # leaves that a worker checks at a time
+MOST_UNPACKED = 200  # bytes for each of a file; deflate packs a thousand zeros into one
 
 
 def contents(path: str) -> tuple[dict[str, Any], list[Any]]:
     kinds, parts = {"tree": "b", "positions": "d", "counts": "H", "directions": "f"}, []
     with zipfile.ZipFile(path) as archive:
+        room = MOST_UNPACKED * Path(path).stat().st_size
+        need(sum(part.file_size for part in archive.filelist) <= room, "a part is far too large")
         for name, kind in kinds.items():
             parts.append(array(kind, archive.read(f"{name}.bin")))
             if sys.byteorder == "big":
@@ -54,8 +61,16 @@ def leaves(p: Problem, codes: Any, positions: Any, counts: Any, directions: Any)
 WORKER: list[Proof] = []
 
 
-def begin(path: str) -> None:
-    data = contents(path)[0]
+def follow() -> None:
+    """End this process when the one that started it ends, in whatever way."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def begin(data: dict[str, Any]) -> None:
+    Thread(target=follow, daemon=True).start()
     WORKER[:] = [(CornerProof if data["format"] == CORNERS else Proof)(data)]
 
 
@@ -66,15 +81,18 @@ def failing(chunk: list[Any]) -> Any:
 def check(path: str, sample: int | None, jobs: int) -> str:
     """Check a file; return the verdict."""
     (data, parts), started, done = contents(path), time.monotonic(), 0
-    begin(path)
+    begin(data)
     proof, (total, opened) = WORKER[0], (parts[0].count(code) for code in (-1, -2))
     proof.check_list(data)
-    need(opened == data["open"], f"{opened} boxes are open, not {data['open']}")
+    need(
+        type(data["open"]) is int and opened == data["open"],
+        f"{opened} boxes are open, not {data['open']}",
+    )
     count = total if sample is None else min(sample, total)
     wanted = range(total) if count == total else set(random.Random(0).sample(range(total), count))
     stream = (leaf for leaf in leaves(proof.p, *parts) if leaf[0] in wanted)
     chunks = iter(lambda: list(islice(stream, CHUNK)), [])
-    with ProcessPoolExecutor(jobs, initializer=begin, initargs=(path,)) as pool:
+    with ProcessPoolExecutor(jobs, initializer=begin, initargs=(data,)) as pool:
         while wave := list(islice(chunks, 4 * jobs)):
             found = (map if jobs == 1 else pool.map)(failing, wave)
             bad = next(filter(None, found), None)
@@ -82,19 +100,23 @@ def check(path: str, sample: int | None, jobs: int) -> str:
             done += sum(map(len, wave))
             line = f"{done} of {count} leaves, {time.monotonic() - started:.0f} s"
             print(line, file=sys.stderr)
-    said = [f"{len(data['points'])} {proof.kind}"]
-    related = len(data.get("relations", ()))
-    said += [f"{related} linear relations (tested, not proved)"] if related else []
-    said += [f"{len(data['open_points'])} that may be"] if data["open_points"] else []
-    said += [f"{proof.tested} zeros at points (tested, not proved)"] if proof.tested else []
-    for met, what in ((True, "loci"), (False, "loci that may be empty")):
-        some = [f for f in proof.loci if f.met == met]
-        said += [f"{sum(not f.outside for f in some)} {what}"] if some else []
-    said += [f"{total} leaves" if count == total else f"ONLY A SAMPLE of {count} of {total} leaves"]
-    said += [f"complete outside {opened} open boxes" if opened else "no open box"]
-    said += (
-        [f"up to {len(proof.symmetries)} symmetries (tested, not proved)"]
-        if proof.symmetries
-        else []
-    )
-    return f"verified: {', '.join(said)}"
+    leaves_ = f"{total} leaves" if count == total else f"ONLY A SAMPLE of {count} of {total} leaves"
+    boxes = f"complete outside {opened} open boxes" if opened else "no open box"
+    return f"verified: {', '.join([*said(proof), leaves_, boxes, proof.p.where()])}"
+
+
+def said(proof: Proof) -> Iterator[str]:
+    """Yield what a proof shows of points and loci, once its list is checked."""
+    images = f" and their images under {len(proof.symmetries)} symmetries (tested, not proved)"
+    yield f"{proof.counted} {proof.kind}{images if proof.symmetries else ''}"
+    loci = proof.distinct()
+    for number, what in (
+        (proof.beside, "of them beside the box by rounding"),
+        (len(set(proof.related)), "linear relations (tested, not proved)"),
+        (proof.open, "that may be"),
+        (proof.tested, "zeros at points (tested, not proved)"),
+        (sum(place.met for place in loci), "loci"),
+        (sum(not place.met for place in loci), "loci that may be empty"),
+    ):
+        if number:
+            yield f"{number} {what}"

@@ -4,7 +4,20 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import ZERO, definite, dot, hull, need, nothing, number, shown, sides, turn, zero
+from .balls import (
+    BESIDE,
+    ZERO,
+    definite,
+    dot,
+    hull,
+    need,
+    nothing,
+    number,
+    shown,
+    sides,
+    turn,
+    zero,
+)
 from .problem import Problem
 
 
@@ -36,9 +49,8 @@ class Vertex:
         self.point = self.at(unknowns)
         ends = zip(self.lower, self.upper, self.point, strict=True)
         need(all(a <= x <= b for i, (a, b, x) in enumerate(ends) if i in p.free), self.name)
-        whole = [period is not None and p.widths[i] >= period for i, period in enumerate(p.periods)]
-        stated = zip(p.free, *sharp, strict=True)  # what meets the domain is listed
-        self.outside = any(b < p.lower[i] or a > p.upper[i] for i, a, b in stated if not whole[i])
+        self.outside = p.is_outside(self.point, p.free)
+        self.far = p.is_outside(self.point, p.free, BESIDE)
         v = p.values(self.point)
         signs = p.signs(v)
         self.zeros = self.active | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
@@ -46,7 +58,9 @@ class Vertex:
         self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
         sets = p.open_sets(signs, self.zeros)
         self.matter = frozenset().union(*sets)
-        self.inside = bool(sets)
+        self.listable = bool(sets) and self.active <= self.matter <= self.zeros
+        self.absent = not (self.active <= self.matter or self.critical & self.matter)
+        self.absent |= not sets
 
     def at(self, unknowns: list[arb]) -> list[arb]:
         known = dict(zip(self.p.free, unknowns, strict=True))
