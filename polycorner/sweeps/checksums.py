@@ -106,13 +106,13 @@ def _check_files(path: Path, attributes: dict[str, Any], metadata: dict[str, Any
     import google_crc32c
 
     checks = json.loads(attributes["checksums"])
-    for name in metadata:
+    for name, about in metadata.items():
         file = path / name / ROOT
         content = _read(file)
         if sha256(content).hexdigest() != checks["metadata"][name]:
             raise _changed(file)
         with reading(file):
-            if json.loads(content) != metadata[name]:
+            if json.loads(content) != about:
                 refuse(name, "the metadata in the root", "others")
         files = chunks(path / name)
         for file in files:

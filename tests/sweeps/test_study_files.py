@@ -69,7 +69,7 @@ MISTAKES = {
     f"x = {'9' * 5000}": "is no TOML file that can be read: .*digits",
     'study = "heading"\n[axes]\nlength = {start = 1, stop = 2, count = 1e12}': "count: expected",
     'study = "heading"\n[axes]\nlength = {start = 1, stop = 2, count = 1000000000000}': (
-        "axes.length: count: expected a whole number >= 1 and <= 1e+08; got 10"
+        "axes.length: count: expected a whole number >= 1 and <= 1e.08; got 10"
     ),
     f'study = "heading"\n[axes]\nlength = {{start = 1, stop = 0x{"f" * 5000}, count = 2}}': (
         "axes.length: stop: expected a finite number in the range of doubles; got a number"
