@@ -5,7 +5,8 @@ kind raises ``TypeError``, one of the right kind that is out of range ``ValueErr
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from numbers import Integral, Real
 from typing import Any, NoReturn, TypeVar
 
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 from polycorner.errors import nearest
 
 T = TypeVar("T")
+MOST = 2**63 - 1  # the largest whole number of compiled code
+LONGEST = 500  # characters of a value in an error
 
 
 def refuse(
@@ -25,8 +28,30 @@ def refuse(
         shown = " ".join(line.strip() for line in repr(got).splitlines())  # arrays have several
     except ValueError:  # of integers of thousands of digits, which Python does not write out
         shown = "a number that is too long to be shown"
+    shown = shown if len(shown) <= LONGEST else f"{shown[: LONGEST - 3]}..."
     msg = f"{argument}: expected {expected}; got {shown}"
     raise kind(msg)
+
+
+@contextmanager
+def about(argument: str) -> Iterator[None]:
+    """Name an argument in the errors of its parts, which know their own names only.
+
+    Examples
+    --------
+    >>> with about("parts"):
+    ...     instance("f1", 3, str)
+    Traceback (most recent call last):
+    TypeError: parts: f1: expected a str; got int
+    """
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        if str(error).startswith(f"{argument}:"):
+            raise
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        msg = f"{argument}: {error}"
+        raise kind(msg) from error
 
 
 def instance(argument: str, value: object, kind: type[T], hint: str = "") -> T:
@@ -66,7 +91,7 @@ def whole(
     Traceback (most recent call last):
     ValueError: count: expected a whole number >= 1; got 0
     """
-    bounds = _bounds((">=", least), ("<=", most))
+    bounds = _bounds((">=", least), ("<=", None if most == MOST else most))
     if isinstance(value, bool) or not isinstance(value, Integral):
         refuse(argument, f"a whole number{bounds}", value, TypeError)
     number = int(value)
@@ -133,8 +158,61 @@ def real(
     return number
 
 
+def flag(argument: str, value: object) -> bool:
+    """Return a truth value, or raise TypeError: words and numbers are none.
+
+    Examples
+    --------
+    >>> flag("resume", "False")
+    Traceback (most recent call last):
+    TypeError: resume: expected True or False; got 'False'
+    """
+    if not isinstance(value, bool | np.bool_):
+        refuse(argument, "True or False", value, TypeError)
+    return bool(value)
+
+
+def is_array(value: object) -> bool:
+    """Whether a value is an array, none of whose entries are masked."""
+    return isinstance(value, np.ndarray) and not isinstance(value, np.ma.MaskedArray)
+
+
+def reals(argument: str, value: Any) -> NDArray[np.float64]:
+    """Return an array of real numbers, or raise; one of float64 is returned as it is.
+
+    Complex numbers, text, dates, records and truth values are no real numbers, and a mask would
+    be lost.
+
+    Examples
+    --------
+    >>> reals("q", [1.0, 2.0 + 1.0j])
+    Traceback (most recent call last):
+    TypeError: q: expected real numbers; got dtype complex128
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    if isinstance(value, np.ma.MaskedArray):
+        msg = f"{argument}: expected real numbers; got a masked array"
+        raise TypeError(msg)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        msg = f"{argument}: expected a rectangular array of real numbers; got ragged nesting"
+        raise ValueError(msg) from error
+    exact = array.dtype.kind == "O" and all(
+        isinstance(x, Real) and not isinstance(x, bool) for x in array.flat
+    )
+    if array.dtype.kind not in "iuf" and not exact:
+        msg = f"{argument}: expected real numbers; got dtype {array.dtype}"
+        raise TypeError(msg)
+    try:
+        return array.astype(np.float64)
+    except OverflowError:
+        refuse(argument, "real numbers that a float can hold", value)
+
+
 def numbers(argument: str, value: object, expected: str) -> NDArray[np.float64]:
-    """Return an array of numbers, or raise.
+    """Return a new array of numbers, or raise.
 
     Examples
     --------
@@ -143,7 +221,7 @@ def numbers(argument: str, value: object, expected: str) -> NDArray[np.float64]:
     TypeError: radii: expected at least two positive numbers; got 'ab'
     """
     try:
-        return np.array(value, dtype=np.float64)
+        return np.array(reals(argument, value))
     except (TypeError, ValueError):
         refuse(argument, expected, value, TypeError)
 
@@ -165,11 +243,7 @@ def increasing(
     ValueError: rods: expected increasing numbers > 0 and < 1; got [0.5, 0.2]
     """
     bounds = _bounds((">", above), (">=", least), ("<", below))
-    try:
-        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    except (TypeError, ValueError) as error:
-        msg = f"{argument}: expected increasing numbers{bounds}; got {values!r}"
-        raise TypeError(msg) from error
+    array = np.atleast_1d(numbers(argument, values, f"increasing numbers{bounds}"))
     inside = (
         array.ndim == 1
         and array.size > 0
@@ -205,8 +279,10 @@ def choice(argument: str, value: object, known: Iterable[str]) -> str:
 
 
 def names(argument: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise ValueError for the first given name that is not known."""
+    """Raise for the first given name that is not known, or for anything but a few names."""
     words = list(known)
+    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+        refuse(argument, f"names among {', '.join(words) or 'none'}", given, TypeError)
     for name in given:
         if name not in words:
             shown = nearest(name, words) if isinstance(name, str) else repr(name)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.kinds import check_fields
+
 if TYPE_CHECKING:
     from functools import cached_property as cached_property  # noqa: PLC0414 - for all to import
 else:
@@ -52,6 +54,15 @@ class Value:
         """Restore the attributes; NumPy forgets in pickles that an array is read-only."""
         for name, value in state.items():
             object.__setattr__(self, name, read_only(value))
+
+
+class Checked(Value):
+    """Base of public dataclasses: their fields are what their annotations say, or they raise."""
+
+    def __post_init__(self) -> None:
+        """Raise TypeError for a field of the wrong kind; make the arrays read-only."""
+        check_fields(self)
+        super().__post_init__()
 
 
 def read_only(value: Any) -> Any:

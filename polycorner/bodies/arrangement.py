@@ -30,19 +30,20 @@ from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import check_fields, checked
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 ORIENTATIONS = ("needed", "all", "none")
 BETWEEN = "between"  # the name of the contacts among repeated bodies
 
 
 @dataclass(frozen=True, eq=False)
-class Arrangement(Value):
+class Arrangement(Checked):
     """Rigid bodies that must not overlap each other, fixed bodies, or walls.
 
     The coordinates of a body ``A`` are those of its origin, ``xA yA`` or ``xA yA zA``, and of its
@@ -124,10 +125,8 @@ class Arrangement(Value):
         for argument, several in (("bodies", self.named), ("fixed", self.fixed)):
             for body in several.values():
                 checks.instance(argument, body, Body, "disc(1.0)")
-        for wall in self.walls.values():
-            if not isinstance(wall, Wall):
-                refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
+        check_fields(self)
         check_together(self.named, self.fixed, self.walls)
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
@@ -209,6 +208,7 @@ class Arrangement(Value):
             for function, point in within(self.manifold, name, wall, member)
         ]
 
+    @checked
     def system(
         self,
         *,

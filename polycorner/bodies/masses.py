@@ -20,14 +20,15 @@ from scipy.spatial import ConvexHull
 from polycorner import checks
 from polycorner.bodies.shapes import Body, Part
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 FLAT = 1e-9  # angle below which triangles are parts of one face
 
 
 @dataclass(frozen=True, eq=False)
-class Mass(Value):
+class Mass(Checked):
     """How a rigid body resists forces and torques.
 
     Parameters
@@ -82,6 +83,7 @@ def _tensor(given: Any) -> Array:
     return (matrix + matrix.T) / 2
 
 
+@checked
 def mass_of(body: Body, density: float = 1.0) -> Mass:
     """Return the mass of a body of uniform density, per area in the plane or volume in space.
 

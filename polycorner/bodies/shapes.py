@@ -17,14 +17,15 @@ from scipy.spatial.transform import Rotation
 from polycorner import checks
 from polycorner.bodies.facets import FLAT, Facets, facets
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 Turn = float | Rotation
 
 
 @dataclass(frozen=True, eq=False)
-class Part(Value):
+class Part(Checked):
     """The points within ``radius`` of the convex hull of ``points``.
 
     Attributes
@@ -63,7 +64,7 @@ class Part(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Body(Value):
+class Body(Checked):
     """A rigid body: the union of its parts, in coordinates of its own.
 
     :func:`disc`, :func:`capsule`, :func:`polygon`, :func:`sphere`, :func:`polytope` and
@@ -125,6 +126,7 @@ class Body(Value):
         """Return the body with its origin elsewhere, turned by a matrix ``(d, d)``."""
         return Body({name: part.moved(origin, matrix) for name, part in self.parts.items()})
 
+    @checked
     def same(self, other: "Body") -> bool:
         """Whether two bodies have equal parts in the same order, up to rounding."""
         if len(self.parts) != len(other.parts) or self.dimension != other.dimension:
@@ -177,7 +179,8 @@ def capsule(start: ArrayLike, end: ArrayLike, radius: float) -> Body:
         The ends of the segment, the centres of the two caps.
     radius : float
     """
-    ends = _points("end", [start, end], np.size(start))
+    points = checks.numbers("start", start, "2 or 3 numbers")
+    ends = _points("end", [_points("start", [points], points.size)[0], end], points.size)
     if np.array_equal(*ends):
         refuse("end", "a point other than start; disc and sphere have one centre", end)
     return _simple(ends, checks.real("radius", radius, above=0))
@@ -263,6 +266,7 @@ def polytope(vertices: ArrayLike, radius: float = 0.0) -> Body:
     return _simple(points, checks.real("radius", radius, least=0))
 
 
+@checked
 def compound(bodies: Sequence[Body] | dict[str, Body]) -> Body:
     """Return one rigid body that consists of several.
 

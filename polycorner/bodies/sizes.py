@@ -21,6 +21,7 @@ from polycorner.formulas import cache
 from polycorner.formulas.compositions import substituted
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
@@ -38,6 +39,7 @@ SMALL = "small"  # bodies as small as they may be
 Change = Callable[[Family, bool], tuple[Family, tuple[float, ...]] | None]
 
 
+@checked
 def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True) -> Polyhedron:
     """Return the placements of bodies whose radii are all smaller by a further coordinate.
 
@@ -101,6 +103,7 @@ def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True)
     return Polyhedron(manifold, AllOf(*together(gaps), *limits))
 
 
+@checked
 def scaled(
     arrangement: Arrangement, name: str = "size", *, least: float = 0.01, excluded: bool = True
 ) -> Polyhedron:

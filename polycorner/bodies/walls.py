@@ -20,13 +20,13 @@ from polycorner.checks import refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 ALONG = 1e-6  # 1 minus the cosine of the angle to x up to which an axis counts as along it
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSpace(Value):
+class HalfSpace(Checked):
     """The points on one side of a line in the plane, or of a plane in space.
 
     Parameters
@@ -74,7 +74,7 @@ class HalfSpace(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Cylinder(Value):
+class Cylinder(Checked):
     """The inside of a circle in the plane, and of a cylinder or a sphere in space.
 
     Parameters

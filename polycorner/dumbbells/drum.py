@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import real, refuse, whole
+from polycorner.checks import flag, real, reals, refuse, whole
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.drum_motion import COORDINATES, imperfect_body, perfect_motion, rub
@@ -27,6 +27,7 @@ from polycorner.dumbbells.imperfections import (
 )
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.formulas.bundles import Call
+from polycorner.kinds import checked
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts, PairLaw
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.mechanics import MechanicalSystem, State
@@ -113,6 +114,7 @@ class DumbbellDrum(MechanicalSystem):
         real("restitution", self.restitution, least=0, most=1)
         real("ball_mass", self.ball_mass, above=0, unit="g")
         real("top", self.top, above=0, infinite=True, unit="mm")
+        flag("floor", self.floor)
         self.imperfections.check(self.tilt, self.centre_radius)
         super().__post_init__()
 
@@ -202,6 +204,7 @@ class DumbbellDrum(MechanicalSystem):
             reach,
         )
 
+    @checked
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return the time in which gravity moves a ball by a tenth of the rod radius.
 
@@ -220,6 +223,7 @@ class DumbbellDrum(MechanicalSystem):
         """Return the parameters of the drum by name."""
         return asdict(self)
 
+    @checked
     def state(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> State:
         """Return a state of the dumbbells, after checking that nothing overlaps.
 
@@ -239,22 +243,24 @@ class DumbbellDrum(MechanicalSystem):
         """
         places = self.placed(q)
         carried = np.array([self.spin, 0.0, 0.0, 0.0])
-        speeds = np.tile(carried, (self.count, 1)) if v is None else np.array(v, dtype=np.float64)
+        speeds = np.tile(carried, (self.count, 1)) if v is None else np.array(reals("v", v))
         if speeds.shape != (self.count, 4) or not np.isfinite(speeds).all():
             refuse("v", f"finite numbers of shape ({self.count}, 4)", speeds.shape)
         at_rest = (speeds == carried).all(axis=1)
-        return State(float(time), places, speeds, np.repeat(at_rest[:, None], 3, axis=1))
+        return State(real("time", time), places, speeds, np.repeat(at_rest[:, None], 3, axis=1))
 
+    @checked
     def check_placement(self, q: Array) -> None:
         """Raise ValueError if dumbbells overlap or do not lie in the drum, naming the worst."""
         self.placed(q)
 
+    @checked
     def placed(self, q: ArrayLike) -> Array:
         """Return placements ``(count, 4)`` after checking that they lie in the drum and apart."""
-        array = np.array(q, dtype=np.float64)
+        array = np.array(reals("q", q))
         if array.ndim == 1:
             array = array[None]
-        if array.shape[0] != self.count or array.ndim != 2 or array.shape[1] not in (3, 4):
+        if array.ndim != 2 or array.shape[0] != self.count or array.shape[1] not in (3, 4):
             msg = (
                 f"q: expected shape ({self.count}, 3) for phi, eta, theta or ({self.count}, 4) "
                 f"with psi; got {array.shape}"

@@ -20,7 +20,7 @@ from polycorner.motion.random_functions import (
     signal_modes,
 )
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 AXES = ("across", "along", "up")
 SIGNAL_MODES, FIELD_MODES = 16, 32
@@ -31,7 +31,7 @@ STEEPEST = 0.5  # slope of a wall out of round up to which formulas of first ord
 SHAKING, UNEVEN_FRICTION = 1, 2  # kinds of random numbers that one and the same seed makes
 
 
-class Imperfection(Value):
+class Imperfection(Checked):
     """Base of what makes a drum imperfect."""
 
     def described(self) -> dict[str, Any]:

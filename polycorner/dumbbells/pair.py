@@ -15,17 +15,18 @@ from polycorner import checks
 from polycorner.dumbbells import formulas
 from polycorner.dumbbells import symmetries as motions
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 Chirality = Literal["L", "R"]
 
 
 @dataclass(frozen=True)
-class DumbbellPair(Value):
+class DumbbellPair(Checked):
     """Two equal dumbbells A and B on the inside of a horizontal drum.
 
     ::
@@ -269,12 +270,13 @@ class DumbbellPair(Value):
         Its position across and along the axis of A, then cosine and sine of the angle between the
         axes times half a length.
         """
-        flat = q.copy()
+        flat = self.manifold.points(q).copy()
         if not self.is_plane:
             apart = math.remainder(q[3] - q[0], math.tau)
             flat[[0, 3]] = 0.0, self.centre_radius * apart
         return motions.plane_invariants(flat, self.length / 2, self.ball_radius)
 
+    @checked
     def placements(
         self, rng: np.random.Generator, count: int, *, heading: float | None = None
     ) -> Array:

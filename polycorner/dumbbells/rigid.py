@@ -19,21 +19,23 @@ from scipy.spatial.transform import Rotation
 
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
 from polycorner.bodies.waves import depth
-from polycorner.checks import instance, refuse
+from polycorner.checks import instance, reals, refuse
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
+from polycorner.kinds import checked
 from polycorner.motion.contacts import Friction
 from polycorner.motion.mechanics import State
 from polycorner.motion.system import System
-from polycorner.spaces.arguments import reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 BALLS = ("D.1-drum", "D.2-drum")  # contacts of the balls with the drum
+SIZE = 7  # coordinates of a placement in space: the centre and a quaternion
 
 
 @dataclass(frozen=True, eq=False)
-class RigidDumbbells(Value):
+class RigidDumbbells(Checked):
     """Dumbbells in a rotating, tilted drum, as rigid bodies in space.
 
     Parameters
@@ -151,7 +153,7 @@ class RigidDumbbells(Value):
         q : (count, 3) array, or (3,) of a single one
             ``phi``, ``eta`` in mm and ``theta`` of each dumbbell, in rad.
         """
-        given, alone = reals(q, "q"), self.drum.count == 1
+        given, alone = reals("q", q), self.drum.count == 1
         if given.shape != (self.drum.count, 3) and not (alone and given.shape == (3,)):
             refuse("q", f"shape ({self.drum.count}, 3) for phi, eta, theta", given.shape)
         places = np.array([self._place(*row) for row in given.reshape(-1, 3).tolist()])
@@ -169,6 +171,7 @@ class RigidDumbbells(Value):
         centre = np.array([0.0, eta, 0.0]) - away * inward
         return self.arrangement.point({"D": (centre, turned)})
 
+    @checked
     def seen(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """Return coordinates ``(..., 7)`` in axes at rest.
 
@@ -178,14 +181,18 @@ class RigidDumbbells(Value):
         t : float or array that broadcasts with ``(...)``, optional
             Times in s; default 0.
         """
-        given = np.array(q, dtype=np.float64)
-        places = given.reshape(-1, given.shape[-1])
-        times = np.broadcast_to(np.asarray(t, dtype=np.float64), given.shape[:-1])
+        given, instants = _many(q), finite(reals("t", t), "t")
+        places = given.reshape(-1, SIZE)
+        try:
+            times = np.broadcast_to(instants, given.shape[:-1])
+        except ValueError:
+            refuse("t", f"times that broadcast with {given.shape[:-1]}", instants.shape)
         turn = Rotation.from_rotvec(times.reshape(-1, 1) * self.spin)
         turned = turn * Rotation.from_quat(places[:, 3:], scalar_first=True)
         found = [turn.apply(places[:, :3]), turned.as_quat(scalar_first=True)]
         return np.concatenate(found, axis=-1).reshape(given.shape)
 
+    @checked
     def placements(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """Return ``phi, eta, theta`` of dumbbells in space, ``(..., 3)``.
 
@@ -205,10 +212,19 @@ class RigidDumbbells(Value):
         found = np.stack([phi, flat[:, 1], np.arctan2(around, rod[:, 1])], axis=-1)
         return found.reshape(*places.shape[:-1], 3)
 
+    @checked
     def lifts(self, q: ArrayLike) -> Array:
         """Return how far the farther ball of each dumbbell is from the drum, ``(...)``, in mm."""
-        places = np.asarray(q, dtype=np.float64)
+        places = _many(q)
         polyhedron = self.arrangement.polyhedron
         balls = [polyhedron.names.index(name) for name in BALLS]
         gaps = polyhedron.values(places.reshape(-1, places.shape[-1]))[:, balls]
         return np.asarray(gaps.max(axis=-1)).reshape(places.shape[:-1])
+
+
+def _many(q: ArrayLike) -> Array:
+    """Return coordinates of dumbbells in space, ``(..., 7)``."""
+    given = reals("q", q)
+    if given.ndim == 0 or given.shape[-1] != SIZE:
+        refuse("q", f"shape (..., {SIZE})", given.shape)
+    return given.copy()  # SciPy's rotations want arrays that they could change

@@ -19,6 +19,7 @@ from polycorner.files.polyhedra import (
 )
 from polycorner.forms import count, entries, many, optional, text, word
 from polycorner.forms import number as real
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Verdict
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.strata import check_tolerance
@@ -42,6 +43,7 @@ HEADER = entries(
 SOLVED = 1000  # times the tolerance, for what comes out of linear systems
 
 
+@checked
 def save_certificate(certificate: Certificate, path: str | os.PathLike[str]) -> Path:
     """Write a certificate as JSON, atomically.
 
@@ -83,6 +85,7 @@ def save_certificate(certificate: Certificate, path: str | os.PathLike[str]) -> 
     return KIND.save_json(path, entries)
 
 
+@checked
 def load_certificate(
     path: str | os.PathLike[str],
     polyhedron: "Polyhedron | None" = None,

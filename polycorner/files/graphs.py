@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from polycorner.checks import instance, refuse
 from polycorner.container import XML, Kind, versions
 from polycorner.forms import Form, count, entries, flag, many, mapped, number, position, text, word
+from polycorner.kinds import checked
 from polycorner.polyhedra.strata import LocalType
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.parts import Completeness, Corner, Edge
@@ -65,6 +66,7 @@ def skeleton_graph(skeleton: Skeleton) -> "nx.MultiGraph":
     return graph
 
 
+@checked
 def save_graph(skeleton: Skeleton, path: str | os.PathLike[str]) -> Path:
     """Write the graph of a skeleton (see :func:`skeleton_graph`) as GraphML, atomically.
 
@@ -93,6 +95,7 @@ def save_graph(skeleton: Skeleton, path: str | os.PathLike[str]) -> Path:
     return KIND.save(path, "\n".join([HEADER, *lines, ""]).encode())
 
 
+@checked
 def load_graph(path: str | os.PathLike[str]) -> "nx.MultiGraph":
     """Return the graph in a file that :func:`save_graph` wrote, after a check of its digest.
 

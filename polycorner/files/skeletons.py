@@ -12,6 +12,7 @@ from polycorner.container import JSON, Kind, number, read_number
 from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
 from polycorner.files.skeleton_forms import HEADER, check_active, check_rays, check_sizes, unlike
 from polycorner.forms import generator_entry, read_generator
+from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
@@ -30,6 +31,7 @@ KIND = Kind("skeleton", "save_skeleton", JSON)
 VALUES = 1e-9  # largest difference of values at corners, relative to the value and the slope
 
 
+@checked
 def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: str = "") -> Path:
     """Write a skeleton, finished or not, as JSON, atomically.
 
@@ -86,6 +88,7 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
     return KIND.save_json(path, entries)
 
 
+@checked
 def load_skeleton(
     path: str | os.PathLike[str],
     polyhedron: Polyhedron | None = None,

@@ -24,6 +24,7 @@ from polycorner.files.motions import (
 )
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.motion.system import System
 from polycorner.motion.trajectory import Trajectory
 
@@ -80,6 +81,7 @@ def trajectory_dataset(
     )
 
 
+@checked
 def save_trajectory(
     trajectory: Trajectory,
     path: str | os.PathLike[str],
@@ -112,6 +114,7 @@ def save_trajectory(
     return save_dataset(KIND, path, trajectory_dataset(trajectory, units=units))
 
 
+@checked
 def load_trajectory(path: str | os.PathLike[str], system: System) -> Trajectory:
     """Read the trajectory of a system back.
 

@@ -43,6 +43,8 @@ def as_expression(argument: str, value: object) -> "sympy.Expr":
     result = sympy.sympify(value, strict=True) if known else None
     if isinstance(result, sympy.core.relational.Relational):
         refuse(argument, "f, meaning f >= 0, instead of an inequality", result, TypeError)
+    if result is not None and result.has(sympy.nan, sympy.zoo, sympy.I):
+        refuse(argument, "a formula of real values", result)
     if not isinstance(result, sympy.Expr):
         refuse(argument, "a SymPy expression", value, TypeError)
     return result

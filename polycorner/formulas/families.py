@@ -7,11 +7,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from polycorner.checks import names
 from polycorner.formulas.expressions import as_expression, kinks
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
-from polycorner.values import Value, cached_property
+from polycorner.kinds import checked
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -52,7 +54,7 @@ class Written:
 
 
 @dataclass(frozen=True, eq=False)
-class Family(Value):
+class Family(Checked):
     """Functions written in the same variables and parameters, compiled together once.
 
     Parameters are bound late: a thousand contacts of one type are one family.
@@ -94,6 +96,7 @@ class Family(Value):
     stationary: tuple[str, ...] = ()
 
     @classmethod
+    @checked
     def of(
         cls,
         expressions: "Mapping[str, Any]",
@@ -153,10 +156,12 @@ class Family(Value):
         """The key; without one, a hash of the program of the formulas."""
         return self.key or self.program().digest()
 
+    @checked
     def expression(self, name: str) -> "sympy.Expr":
         """Return one function with all definitions written out."""
         import sympy
 
+        names("name", [name], self.names)
         definitions, expressions = self.formulas()
         written: dict[str, sympy.Expr] = {}
 

@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.checks import reals
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.periodicity import check_function
-from polycorner.spaces.arguments import finite, reals, scalar
+from polycorner.kinds import checked
+from polycorner.spaces.arguments import finite, scalar
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
 
@@ -94,6 +96,7 @@ class SmoothFunction(Value):
         check_function(self)
 
     @classmethod
+    @checked
     def member(
         cls,
         family: Family,
@@ -106,11 +109,12 @@ class SmoothFunction(Value):
     ) -> "SmoothFunction":
         """Return a function of a family, bound to coordinates and parameter values."""
         function = cls.__new__(cls)
-        reads = tuple(reads or family.variables)
+        reads = tuple(family.variables if reads is None else reads) or family.variables
         cls._bind(function, family, name, manifold, reads, tuple(parameters), label)
         return function
 
     @classmethod
+    @checked
     def quantity(cls, name: str, expression: "sympy.Expr", manifold: Manifold) -> "SmoothFunction":
         """Return a quantity to be read off near a point; unlike others it need not be periodic.
 
@@ -119,6 +123,7 @@ class SmoothFunction(Value):
         return cls.member(Family.of({name: expression}, manifold.names), name, manifold)
 
     @classmethod
+    @checked
     def sum(cls, name: str, terms: "Iterable[SmoothFunction]") -> "SmoothFunction":
         """Return a sum of functions of few coordinates each, such as the energies of many springs.
 
@@ -148,7 +153,6 @@ class SmoothFunction(Value):
         >>> E.value([0.0, 1.0, 3.0]), E.gradient([0.0, 1.0, 3.0]).tolist()
         (2.5, [-1.0, -1.0, 2.0])
         """
-        checks.instance("name", name, str)
         parts = tuple(terms)
         for part in parts:
             checks.instance("terms", part, SmoothFunction)
@@ -168,12 +172,9 @@ class SmoothFunction(Value):
         known = manifold.positions
         unknown = [name for name in reads if name not in known]
         if unknown or len(set(reads)) != len(reads) or len(reads) != len(family.variables):
-            msg = (
-                f"reads: expected {len(family.variables)} different ones of the coordinates "
-                f"{', '.join(manifold.names)}; got {', '.join(reads)}"
-            )
-            raise ValueError(msg)
-        numbers = finite(reals(parameters or np.empty(0), "parameters"), "parameters")
+            different = f"{len(family.variables)} different ones of the coordinates"
+            checks.refuse("reads", f"{different} {', '.join(manifold.names)}", reads)
+        numbers = finite(reals("parameters", parameters or np.empty(0)), "parameters")
         if numbers.shape != (len(family.parameters),):
             msg = f"parameters: expected {len(family.parameters)} numbers; got {numbers.shape}"
             raise ValueError(msg)
@@ -203,6 +204,7 @@ class SmoothFunction(Value):
         """The functions whose sum it is: itself alone, unless it was made by :meth:`sum`."""
         return (self,)
 
+    @checked
     def renamed(self, name: str) -> "SmoothFunction":
         """Return the same function under another name."""
         reads = [self.manifold.names[i] for i in self.reads]

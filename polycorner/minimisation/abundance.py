@@ -5,13 +5,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from polycorner import checks
+from polycorner.kinds import checked
+from polycorner.values import Checked
 
 NORMAL = 1.959963984540054  # half the 95 % interval of a normal distribution, in deviations
 MISSED = 0.05  # probability from which on a kind may well have been missed
 
 
 @dataclass(frozen=True)
-class Richness:
+class Richness(Checked):
     """An estimate of the number of kinds from a sample of independent draws; see :func:`richness`.
 
     Attributes
@@ -57,6 +59,7 @@ class Richness:
         return 1 - MISSED ** (1 / self.draws) if self.draws else 1.0
 
 
+@checked
 def richness(counts: Iterable[int]) -> Richness:
     r"""Estimate the number of kinds in a population from the rare ones in a sample.
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from polycorner.kinds import check_fields, checked
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.explanation import explanation
 from polycorner.minimisation.findings import Analysis
@@ -43,7 +44,7 @@ from polycorner.printing import (
     units,
 )
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -56,7 +57,7 @@ VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALON
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate(Value, Printed):
+class Certificate(Checked, Printed):
     """A point, and the evidence for or against its being a local minimum.
 
     Everything but the point is computed on demand from the problem.
@@ -93,6 +94,7 @@ class Certificate(Value, Printed):
     note: str = ""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         point = self.problem.polyhedron.manifold.canonical(self.point)
         point.flags.writeable = False  # the only array: the base class would search for others
         object.__setattr__(self, "point", point)
@@ -212,11 +214,13 @@ class Certificate(Value, Printed):
         """The residuals, recomputed from the functions and the multipliers."""
         return residuals_at(self.problem, self.point, self.found.named_multipliers)
 
+    @checked
     def holds(self, tolerance: float | None = None) -> bool:
         """Whether this is a minimum with all recomputed residuals at most ``tolerance``."""
         limit = self.tolerance if tolerance is None else tolerance
         return self.is_minimum and self.residuals.worst <= limit
 
+    @checked
     def explain(self, *, unit: str | None = None) -> str:
         """Explain in a few sentences why the point is, or is not, a local minimum.
 

@@ -6,17 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.parametric import Lifted, Linear, bordered, check_rates
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 NEWTON = 40  # steps, at most
 CLOSE = 1e-8  # relative size of a step after which one more is taken
 
 
 @dataclass(frozen=True, eq=False)
-class Crossing(Value):
+class Crossing(Checked):
     """A point at which the multiplier of a contact vanishes; see :func:`crossing`.
 
     Attributes
@@ -34,6 +35,7 @@ class Crossing(Value):
     multipliers: dict[str, float]
 
 
+@checked
 def crossing(
     certificate: Certificate, contact: str, parameter: str | Mapping[str, float]
 ) -> Crossing | None:

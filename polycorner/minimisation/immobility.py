@@ -29,12 +29,13 @@ from numpy.typing import ArrayLike
 
 from polycorner.checks import instance, refuse
 from polycorner.errors import SolverError
+from polycorner.kinds import checked
 from polycorner.minimisation.convex import ONE_AT_A_TIME, solve
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, stratum_at
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 NEARBY = 1e-5  # displacement, in scale units, across which second derivatives may jump
 LINE = (1e-3, 1e-2, 1e-1)  # where points of a line are compared, in scale units
@@ -52,7 +53,7 @@ class Mobility(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Immobility(Value):
+class Immobility(Checked):
     """What holds a point, or how it moves.
 
     Attributes
@@ -74,6 +75,7 @@ class Immobility(Value):
         return f"Immobility({self.mobility.value})"
 
 
+@checked
 def immobility(
     polyhedron: Polyhedron,
     q: ArrayLike | Mapping[str, float],

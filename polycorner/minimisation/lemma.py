@@ -10,10 +10,11 @@ from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.sparse_analysis import SparseAnalysis, SparseLocal
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
 from polycorner.spaces.manifold import Array
+from polycorner.values import Checked
 
 
 @dataclass(frozen=True)
-class Residuals:
+class Residuals(Checked):
     """Deviations from the first-order conditions at a point; all dimensionless.
 
     Attributes
@@ -38,7 +39,7 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class Condition:
+class Condition(Checked):
     """One hypothesis of the minimisation lemma ([GMBN] app. C), checked.
 
     Attributes

@@ -100,7 +100,7 @@ def minimise(
     ([-0.5, 0.25], ('bowl',), 'STRICT_MINIMUM')
     """
     checks.choice("method", method, _DESCENTS)
-    checks.whole("max_iterations", max_iterations, least=1)
+    checks.whole("max_iterations", max_iterations, least=1, most=checks.MOST)
     check_tolerance("tolerance", tolerance)
     check_tolerance("rank_tolerance", rank_tolerance)
     problem = pose(polyhedron, energy)

@@ -9,11 +9,11 @@ from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.printing import Printed, Sheet, listed, names, number, titled
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Minima(Value, Printed, Sequence[Certificate]):
+class Minima(Checked, Printed, Sequence[Certificate]):
     """The minima that a search found, as a sequence of certificates, the lowest first.
 
     Attributes

@@ -208,7 +208,8 @@ def check_rates(certificate: Certificate, parameters: Iterable[str] | Rates | No
     if parameters is None:
         known = problem.parameter_values.items()
         parameters = [name for name, values in known if len(values) == 1]
-    if isinstance(parameters, str):
+    texts = not isinstance(parameters, str) and all(isinstance(name, str) for name in parameters)
+    if not texts:
         checks.refuse("parameters", "a list of names or a mapping", parameters, TypeError)
     if not isinstance(parameters, Mapping):
         parameters = {name: {name: 1.0} for name in parameters}

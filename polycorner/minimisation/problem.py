@@ -16,7 +16,7 @@ from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -34,7 +34,7 @@ MANY = 100  # coordinates from which on an energy is kept as the sum of the term
 
 
 @dataclass(frozen=True, eq=False)
-class Problem(Value):
+class Problem(Checked):
     """Minimise ``energy`` over ``polyhedron``.
 
     Rows of the system are the inequalities, the equations, and last the energy; derivatives here

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from polycorner import checks
+from polycorner.checks import reals
 from polycorner.minimisation.problem import Problem
-from polycorner.spaces.arguments import reals
 from polycorner.spaces.manifold import Array
 
 # Bounds for each coordinate; None for a whole circle or sphere.
@@ -23,12 +23,12 @@ def start_points(
     """Return the start points ``(k, n)``, given or sampled, after checking them."""
     manifold = problem.polyhedron.manifold
     if isinstance(starts, Real):
-        count = checks.whole("starts", starts, least=1)
+        count = checks.whole("starts", starts, least=1, most=checks.MOST)
         return _sampled(problem, count, *_bounds(problem, box), checks.generator("rng", rng))
     if box is not None:
         msg = f"box: expected None with starts given as points; got {box!r}"
         raise ValueError(msg)
-    points = manifold.points(np.atleast_2d(reals(starts, "starts")), "starts")
+    points = manifold.points(np.atleast_2d(reals("starts", starts)), "starts")
     points = manifold.placed(points, "starts")
     if points.ndim != 2 or not len(points):
         msg = f"starts: expected points of shape (k, {problem.dimension}); got {points.shape}"

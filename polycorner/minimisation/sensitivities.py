@@ -21,6 +21,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.parametric import (
     Lifted,
@@ -34,7 +35,7 @@ from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.strata import local_pieces
 from polycorner.printing import Printed, Sheet, Table, number, titled, units
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import sympy
@@ -45,7 +46,7 @@ DRIFT = 1e-8  # relative slope along a free direction up to which it counts as z
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity(Value, Printed):
+class Sensitivity(Checked, Printed):
     """Derivatives of a stationary point by ``p`` parameters; see :func:`sensitivity`.
 
     Attributes
@@ -81,6 +82,7 @@ class Sensitivity(Value, Printed):
         """Names of the parameters."""
         return tuple(self.rates)
 
+    @checked
     def of(self, quantity: "Quantity") -> Array:
         """Return the derivatives ``(p,)`` of a function of the point and the parameters.
 
@@ -108,6 +110,7 @@ class Sensitivity(Value, Printed):
             raise ValueError(msg)
         return np.asarray(slope @ self.point + partial_derivatives(function, point, self.rates))
 
+    @checked
     def function(self, quantity: "Quantity") -> SmoothFunction:
         """Return a quantity, as :meth:`of` takes it, as a function on the manifold."""
         manifold = self.certificate.problem.polyhedron.manifold
@@ -116,12 +119,14 @@ class Sensitivity(Value, Printed):
             symbol = manifold.symbols[manifold.names.index(quantity)]
             return SmoothFunction.quantity(quantity, symbol, manifold)
         if not isinstance(quantity, SmoothFunction):
-            return SmoothFunction.quantity("quantity", quantity, manifold)
+            with checks.about("quantity"):
+                return SmoothFunction.quantity("quantity", quantity, manifold)
         if quantity.manifold != manifold:
             msg = f"quantity: expected a function on {', '.join(manifold.names)}; got {quantity!r}"
             raise ValueError(msg)
         return quantity
 
+    @checked
     def predict(self, changes: Mapping[str, float]) -> Array:
         """Return the point ``(n,)`` to first order in given changes of the parameters."""
         checks.names("changes", changes, self.rates)
@@ -149,6 +154,7 @@ class Sensitivity(Value, Printed):
         return Sheet("Sensitivity", (table, units(manifold.periods)))
 
 
+@checked
 def sensitivity(
     certificate: Certificate, parameters: Iterable[str] | Rates | None = None
 ) -> Sensitivity:

@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.checks import reals
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -47,7 +49,7 @@ CUPS = ((4.3, 3.1, 0.5, 0.65), (6.0, 4.7, 0.6, 0.75))
 
 
 @dataclass(frozen=True)
-class Pinball(Value):
+class Pinball(Checked):
     """A point ball on a tilted board between walls, among pins, wedges and cups.
 
     Coordinates are ``x`` across the board and ``y`` up the board, from its lower left corner.
@@ -137,6 +139,7 @@ class Pinball(Value):
         """Return every corner of the region, locally convex or concave, ``(k, 2)``."""
         return meeting_corners(self.polyhedron, self.walls)
 
+    @checked
     def starts(self, rng: np.random.Generator | int | None, count: int) -> Array:
         """Return ``count`` points of the region, uniformly distributed, ``(count, 2)``."""
         return uniform_points(self.polyhedron, (0, 0), (self.width, self.height), rng, count)
@@ -197,7 +200,7 @@ def _height_formula() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
 
 def _rows(argument: str, values: Any, shape: tuple[int, ...], meaning: str) -> Any:
     """Return an array of rows as nested tuples, so that the board is hashable."""
-    array = finite(reals(values, argument), argument)
+    array = finite(reals(argument, values), argument)
     if array.shape[:1] == (0,):
         return ()
     if array.shape[1:] != shape:

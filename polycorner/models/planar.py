@@ -125,6 +125,7 @@ class Wall(Value):
 
         Of the two arcs of a circle it is the one that does not pass opposite ``m``.
         """
+        checks.whole("count", count, least=0)
         return self.at(np.linspace(self.position(start), self.position(end), count))
 
 

@@ -19,11 +19,12 @@ from polycorner import checks
 from polycorner.formulas import cache
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Relabelling, Symmetry
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -45,7 +46,7 @@ def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
 
 
 @dataclass(frozen=True)
-class SphereCluster(Value):
+class SphereCluster(Checked):
     """``n`` hard spheres of unit diameter in space.
 
     Coordinates are ``x1 y1 z1 ... xn yn zn``, in diameters.  The contact of spheres ``i < j`` is
@@ -106,6 +107,7 @@ class SphereCluster(Value):
         first, second = (list(side) for side in zip(*self.pairs, strict=True))
         return np.asarray(np.linalg.norm(centres[..., first, :] - centres[..., second, :], axis=-1))
 
+    @checked
     def contacts(self, q: ArrayLike, *, tolerance: float = 1e-6) -> NDArray[np.bool_]:
         """Return the adjacency matrix ``(n, n)`` of touching spheres, as booleans."""
         touching = np.zeros((self.count, self.count), dtype=np.bool_)

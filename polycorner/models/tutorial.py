@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polycorner.kinds import checked
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 SIDES = (
     Wall("AB", (0.2, -1.6), (1, 12), 0.4),
@@ -26,7 +27,7 @@ SIDES = (
 
 
 @dataclass(frozen=True)
-class Tutorial(Value):
+class Tutorial(Checked):
     """A region in the plane with corners A to G, locally a quadrant at each ([GMBN] app. B).
 
     Counterclockwise from A its sides ``AB``, ``BC``, ..., ``GA`` are two segments, two arcs that
@@ -89,6 +90,7 @@ class Tutorial(Value):
             found[letter] = point
         return dict(sorted(found.items()))
 
+    @checked
     def sides(self, count: int = 65) -> dict[str, Array]:
         """Return the seven sides as polylines ``(count, 2)``, each from its first corner."""
         corners = self.corners()
@@ -97,6 +99,7 @@ class Tutorial(Value):
             for wall in self.walls
         }
 
+    @checked
     def starts(self, rng: np.random.Generator | int | None, count: int) -> Array:
         """Return ``count`` points of the region, uniformly distributed, ``(count, 2)``."""
         outline = np.vstack([*self.sides().values()])

@@ -14,7 +14,7 @@ from polycorner.motion.formulation import moment
 from polycorner.motion.mechanics import OVERLAP, State
 from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 MOST_MODES = 4096  # that are examined
 ALIKE = 1e-6  # difference of accelerations, relative to the largest, up to which they are the same
@@ -32,7 +32,7 @@ class Consistency(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Accelerations(Value):
+class Accelerations(Checked):
     """The accelerations that the contacts of a state allow.
 
     Attributes

@@ -20,10 +20,11 @@ from polycorner import forms
 from polycorner.atomic import PART
 from polycorner.checks import instance, real, refuse
 from polycorner.container import BINARY, Kind
+from polycorner.kinds import check_fields
 from polycorner.motion.events import joined
 from polycorner.motion.recorder import Recorder
 from polycorner.motion.tables import event_arrays, touch_table
-from polycorner.values import Value
+from polycorner.values import Checked
 
 KIND = Kind("checkpoint", "a simulation", BINARY)
 STATE = "state.npz"
@@ -33,7 +34,7 @@ SHOWN = 40  # characters of a value in an error
 
 
 @dataclass(frozen=True)
-class Checkpoint(Value):
+class Checkpoint(Checked):
     """Where and how often a simulation saves its progress, and whether it continues from there.
 
     ==================================  =======================  ==========================
@@ -68,6 +69,7 @@ class Checkpoint(Value):
     resume: bool = True
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "folder", Path(self.folder))
         object.__setattr__(self, "seconds", real("seconds", self.seconds, least=0))
         super().__post_init__()

@@ -14,7 +14,7 @@ from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import TIME, dotted
 from polycorner.motion.friction import Interval
 from polycorner.spaces.manifold import Manifold
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import sympy
@@ -65,7 +65,7 @@ def _component(given: Any) -> "sympy.Expr | SmoothFunction":
     return given if isinstance(given, SmoothFunction) else as_expression("slip", given)
 
 
-class FrictionLaw(Value):
+class FrictionLaw(Checked):
     """Base of laws with a set of forces that hold and one of forces that resist slip."""
 
     static: ConvexSet
@@ -167,7 +167,8 @@ def check_sets(name: str, static: ConvexSet, dynamic: ConvexSet | None) -> None:
 
 
 def _several(values: Any) -> tuple[Any, ...]:
-    return tuple(values) if isinstance(values, Sequence) else (values,)
+    several = isinstance(values, Sequence) and not isinstance(values, str)
+    return tuple(values) if several else (values,)
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,7 @@ class PairFriction(FrictionLaw):
 
 
 @dataclass(frozen=True)
-class ContactFamily(Value):
+class ContactFamily(Checked):
     """The contacts between any two of several identical bodies.
 
     Expressions are written for a pair, in the coordinates of both: of the coordinate ``x`` they
@@ -252,13 +253,12 @@ class ContactFamily(Value):
     definitions: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "position", _several(self.position))
         object.__setattr__(self, "definitions", as_expressions("definitions", self.definitions))
         object.__setattr__(self, "gaps", as_expressions("gaps", self.gaps))
         if not self.gaps:
             refuse("gaps", "at least one gap of a pair", self.gaps)
         object.__setattr__(self, "reach", real("reach", self.reach, above=0))
-        position = (self.position,) if isinstance(self.position, str) else tuple(self.position)
-        object.__setattr__(self, "position", position)
         object.__setattr__(self, "friction", _several(self.friction))
         object.__setattr__(
             self, "restitution", real("restitution", self.restitution, least=0, most=1)

@@ -7,7 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.spaces.arguments import finite, reals, scalar
+from polycorner.checks import reals
+from polycorner.kinds import checked
+from polycorner.spaces.arguments import finite, scalar
 from polycorner.spaces.manifold import Array
 
 INTERVAL, DISC, ELLIPSE, CUT_DISC, POLYGON = range(5)
@@ -99,6 +101,7 @@ class ConvexSet(ABC):
         An interval, a disc, an ellipse or a cut disc contains ``C`` exactly if it contains them.
         """
 
+    @checked
     def covers(self, inner: "ConvexSet") -> bool:
         """Whether another set of the same dimension is a subset of ``C``, up to rounding."""
         return bool((self._gauge(inner.tips) <= 1 + ROUNDING).all())
@@ -113,7 +116,7 @@ class ConvexSet(ABC):
     def _gauge(self, p: Array) -> Array: ...
 
     def _vectors(self, values: ArrayLike, argument: str) -> Array:
-        array = reals(values, argument)
+        array = reals(argument, values)
         if array.ndim == 0 or array.shape[-1] != self.dimension:
             msg = f"{argument}: expected shape (..., {self.dimension}); got shape {array.shape}"
             raise ValueError(msg)
@@ -122,7 +125,7 @@ class ConvexSet(ABC):
 
 def coefficient(argument: str, value: Any, sign: int = 1) -> float:
     """Return the magnitude of a finite number that has the given sign or is zero."""
-    number = reals(value, argument)
+    number = reals(argument, value)
     if number.ndim or not np.isfinite(number) or sign * number < 0:
         side = "at least" if sign > 0 else "at most"
         msg = f"{argument}: expected a finite number, {side} 0; got {value!r}"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.spaces.manifold import Array
+from polycorner.values import Checked
 
 
 class EventKind(IntEnum):
@@ -40,7 +41,7 @@ _SENTENCES = {
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(Checked):
     """An event: a contact, the rest or the exit of bodies at a time.
 
     Attributes

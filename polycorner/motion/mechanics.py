@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.noise import Solver
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked, Value
 
 PILES = Solver(tolerance=1e-4, sweeps=62)  # default for more than two bodies
 OVERLAP = 1e-4  # scaled depth up to which a start counts as touching: what a step may leave
 
 
 @dataclass(frozen=True, eq=False)
-class State(Value):
+class State(Checked):
     """Placement, velocity, and the friction contacts that stick.
 
     Attributes

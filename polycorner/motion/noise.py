@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from polycorner.checks import instance, mapping, real, whole
-from polycorner.values import Value
+from polycorner.values import Checked
 
 
 @dataclass(frozen=True)
-class Solver(Value):
+class Solver(Checked):
     """How exactly the inclusion of each step is solved.
 
     Parameters
@@ -50,7 +50,7 @@ class Solver(Value):
 
 
 @dataclass(frozen=True)
-class Noise(Value):
+class Noise(Checked):
     """Chattering loads and random impulses.
 
     On a substrate that is not quite smooth loads fluctuate.  *Chatter*: every known load ``N`` is

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import whole
+from polycorner.checks import reals, whole
+from polycorner.kinds import checked
 from polycorner.motion.convex_sets import (
     POLYGON,
     ROUNDING,
@@ -17,7 +18,7 @@ from polycorner.motion.convex_sets import (
     length,
     over,
 )
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 
 
@@ -91,6 +92,7 @@ class ConvexPolygon(ConvexSet):
         normals, distances = self.edges
         return np.asarray(np.maximum(over(_dots(p, normals), distances).max(axis=-1), 0.0))
 
+    @checked
     def covers(self, inner: ConvexSet) -> bool:
         """Whether the support of a set along the edges' normals stays within the edges."""
         normals, distances = self.edges
@@ -169,7 +171,7 @@ def _corners(values: ArrayLike, argument: str) -> Array:
     Sorted by their angle about the mean, the points of a convex polygon are in order; a point
     that lies within rounding on the line through its neighbours is dropped.
     """
-    points = finite(reals(values, argument), argument)
+    points = finite(reals(argument, values), argument)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
         msg = f"{argument}: expected at least three points, shape (k, 2); got shape {points.shape}"
         raise ValueError(msg)

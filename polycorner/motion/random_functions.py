@@ -8,6 +8,7 @@ import numpy as np
 
 from polycorner.checks import real, refuse, whole
 from polycorner.formulas.expressions import as_expression
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ FINEST = 1e-4  # least correlation length of a periodic field, as a part of its 
 TAIL = 9.0  # standard deviations of the wave numbers that are drawn
 
 
+@checked
 def random_signal(
     time: Any, *, rms: float, band: tuple[float, float], modes: int = 16, seed: int = 0
 ) -> "sympy.Expr":
@@ -58,6 +60,7 @@ def random_signal(
     return sum_of_cosines(real("rms", rms, least=0) * math.sqrt(2 / modes), turns)
 
 
+@checked
 def random_field(
     x: Any,
     y: Any,

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from polycorner.checks import choice, instance, refuse
+from polycorner.checks import choice, instance, reals, refuse
+from polycorner.kinds import checked
 from polycorner.motion.contacts import velocities
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ FRAMES = ("body", "space")
 _RECOGNISING = Lock()  # of numbers: SymPy sets the precision of mpmath, which all threads share
 
 
+@checked
 def angular_velocity(
     manifold: Manifold, name: str | None = None, *, frame: Literal["body", "space"] = "body"
 ) -> "sympy.ImmutableMatrix":
@@ -50,6 +52,7 @@ def angular_velocity(
     return sympy.ImmutableMatrix((2 * turned).expand())
 
 
+@checked
 def rotational_energy(
     manifold: Manifold, inertia: Sequence[float], name: str | None = None
 ) -> "sympy.Expr":
@@ -81,7 +84,7 @@ def rotational_energy(
     """
     import sympy
 
-    given = finite(reals(inertia, "inertia"), "inertia")
+    given = finite(reals("inertia", inertia), "inertia")
     matrix = np.diag(given) if given.shape == (3,) else given
     symmetric = matrix.shape == (3, 3) and np.allclose(matrix, matrix.T, rtol=1e-12, atol=0)
     if not symmetric or np.linalg.eigvalsh(matrix)[0] <= 0:

@@ -63,6 +63,7 @@ from polycorner import __version__
 from polycorner.checks import instance, names, real, refuse, whole
 from polycorner.errors import SolverError
 from polycorner.interrupts import first_interrupt
+from polycorner.kinds import checked
 from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.formulation import moment
 from polycorner.motion.mechanics import MechanicalSystem, State
@@ -84,6 +85,7 @@ SHORTEST_STEP = 1e-50  # s, by which gaps are divided
 ROUNDING = 1e-12  # relative, within which a duration is a whole number of steps
 
 
+@checked
 def simulate(
     system: MechanicalSystem,
     state: State,
@@ -150,7 +152,6 @@ def simulate(
 
     noise = Noise() if noise is None else instance("noise", noise, Noise)
     solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
-    instance("state", state, State, "system.state(q, v)")
     begin = real("state.time", state.time, unit="s")
     end = real("t_end", t_end, least=begin, most=LONGEST, unit="s")
     steps, step = _steps(end - state.time, real("dt", dt, above=0, unit="s"))
@@ -277,7 +278,6 @@ def start(
     from polycorner.motion.engine.driver import Engine
 
     solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
-    instance("state", state, State, "system.state(q, v)")
     bodies = system.bodies
     shape = (bodies.count, bodies.dimension)
     if state.q.size != shape[0] * shape[1]:
@@ -314,6 +314,7 @@ def _check_mass(bodies: IdenticalBodies, q: Array, v: Array) -> None:
             raise ValueError(msg)
 
 
+@checked
 def step(system: MechanicalSystem, state: State, dt: float) -> State:
     """Return the state one step later.
 

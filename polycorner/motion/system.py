@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import instance, mapping, names, real, refuse, whole
+from polycorner.checks import instance, mapping, names, real, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, as_expressions, written
+from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
 from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
@@ -124,16 +125,14 @@ class System(MechanicalSystem):
         object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
         object.__setattr__(self, "potential", as_expression("potential", self.potential))
         object.__setattr__(self, "forces", as_expressions("forces", self.forces))
+        check_fields(self)
         object.__setattr__(self, "friction", tuple(self.friction))
         for friction in self.friction:
-            if not isinstance(friction, Friction):
-                refuse("friction", "Friction values", friction, TypeError)
             if isinstance(friction.load, str) and friction.load not in self._normals:
                 known = f"one of the contacts {', '.join(self._normals)} or an expression"
                 refuse("load", f"{known} for friction {friction.name!r}", friction.load)
         whole("count", self.count, least=1)
         if self.between is not None:
-            instance("between", self.between, ContactFamily)
             names("position", self.between.position, self.manifold.names)
             if len(self.between.position) > 2:
                 refuse("position", "one or two coordinates", self.between.position)
@@ -258,7 +257,7 @@ class System(MechanicalSystem):
             Velocities, along all equations; default those of the substrate.
         time : float, optional
         """
-        if self.count == 1 and (isinstance(q, Mapping) or np.ndim(q) < 2):
+        if self.count == 1 and (isinstance(q, Mapping) or reals("q", q).ndim < 2):
             places = self.manifold.point(q).copy()
         else:
             # `points` refuses a mapping, which only one body may have.
@@ -276,6 +275,7 @@ class System(MechanicalSystem):
         check_velocities(self.polyhedron, places, speeds)
         return State(real("time", time, unit="s"), places, speeds, self.sticks(places, speeds))
 
+    @checked
     def check_placement(self, q: Array) -> None:
         """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
         check_contacts(self.polyhedron, q)
@@ -289,6 +289,7 @@ class System(MechanicalSystem):
             )
             raise ValueError(msg)
 
+    @checked
     def sticks(self, q: Array, v: Array) -> NDArray[np.bool_]:
         """Return for each friction contact whether its slip is zero, ``(..., F)``."""
         if not self.friction:
@@ -299,6 +300,7 @@ class System(MechanicalSystem):
         still = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
         return np.asarray(still.reshape(*q.shape[:-1], len(self.friction)))
 
+    @checked
     def energies(self, state: State) -> tuple[float, float]:
         """Return kinetic and potential energy of all bodies."""
         n = self.manifold.size
@@ -309,6 +311,7 @@ class System(MechanicalSystem):
         kinetic, potential = np.sum(each, axis=0)
         return float(kinetic), float(potential)
 
+    @checked
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
         n, scales = self.manifold.size, self.manifold.scale_array

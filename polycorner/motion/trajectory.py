@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.kinds import checked
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.mechanics import MechanicalSystem
@@ -16,7 +17,7 @@ from polycorner.motion.placements import onto_equations
 from polycorner.motion.system import System
 from polycorner.printing import Printed, Sheet, Table, facts, listed, number, titled
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     from polycorner.polyhedra.strata import Stratum
@@ -26,7 +27,7 @@ Touch = tuple[tuple[int, ...], str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Value, Printed):
+class Trajectory(Checked, Printed):
     """A motion, recorded at ``T`` instants and at every event between them.
 
     Attributes
@@ -169,10 +170,12 @@ class Trajectory(Value, Printed):
         worst = float(np.abs(self.energy_audit).max())
         return worst / scale if scale > 0 else worst
 
+    @checked
     def of_kind(self, kind: EventKind) -> list[Event]:
         """Return the events of one kind, in time."""
         return [event for event in self.events if event.kind == kind]
 
+    @checked
     def stratum(self, index: int, *, tolerance: float = 1e-6) -> "Stratum":
         """Return the face of the polyhedron at a recorded instant, moved onto the equations.
 
@@ -186,6 +189,7 @@ class Trajectory(Value, Printed):
         place = onto_equations(self.system.polyhedron, self.q[index, 0])
         return stratum_at(self.system.polyhedron, place, tolerance=tolerance)
 
+    @checked
     def at(self, time: float) -> int:
         """Return the index of the last recorded instant that is not after ``time``."""
         if not self.times[0] <= time <= self.times[-1]:

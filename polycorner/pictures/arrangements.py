@@ -17,6 +17,7 @@ from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.shapes import Body, Part
 from polycorner.bodies.walls import Cylinder, HalfSpace
 from polycorner.checks import instance, refuse
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
@@ -31,6 +32,7 @@ BALL = 300  # points of a ball
 LIGHT = LightSource(azdeg=315, altdeg=50)
 
 
+@checked
 def draw_arrangement(
     arrangement: Arrangement,
     points: ArrayLike,

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.pictures.style import SHADES
 from polycorner.polyhedra.nerves import Nerve
 
@@ -13,6 +14,7 @@ WIDTH, HEAD, ROW = 7.0, 1.2, 0.09  # inches
 MARGIN = 0.15  # of the span of the heights, beyond which bars go on that do not end
 
 
+@checked
 def draw_barcode(nerve: Nerve, label: str = "height") -> Figure:
     """Draw a bar for every class of homology, from its death to its birth.
 

@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path
 from numpy.typing import ArrayLike
 
-from polycorner.checks import instance, refuse, whole
+from polycorner.checks import instance, reals, refuse, whole
+from polycorner.kinds import checked
 from polycorner.models.spheres import SphereCluster
 from polycorner.polyhedra.strata import RANK_TOLERANCE
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 
 BALL, SINGULAR_BALL = "#56B4E9", "#E69F00"  # Okabe and Ito
@@ -35,6 +36,7 @@ Pair = tuple[int, int]
 Layer = tuple[float, Path, Array]
 
 
+@checked
 def draw_clusters(
     model: SphereCluster,
     points: ArrayLike,
@@ -82,6 +84,7 @@ def draw_clusters(
     return figure
 
 
+@checked
 def draw_motion(model: SphereCluster, polyline: ArrayLike, frames: int = 6) -> Figure:
     """Draw frames of a one-dimensional motion, from one end to the other by arc length.
 
@@ -277,7 +280,7 @@ def _faded(colour: str, depth: float) -> Array:
 
 def _clusters(model: Any, argument: str, given: ArrayLike) -> Array:
     instance("model", model, SphereCluster)
-    points = np.atleast_2d(finite(reals(given, argument), argument))
+    points = np.atleast_2d(finite(reals(argument, given), argument))
     if points.ndim != 2 or points.shape[1] != 3 * model.count or not len(points):
         refuse(argument, f"points of shape (k, {3 * model.count}) with k >= 1", points.shape)
     return points

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 from polycorner.models.disks.configurations import CriticalConfiguration
 from polycorner.models.disks.disks import TorusDisks
 from polycorner.spaces.manifold import Array
@@ -23,6 +24,7 @@ THINNEST, THICKEST = 0.8, 4.0
 REACH = 0.74  # half the side of a picture, in lattice vectors
 
 
+@checked
 def draw_critical(
     model: TorusDisks, configurations: Sequence[CriticalConfiguration], *, columns: int = 4
 ) -> Figure:

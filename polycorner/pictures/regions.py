@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
-from polycorner.checks import instance, refuse, whole
+from polycorner.checks import instance, reals, refuse, whole
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, stratum_at
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 
 Labelled = Sequence[tuple[str, ArrayLike]]
@@ -192,7 +192,7 @@ def _check_planar(polyhedron: Polyhedron) -> None:
 
 
 def _bounds(bounds: Any) -> tuple[float, float, float, float]:
-    array = finite(reals(bounds, "bounds"), "bounds")
+    array = finite(reals("bounds", bounds), "bounds")
     if array.shape != (4,) or not (array[0] < array[1] and array[2] < array[3]):
         refuse("bounds", "left < right and bottom < top", bounds)
     left, right, bottom, top = array.tolist()
@@ -223,4 +223,4 @@ def _polylines(edges: Edges) -> list[tuple[str, Array]]:
 def _pair(argument: str, entry: Any) -> tuple[str, Array]:
     if not isinstance(entry, tuple) or len(entry) != 2 or not isinstance(entry[0], str):
         refuse(argument, "pairs of a label and numbers", entry, TypeError)
-    return entry[0], finite(reals(entry[1], argument), argument)
+    return entry[0], finite(reals(argument, entry[1]), argument)

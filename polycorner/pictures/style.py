@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from polycorner.atomic import atomic
+from polycorner.kinds import checked
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito).
 BODIES = ("#0072B2", "#D55E00")
@@ -28,6 +29,7 @@ def bridged(shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return near
 
 
+@checked
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG and return its path."""
     FigureCanvasAgg(figure)

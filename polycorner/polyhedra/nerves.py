@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.polyhedra.affine import Programmes
 from polycorner.polyhedra.persistence import Bar, bars
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -34,7 +35,7 @@ Cell = tuple[frozenset[int], ...]  # of every union, which of its pieces
 
 
 @dataclass(frozen=True, eq=False)
-class Nerve(Value):
+class Nerve(Checked):
     """The cells of a union of flat pieces, and its homology above every height.
 
     Attributes
@@ -61,6 +62,7 @@ class Nerve(Value):
         ends = {h for bar in self.bars for h in (bar.birth, bar.death)}
         return tuple(sorted((h for h in ends if np.isfinite(h)), reverse=True))
 
+    @checked
     def betti(self, height: float = float("-inf")) -> tuple[int, ...]:
         """Return the Betti numbers modulo 2 of the part above a height, that of components first.
 
@@ -71,12 +73,14 @@ class Nerve(Value):
             alive = Counter(bar.dimension for bar in self.bars if bar.death == height)
         return tuple(alive[d] for d in range(max(alive, default=-1) + 1))
 
+    @checked
     def euler_characteristic(self, height: float = float("-inf")) -> int:
         """Return the number of cells above a height, those of odd dimension counted negative."""
         signs = 1 - 2 * (self.dimensions % 2)
         return int(signs[self.heights >= height].sum())
 
 
+@checked
 def nerve(
     polyhedron: Polyhedron,
     height: "SmoothFunction | sympy.Expr | None" = None,

@@ -7,11 +7,11 @@ are whole numbers whose bits are faces; adding two columns modulo 2 is their exc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from polycorner.values import Value
+from polycorner.values import Checked
 
 
 @dataclass(frozen=True)
-class Bar(Value):
+class Bar(Checked):
     """A class of homology: its dimension, and the heights from which to which it lives.
 
     Attributes

@@ -73,7 +73,8 @@ class Polyhedron(Printed, Value):
     ) -> None:
         checks.instance("manifold", manifold, Manifold)
         self.manifold = manifold
-        self.annotations = dict(annotations or {})
+        annotations = {} if annotations is None else annotations
+        self.annotations = dict(checks.mapping("annotations", annotations))
         tree, functions = collect(manifold, "parts", parts, "f")
         flat, sections = collect(manifold, "equations", equations, "h")
         if any(isinstance(node, AnyOf) for node in _groups(flat)):
@@ -143,6 +144,7 @@ class Polyhedron(Printed, Value):
 
     def evaluate(self, q: ArrayLike, order: int = 1) -> tuple[Array, ...]:
         """Return values, gradients and Hessians of every ``f_i`` up to ``order`` in one call."""
+        checks.whole("order", order, least=0, most=2)
         return self._bundle.evaluate(self.manifold.points(q), order)
 
     def equation_values(self, q: ArrayLike) -> Array:
@@ -163,6 +165,7 @@ class Polyhedron(Printed, Value):
     def contains(self, q: ArrayLike, *, tolerance: float = 0.0) -> Any:
         """Whether ``q`` lies in ``D``, functions allowed to miss by ``tolerance``."""
         points = self.manifold.placed(self.manifold.points(q))
+        checks.real("tolerance", tolerance, infinite=True)
         inside = self.implicit_of(self.values(points)) >= -tolerance
         off = abs(self.equation_values(points)[..., : len(self.stated)])
         return scalar(inside & (off <= tolerance).all(axis=-1))

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.polyhedra.cones import inward_direction, rank
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.printing import Printed, Sheet, facts, names
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 TOLERANCE = 1e-8
 RANK_TOLERANCE = 1e-6
@@ -31,7 +32,7 @@ class LocalType(Enum):
 
 
 @dataclass(frozen=True)
-class Stratum(Printed, Value):
+class Stratum(Printed, Checked):
     """The face of a polyhedron that a point lies on.
 
     Attributes
@@ -82,6 +83,7 @@ class Stratum(Printed, Value):
         return Sheet("Stratum", (facts(rows),))
 
 
+@checked
 def stratum_at(
     polyhedron: Polyhedron,
     q: ArrayLike | Mapping[str, float],

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     from polycorner.formulas.functions import SmoothFunction
@@ -23,7 +24,7 @@ Relabelling = Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class Element(Value):
+class Element(Checked):
     """An element of a finite symmetry group: a map of points, and how it renames functions.
 
     Attributes
@@ -40,7 +41,7 @@ class Element(Value):
 
 
 @dataclass(frozen=True)
-class Symmetry(Value):
+class Symmetry(Checked):
     """A group of symmetries of a polyhedron, continuous, finite or both.
 
     It can be pickled where its functions can: module-level functions and methods of values.
@@ -90,6 +91,7 @@ class Symmetry(Value):
         """The finite group with the identity first."""
         return [Element(_same, {}), *self.elements]
 
+    @checked
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
         if self.tangents is not None:
@@ -99,16 +101,19 @@ class Symmetry(Value):
         vectors = [[f.value(q) for f in field] for field in self._compiled[manifold]]
         return np.array(vectors).reshape(-1, manifold.size) / manifold.scale_array
 
+    @checked
     def displacement(self, manifold: Manifold, p: Array, q: Array) -> Array:
         """Return the displacement from one continuous orbit to another, by the invariants."""
         if self.invariants is None:
             return manifold.chord(p, q) / manifold.scale_array
         return self.invariants(p) - self.invariants(q)
 
+    @checked
     def separation(self, manifold: Manifold, p: Array, q: Array) -> float:
         """Return how far the continuous orbits of two points are apart, in scale units."""
         return float(abs(self.displacement(manifold, p, q)).max())
 
+    @checked
     def separations(self, manifold: Manifold, p: Array, points: Array) -> Array:
         """Return how far the orbit of ``p`` is apart from those of points ``(k, n)``, ``(k,)``."""
         if self.invariants is None:
@@ -117,6 +122,7 @@ class Symmetry(Value):
             apart = np.array([self.invariants(q) for q in points]) - self.invariants(p)
         return np.asarray(abs(apart).max(axis=1))
 
+    @checked
     def possible(self, manifold: Manifold, p: Array, points: Array, tolerance: float) -> list[int]:
         """Return the positions of points ``(k, n)`` that ``p`` may be carried to.
 
@@ -130,6 +136,7 @@ class Symmetry(Value):
         found: list[int] = np.flatnonzero((away.max(axis=-1) <= tolerance).any(axis=0)).tolist()
         return found
 
+    @checked
     def relabellings(
         self, manifold: Manifold, p: Array, q: Array, tolerance: float
     ) -> list[Relabelling]:

@@ -24,6 +24,7 @@ from polycorner.proofs.hypotheses import check_hypotheses, without_enclosure
 from polycorner.proofs.kkt import newton
 from polycorner.proofs.krawczyk import Cell, Enclosure, enclose
 from polycorner.proofs.statements import Claim, ConditionResult, Status
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
@@ -37,7 +38,7 @@ Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class ParameterCell:
+class ParameterCell(Checked):
     """A cell of a box of parameters, and the status of the claim on it.
 
     Attributes

@@ -11,12 +11,13 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.balls import between, bounds, decimals, precision
 from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import Box
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate
 from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.proofs.attempt import bits_for
 from polycorner.proofs.parameter_boxes import Interval, ParameterCell, shown_box
 from polycorner.proofs.statements import Status
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import sympy
@@ -27,7 +28,7 @@ Bounds = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True, eq=False)
-class Proof(Value, Printed):
+class Proof(Checked, Printed):
     """Result of the verification of a certificate in interval arithmetic.
 
     Attributes
@@ -106,6 +107,7 @@ class Proof(Value, Printed):
         """The undecided cells."""
         return tuple(cell for cell in self.cells if cell.status is Status.UNDECIDED)
 
+    @checked
     def enclose(self, expression: "SmoothFunction | sympy.Expr") -> tuple[str, str]:
         """Return decimal bounds of a function of the coordinates at the enclosed point.
 

@@ -8,14 +8,14 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled, units
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.walks import End
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import networkx as nx
 
 
 @dataclass(frozen=True, eq=False)
-class Skeleton(Printed, Value):
+class Skeleton(Printed, Checked):
     """Corners, edges and faces of a polyhedron modulo its symmetry; see :func:`skeleton`.
 
     Attributes

@@ -10,7 +10,7 @@ from polycorner.skeletons.indices import face_euler_characteristic
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 
 class Completeness(Enum):
@@ -28,7 +28,7 @@ closed edges and faces that no walk met are not excluded"
 
 
 @dataclass(frozen=True, eq=False)
-class Corner(Value):
+class Corner(Checked):
     """A corner: a point that its active functions isolate, modulo the symmetry.
 
     Attributes
@@ -70,7 +70,7 @@ class Corner(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Edge(Value):
+class Edge(Checked):
     """An edge: a curve on which the active functions vanish, modulo the symmetry.
 
     Attributes
@@ -116,7 +116,7 @@ class Edge(Value):
 
 
 @dataclass(frozen=True)
-class Face(Value):
+class Face(Checked):
     """A two-dimensional face, modulo the symmetry.
 
     Attributes
@@ -154,7 +154,7 @@ class Face(Value):
 
 
 @dataclass(frozen=True)
-class Contact:
+class Contact(Checked):
     """Where a function of a polyhedron vanishes on it, as far as was found.
 
     Attributes

@@ -3,6 +3,7 @@
 import numpy as np
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.parts import Edge
 from polycorner.skeletons.points import projected
@@ -10,6 +11,7 @@ from polycorner.skeletons.states import SearchState
 from polycorner.spaces.manifold import Array
 
 
+@checked
 def traced(skeleton: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
     """Return points of an edge ``(k, n)``: its polyline with every chord cut into pieces.
 

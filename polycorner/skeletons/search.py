@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.checks import reals
+from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
@@ -18,7 +20,6 @@ from polycorner.skeletons.insides import add_inner_corners
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
-from polycorner.spaces.arguments import reals
 from polycorner.workers import Workers, opened
 
 UNFINISHED = (Completeness.BUDGET, Completeness.INTERRUPTED)
@@ -103,7 +104,7 @@ def skeleton(
         checks.instance("symmetry", symmetry, Symmetry)
     check_tolerance("tolerance", tolerance)
     checks.real("extent", extent, above=0, infinite=True, unit="scale units")
-    points = polyhedron.manifold.points(np.atleast_2d(reals(starts, "starts")), "starts")
+    points = polyhedron.manifold.points(np.atleast_2d(reals("starts", starts)), "starts")
     if points.ndim != 2:
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)
@@ -113,6 +114,7 @@ def skeleton(
     return _run(explorer, budget, executor, progress)
 
 
+@checked
 def resume(
     skeleton: Skeleton,
     *,
@@ -139,6 +141,7 @@ def resume(
     return _run(Explorer.resumed(state), budget, executor, progress)
 
 
+@checked
 def examine_faces(
     skeleton: Skeleton,
     *,

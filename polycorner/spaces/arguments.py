@@ -7,28 +7,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from polycorner.checks import refuse
+from polycorner.checks import reals, refuse
 from polycorner.spaces.embedding import Array
 
 FEW = 24
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
-
-
-def reals(values: ArrayLike, argument: str) -> Array:
-    """Turn ``values`` into an array of float64, refusing anything that is not real numbers."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        return values
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        msg = f"{argument}: expected a rectangular array of real numbers; got ragged nesting"
-        raise ValueError(msg) from error
-    if array.dtype.kind not in "iuf":
-        msg = f"{argument}: expected real numbers; got dtype {array.dtype}"
-        raise TypeError(msg)
-    return array.astype(np.float64)
 
 
 def scalar(values: Any) -> Any:
@@ -73,8 +57,10 @@ def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
 
 def groups_of(argument: str, given: Any) -> tuple[tuple[str, ...], ...]:
     """Return groups of names of coordinates as tuples."""
-    groups = tuple(map(tuple, given)) if isinstance(given, list | tuple) else ()
-    if len(groups) != len(given) or any(isinstance(some, str) for some in given):
+    kinds = (list, tuple)
+    fits = isinstance(given, kinds) and all(isinstance(some, kinds) for some in given)
+    groups: tuple[tuple[Any, ...], ...] = tuple(map(tuple, given)) if fits else ()
+    if not fits or not all(isinstance(name, str) for some in groups for name in some):
         refuse(argument, "tuples of names of coordinates", given)
     return groups
 
@@ -84,7 +70,7 @@ def units_of(units: Any, periods: Sequence[float]) -> tuple[str, ...]:
     given = tuple("rad" if period == math.tau else "" for period in periods)
     if isinstance(units, tuple) and not units:
         return given
-    words = () if isinstance(units, str) else tuple(units)
+    words = tuple(units) if isinstance(units, Sequence) and not isinstance(units, str) else ()
     if len(words) != len(given) or not all(isinstance(unit, str) for unit in words):
         refuse("units", f"{len(given)} strings, one for each coordinate", units)
     return words
@@ -97,7 +83,7 @@ def given(values: Any, default: float, n: int) -> Any:
 
 def positive(argument: str, values: Any, n: int, *, finite: bool) -> tuple[float, ...]:
     """Return ``n`` positive numbers; infinities may be among them unless ``finite``."""
-    array = reals(values, argument)
+    array = reals(argument, values)
     if array.shape != (n,):
         msg = f"{argument}: expected {n} numbers, one for each coordinate; got {values!r}"
         raise ValueError(msg)

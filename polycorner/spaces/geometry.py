@@ -8,7 +8,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.spaces.arguments import finite, reals
+from polycorner.checks import reals, refuse
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.embedding import Array
 from polycorner.spaces.factors import NEAR, Factors, factors
 from polycorner.values import Value, cached_property, read_only
@@ -89,7 +90,10 @@ class Geometry(Value):
 
         Images are points a period away on circles, and the negative quaternion of a rotation.
         """
-        p, q = finite(reals(p, "p"), "p"), finite(reals(q, "q"), "q")
+        p, q = finite(reals("p", p), "p"), finite(reals("q", q), "q")
+        for argument, array in (("p", p), ("q", q)):
+            if array.shape[-1:] != (len(self.names),):
+                refuse(argument, f"shape (..., {len(self.names)})", array.shape)
         return self._principal(self.image(p, q) - q)
 
     def image(self, p: Array, q: Array) -> Array:

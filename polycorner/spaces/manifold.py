@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import instance, real, reals
+from polycorner.kinds import checked
 from polycorner.spaces.arguments import (
     finite,
     given,
     groups_of,
     names_of,
     positive,
-    reals,
     scalar,
     units_of,
 )
@@ -111,7 +112,8 @@ class Manifold(Geometry):
         """
         parsed = names_of(names)
         n = len(parsed)
-        return cls(parsed, (math.inf,) * n, (scale,) * n, (unit,) * n)
+        real("scale", scale, above=0)
+        return cls(parsed, (math.inf,) * n, (scale,) * n, (instance("unit", unit, str),) * n)
 
     @classmethod
     def sphere(cls, names: str | Sequence[str], *, scale: float = 1.0) -> "Manifold":
@@ -125,6 +127,7 @@ class Manifold(Geometry):
         parsed = names_of(names)
         parsed = tuple(parsed[0] + axis for axis in "xyz") if len(parsed) == 1 else parsed
         n = len(parsed)
+        real("scale", scale, above=0)
         return cls(parsed, (math.inf,) * n, (scale,) * n, spheres=(parsed,))
 
     @classmethod
@@ -141,6 +144,7 @@ class Manifold(Geometry):
         parsed = names_of(names)
         parsed = tuple(parsed[0] + axis for axis in "wxyz") if len(parsed) == 1 else parsed
         n = len(parsed)
+        real("scale", scale, above=0)
         return cls(parsed, (math.inf,) * n, (scale / 2,) * n, rotations=(parsed,))
 
     @property
@@ -187,7 +191,7 @@ class Manifold(Geometry):
         ValueError
             If the last axis is not ``n`` long, or an entry is NaN or infinite.
         """
-        array = reals(q, argument)
+        array = reals(argument, q)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             msg = (
                 f"{argument}: expected shape (..., {self.size}) for the coordinates "
@@ -279,6 +283,7 @@ class Manifold(Geometry):
         self.factors.frame(q, found)
         return found
 
+    @checked
     def matrix(self, name: str | None = None) -> "sympy.ImmutableMatrix":
         """Return the matrix of a rotation as formulas in its quaternion, from body to space.
 
@@ -293,6 +298,7 @@ class Manifold(Geometry):
         """
         return rotation_matrix(self.symbols[self.factors.named(name, turns=True).at])
 
+    @checked
     def vector(self, name: str | None = None) -> "sympy.ImmutableMatrix":
         """Return the coordinates of a sphere as a column; ``name`` as for :meth:`matrix`."""
         import sympy

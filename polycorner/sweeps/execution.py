@@ -13,6 +13,7 @@ import numpy as np
 from polycorner.checks import names, whole
 from polycorner.errors import WorkersError
 from polycorner.interrupts import first_interrupt
+from polycorner.kinds import checked
 from polycorner.progress import Progress, silent
 from polycorner.sweeps.grid import Grid
 from polycorner.sweeps.points import Job, Outcome
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+@checked
 def sweep(
     function: Callable[..., Mapping[str, Any]],
     grid: "Mapping[str, Any] | Grid",

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.checks import instance, refuse
-from polycorner.values import cached_property
+from polycorner.kinds import checked
+from polycorner.values import Checked, cached_property
 
 Scalar: TypeAlias = bool | int | float | str
 RESERVED = ("status", "message", "seconds", "rng")
@@ -63,7 +64,7 @@ def _scalars(values: Any) -> tuple[Scalar, ...]:
 
 
 @dataclass(frozen=True)
-class Grid:
+class Grid(Checked):
     """The full product of axes; the last axis varies fastest in the numbering of the points.
 
     Parameters
@@ -100,6 +101,7 @@ class Grid:
         """Number of points."""
         return math.prod(self.shape)
 
+    @checked
     def point(self, number: int) -> dict[str, Scalar]:
         """Return the parameters of a point."""
         index = np.unravel_index(number, self.shape)

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from polycorner import forms
 from polycorner.atomic import is_part
 from polycorner.checks import missing_extra
+from polycorner.kinds import checked
 from polycorner.sweeps.checksums import ROOT, check_store, checked_root, write_root
 from polycorner.sweeps.metadata import reading, stored_columns, stored_grid
 from polycorner.sweeps.study import Study, SweepError, difference, versions
@@ -244,6 +245,7 @@ def stored_state(path: Path) -> str:
     return str(checked_root(path)[0]["complete"]) if (path / ROOT).exists() else ""
 
 
+@checked
 def open_results(path: str | Path) -> "xr.Dataset":
     """Return the results in a store, finished or not, after checking every file of it.
 

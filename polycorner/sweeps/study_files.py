@@ -12,8 +12,10 @@ import numpy as np
 
 from polycorner.checks import choice, instance, real, whole
 from polycorner.errors import nearest
+from polycorner.kinds import checked
 from polycorner.sweeps.execution import check_arguments
 from polycorner.sweeps.grid import MOST_POINTS, Axis, Grid
+from polycorner.values import Checked
 
 KEYS = ("study", "seed", "axes", "fixed")
 AXIS = ("values", "start", "stop", "count", "spacing", "unit")
@@ -21,7 +23,7 @@ SPACINGS: Mapping[str, Callable[..., Any]] = {"linear": np.linspace, "logarithmi
 
 
 @dataclass(frozen=True)
-class NamedStudy:
+class NamedStudy(Checked):
     """A study that files refer to by a name.
 
     Attributes
@@ -43,7 +45,7 @@ class NamedStudy:
 
 
 @dataclass(frozen=True)
-class StudyFile:
+class StudyFile(Checked):
     """The contents of a study file.
 
     Attributes
@@ -68,6 +70,7 @@ class StudyFile:
     random: bool
 
 
+@checked
 def read_study(
     path: str | os.PathLike[str], named: Mapping[str, NamedStudy] | None = None
 ) -> StudyFile:

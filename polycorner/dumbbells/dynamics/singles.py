@@ -14,13 +14,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner.checks import reals
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import Keel, exact_eastern_boundary
 from polycorner.motion.events import EventKind
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.simulation import simulate
 from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.arguments import reals
 from polycorner.spaces.manifold import Array
 
 APART = 1e4  # mm along the drum, so that dumbbells of one run never meet
@@ -120,7 +120,7 @@ def onset_azimuths(drum: DumbbellDrum, headings: ArrayLike) -> Array:
     """
     sign = -1.0 if drum.spin < 0 else 1.0
     kappa = drum.length / (2 * drum.centre_radius)
-    theta = sign * reals(headings, "headings")
+    theta = sign * reals("headings", headings)
     return sign * np.asarray(exact_eastern_boundary(theta, keel_of(drum).onset, kappa))
 
 
@@ -149,7 +149,7 @@ def follow(
     if drum.floor or math.isfinite(drum.top):
         msg = "drum: expected one without bottom and top, in which dumbbells are put far apart"
         raise ValueError(msg)
-    theta = np.atleast_1d(reals(headings, "headings"))
+    theta = np.atleast_1d(reals("headings", headings))
     q = np.stack([np.full_like(theta, azimuth), APART * np.arange(len(theta)), theta], axis=-1)
     many = replace(drum, count=len(theta))
     return simulate(many, many.state(q), duration, dt, every=STRIDE, noise=noise, solver=Solver())

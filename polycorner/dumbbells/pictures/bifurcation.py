@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.critical import Branch, branches, critical_rod_radius
 from polycorner.dumbbells.statics.minima import paper_heading
+from polycorner.kinds import checked
 from polycorner.pictures.style import BODIES, SHADES
 from polycorner.spaces.manifold import Array
 
@@ -19,6 +20,7 @@ SAMPLES = 60
 BESIDE = 1e-7  # distance from the critical radius, in ball radii, at which branches are cut
 
 
+@checked
 def draw_bifurcation(pair: DumbbellPair, rods: tuple[float, float] | None = None) -> Figure:
     """Draw heading, ball-rod gap and energy of corner and pass against the rod radius.
 
@@ -135,6 +137,7 @@ def _note(
     )
 
 
+@checked
 def draw_critical(
     ball_radius: float,
     drums: Sequence[float] = (math.inf,),

@@ -15,6 +15,7 @@ from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Sizes, dyads, mean_heading
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.pictures.symbols import HANDS, WORDS, sizes_in_words
+from polycorner.kinds import checked
 from polycorner.motion.trajectory import Trajectory
 from polycorner.pictures.style import BODIES
 from polycorner.spaces.manifold import Array
@@ -31,6 +32,7 @@ TALL = 11.0  # inches at most, of a drum
 PANELS = ("azimuth φ (degrees)", "axial position η (mm)", "heading θ (degrees)")
 
 
+@checked
 def draw_history(run: Trajectory) -> Figure:
     """Draw azimuth, axial position and heading against time, as in [GMBN] fig. 4 and 6.
 
@@ -135,6 +137,7 @@ def _legend(axes: Axes, count: int, hands: NDArray[np.int64] | None) -> None:
     axes.legend(handles=handles, ncols=len(handles), fontsize=9, frameon=False, **place)
 
 
+@checked
 def draw_drum(run: Trajectory, index: int = -1) -> Figure:
     """Draw the drum unrolled with the dumbbells at a recorded instant, dyads coloured."""
     return DrumView(run).show(index)
@@ -214,6 +217,7 @@ class DrumView:
                 "", stop, xytext=start, xycoords="axes fraction", arrowprops=arrow, zorder=4
             )
 
+    @checked
     def show(self, index: int = -1) -> Figure:
         """Show a recorded instant and return the figure."""
         path = self.run

@@ -15,10 +15,12 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import contact_point, rod_outlines
 from polycorner.dumbbells.pictures.symbols import multiplier_unit, sizes_in_words
 from polycorner.dumbbells.statics.minima import DyadMinimum, heading_curve
+from polycorner.kinds import checked
 from polycorner.pictures.style import BODIES, SHADES, bridged
 from polycorner.spaces.manifold import Array
 
 
+@checked
 def draw_pair(entry: DyadMinimum) -> Figure:
     """Draw a pair in the drum (in perspective) and in the developed plane with its contacts."""
     pair = entry.pair
@@ -34,6 +36,7 @@ def draw_pair(entry: DyadMinimum) -> Figure:
     return figure
 
 
+@checked
 def draw_heading(pair: DumbbellPair, lengths: Sequence[float], rods: Sequence[float]) -> Figure:
     """Draw the heading of both chiralities against length for several rod radii.
 

@@ -13,6 +13,7 @@ from polycorner.dumbbells.dynamics.bunch import KINDS, BunchRun
 from polycorner.dumbbells.dynamics.dyads import heading_at_shift
 from polycorner.dumbbells.dynamics.singles import Zigzag
 from polycorner.dumbbells.dynamics.steady import Steady
+from polycorner.kinds import checked
 from polycorner.pictures.style import SHADES
 from polycorner.spaces.manifold import Array
 
@@ -24,6 +25,7 @@ MINIMISER, PAPER, OTHER_END = "#333333", "#C1272D", "#7B3294"
 TILTED, LEVEL = "#0072B2", "#E69F00"
 
 
+@checked
 def draw_steady_headings(found: Sequence[Steady]) -> Figure:
     """Draw steady headings and shifts of right-handed pairs against length.
 
@@ -116,6 +118,7 @@ def draw_balance(found: "xr.Dataset") -> Figure:
     return figure
 
 
+@checked
 def draw_climbing(
     zigzags: Sequence[Zigzag], drum: DumbbellDrum, found: Sequence[Steady] = ()
 ) -> Figure:
@@ -151,6 +154,7 @@ def draw_climbing(
     return figure
 
 
+@checked
 def draw_exits(runs: Mapping[str, BunchRun]) -> Figure:
     """Draw the cumulative exits of each named bunch by kind, against time.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import refuse
+from polycorner.checks import reals, refuse
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Handed, Sizes, dyads_among
 from polycorner.dumbbells.formulas import CONTACTS
@@ -16,12 +16,13 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.symbols import energy_unit
+from polycorner.kinds import checked
 from polycorner.motion.trajectory import Trajectory
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     from polycorner.motion.trajectory import Touch
@@ -48,7 +49,7 @@ class Words:
 
 
 @dataclass(frozen=True, eq=False)
-class Film(Value):
+class Film(Checked):
     """Dumbbells at ``T`` instants.
 
     Attributes
@@ -105,6 +106,7 @@ def energy_name(pair: DumbbellPair) -> str:
 # ----------------------------------------------------------------------------------------- a pair
 
 
+@checked
 def pair_film(
     pair: DumbbellPair,
     q: ArrayLike,
@@ -137,7 +139,7 @@ def pair_film(
     ValueError
         For arrays that do not fit, or times that do not increase.
     """
-    points = np.atleast_2d(finite(reals(q, "q"), "q"))
+    points = np.atleast_2d(finite(reals("q", q), "q"))
     if points.ndim != 2 or points.shape[1] != 6 or not len(points):
         refuse("q", "shape (T, 6) with T >= 1", np.shape(q))
     if times is None:
@@ -168,7 +170,7 @@ def pair_film(
 
 
 def _increasing(times: ArrayLike, count: int) -> Array:
-    instants = finite(reals(times, "times"), "times")
+    instants = finite(reals("times", times), "times")
     if instants.shape != (count,) or not (np.diff(instants) > 0).all():
         refuse("times", f"{count} increasing numbers", instants)
     return instants
@@ -177,6 +179,7 @@ def _increasing(times: ArrayLike, count: int) -> Array:
 # ------------------------------------------------------------------------------------------ a run
 
 
+@checked
 def run_film(
     run: Trajectory, *, frames: int = FRAMES, title: str = "Dumbbells in the drum"
 ) -> Film:

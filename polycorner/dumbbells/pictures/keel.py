@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from polycorner.dumbbells.statics.keel import Keel, RestRegion
 from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 
 CURVE, POSITIVE, NEGATIVE = "#D55E00", "#0072B2", "#009E73"
@@ -17,6 +18,7 @@ SAMPLES = 1441
 RESOLUTION = 721  # of the torque, in both directions
 
 
+@checked
 def draw_keel(keel: Keel, *, friction: float | None = None) -> Figure:
     """Draw the plane of azimuth and heading: regions of rest, and regions of growing headings.
 

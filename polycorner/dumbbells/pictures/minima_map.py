@@ -14,6 +14,7 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_clearance
 from polycorner.dumbbells.statics.skeleton import long_rod_length
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate
 from polycorner.pictures.style import BODIES
 from polycorner.spaces.manifold import Array
@@ -26,6 +27,7 @@ FINE = 90  # points of a closed-form curve along either axis
 COLUMNS = 4
 
 
+@checked
 def draw_minima_map(found: MinimaMap) -> Figure:
     """Draw, for every ``l/R``, the kinds of minima found over ``l/r`` and ``t/r``.
 
@@ -45,6 +47,7 @@ def draw_minima_map(found: MinimaMap) -> Figure:
     return figure
 
 
+@checked
 def draw_kinds(found: MinimaMap) -> Figure:
     """Draw an example of each kind, seen from above and along the drum.
 

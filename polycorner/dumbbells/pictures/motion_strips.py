@@ -12,6 +12,7 @@ from polycorner.dumbbells.pictures.relabelling import (
 )
 from polycorner.dumbbells.pictures.symbols import HANDS, corner_symbol
 from polycorner.dumbbells.statics.skeleton import PairAtlas
+from polycorner.kinds import checked
 from polycorner.skeletons.points import projected
 from polycorner.spaces.manifold import Array
 
@@ -19,6 +20,7 @@ FRAMES = 5
 TOUCH = 1e-6  # ball radii within which a contact of a frame counts as closed
 
 
+@checked
 def draw_motions(atlas: PairAtlas) -> Figure:
     """Draw every edge of the pair's skeleton, up to relabelling, as a strip of frames.
 

@@ -17,6 +17,7 @@ from PIL import Image
 from polycorner.atomic import atomic
 from polycorner.checks import missing_extra, refuse
 from polycorner.dumbbells.pictures.drum import DrumView
+from polycorner.kinds import checked
 from polycorner.motion.trajectory import Trajectory
 
 Picture = NDArray[np.uint8]
@@ -59,6 +60,7 @@ def chosen_frames(count: int, most: int = FRAMES) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, shown).tolist()})
 
 
+@checked
 def write_movie(
     run: Trajectory,
     path: str | os.PathLike[str],

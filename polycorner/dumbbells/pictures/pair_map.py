@@ -7,9 +7,11 @@ from matplotlib.figure import Figure
 from polycorner.dumbbells.pictures.symbols import corner_symbol
 from polycorner.dumbbells.statics.skeleton import long_rod_length
 from polycorner.dumbbells.statics.skeleton_map import PairMap, Signature
+from polycorner.kinds import checked
 from polycorner.pictures.style import SHADES
 
 
+@checked
 def draw_pair_map(found: PairMap) -> Figure:
     """Draw where the skeleton of the pair in the plane changes, over ``l/r`` and ``t/r``.
 

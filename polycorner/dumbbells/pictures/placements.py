@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike
 
 from polycorner.checks import refuse
 from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.kinds import checked
 from polycorner.pictures.solids.charts import Gaps
 from polycorner.pictures.solids.grids import FEWEST_CELLS, Function
 from polycorner.pictures.solids.sharp_surfaces import SharpSurface, sharp_surface
 from polycorner.spaces.manifold import Array
 
 
+@checked
 def relative_placements(
     pair: DumbbellPair, points: ArrayLike, *, mean_heading: float | None = None
 ) -> Array:
@@ -54,6 +56,7 @@ def relative_placements(
     return q
 
 
+@checked
 def relative_coordinates(
     pair: DumbbellPair, q: ArrayLike, *, mean_heading: float | None = None
 ) -> Array:
@@ -113,6 +116,7 @@ def relative_gaps(pair: DumbbellPair, *, mean_heading: float | None = None) -> G
     return gaps
 
 
+@checked
 def forbidden_solid(
     pair: DumbbellPair,
     resolution: int | Sequence[int] = 96,

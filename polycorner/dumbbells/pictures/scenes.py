@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgba
 from numpy.typing import ArrayLike
 
 from polycorner.atomic import write_atomically
-from polycorner.checks import refuse
+from polycorner.checks import reals, refuse
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import (
@@ -30,9 +30,10 @@ from polycorner.dumbbells.pictures.placements import forbidden_solid
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
 from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, KIND_WORDS, KINDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
+from polycorner.kinds import checked
 from polycorner.pictures.style import BODIES
 from polycorner.polyhedra.strata import stratum_at
-from polycorner.spaces.arguments import finite, reals
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def library() -> Any:
     return trimesh
 
 
+@checked
 def pair_scene(pair: DumbbellPair, q: ArrayLike, *, tolerance: float = TOUCHING) -> "trimesh.Scene":
     """Return two dumbbells in the drum or on the plane, with their contacts, as a scene in mm.
 
@@ -77,7 +79,7 @@ def pair_scene(pair: DumbbellPair, q: ArrayLike, *, tolerance: float = TOUCHING)
     >>> [name for name in scene.graph.nodes_geometry if name[0] in "AB"]
     ['A1', 'A2', 'B1', 'B2']
     """
-    point = pair.manifold.point(finite(reals(q, "q"), "q"))
+    point = pair.manifold.point(finite(reals("q", q), "q"))
     centres = pair.ball_centres(point)
     scene: trimesh.Scene = library().Scene()
     _add_dumbbells(scene, pair, centres.reshape(2, 2, 3), [("A1", "A2", "a"), ("B1", "B2", "b")])
@@ -87,6 +89,7 @@ def pair_scene(pair: DumbbellPair, q: ArrayLike, *, tolerance: float = TOUCHING)
     return scene
 
 
+@checked
 def drum_scene(drum: DumbbellDrum, q: ArrayLike) -> "trimesh.Scene":
     """Return the dumbbells of a drum as a scene in mm.
 
@@ -100,7 +103,7 @@ def drum_scene(drum: DumbbellDrum, q: ArrayLike) -> "trimesh.Scene":
     q : (N, k) array
         ``phi, eta, theta`` (and ``psi``) of each dumbbell, as a row of ``trajectory.q``.
     """
-    places = np.atleast_2d(reals(q, "q"))
+    places = np.atleast_2d(reals("q", q))
     if places.ndim != 2 or places.shape[0] != drum.count or places.shape[1] not in (3, 4):
         refuse("q", f"shape ({drum.count}, 3) or ({drum.count}, 4)", places.shape)
     here = np.flatnonzero(np.isfinite(places[:, :3]).all(axis=1))
@@ -114,6 +117,7 @@ def drum_scene(drum: DumbbellDrum, q: ArrayLike) -> "trimesh.Scene":
     return scene
 
 
+@checked
 def atlas_scene(atlas: PairAtlas, *, resolution: int = 64) -> "trimesh.Scene":
     """Return the forbidden solid of a pair with the edges and corners of its atlas.
 
@@ -160,12 +164,14 @@ def solid_bytes(
     return glb(scene)
 
 
+@checked
 def glb(scene: "trimesh.Scene") -> bytes:
     """Return a scene as the bytes of a GLB file."""
     drawn: Any = scene
     return bytes(drawn.export(file_type="glb"))
 
 
+@checked
 def write_scene(scene: "trimesh.Scene", path: Path) -> Path:
     """Write a scene as ``.glb``, whole or not at all, and return the path; folders are made.
 

@@ -17,6 +17,7 @@ from polycorner.dumbbells.pictures.placements import (
 from polycorner.dumbbells.pictures.relabelling import contact_counts
 from polycorner.dumbbells.pictures.symbols import KIND_WORDS, corner_symbol
 from polycorner.dumbbells.statics.skeleton import PairAtlas
+from polycorner.kinds import checked
 from polycorner.pictures.solids.charts import Chart
 from polycorner.pictures.solids.meshes import write_mesh
 from polycorner.pictures.solids.rendering import draw_solid
@@ -24,6 +25,7 @@ from polycorner.pictures.solids.sharp_surfaces import SharpSurface
 from polycorner.pictures.style import save
 from polycorner.skeletons.refinement import traced
 from polycorner.spaces.manifold import Array
+from polycorner.values import Checked
 
 SAME = 1e-6  # mm or radians
 
@@ -34,6 +36,7 @@ def contacts_in_words(active: Iterable[str]) -> str:
     return KIND_WORDS.get(kind, "{} ball-ball, {} ball-rod, {} rod-rod".format(*kind))
 
 
+@checked
 def relative_curves(
     atlas: PairAtlas,
     period: float,
@@ -122,6 +125,7 @@ def _images(atlas: PairAtlas, points: Array) -> list[Array]:
     return [points, points * np.array([-1, -1, 1])]
 
 
+@checked
 def relative_corners(
     atlas: PairAtlas, period: float, *, hands: bool = False
 ) -> tuple[Array, list[str]]:
@@ -142,7 +146,7 @@ def relative_corners(
 
 
 @dataclass(frozen=True)
-class SolidFacts:
+class SolidFacts(Checked):
     """Size of a solid, and agreement of its mesh with the skeleton.
 
     Attributes
@@ -177,6 +181,7 @@ class SolidFacts:
     corners: int
 
 
+@checked
 def solid_facts(solid: SharpSurface, atlas: PairAtlas) -> SolidFacts:
     """Return the size of a solid and the errors of its mesh against the atlas of the same pair."""
     low, high = solid.bounds[2].tolist()
@@ -195,6 +200,7 @@ def solid_facts(solid: SharpSurface, atlas: PairAtlas) -> SolidFacts:
     )
 
 
+@checked
 def write_solid(atlas: PairAtlas, folder: Path, *, resolution: int = 96) -> list[Path]:
     """Write ``solid.png``, ``solid.glb`` and ``solid.json``; a radian is as long as ``l/2`` mm.
 

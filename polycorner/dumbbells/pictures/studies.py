@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from polycorner.kinds import checked
 from polycorner.pictures.style import SHADES, bridged
 from polycorner.spaces.manifold import Array
 
@@ -20,6 +21,7 @@ PAPER = (16.0, 15.0, 2.0)  # measured: length in mm, heading and its fluctuation
 MOST_CURVES = 12  # drawn for a second parameter of many values
 
 
+@checked
 def draw_study(study: str, found: "xr.Dataset") -> Figure | None:
     """Draw an installed study; None for others, and for more than two axes of several values."""
     draw = DRAWN.get(study)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_escapes, hold_times
+from polycorner.kinds import checked
 from polycorner.minimisation import Entrapment
 from polycorner.models.wells.escape import overdamped_escape_time
 from polycorner.models.wells.holding import NORMAL, Comparison, Escapes, kick_of, ladder, rests
@@ -28,6 +29,7 @@ PATH = 2  # seed of the sample paths
 FRICTION = 0.04  # of the depth per rim, in the panels with friction
 
 
+@checked
 def draw_wells(comparison: Comparison, pair: DumbbellPair) -> Figure:
     """Draw the three wells, their escape times by drag and restitution, and the wells of a dyad.
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Verdict, certify, crossing, stationary_on
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
@@ -65,6 +66,7 @@ class Critical(Value):
     minimum_above: bool
 
 
+@checked
 def critical_rod_radius(pair: DumbbellPair) -> float | None:
     """Return the rod radius, in mm, at which the dyad's corner stops being a minimum.
 
@@ -86,6 +88,7 @@ def critical_rod_radius(pair: DumbbellPair) -> float | None:
     return None if found is None else found.value
 
 
+@checked
 def critical_length(pair: DumbbellPair) -> float | None:
     """Return the least length, in mm, at which the dyad's corner is a minimum.
 

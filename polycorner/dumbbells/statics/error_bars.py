@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
+from polycorner.kinds import checked
 from polycorner.minimisation import Sensitivity, sensitivity, stationary_on
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     from polycorner.minimisation.sensitivities import Quantity
@@ -28,7 +29,7 @@ DRUM_RATES = PLANE_RATES | {
 
 
 @dataclass(frozen=True)
-class ErrorBar(Value):
+class ErrorBar(Checked):
     """A value with its spread from independent tolerances, to first order ([GUM] sec. 5).
 
     Attributes
@@ -80,6 +81,7 @@ def error_bar(
     return ErrorBar(value, math.hypot(*shares.values()), shares)
 
 
+@checked
 def pair_sensitivity(pair: DumbbellPair, chirality: Chirality = "R") -> Sensitivity:
     """Differentiate the three-contact corner of a pair by the pair's own parameters.
 
@@ -101,6 +103,7 @@ def pair_sensitivity(pair: DumbbellPair, chirality: Chirality = "R") -> Sensitiv
     return sensitivity(corner, PLANE_RATES if pair.is_plane else DRUM_RATES)
 
 
+@checked
 def heading_error_bar(
     pair: DumbbellPair, tolerances: Mapping[str, float], chirality: Chirality = "R"
 ) -> ErrorBar:

@@ -25,18 +25,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.checks import reals
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells.statics.keel_formulas import force_ratio
 from polycorner.formulas import kernels
-from polycorner.spaces.arguments import reals, scalar
+from polycorner.kinds import check_fields
+from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, Value, cached_property
 
 BISECTIONS = 60  # these bracket an azimuth in a quarter turn to one unit in the last place
 
 
 @dataclass(frozen=True)
-class RestRegion(Value):
+class RestRegion(Checked):
     """All ``(phi, theta)`` at which friction holds a dumbbell: ``A`` or ``B`` of [GMBN] app. A.
 
     The dumbbell is short, its length small against the radius of the drum; for the region of one of
@@ -86,7 +88,7 @@ class RestRegion(Value):
         All azimuths in between are azimuths of rest, too: ``|phi| <= phi_s`` and
         ``cos(theta) sin(phi) -+ mu_r cos(phi) <= (>=) tan(alpha) sin(theta)`` are each an interval.
         """
-        low, high = self._ends(reals(theta, "theta"))
+        low, high = self._ends(reals("theta", theta))
         west, east = low.max(axis=0), high.min(axis=0)
         empty = ~(west <= east)
         return scalar(np.where(empty, np.nan, west)), scalar(np.where(empty, np.nan, east))
@@ -100,7 +102,7 @@ class RestRegion(Value):
 
         Otherwise it slides, or rolls on down the axis of the drum.
         """
-        heading = reals(theta, "theta")
+        heading = reals("theta", theta)
         high, found = self._ends(heading)[1], np.isfinite(self.eastern_boundary(heading))
         return scalar(found & (high[1] <= high[0]))
 
@@ -148,7 +150,7 @@ class Turning(Value):
 
 
 @dataclass(frozen=True)
-class Keel(Value):
+class Keel(Checked):
     """Friction of a dumbbell in a tilted drum, before and after it starts to move.
 
     Parameters
@@ -175,7 +177,10 @@ class Keel(Value):
     sliding_dynamic: float
 
     def __post_init__(self) -> None:
-        inner, outer = self.arrest, self.onset
+        check_fields(self)
+        with checks.about("rolling_dynamic, sliding_dynamic"):
+            inner = self.arrest
+        outer = self.onset
         if inner.rolling > outer.rolling or inner.sliding > outer.sliding:
             got = f"{inner.rolling}, {inner.sliding} above {outer.rolling}, {outer.sliding}"
             msg = f"rolling_dynamic, sliding_dynamic: expected at most the static ones; got {got}"
@@ -201,7 +206,7 @@ class Keel(Value):
 
     def turning(self, theta: ArrayLike) -> Turning:
         """Return the turning points of a dumbbell of heading ``theta``."""
-        heading = reals(theta, "theta")
+        heading = reals("theta", theta)
         rolls = np.asarray(self.onset.rolls_back(heading))
         upper = np.asarray(self.onset.eastern_boundary(heading))
         # rolling balls do not slip, so on the axis static friction holds until it stops
@@ -267,7 +272,7 @@ def _acting(
 
     Forces in units of ``m g cos(alpha)``.
     """
-    azimuth, heading = np.broadcast_arrays(reals(phi, "phi"), reals(theta, "theta"))
+    azimuth, heading = np.broadcast_arrays(reals("phi", phi), reals("theta", theta))
     at = np.stack([azimuth, 0 * azimuth, heading], axis=-1).reshape(-1, 3)
     sizes = np.array([2 * slenderness, 1.0, 1.0, math.tan(tilt)])
     slopes = drum_formulas.weight().kernel.over(at, kernels.address(sizes), 1)[1]
@@ -290,7 +295,7 @@ def exact_eastern_boundary(theta: ArrayLike, region: RestRegion, slenderness: fl
     Found by bisection between the middle of the interval that ``region`` gives for a short one,
     where it has to rest (else nan), and the azimuth at which a ball would leave the drum.
     """
-    heading = reals(theta, "theta")
+    heading = reals("theta", theta)
     inside = np.asarray(sum(region.azimuths(heading)) / 2)
     inside = np.where(rests(inside, heading, region, slenderness), inside, np.nan)
     outside = np.full_like(inside, math.acos(slenderness))

@@ -21,10 +21,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner.checks import reals
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.formulas import cache, families, kernels
-from polycorner.spaces.arguments import reals, scalar
+from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ def s_curve(phi: ArrayLike, tilt: float) -> Any:
 
     Gravity does not make a dumbbell that lies along it roll.
     """
-    return scalar(np.arctan2(np.sin(reals(phi, "phi")), math.tan(tilt)))
+    return scalar(np.arctan2(np.sin(reals("phi", phi)), math.tan(tilt)))
 
 
 def net_torque(
@@ -167,7 +168,7 @@ def net_torque(
 
 
 def _evaluated(phi: ArrayLike, theta: ArrayLike, tilt: float, slenderness: float) -> Array:
-    first, second = np.broadcast_arrays(reals(phi, "phi"), reals(theta, "theta"))
+    first, second = np.broadcast_arrays(reals("phi", phi), reals("theta", theta))
     inputs = np.stack([first.ravel(), second.ravel()], axis=-1)
     numbers = np.array([tilt, slenderness], dtype=np.float64)
     (found,) = family().kernel.over(inputs, kernels.address(numbers), 0)

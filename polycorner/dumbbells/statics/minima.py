@@ -6,16 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, minimise, stationary_on
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 CORNER = ("A2B1", "A2b", "aB1")
 
 
 @dataclass(frozen=True)
-class DyadMinimum(Value):
+class DyadMinimum(Checked):
     """One of the three loci that the paper names, for one pair.
 
     Attributes
@@ -75,6 +77,7 @@ class DyadMinimum(Value):
         return {name: factor * value for name, value in self.certificate.multipliers.items()}
 
 
+@checked
 def dyad_minima(pair: DumbbellPair) -> tuple[DyadMinimum, ...]:
     """Find and certify ``delta_R``, ``delta_L`` and ``G`` of a pair.
 
@@ -97,16 +100,20 @@ def dyad_corner(pair: DumbbellPair, chirality: Chirality) -> DyadMinimum:
     return DyadMinimum(f"delta_{chirality}", pair, found)
 
 
+@checked
 def paper_heading(pair: DumbbellPair) -> float:
     """Return the paper's heading of a right-handed dyad, ``arctan(r/l)``, in degrees."""
     return math.degrees(math.atan2(pair.ball_radius, pair.length))
 
 
+@checked
 def heading_curve(
     pair: DumbbellPair, lengths: Iterable[float], chirality: Chirality = "R"
 ) -> tuple[Array, Array]:
     """Return the dyad's heading in degrees at each length, and whether it is a minimum there."""
-    entries = [dyad_corner(replace(pair, length=float(length)), chirality) for length in lengths]
+    several = checks.numbers("lengths", [*lengths], "a few numbers").tolist()
+    with checks.about("lengths"):
+        entries = [dyad_corner(replace(pair, length=length), chirality) for length in several]
     headings = np.array([entry.headings[0] for entry in entries])
     return headings, np.array([entry.certificate.is_minimum for entry in entries])
 

@@ -24,11 +24,12 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Minima, certify, minima
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 CURVATURES = (0.128, 0.5, 1.0, 1.5)
 RODS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
@@ -106,6 +107,7 @@ def _placed(
     return pair.manifold.wrap(found[:count])
 
 
+@checked
 def pair_minima(
     pair: DumbbellPair,
     *,
@@ -129,7 +131,7 @@ def pair_minima(
     progress : callable, optional
         As for :func:`~polycorner.minima`.
     """
-    checks.whole("starts", starts, least=1)
+    checks.whole("starts", starts, least=1, most=checks.MOST)
     generator = checks.generator("rng", rng)
     return minima(
         pair.polyhedron,
@@ -175,7 +177,7 @@ def crossing_clearance(pair: DumbbellPair) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class MinimaMap(Value):
+class MinimaMap(Checked):
     """Kinds of minima found from random starts, over the proportions of a pair.
 
     Attributes
@@ -207,6 +209,7 @@ class MinimaMap(Value):
     starts: int
     examples: Mapping[str, tuple[DumbbellPair, Certificate]]
 
+    @checked
     def has(self, kind: str) -> NDArray[np.bool_]:
         """Whether a kind was found, ``(k, n, m)``."""
         if kind not in self.kinds:
@@ -218,11 +221,13 @@ class MinimaMap(Value):
         """Whether a pair fits in its drum and was examined, ``(k, n, m)``."""
         return np.asarray(self.lost >= 0)
 
+    @checked
     def pair(self, i: int, j: int, k: int) -> DumbbellPair | None:
         """Return a pair of the grid, in ball radii; None if it does not fit in its drum."""
         return _pair(*(float(x) for x in (self.curvatures[i], self.rods[j], self.lengths[k])))
 
 
+@checked
 def minima_map(
     *,
     curvatures: ArrayLike = CURVATURES,

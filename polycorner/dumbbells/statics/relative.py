@@ -58,7 +58,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.spaces import distances
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -67,7 +67,7 @@ MARGIN = 1.05  # sides of the box over the reach of contacts
 
 
 @dataclass(frozen=True)
-class RelativePlacements(Value):
+class RelativePlacements(Checked):
     """Two equal dumbbells up to rolling and shifts; see the module.
 
     Parameters

@@ -10,6 +10,7 @@ import numpy as np
 from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import ball_relabellings, relabellings
+from polycorner.kinds import checked
 from polycorner.polyhedra.symmetry import Element
 from polycorner.progress import Progress
 from polycorner.skeletons.elements import Skeleton
@@ -17,13 +18,13 @@ from polycorner.skeletons.orbits import Orbits, orbits
 from polycorner.skeletons.parts import Corner
 from polycorner.skeletons.search import BUDGET, skeleton
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 PLACEMENTS = 6
 
 
 @dataclass(frozen=True)
-class PairAtlas(Value):
+class PairAtlas(Checked):
     """Corners, edges and faces of ``D`` for a pair, modulo motions of the pair as a whole.
 
     Attributes
@@ -85,6 +86,7 @@ class PairAtlas(Value):
         counts = {3 + k: len(found) for k, found in enumerate(grouped.values())}
         return counts | ({6: 1} if self.components.get(6) == 1 else {})
 
+    @checked
     def kind(self, corner: Corner) -> str:
         """Return the paper's letter for a corner with its chirality, see :func:`corner_kind`."""
         return corner_kind(corner.active, corner.chirality)
@@ -102,6 +104,7 @@ def corner_kind(active: Iterable[str], chirality: str | None) -> str:
     return f"{letter}_{chirality or 'N'}"
 
 
+@checked
 def pair_atlas(
     pair: DumbbellPair,
     *,
@@ -142,6 +145,7 @@ def pair_starts(pair: DumbbellPair, rng: np.random.Generator, heading: float = 0
     return np.array([*fitting, *pair.placements(rng, PLACEMENTS, heading=heading)])
 
 
+@checked
 def long_rod_length(ball_radius: float, rod_radius: float) -> float:
     """Return the length above which the rods are long enough, ``2 sqrt(4 r^2 - (r + t)^2)``.
 
@@ -149,4 +153,6 @@ def long_rod_length(ball_radius: float, rod_radius: float) -> float:
     triangle with legs ``l/2`` and ``r + t`` and hypotenuse ``2 r``.  Below it the ball touches both
     balls before it reaches the rod, and no rod is ever touched.
     """
+    checks.real("ball_radius", ball_radius, above=0)
+    checks.real("rod_radius", rod_radius, above=0, most=ball_radius)
     return 2 * math.sqrt(4 * ball_radius**2 - (ball_radius + rod_radius) ** 2)

@@ -12,13 +12,14 @@ from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from polycorner.dumbbells.symmetries import relabellings
+from polycorner.kinds import checked
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.orbits import Orbits
 from polycorner.skeletons.parts import Completeness, Edge
 from polycorner.skeletons.search import skeleton
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 # Distance, in ball radii, below which corners are not distinguished reliably, and so the possible
 # error of the position of a change.
@@ -77,7 +78,7 @@ class Signature:
 
 
 @dataclass(frozen=True)
-class PairMap(Value):
+class PairMap(Checked):
     """Signatures of the atlas over a grid, and their changes along ``l/r``.
 
     Attributes
@@ -133,6 +134,7 @@ class PairMap(Value):
         return np.setdiff1d(self.rods[inside], self.change_rods[self.explained])
 
 
+@checked
 def pair_map(
     lengths: ArrayLike,
     rods: ArrayLike,

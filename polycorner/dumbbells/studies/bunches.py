@@ -9,6 +9,7 @@ import numpy as np
 from polycorner.checks import choice, whole
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed, kicks_of
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ HEADING = 8.0  # degrees
 BETWEEN = 36.0  # mm, from pair to pair
 
 
+@checked
 def bunch(
     start: int,
     *,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.checks import choice, real, refuse
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ CORNER = "ball rod rod"  # contacts of a nested pair
 CLOSE = 0.1  # mm, up to which a contact of a pair that rattles counts as closed
 
 
+@checked
 def driven(
     kind: str,
     strength: float,

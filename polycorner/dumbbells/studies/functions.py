@@ -8,10 +8,12 @@ import numpy as np
 from polycorner.checks import whole
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
+from polycorner.kinds import checked
 
 FIRST, LAST = 2.0, 14.0  # degrees: headings of the first and the last pair at the start
 
 
+@checked
 def heading(
     length: float,
     rod_radius: float,
@@ -68,6 +70,7 @@ def heading(
     }
 
 
+@checked
 def climbing(
     noise: float,
     tilt: float,

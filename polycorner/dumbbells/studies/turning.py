@@ -8,11 +8,13 @@ import numpy as np
 
 from polycorner.checks import choice, real
 from polycorner.dumbbells.studies.driven import disturbed
+from polycorner.kinds import checked
 
 PAIRS = 6  # and as many single dumbbells
 PARTS = {"all": ("phi", "eta", "theta"), "rolling": ("phi",), "sliding": ("eta", "theta")}
 
 
+@checked
 def turning(
     heading: float,
     kind: str,

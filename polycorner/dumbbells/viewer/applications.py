@@ -21,6 +21,7 @@ from polycorner.dumbbells.viewer.board import Board
 from polycorner.dumbbells.viewer.page import page_file, three_script
 from polycorner.dumbbells.viewer.server import allowed, names_of
 from polycorner.dumbbells.viewer.sliders import MESSAGE, RefusedError, hello, parsed
+from polycorner.kinds import checked
 
 RATE = 300  # most messages of a page in a second
 PAGES = 16  # most live pages at a time
@@ -199,6 +200,7 @@ class _Live(WebSocketHandler):
 # ---------------------------------------------------------------------------------------- servers
 
 
+@checked
 def live_application(pair: DumbbellPair, host: str) -> Application:
     """Return the application of the live page of a pair, with its kernels compiled."""
     Board.of(pair).fall()
@@ -207,6 +209,7 @@ def live_application(pair: DumbbellPair, host: str) -> Application:
     return _application(texts, POLICY, host, [("/live", _Live, {"pair": pair})])
 
 
+@checked
 def page_application(page: str, host: str) -> Application:
     """Return the application that serves one page complete in itself."""
     return _application({"": page}, UNFRAMED, host, [])

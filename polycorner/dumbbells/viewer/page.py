@@ -29,18 +29,21 @@ from polycorner.dumbbells.pictures.scenes import atlas_scene, glb, library
 from polycorner.dumbbells.pictures.symbols import HANDS, KIND_WORDS, KINDS, WORDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.errors import PolycornerError
+from polycorner.kinds import checked
 
 END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # trimesh's own page follows
 KEYS = " Space plays, ← and → step, Home and End go to the ends."
 CELLS = 48  # of an atlas's solid along each axis
 
 
+@checked
 def film_page(film: Film) -> str:
     """Return the HTML page that plays a film."""
     keys = KEYS if len(film) > 1 else ""
     return _page(film.title, film.note, film_data(film), keys)
 
 
+@checked
 def atlas_page(atlas: PairAtlas, *, resolution: int = CELLS) -> str:
     """Return the HTML page of the forbidden solid of a pair with its edges and corners."""
     pair = atlas.pair
@@ -65,6 +68,7 @@ def _hands(atlas: PairAtlas) -> list[str]:
     return [hand for hand in HANDS if hand in found]
 
 
+@checked
 def write_page(page: str, path: Path) -> Path:
     """Write a page as ``.html``, whole or not at all, and return the path; folders are made.
 

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, minimise
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -29,7 +30,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Descent(Value):
+class Descent(Checked):
     """A path of steepest descent, and the certificate of its end.
 
     Attributes
@@ -53,6 +54,7 @@ class Descent(Value):
         return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+@checked
 def descent(
     polyhedron: "Polyhedron",
     energy: "Energy",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from polycorner.models.disks.critical_points import judged
 from polycorner.models.disks.torus import IMAGES, Pairs, components, translates, uncut
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 SAME = 1e-6
 TRIES, PLACES = 40, 500
@@ -51,7 +51,7 @@ class Disks(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class CriticalConfiguration(Value):
+class CriticalConfiguration(Checked):
     """A configuration at which the largest common radius is critical.
 
     Attributes

@@ -23,7 +23,7 @@ from polycorner.models.disks.critical_points import solved
 from polycorner.models.disks.smoothing import Candidate, candidates, smooth
 from polycorner.models.disks.torus import OWN
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 STARTS_PER_DISK, ROUNDS = 80, 8
 
@@ -39,7 +39,7 @@ Configurations = tuple[CriticalConfiguration, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class CriticalSearch(Value):
+class CriticalSearch(Checked):
     """A search for critical configurations, finished or not.
 
     Configurations with rattlers are those of fewer disks with room for the others, so that two

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
 from polycorner.models.disks.configurations import SAME, CriticalConfiguration, coincide
 from polycorner.models.disks.critical import CriticalSearch
 from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrapped
@@ -22,7 +23,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.progress import Progress
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 Lattice = Literal["square", "hexagonal"]
 
@@ -30,7 +31,7 @@ COSINES = {"square": 0.0, "hexagonal": 0.5}
 
 
 @dataclass(frozen=True)
-class TorusDisks(Value):
+class TorusDisks(Checked):
     """``n`` equal disks on the torus ``R^2/L``.
 
     ::
@@ -150,6 +151,7 @@ class TorusDisks(Value):
     def _bundle(self) -> Bundle:
         return Bundle(self.manifold, self.gaps)
 
+    @checked
     def starts(self, rng: np.random.Generator, count: int) -> Array:
         """Return ``count`` random placements in the polyhedron, at half their largest radius."""
         points = rng.random((checks.whole("count", count, least=1), 2 * self.count + 1))
@@ -161,6 +163,7 @@ class TorusDisks(Value):
         points = self.manifold.points(q)[..., :-1]
         return np.asarray(points.reshape(*points.shape[:-1], self.count, 2) @ self.basis)
 
+    @checked
     def segment(self, q: ArrayLike, contact: str) -> Array:
         """Return the two centres, ``(2, 2)``, between which a contact lies."""
         if contact not in self.ends:
@@ -203,6 +206,7 @@ class TorusDisks(Value):
         """The same distances, grouped by pair, for batches."""
         return Pairs(self.count, COSINES[self.lattice])
 
+    @checked
     def critical(
         self,
         rng: np.random.Generator | int | None = None,
@@ -281,6 +285,7 @@ class TorusDisks(Value):
         first = 2 if self.count > 1 else 3
         return CriticalSearch(self, starts, checks.generator("rng", rng), disks=first)
 
+    @checked
     def same(
         self,
         first: CriticalConfiguration,

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate, certify
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.models.packings.contacts import gaps_polyhedron, neighbours
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
@@ -46,7 +47,7 @@ class PackingResiduals:
 
 
 @dataclass(frozen=True, eq=False)
-class JammedPacking(Value):
+class JammedPacking(Checked):
     """A packing at a maximum of the inflation, with its contacts and forces.
 
     Attributes
@@ -133,6 +134,7 @@ class JammedPacking(Value):
         """The vectors ``x_j - x_i`` of the contacts, ``(m, d)``."""
         return self.centres[self.pairs[:, 1]] - self.centres[self.pairs[:, 0]] + self.images
 
+    @checked
     def near_gaps(self, reach: float = 0.1) -> tuple[NDArray[np.int64], Array]:
         """Return pairs that do not carry force, with gaps up to ``reach`` mean diameters.
 

@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner import checks
 from polycorner.formulas.rows import SparseRows
+from polycorner.kinds import checked
 from polycorner.minimisation.sparse.chain import ChainEnd, Landscape, descend
 from polycorner.models.packings.contacts import neighbours, rows_of
 from polycorner.models.packings.jammed import JammedPacking
 from polycorner.models.packings.starts import decompressed, largest_inflation
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 # Densities at which soft bodies are pushed apart: a little above those at which they jam.
 SOFT_DENSITY = {2: 0.85, 3: 0.65}
@@ -22,7 +23,7 @@ REACH = 0.3  # first box of the linear programmes, in mean diameters
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodicPacking(Value):
+class PeriodicPacking(Checked):
     """Discs (``d = 2``) or spheres (``d = 3``) in a periodic square or cube.
 
     Their radii are ``s radii``, and the inflation ``s`` is to be as large as possible while no two
@@ -71,12 +72,14 @@ class PeriodicPacking(Value):
             raise ValueError(msg)
 
     @classmethod
+    @checked
     def monodisperse(cls, count: int, dimension: int = 3, box: float = 1.0) -> "PeriodicPacking":
         """Return ``count`` equal bodies."""
         checks.whole("count", count, least=2)
         return cls(np.ones(count), dimension, box)
 
     @classmethod
+    @checked
     def bidisperse(
         cls, count: int, dimension: int = 2, ratio: float = 1.4, box: float = 1.0
     ) -> "PeriodicPacking":
@@ -90,6 +93,7 @@ class PeriodicPacking(Value):
         """The number of bodies ``N``."""
         return len(self.radii)
 
+    @checked
     def density(self, inflation: float) -> float:
         """Return the part of the box that the inflated bodies fill."""
         ball = math.pi if self.dimension == 2 else 4 * math.pi / 3
@@ -101,6 +105,7 @@ class PeriodicPacking(Value):
         rng = checks.generator("rng", rng)
         return np.asarray(rng.random((self.count, self.dimension)) * self.box)
 
+    @checked
     def soft_start(
         self,
         rng: "np.random.Generator | int | None" = None,
@@ -127,6 +132,7 @@ class PeriodicPacking(Value):
         radii = self.radii * self._inflation_at(SOFT_DENSITY[self.dimension])
         return decompressed(self.scattered(rng), radii, self.box, iterations, overlap=overlap)
 
+    @checked
     def jam(
         self,
         start: "ArrayLike | np.random.Generator | int | None" = None,

@@ -24,9 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.checks import reals
 from polycorner.minimisation import Entrapment
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.spaces.arguments import reals, scalar
+from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
 
@@ -146,7 +147,7 @@ class Well(Value):
 
     def potential(self, x: ArrayLike) -> Any:
         """Return ``V(x)``."""
-        away = abs(reals(x, "x"))
+        away = abs(reals("x", x))
         return scalar(self.slope * away + self.stiffness * away**2 / 2)
 
     @property

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from polycorner.atomic import atomic
 from polycorner.checks import refuse
 from polycorner.errors import SolverError
+from polycorner.kinds import checked
 from polycorner.pictures.solids.grids import (
     AXES,
     Bounds,
@@ -32,7 +33,7 @@ from polycorner.pictures.solids.sewing import (
     shared,
 )
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import trimesh
@@ -42,7 +43,7 @@ LEAST = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Isosurface(Value):
+class Isosurface(Checked):
     """The boundary of a region ``{f < 0}`` of a box some of whose sides may be identified.
 
     ``mesh`` is closed in the chart: where the region crosses the seam of a periodic axis, flat
@@ -89,6 +90,7 @@ class Isosurface(Value):
         return np.asarray(sides / (np.array(self.inside.shape) - 1))
 
 
+@checked
 def isosurface(
     function: Function,
     bounds: Bounds,
@@ -139,6 +141,7 @@ def isosurface(
     return Isosurface(mesh, caps[kept], euler, values < 0, box, flags)
 
 
+@checked
 def components_of_complement(surface: Isosurface) -> int:
     """Return the number of connected components of ``{f >= 0}``, seams identified.
 
@@ -159,6 +162,7 @@ def components_of_complement(surface: Isosurface) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
+@checked
 def write_mesh(
     mesh: "trimesh.Trimesh",
     path: Path,

@@ -13,7 +13,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
+from polycorner.values import Checked
 
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
@@ -33,7 +35,7 @@ class Faces(Protocol):
 
 
 @dataclass(frozen=True)
-class View:
+class View(Checked):
     """A direction of sight, and the units and proportions of the axes.
 
     Parameters
@@ -53,6 +55,7 @@ class View:
     height: float = 1.1
 
 
+@checked
 def draw_solid(
     mesh: Faces,
     curves: Sequence[tuple[str, ArrayLike]] = (),
@@ -108,6 +111,7 @@ def draw_solid(
     return figure
 
 
+@checked
 def place_solid(
     axes: Any,
     mesh: Faces,
@@ -139,6 +143,7 @@ def place_solid(
     _draw_points(axes, places, [label for label, _ in marks], box, depth)
 
 
+@checked
 def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
     """Return a mask of the points ``(m, 3)``, on or outside a solid, that it does not hide.
 

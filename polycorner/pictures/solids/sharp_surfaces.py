@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.errors import SolverError
+from polycorner.kinds import checked
 from polycorner.pictures.solids.charts import Chart, Gaps
 from polycorner.pictures.solids.creases import Cut, cut_along_creases, edges_of
 from polycorner.pictures.solids.edge_collapse import Labelled, collapsed, labelled
@@ -72,6 +73,7 @@ class SharpSurface(Isosurface):
         rim = np.isin(ends, faces[self.caps])
         return np.asarray(self.mesh.vertices[ends[(counts > 2) | ((counts == 1) & ~rim)]])
 
+    @checked
     def corner_error(self, corners: ArrayLike, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> float:
         """Return the largest distance of given corners ``(k, 3)`` from the nearest vertex.
 
@@ -88,6 +90,7 @@ class SharpSurface(Isosurface):
         return float(np.max(away, initial=0.0))
 
 
+@checked
 def sharp_surface(
     gaps: Gaps,
     bounds: Bounds,

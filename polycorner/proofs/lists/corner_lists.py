@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
@@ -13,7 +14,7 @@ from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.search import Tally
 from polycorner.skeletons.elements import Skeleton
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import os
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class CornerPoint(Value):
+class CornerPoint(Checked):
     """A box with exactly one corner.
 
     Attributes
@@ -49,7 +50,7 @@ class CornerPoint(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class CornerList(Printed, Value):
+class CornerList(Printed, Checked):
     """Corners of a polyhedron in a box; see :func:`corners`.
 
     Attributes
@@ -121,6 +122,7 @@ class CornerList(Printed, Value):
         unit = units(self.polyhedron.manifold.periods)
         return Sheet("Corners", (self.statement, counts, *([table] if rows else []), unit))
 
+    @checked
     def skeleton(self, *, symmetry: Symmetry | None = None, **options: Any) -> Skeleton:
         """Find the skeleton with the corners of this list as starts.
 
@@ -141,6 +143,7 @@ class CornerList(Printed, Value):
             self.polyhedron, points, symmetry or Symmetry(), complete=self.complete, **options
         )
 
+    @checked
     def save(self, path: "str | os.PathLike[str]") -> "Path":
         """Save the list and its proof, for an independent checker; return the path.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner import checks
-from polycorner.spaces.arguments import reals
+from polycorner.checks import reals
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
 
@@ -147,7 +147,7 @@ def _circle(period: float) -> tuple[float, float]:
 
 def _side(name: str, side: Any) -> tuple[float, float]:
     argument = f"box[{name!r}]"
-    values = reals(side, argument)
+    values = reals(argument, side)
     if values.ndim == 0:
         values = np.array([values, values])
     if values.shape != (2,) or not np.isfinite(values).all():

@@ -8,6 +8,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.interrupts import first_interrupt
+from polycorner.kinds import checked
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
@@ -38,6 +39,7 @@ RESOLUTION = 1e-6
 MOST_BOXES = 10_000_000
 
 
+@checked
 def stationary_points(
     polyhedron: Polyhedron,
     energy: "Energy",

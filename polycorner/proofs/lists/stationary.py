@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, certify
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
@@ -13,7 +14,7 @@ from polycorner.proofs.lists.records import Record, save
 from polycorner.proofs.lists.search import Search, Tally
 from polycorner.proofs.parameter_boxes import Interval, shown_box
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import os
@@ -23,7 +24,7 @@ Bounds = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class StationaryPoint(Value):
+class StationaryPoint(Checked):
     """A box with exactly one stationary point.
 
     It is a nondegenerate KKT point of the active functions, or they are more than can be
@@ -68,7 +69,7 @@ class StationaryPoint(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class StationaryLocus(Value):
+class StationaryLocus(Checked):
     """Points with given values of some coordinates, all of them stationary.
 
     The energy depends on these coordinates only; its derivative vanishes there, and at no other
@@ -97,7 +98,7 @@ class StationaryLocus(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class StationaryList(Printed, Value):
+class StationaryList(Printed, Checked):
     """Stationary points of an energy on a polyhedron in a box; see :func:`stationary_points`.
 
     Attributes
@@ -245,6 +246,7 @@ class StationaryList(Printed, Value):
         head = (*given, "index", f"a point ({', '.join(names)})")
         return Table(head, rows, tuple(range(len(given) + 1)), "Loci")
 
+    @checked
     def save(self, path: "str | os.PathLike[str]") -> "Path":
         """Save the list and its proof, for an independent checker; return the path.
 

@@ -1,0 +1,284 @@
+"""The kinds of values that annotations name, for fields of values and arguments of functions.
+
+A kind is checked as far as it can be seen from outside: classes, numbers, truth values, words,
+arrays, and what collections contain.  Whatever an annotation leaves open (``Any``, ``ArrayLike``,
+iterables) is checked by the function itself.  A name that is known to a type checker only, such as
+``sympy.Expr``, stands for every class of that name.
+"""
+
+import builtins
+import os
+import sys
+import types
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cache, wraps
+from inspect import Parameter, signature
+from itertools import islice
+from numbers import Integral, Real
+from typing import Any, ForwardRef, Literal, NoReturn, TypeVar, Union, get_args, get_origin
+
+import numpy as np
+
+from polycorner.checks import is_array, listed, refuse
+
+F = TypeVar("F", bound=Callable[..., Any])
+Test = Callable[[Any], bool]
+LOOKED_AT = 64  # members of a collection that are checked, so that long ones stay cheap
+OPEN = "anything"
+UNIONS = ("Energy", "Quantity")  # unions for a type checker; what takes them checks them
+WORDS: Mapping[Any, tuple[str, Test]] = {
+    bool: ("True or False", lambda value: isinstance(value, bool | np.bool_)),
+    int: ("a whole number", lambda value: _is_number(value, Integral)),
+    float: ("a number", lambda value: _is_number(value, Real)),
+    str: ("text", lambda value: isinstance(value, str)),
+    type(None): ("None", lambda value: value is None),
+    os.PathLike: ("a path", lambda value: isinstance(value, os.PathLike)),
+}
+DTYPES = {np.float64: "fiu", np.int64: "iu", np.bool_: "b"}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is expected, in words, and the test of it; None where everything passes."""
+
+    words: str
+    test: Test | None
+    by_class: bool = False  # then an error names the class that came instead
+
+    def refuse(self, argument: str, value: object) -> NoReturn:
+        """Raise TypeError for a value."""
+        if not self.by_class:
+            refuse(argument, self.words, value, TypeError)
+        msg = f"{argument}: expected {self.words}; got {type(value).__name__}"
+        raise TypeError(msg)
+
+    def check(self, argument: str, value: object) -> None:
+        """Raise TypeError unless a value is of this kind."""
+        if self.test is not None and not self.test(value):
+            self.refuse(argument, value)
+
+
+def check_fields(value: Any) -> None:
+    """Raise TypeError for a field of a dataclass that is not what its annotation says."""
+    known: Any = type(value)  # mypy does not know that classes are hashable
+    given = vars(value)
+    for name, test, kind in _fields(known):
+        if not test(given[name]):
+            kind.refuse(name, given[name])
+
+
+def checked(function: F) -> F:
+    """Return a function that raises TypeError for arguments that are not what they should be.
+
+    Examples
+    --------
+    >>> @checked
+    ... def half(count: int) -> float:
+    ...     return count / 2
+    >>> half("4")
+    Traceback (most recent call last):
+    TypeError: count: expected a whole number; got '4'
+    """
+    parameters = signature(function).parameters
+    names = [
+        name
+        for name, p in parameters.items()
+        if p.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    ]
+    kinds: dict[str, Kind] = {}
+
+    @wraps(function)
+    def call(*given: Any, **named: Any) -> Any:
+        if not kinds:
+            known = {
+                n: _or_list(kind_of(p.annotation, function.__module__))
+                for n, p in parameters.items()
+            }
+            kinds.update(known)
+        for name, value in zip(names, given, strict=False):
+            kinds[name].check(name, value)
+        for name, value in named.items():
+            if name in kinds:
+                kinds[name].check(name, value)
+        return function(*given, **named)
+
+    return call  # type: ignore[return-value]
+
+
+def kind_of(annotation: Any, module: str) -> Kind:
+    """Return the kind that an annotation in a module stands for."""
+    if isinstance(annotation, ForwardRef):
+        annotation = annotation.__forward_arg__
+    if isinstance(annotation, str):
+        annotation = eval(annotation, {}, _Names(vars(sys.modules[module])))
+        return kind_of(annotation, module)
+    if annotation is Parameter.empty:
+        return Kind(OPEN, None)
+    if annotation is None:
+        annotation = type(None)
+    if annotation in WORDS:
+        return Kind(*WORDS[annotation])
+    parts = get_args(annotation)
+    origin = get_origin(annotation) or annotation
+    if origin in (Union, types.UnionType) or isinstance(annotation, _Either):
+        return _either([kind_of(part, module) for part in parts or annotation.parts])
+    if origin is Literal:
+        return Kind(listed(map(repr, parts)), lambda v: isinstance(v, str))  # which word: `choice`
+    if origin is np.ndarray:
+        return _array(get_args(parts[1])[0] if len(parts) > 1 and get_args(parts[1]) else None)
+    if isinstance(annotation, _Named):
+        name = annotation.name
+        return Kind(_a(name), lambda v: any(c.__name__ == name for c in type(v).__mro__), True)
+    return _of_class(origin, parts, module)
+
+
+def _or_list(kind: Kind) -> Kind:
+    """Return the kind of an argument: lists are arrays, whose numbers the function checks."""
+    test = kind.test
+    if test is None or not kind.words.startswith("an array"):
+        return kind
+    return Kind(kind.words, lambda value: isinstance(value, list | tuple) or test(value))
+
+
+def _of_class(origin: Any, parts: Sequence[Any], module: str) -> Kind:
+    if origin is os.PathLike:
+        return Kind(*WORDS[os.PathLike])
+    if origin is Callable:
+        return Kind("a function", callable)
+    if getattr(origin, "_is_protocol", False) and origin.__module__ != "collections.abc":
+        return Kind("a function", callable) if "__call__" in vars(origin) else Kind(OPEN, None)
+    if not isinstance(origin, type) or origin in (Any, object):
+        return Kind(OPEN, None)
+    if issubclass(origin, tuple) and parts:
+        return _tuple([kind_of(p, module) for p in parts if p is not ...], ... in parts)
+    if issubclass(origin, Mapping) and len(parts) == 2:
+        return _mapping(origin, *(kind_of(p, module) for p in parts))
+    if issubclass(origin, Collection) and len(parts) == 1:
+        return _collection(origin, kind_of(parts[0], module))
+    return Kind(_a(origin.__name__), lambda value: isinstance(value, origin), by_class=True)
+
+
+def _either(kinds: Sequence[Kind]) -> Kind:
+    tests = [kind.test for kind in kinds if kind.test is not None]
+    if len(tests) < len(kinds):
+        return Kind(OPEN, None)
+    words = dict.fromkeys(kind.words for kind in kinds if kind.words != "None")
+    classes = all(kind.by_class or kind.words == "None" for kind in kinds)
+    return Kind(listed(words), lambda value: any(test(value) for test in tests), classes)
+
+
+def _array(scalar: Any) -> Kind:
+    kinds = DTYPES.get(scalar)
+    words = {"fiu": "an array of numbers", "iu": "an array of whole numbers"}.get(
+        kinds or "", "an array of truth values" if kinds else "an array"
+    )
+    return Kind(words, lambda v: is_array(v) and (kinds is None or v.dtype.kind in kinds))
+
+
+def _tuple(kinds: Sequence[Kind], several: bool) -> Kind:
+    if several:
+        return _collection(tuple, kinds[0])
+    tests = [kind.test for kind in kinds]
+
+    def fits(value: Any) -> bool:
+        return (
+            isinstance(value, tuple | list)
+            and len(value) == len(tests)
+            and all(test is None or test(v) for test, v in zip(tests, value, strict=True))
+        )
+
+    return Kind(f"({', '.join(kind.words for kind in kinds)})", fits)
+
+
+def _collection(origin: type, kind: Kind) -> Kind:
+    test, words = kind.test, _a(origin.__name__.lower())
+    like: dict[type, Test] = {Sequence: _is_plain, tuple: lambda value: isinstance(value, list)}
+    is_like = like.get(origin, lambda _: False)
+
+    def fits(value: Any) -> bool:
+        return (
+            (isinstance(value, origin) or is_like(value))
+            and not isinstance(value, str | bytes | Mapping)
+            and (test is None or is_array(value) or all(map(test, islice(value, LOOKED_AT))))
+        )
+
+    return Kind(words if kind.words == OPEN else f"{words}, each {kind.words}", fits)
+
+
+def _mapping(origin: Any, key: Kind, value: Kind) -> Kind:
+    def fits(given: Any) -> bool:
+        return isinstance(given, origin) and all(
+            (key.test is None or key.test(k)) and (value.test is None or value.test(v))
+            for k, v in islice(given.items(), LOOKED_AT)
+        )
+
+    return Kind(f"a mapping from {key.words} to {value.words}", fits)
+
+
+def _is_plain(value: Any) -> bool:
+    return is_array(value) and value.dtype.kind in "biuf"
+
+
+def _is_number(value: Any, kind: type) -> bool:
+    if isinstance(value, bool) or not isinstance(value, kind):
+        return False
+    try:
+        float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return False
+    return True
+
+
+def _a(name: str) -> str:
+    return f"{'an' if name[:1] in 'AEIOUaeiou' else 'a'} {name}"
+
+
+@cache
+def _fields(kind: Any) -> tuple[tuple[str, Test, Kind], ...]:
+    owners = {
+        name: base
+        for base in reversed(kind.__mro__)
+        for name in vars(base).get("__annotations__", ())
+    }
+    found = ((f.name, kind_of(f.type, owners[f.name].__module__)) for f in fields(kind))
+    return tuple((name, k.test, k) for name, k in found if k.test is not None)
+
+
+@dataclass(frozen=True)
+class _Named:
+    """A class that is known to a type checker only."""
+
+    name: str
+
+    def __getattr__(self, name: str) -> "_Named":
+        return _Named(name)
+
+    def __getitem__(self, _: object) -> "_Named":
+        return self
+
+    def __or__(self, other: object) -> "_Either":
+        return _Either((self, other))
+
+    def __ror__(self, other: object) -> "_Either":
+        return _Either((other, self))
+
+
+@dataclass(frozen=True)
+class _Either:
+    parts: tuple[object, ...]
+
+    def __or__(self, other: object) -> "_Either":
+        return _Either((*self.parts, other))
+
+    def __ror__(self, other: object) -> "_Either":
+        return _Either((other, *self.parts))
+
+
+class _Names(dict[str, Any]):
+    """Names of a module; any other stands for a class."""
+
+    def __missing__(self, name: str) -> Any:
+        if name in UNIONS:
+            return Any
+        return getattr(builtins, name, None) or sys.modules.get(name) or _Named(name)
