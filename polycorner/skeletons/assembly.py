@@ -7,13 +7,22 @@ from itertools import pairwise
 import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
-from polycorner.skeletons.borders import Border, seeds_of
+from polycorner.skeletons.borders import Border, Tip, seeds_of
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.incidences import Flag, flags_of, groups_of, joins_of, masked
+from polycorner.skeletons.incidences import (
+    Flag,
+    edge_of,
+    flags_of,
+    groups_of,
+    joins_of,
+    masked,
+    untold,
+)
 from polycorner.skeletons.masks import mask_of, positions_in
 from polycorner.skeletons.partitions import Partition
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
+from polycorner.skeletons.pieces import joined_by_nets, pointed_faces, tip_of
 from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.vertex_figures import Ray
@@ -23,7 +32,10 @@ from polycorner.spaces.manifold import Array
 
 def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
     """Return the skeleton as far as it was found."""
-    faces, components = _faces(explorer)
+    finished = complete is Completeness.EXHAUSTED
+    faces, components, notes = _faces(explorer, finished=finished)
+    if notes and finished:
+        complete = Completeness.GAPS
     corners = tuple(_corner(explorer, record) for record in explorer.records)
     edges = tuple(
         Edge(
@@ -44,7 +56,7 @@ def assembled(explorer: Explorer, complete: Completeness) -> Skeleton:
         edges=edges,
         faces=faces,
         complete=complete,
-        notes=tuple(explorer.notes),
+        notes=tuple(dict.fromkeys([*explorer.notes, *notes])),
         components=components,
         whole=_whole(explorer),
         contacts=_contacts(explorer, corners, edges, faces),
@@ -84,8 +96,14 @@ def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
     )
 
 
-def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
-    """Assemble faces: flags that meet at corners and along edges, then crossings."""
+def _faces(
+    explorer: Explorer, *, finished: bool
+) -> tuple[tuple[Face, ...], dict[int, int], list[str]]:
+    """Assemble faces: flags that meet at corners and along edges, then crossings.
+
+    A straight way across a face with a tip may pass through the tip into another one: there nets
+    tell what belongs together.  Notes say where they do not.
+    """
     flags = dict.fromkeys(flags_of(explorer))
     boundary, surface = Partition(flags), Partition(flags)
     broken: list[Flag] = []
@@ -95,8 +113,16 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
             surface.join(one, other)
         elif one in flags:
             broken.append(one)
+    pointed = pointed_faces(explorer)
     for crossing in explorer.crossings:
-        surface.join(*(masked(explorer, flag) for flag in (crossing.start, crossing.stop)))
+        start, stop = (masked(explorer, flag) for flag in (crossing.start, crossing.stop))
+        if start[2] not in pointed:
+            surface.join(start, stop)
+    notes = list(untold(explorer, flags)) if finished else []
+    for mask, tips in pointed.items():
+        around = groups_of(surface, [flag for flag in flags if flag[2] == mask])
+        for one, other in joined_by_nets(explorer, mask, tips, around, notes):
+            surface.join(one, other)
     patches = _patches(explorer, flags)
     for flag, k in patches.items():
         surface.join(flag, next(other for other, j in patches.items() if j == k))
@@ -108,11 +134,13 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
             Face(
                 active=tuple(explorer.polyhedron.names[i] for i in positions_in(group[0][2])),
                 boundary=tuple(
-                    tuple(sorted({_edge_of(explorer, flag) for flag in curve} - {-1}))
+                    tuple(sorted({edge_of(explorer, flag) for flag in curve} - {-1}))
                     for curve in curves
                 ),
                 closed=not any(boundary[curve[0]] in loose for curve in curves),
-                border=_border(explorer, group, len(curves), patches.get(group[0])),
+                border=_border(
+                    explorer, group, sum(c[0][0] != "apex" for c in curves), patches.get(group[0])
+                ),
             )
         )
     alone = [k for k in range(len(explorer.patches)) if k not in patches.values()]
@@ -120,7 +148,7 @@ def _faces(explorer: Explorer) -> tuple[tuple[Face, ...], dict[int, int]]:
         Face(_ordered(explorer, explorer.registry.names(explorer.patches[k].active)), (), True, b)
         for k, b in ((k, _closed_border(explorer, k)) for k in alone)
     ]
-    return tuple(faces), _components(explorer, flags, surface, patches, len(faces))
+    return tuple(faces), _components(explorer, flags, surface, patches, len(faces)), notes
 
 
 def _patches(explorer: Explorer, flags: Iterable[Flag]) -> dict[Flag, int]:
@@ -149,28 +177,36 @@ def _border(explorer: Explorer, group: list[Flag], curves: int, patch: int | Non
     """
     if patch is not None:
         return _closed_border(explorer, patch)
-    if explorer.symmetry.relabels or any(flag[0] == "apex" for flag in group):
+    if explorer.symmetry.relabels:
         return None
-    positions = sorted({_edge_of(explorer, flag) for flag in group} - {-1})
+    positions = sorted({edge_of(explorer, flag) for flag in group} - {-1})
     around = [explorer.curves[k] for k in positions]
-    members, corners = set(group), []
+    members, corners, tips = set(group), [], list[Tip]()
     for k, record in enumerate(explorer.records):
-        for sector in record.figure.sectors:
+        for s, sector in enumerate(record.figure.sectors):
             rays = sector.rays
-            if rays and ("half", (k, rays[0]), mask_of(sector.held)) in members:
-                if record.figure.singular:
+            where = ("half", (k, rays[0])) if rays else ("apex", (k, s))
+            if (*where, mask_of(sector.held)) not in members:
+                continue
+            if record.figure.singular or sector.sample is not None:
+                tip = tip_of(explorer, record, sector)
+                if tip is None:
                     return None
-                first, last = (
-                    _ray(record.figure.rays[i]) for i in (sector.rays[0], sector.rays[-1])
+                tips.append(tip)
+            else:
+                corners.append(
+                    (_ray(record.figure.rays[rays[0]]), _ray(record.figure.rays[rays[-1]]))
                 )
-                corners.append((first, last))
+    seeds = [seeds_of([curve.points for curve in around])] if around else []
+    seeds += [tip.near[None] for tip in tips if tip.sampled]
     return Border(
         quotient=explorer.quotient,
         active=frozenset(positions_in(group[0][2])),
-        seeds=seeds_of([curve.points for curve in around]) if around else np.empty((0, 0)),
+        seeds=np.concatenate(seeds) if seeds else np.empty((0, 0)),
         edges=tuple((c.active, c.points, c.start is None) for c in around),
         corners=tuple(corners),
         curves=curves,
+        tips=tuple(tips),
     )
 
 
@@ -201,19 +237,8 @@ def _ends(explorer: Explorer, flags: Iterable[Flag]) -> Iterator[Flag]:
         if flag[0] == "curve":
             if explorer.curves[flag[1]].kinds[0] is not End.CLOSED:
                 yield flag
-        elif flag[0] == "half" and _edge_of(explorer, flag) < 0:
+        elif flag[0] == "half" and edge_of(explorer, flag) < 0:
             yield flag
-
-
-def _edge_of(explorer: Explorer, flag: Flag) -> int:
-    if flag[0] == "curve":
-        return int(flag[1])
-    if flag[0] == "apex":
-        return -1
-    k, i = flag[1]
-    record = explorer.records[k]
-    found: int = record.edges.get(record.orbit[i], -1)
-    return found
 
 
 def _components(
@@ -239,7 +264,7 @@ def _components(
         inside = Partition([*patch_places, *(("surface", surface[flag]) for flag in flags)])
         for flag in flags:
             if flag[0] != "apex":
-                inside.join(("edge", _edge_of(explorer, flag)), ("surface", surface[flag]))
+                inside.join(("edge", edge_of(explorer, flag)), ("surface", surface[flag]))
         for flag, k in patches.items():
             inside.join(("patch", k), ("surface", surface[flag]))
         for link in explorer.links:

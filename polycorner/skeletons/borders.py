@@ -11,6 +11,31 @@ from polycorner.values import Value
 
 
 @dataclass(frozen=True, eq=False)
+class Tip(Value):
+    """A corner of a face whose tangents there do not tell the face.
+
+    Attributes
+    ----------
+    point : (n,) array
+        The corner.
+    near : (n,) array
+        A point of the face, or of an edge around it, at a small distance.
+    ways : tuple of (n,) arrays
+        Scaled directions of the edges of the face there; none where it goes around.
+    sampled : bool
+        Whether ``near`` lies inside the face, so that it can be followed around the corner.
+    pointed : bool
+        Whether the gradients of the functions that vanish on the face are dependent there.
+    """
+
+    point: Array
+    near: Array
+    ways: tuple[Array, ...]
+    sampled: bool
+    pointed: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Border(Value):
     """The boundary of a two-dimensional face.
 
@@ -28,7 +53,9 @@ class Border(Value):
         For every corner of the face and both of its edges there, the active functions, and a point
         of the edge with the direction away from the corner.
     curves : int
-        Number of boundary curves.
+        Number of boundary curves, without those that are one point.
+    tips : tuple of Tip
+        Corners that are not told by tangents.
     """
 
     quotient: Quotient
@@ -37,6 +64,17 @@ class Border(Value):
     edges: tuple[tuple[frozenset[int], Array, bool], ...]
     corners: tuple[tuple[tuple[frozenset[int], Array], tuple[frozenset[int], Array]], ...]
     curves: int
+    tips: tuple[Tip, ...] = ()
+
+    @property
+    def balls(self) -> list[tuple[Array, Array]]:
+        """Centres of balls about the tips, and points outside them."""
+        return balls_about(self.tips)
+
+
+def balls_about(tips: Sequence[Tip]) -> list[tuple[Array, Array]]:
+    """Return centres of balls about tips, and points outside them."""
+    return [(tip.point, tip.near) for tip in tips]
 
 
 def seeds_of(edges: Sequence[Array]) -> Array:

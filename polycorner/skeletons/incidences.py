@@ -1,6 +1,7 @@
 """Incidences of a search: which beginnings of edges and faces belong to one face."""
 
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator
 from typing import Any
 
 from polycorner.polyhedra.symmetry import generators
@@ -53,10 +54,41 @@ def joins_of(explorer: Explorer) -> Iterator[tuple[Flag, Flag]]:
                 yield ("half", curve.start, face), ("half", curve.stop, along(face))
 
 
+def untold(explorer: Explorer, flags: Container[Flag]) -> Iterator[str]:
+    """Yield notes on corners at which faces beside their edges are missing.
+
+    The closure of a face is a union of faces, edges and corners (the condition of the frontier,
+    [GoreskyMacPherson], part I): a face whose closure contains a part of an edge contains its ends.
+    """
+    missing: Counter[int] = Counter()
+    for k, curve in enumerate(() if explorer.symmetry.relabels else explorer.curves):
+        faces = explorer.faces_beside(k)
+        for end in (curve.start, curve.stop):
+            if end is not None:
+                told = (("half", end, mask_of(face)) in flags for face in faces)
+                missing[end[0]] += sum(not known for known in told)
+    for k, count in missing.items():
+        if count:
+            active = explorer.registry.written(explorer.records[k].active)
+            yield f"at the corner {active} {count} faces beside its edges could not be followed"
+
+
 def masked(explorer: Explorer, flag: NamedFlag) -> Flag:
     """Return a flag with the bits of its functions in place of their names."""
     kind, where, names = flag
     return kind, where, mask_of(map(explorer.polyhedron.names.index, names))
+
+
+def edge_of(explorer: Explorer, flag: Flag) -> int:
+    """Return the position of the edge that a flag is at; -1 for an apex and where it is unknown."""
+    if flag[0] == "curve":
+        return int(flag[1])
+    if flag[0] == "apex":
+        return -1
+    k, i = flag[1]
+    record = explorer.records[k]
+    found: int = record.edges.get(record.orbit[i], -1)
+    return found
 
 
 def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:

@@ -7,7 +7,8 @@ For a height without degenerate critical points on a compact face and on its edg
 a critical point inside counts ``(-1)^index``; a minimum of the height along an edge counts 1 and a
 maximum -1 if the height rises into the face there, otherwise 0; a corner counts 1 if the height
 rises everywhere, -1 if it falls on two sides of a rise, otherwise 0 [GoreskyMacPherson, part I].
-Several heights in general position have to agree.
+Tips count as in :mod:`~polycorner.skeletons.tip_indices`.  Several heights in general position have
+to agree.
 """
 
 import numpy as np
@@ -17,6 +18,7 @@ from polycorner.skeletons.borders import Border
 from polycorner.skeletons.heights import Height
 from polycorner.skeletons.nets import LEVELS, Net
 from polycorner.skeletons.surfaces import Surface
+from polycorner.skeletons.tip_indices import links_at, tips_index
 from polycorner.spaces.manifold import Array
 
 # Heights that have to agree, and that are tried.
@@ -29,14 +31,14 @@ NEWTON = 10
 ACROSS = 1e-7
 # Determinant of a Hessian, relative to its entries, below which it counts as degenerate.
 DEGENERATE = 1e-6
-# Parts of the way from a point of the net to a critical point at which it must be on the face.
+# Parts of the way from the net to a critical point at which it must be on the face.
 WAY = np.linspace(0.1, 1.0, 10)
 PARALLEL = 1e-6
 FAR = 1e9
 HALVINGS = 12
 # Distance in scale units from the end of an edge at which it is looked at last.
 BEFORE = 1e-3
-# Last Newton step, in scale units, to a critical point.
+# Last Newton step, in scale units, to a critical point, and distance of points that are one.
 CONVERGED = 1e-6
 
 
@@ -45,35 +47,64 @@ def face_euler_characteristic(border: Border) -> int | None:
 
     It is not where a net does not cover the face, where the net leaves the face elsewhere than
     at the edges of the border, where heights do not agree, or where a finite symmetry carries the
-    face to itself.
+    face to itself.  A bounded face of a plane has no handles: there the number of boundary curves
+    must tell the same, and at thin tips, which a net does not fill, tells it alone.
     """
     symmetry = border.quotient.symmetry
     whole = None if symmetry.relabels else aligned(border)
     if whole is None:
         return None
     border = whole
-    surface = Surface(border.quotient, border.active, border.seeds[0])
-    nets = (Net(surface, border.seeds, levels=levels) for levels in (LEVELS, FINER * LEVELS))
-    net = next((net for net in nets if net.complete and _enclosed(surface, net, border)), None)
-    if net is None:
+    surface = Surface(border.quotient, border.active, border.seeds[0], border.balls)
+    found = _agreed(border, surface, np.random.default_rng(0))
+    handles = None if found is None else 2 - border.curves - found
+    if surface.is_plane:
+        known = handles == 0 or (found is None and border.tips and _is_bounded(surface, border))
+        return 2 - border.curves if known else None
+    orientable = symmetry.invariants is None and not surface.manifold.rotations
+    if handles is None or handles < 0 or (orientable and handles % 2):
         return None
-    rng = np.random.default_rng(0)
+    return found
+
+
+def _agreed(border: Border, surface: Surface, rng: np.random.Generator) -> int | None:
+    """Return the number in which several heights agree."""
+    links = links_at(surface, border.tips)
+    seeds, extent = border.seeds, border.quotient.extent
+    nets = (Net(surface, seeds, extent, levels) for levels in (LEVELS, FINER * LEVELS))
+    net = next((net for net in nets if net.complete and _enclosed(surface, net, border)), None)
+    if links is None or net is None:
+        return None
     found: list[int] = []
     for _ in range(HEIGHTS):
-        total = _counted(border, surface, net, Height(surface, rng))
+        height = Height(surface, rng)
+        total = _counted(border, surface, net, height)
         if total is not None:
-            found.append(total)
+            found.append(total + tips_index(height, links))
         if len(found) == AGREEING:
             break
-    if len(found) < AGREEING or len(set(found)) > 1:
-        return None
-    handles = 2 - border.curves - found[0]
-    orientable = symmetry.invariants is None and not surface.manifold.rotations
-    return found[0] if handles >= 0 and not (orientable and handles % 2) else None
+    return found[0] if len(found) == AGREEING and len(set(found)) == 1 else None
+
+
+def _is_bounded(surface: Surface, border: Border) -> bool:
+    """Whether a face of a plane lies inside its boundary: whether Green's theorem gives an area."""
+    height, area = Height(surface, np.random.default_rng(0)), 0.0
+    surface = Surface(surface.quotient, surface.active, border.seeds[0])
+    for active, points, _ in border.edges:
+        k = len(points) // 2
+        chord = (points[k] - points[k - 1])[None] / surface.scales
+        found = _sides(surface, height, active, points[k : k + 1], chord)
+        if found is None:
+            return False
+        u, inward = points / surface.scales, found[2][0]
+        turn = np.sign(chord[0, 0] * inward[1] - chord[0, 1] * inward[0])
+        area += turn * float((u[:-1, 0] * u[1:, 1] - u[1:, 0] * u[:-1, 1]).sum())
+    return area > 0
 
 
 def _counted(border: Border, surface: Surface, net: Net, height: Height) -> int | None:
     total = _inside(surface, net, height)
+    surface = Surface(surface.quotient, surface.active, border.seeds[0])  # balls would hide ends
     for edge in border.edges:
         along = None if total is None else _along(surface, height, *edge)
         total = None if along is None or total is None else total + along
@@ -84,11 +115,11 @@ def _counted(border: Border, surface: Surface, net: Net, height: Height) -> int 
 
 
 def _enclosed(surface: Surface, net: Net, border: Border) -> bool:
-    """Whether rays of a net leave the face only near the edges of its border."""
+    """Whether rays of a net leave the face only near the edges of its border, and at balls."""
     if not len(net.ends):
         return True
     ends = surface.embedded(net.ends)
-    near = np.zeros(len(ends), dtype=bool)
+    near = surface.inside_balls(net.ends)
     for _, points, _ in border.edges:
         where = surface.embedded(points)
         chords = np.diff(where, axis=0)
@@ -234,7 +265,14 @@ def _along(
 
 
 def _approached(surface: Surface, active: frozenset[int], points: Array) -> Array:
-    """Return the points of an edge with one more just before its end."""
+    """Return the points of an edge with one more just before its end.
+
+    Without those that are its ends but for rounding, as where a walk arrives at a tip.
+    """
+    away = [np.linalg.norm((points - end) / surface.scales, axis=1) for end in points[[0, -1]]]
+    apart = np.minimum(*away) > CONVERGED
+    apart[[0, -1]] = True
+    points = points[apart]
     back = points[-2] - points[-1]
     part = min(0.5, BEFORE / float(np.linalg.norm(back / surface.scales)))
     edge = Surface(surface.quotient, active, points[-2])

@@ -24,6 +24,8 @@ COVERED = 0.85
 WITHIN = 1.1
 HEIGHT = 0.35
 FIRST = 0.5
+# Longest radius as a part of the distance from the centre of a ball: rays do not pass beyond it.
+BEFORE_BALLS = 0.5
 GROWTH = 1.5
 SHRINK = 0.7
 SHORTEST = 1e-4
@@ -44,10 +46,18 @@ class Net:
         Points of the net, and points just outside the face where rays from them have left it.
     complete : bool
         Whether the face is covered.
+    within : bool
+        Whether it is covered up to the extent; looked at only ``up_to_extent``.
     """
 
     def __init__(
-        self, surface: Surface, seeds: Array, extent: float = math.inf, levels: int = LEVELS
+        self,
+        surface: Surface,
+        seeds: Array,
+        extent: float = math.inf,
+        levels: int = LEVELS,
+        *,
+        up_to_extent: bool = False,
     ) -> None:
         self.surface, self.extent, self.levels = surface, extent, levels
         n = len(surface.scales)
@@ -59,7 +69,9 @@ class Net:
         self.images = np.empty((0, n, 2))
         self.starts: Array = np.empty((0, n))
         self.ends: Array = np.empty((0, n))
-        self.complete = self._grow(seeds, np.full(len(seeds), min(FIRST, self.longest)))
+        self._far, self._beyond = False, up_to_extent
+        self.within = self._grow(seeds, np.full(len(seeds), min(FIRST, self.longest)))
+        self.complete = self.within and not self._far
 
     def _grow(self, candidates: Array, radii: Array) -> bool:
         while len(candidates):
@@ -68,9 +80,11 @@ class Net:
                 return False
             new = np.arange(known, len(self.points))
             moved = (self.points[new] - self.points[0]) / self.surface.scales
-            if (abs(moved) > self.extent).any():
+            far = (abs(moved) > self.extent).any(axis=1)
+            self._far |= bool(far.any())
+            if self._far and not self._beyond:
                 return False
-            candidates, radii = self._rays(new)
+            candidates, radii = self._rays(new[~far])
             if np.isnan(radii).any():
                 return False
         return True
@@ -86,6 +100,7 @@ class Net:
         frames, images = self.surface.frames(points, tangents)
         normals = self.surface.across(gradients)
         where = self.surface.embedded(points)
+        radii = np.minimum(radii, BEFORE_BALLS * self.surface.room(where))
         free = ~self.covers(where, normals)
         for k in np.flatnonzero(free):
             if not free[k]:
@@ -103,6 +118,12 @@ class Net:
             self.where = np.concatenate([self.where, where[one]])
             self.radii = np.concatenate([self.radii, radii[one]])
         return True
+
+    def holds(self, q: Array) -> bool:
+        """Whether a point of the surface lies on the net."""
+        _, gradients = self.surface.evaluated(q[None])
+        normals = self.surface.across(gradients)
+        return bool(self.covers(self.surface.embedded(q[None]), normals, WITHIN)[0])
 
     def covers(self, where: Array, normals: Array, part: float = COVERED) -> Flags:
         """Whether embedded points with given normals lie near a point of the net."""
@@ -177,6 +198,8 @@ class Net:
             radii.append(length)
             self._leave(new, guess, reached, good)
             new = new[bent]
+        if not starts:
+            return np.empty((0, self.points.shape[1])), np.empty(0)
         points = np.concatenate([p for p, _ in starts])
         found = np.concatenate([f for _, f in starts])
         allowed = np.minimum(GROWTH * np.concatenate(radii), self.longest)

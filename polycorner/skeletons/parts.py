@@ -130,7 +130,8 @@ class Face(Checked):
         Whether every boundary curve closes: no end at infinity, and no corner where the face
         could not be followed.
     border : Border or None
-        What its Euler characteristic is computed from.
+        What its Euler characteristic is computed from; None modulo relabellings, and where no point
+        of it is known beside a singular corner.
     """
 
     active: tuple[str, ...]
@@ -147,9 +148,9 @@ class Face(Checked):
         was found, heights do not agree, or a finite symmetry carries it to itself or relabels
         functions.  Computed when it is asked for.
         """
-        if self.border is None:  # as at a singular corner
-            return 2 - len(self.boundary) if self.closed else None
-        found = face_euler_characteristic(self.border) if self.closed else None
+        if self.border is None or not self.closed:
+            return None
+        found = face_euler_characteristic(self.border)
         return None if found is None else found - self.boundary.count(())
 
 

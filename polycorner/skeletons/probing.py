@@ -8,7 +8,7 @@ import numpy as np
 from polycorner.polyhedra.symmetry import renamed
 from polycorner.skeletons.curves import Curve, EdgeEnd
 from polycorner.skeletons.islands import Cloud, minimised, moved_in, on_zero, violated
-from polycorner.skeletons.nets import WITHIN, Net
+from polycorner.skeletons.nets import Net
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.registry import SingularFigure, written_point
 from polycorner.skeletons.surfaces import Surface
@@ -102,17 +102,11 @@ class Prober(EdgeTracer):
     def _on_net(self, k: int, q: Array) -> bool:
         if k not in self._nets:
             self._nets[k] = self._net(self.patches[k].active, self.patches[k].point)
-        return self._is_on(self._nets[k], q)
+        return self._nets[k].holds(q)
 
     def _is_open(self, point: EvaluatedPoint, active: frozenset[int]) -> bool:
         """Whether a point lies on a face that a net could not cover."""
-        return any(there == active and self._is_on(net, point.q) for there, net in self._open)
-
-    @staticmethod
-    def _is_on(net: Net, q: Array) -> bool:
-        _, gradients = net.surface.evaluated(q[None])
-        normals = net.surface.across(gradients)
-        return bool(net.covers(net.surface.embedded(q[None]), normals, WITHIN)[0])
+        return any(there == active and net.holds(point.q) for there, net in self._open)
 
     def _net(self, active: frozenset[int], q: Array) -> Net:
         surface = Surface(self.quotient, active, q)

@@ -14,6 +14,7 @@ from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.branched_corners import with_branches
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.singularities import SingularPoint, refined
+from polycorner.skeletons.spheres_about import SAMPLED
 from polycorner.skeletons.vertex_figures import VertexFigure, corner_rank, vertex_figure
 from polycorner.spaces.manifold import Array
 from polycorner.workers import Shared
@@ -184,10 +185,13 @@ class CornerRegistry:
         """Return the vertex figure of a corner."""
         rank, full = corner_rank(point, active)
         if rank == full:
-            found = vertex_figure(point, active)
-            if len(active) == full or self.polyhedron.is_union:
-                return found
-            return with_branches(found, point, active)
+            found = whole = vertex_figure(point, active)
+            if len(active) > full and not self.polyhedron.is_union:
+                whole = with_branches(found, point, active)
+            if full > SAMPLED or (len(whole.rays) == len(found.rays) and not whole.is_thin):
+                return whole
+            linked = self.singular_figure(point, active, rank)
+            return whole if linked.notes else linked
         point = SingularPoint(self.quotient, point.q, sorted(active))
         return self.singular_figure(point, active, corner_rank(point, active)[0])
 
@@ -220,7 +224,8 @@ class CornerRegistry:
             alike.setdefault(self.names(record.figure.rays[i].active), []).append(i)
         names = self.names(active)
         possible = [(i, p) for p in relabellings for i in alike.get(renamed(names, p), [])]
-        if possible and not record.figure.singular and not self.polyhedron.is_union:
+        single = max(map(len, alike.values()), default=0) == 1 and not self.polyhedron.is_union
+        if possible and single and not record.figure.singular:
             return possible[0]
         for i, p in possible:
             other = record.figure.rays[i]

@@ -5,7 +5,7 @@ are told apart by their coordinates, or by the invariants of the symmetry, and n
 in orthonormal frames of the tangent plane.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ EXACT = 1e-11
 DIFFERENCE = 1e-6
 # Points at which it is seen whether invariants are computed for many points at once.
 SAMPLE = 3
+# Radius of a ball, as a part of the distance of a point outside it.
+OUTSIDE = 0.7
 # Parts of a straight way that are looked at.
 WAY = np.linspace(0.05, 0.95, 10)
 
@@ -37,9 +39,17 @@ class Surface:
         Functions that vanish on the face.
     seed : (n,) array
         A point of the face or of its boundary.
+    balls : sequence of (n,) arrays, two by two
+        Centres of balls that are taken out of the face, and points just outside them.
     """
 
-    def __init__(self, quotient: Quotient, active: frozenset[int], seed: Array) -> None:
+    def __init__(
+        self,
+        quotient: Quotient,
+        active: frozenset[int],
+        seed: Array,
+        balls: Sequence[tuple[Array, Array]] = (),
+    ) -> None:
         self.quotient, self.active = quotient, active
         self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
         self.scales = self.manifold.scale_array
@@ -47,18 +57,37 @@ class Surface:
         self.watched = [i for i in range(quotient.count) if i not in active]
         self._at_once: bool | None = None  # whether invariants of many points are found in one call
         self._belongs: dict[tuple[bool, ...], bool] = {}
+        self._functions = quotient.count + len(self.polyhedron.equation_names)
+        self._centres: Array = np.array([])
+        if balls:
+            centres, beside = np.array(balls).transpose(1, 0, 2)
+            self._centres = self.embedded(centres)
+            sizes = np.linalg.norm(self.apart(self.embedded(beside), self._centres), axis=1)
+            self._radii = OUTSIDE * sizes
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether it is a plane, in which no face has handles."""
+        plain = self.quotient.symmetry.invariants is None and not self.polyhedron.equation_names
+        return plain and len(self.scales) == 2 and bool(np.isinf(self.manifold.periods).all())
 
     def values(self, q: Array) -> Array:
-        """Return values ``(k, m)`` of all functions."""
+        """Return values ``(k, m)`` of all functions, and distances from the balls after them."""
         with np.errstate(all="ignore"):
             found: Array = self.polyhedron.bundle.evaluate(q, 0)[0]
-        return found
+        return self._with_balls(q, found)
 
     def evaluated(self, q: Array) -> tuple[Array, Array]:
-        """Return values ``(k, m)`` and scaled gradients ``(k, m, n)`` of all functions."""
+        """Return values as :meth:`values`, and scaled gradients ``(k, m, n)`` of all functions."""
         with np.errstate(all="ignore"):
             values, gradients = self.polyhedron.bundle.evaluate(q, 1)
-        return values, gradients * self.scales
+        return self._with_balls(q, values), gradients * self.scales
+
+    def _with_balls(self, q: Array, values: Array) -> Array:
+        if not len(self._centres):
+            return values
+        away = np.linalg.norm(self.apart(self.embedded(q)[:, None], self._centres), axis=2)
+        return np.concatenate([values, away - self._radii], axis=1)
 
     def normals(self, gradients: Array) -> tuple[Array, Array]:
         """Return unit gradients of the held functions ``(k, r, n)`` and their lengths."""
@@ -96,16 +125,27 @@ class Surface:
             q = q + self.scales * _shortest(units, np.nan_to_num(target))
         return q, (size < 1e-8) & np.isfinite(q).all(axis=1)
 
+    def room(self, where: Array) -> Array:
+        """Return distances of embedded points from the nearest centre of a ball."""
+        away = self.apart(where[:, None], self._centres) if len(self._centres) else None
+        none = np.full(len(where), np.inf)
+        return none if away is None else np.asarray(np.linalg.norm(away, axis=2).min(axis=1))
+
+    def inside_balls(self, q: Array) -> Flags:
+        """Whether points lie in one of the balls."""
+        return np.asarray((self.values(q)[:, self._functions :] < 0).any(axis=1))
+
     def contains(self, values: Array) -> Any:
         """Whether points of the surface with given values lie on the face, not on another one."""
         signs = values[:, self.watched] > 0
+        outside = (values[:, self._functions :] > 0).all(axis=1)
         if not self.polyhedron.is_union:
-            return signs.all(axis=1)
+            return signs.all(axis=1) & outside
         found = np.zeros(len(signs), dtype=bool)
         patterns, where = np.unique(signs, axis=0, return_inverse=True)
         for k, pattern in enumerate(patterns):
             found[where.ravel() == k] = self._belongs_to(tuple(pattern.tolist()))
-        return found & np.isfinite(values).all(axis=1)
+        return found & outside & np.isfinite(values).all(axis=1)
 
     def joins(self, before: Array, after: Array) -> Flags:
         """Whether values ``(..., m)`` that change in proportion stay those of the face.

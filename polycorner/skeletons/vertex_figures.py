@@ -83,6 +83,13 @@ class VertexFigure:
         """Whether the point is isolated by second-order terms only."""
         return self.rank < self.full
 
+    @property
+    def is_thin(self) -> bool:
+        """Whether first derivatives do not tell the faces: edges touch, or surfaces do."""
+        pairs = combinations(self.rays, 2)
+        touching = any(one.direction @ other.direction > 1 - FLAT for one, other in pairs)
+        return touching or any(len(s.held) > self.full - 2 for s in self.sectors)
+
 
 def corner_rank(point: EvaluatedPoint, active: frozenset[int]) -> tuple[int, int]:
     """Return the rank of the active gradients in the quotient, and the quotient's dimension."""
