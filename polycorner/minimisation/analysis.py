@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.minimisation.conditions import (
-    NEARLY_FLAT,
     Curvature,
     Multipliers,
     find_curvature,
@@ -16,21 +15,30 @@ from polycorner.minimisation.constancy import symmetric_tangents, without
 from polycorner.minimisation.corner_degeneracy import decide
 from polycorner.minimisation.corners import beside_inflection, corner, seen_from
 from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.evidence import steepest_descent
 from polycorner.minimisation.findings import OPEN, Analysis, Higher, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
 from polycorner.minimisation.steadiness import steady
+from polycorner.minimisation.tangency import falls_on_set, unresolved
 from polycorner.minimisation.verdicts import Verdict
-from polycorner.polyhedra.cones import Rows, inward_direction, rank, unit_rows
+from polycorner.polyhedra.cones import (
+    Rows,
+    independent_rows,
+    inward_direction,
+    null_space,
+    rank,
+    unit_rows,
+)
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.spaces.manifold import Array
 
 # Distances, in scale units, at which lower points are sought where a gradient vanishes.
 DISTANCES = 10.0 ** np.arange(-5, 0)
-STEPS = (0.1, 0.01, 0.001)  # in scale units, at which a way down on the set itself is sought
-ON = 1e-9  # distance, in scale units, up to which a point counts as one of the set
+UNRESOLVED = "at the corner of the active functions beside it, their gradients may be dependent"
+BLIND = "a function whose gradient vanishes may forbid these directions"
 # Where several pieces meet, the first of these verdicts that any of them has decides.
 DECISIVE = (
     Verdict.NOT_STATIONARY,
@@ -89,11 +97,20 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     """
     active = tuple(sorted(piece))
     k, small = len(active), local.small
-    gradients = local.gradients[[*active, *local.sections]]
+    numbers = [*active, *local.sections]
+    gradients = local.gradients[numbers]
     blind = _blind(local, active)
     seen = [i for i in range(len(gradients)) if i not in blind]
     kept = sum(1 for i in seen if i < k)
     rows = Rows(gradients[seen] if blind else gradients, local.rank_tolerance)
+    level = unresolved(local, [numbers[i] for i in seen], rows)
+    if level:
+        exact = None if settled else corner(local, active)
+        if exact is not None:
+            return _analyse_piece(exact, piece, settled=True)
+        sizes = np.linalg.norm(gradients[seen], axis=1)
+        gradients[seen] = rows.truncated(level) * sizes[:, None]
+        rows = Rows(gradients[seen], local.rank_tolerance)
     slope = local.gradients[-1]
     most = 0.1 * float(np.linalg.norm(slope)) / local.rank_tolerance + small
     multipliers = find_multipliers(rows, kept, slope, small, most)
@@ -133,7 +150,10 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
         local=local,
     )
     higher = local.higher != "none"
-    if verdict is Verdict.UNDECIDED and higher and curvature.least >= -small_curvature:
+    if level and verdict not in {Verdict.NOT_STATIONARY, Verdict.NO_MULTIPLIER}:
+        decision = undecided(len(local.point), UNRESOLVED)
+        result = replace(result, decision=decision, verdict=Verdict.UNDECIDED)
+    elif verdict is Verdict.UNDECIDED and higher and curvature.least >= -small_curvature:
         exact = corner(local, active) if weak and independent and not settled else None
         if exact is not None:
             return seen_from(result, _analyse_piece(exact, piece, settled=True))
@@ -142,7 +162,7 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     elif verdict in {Verdict.STRICT_MINIMUM, Verdict.SADDLE} and weak and higher:
         result = beside_inflection(result)
     result = _with_blind(result) if blind else result
-    if result.verdict is Verdict.NO_MULTIPLIER and higher and _falls_on_set(result):
+    if result.verdict is Verdict.NO_MULTIPLIER and higher and falls_on_set(result):
         return replace(result, verdict=Verdict.NOT_STATIONARY)
     return result
 
@@ -169,36 +189,14 @@ def _with_blind(a: Analysis) -> Analysis:
     """
     if a.verdict.is_minimum:
         return a
-    way = (
-        steepest_descent(a)[1] if a.verdict is Verdict.NOT_STATIONARY else a.curvature.vectors[:, 0]
-    )
-    if a.verdict in {Verdict.NOT_STATIONARY, Verdict.SADDLE} and _leads_down(a, way):
+    if a.verdict is Verdict.NOT_STATIONARY and _leads_down(a, steepest_descent(a)[1]):
         return a
+    if a.verdict is Verdict.SADDLE and _leads_down(a, a.curvature.vectors[:, 0]):
+        return a
+    if a.multipliers.exist:
+        decision = undecided(len(a.local.point), BLIND)
+        return replace(a, verdict=Verdict.UNDECIDED, decision=decision)
     return replace(a, verdict=Verdict.NO_MULTIPLIER)
-
-
-def _falls_on_set(a: Analysis) -> bool:
-    """Whether points of the set itself lie in the steepest direction, lower at its rate when near.
-
-    Dependent gradients do not exclude a way down, as those of two equal equations: the linearised
-    cone is then that of the set all the same.
-    """
-    local, problem = a.local, a.local.problem
-    rate, way = steepest_descent(a)
-    if rate <= local.small:
-        return False
-    smaller = problem.with_independent_equations(frozenset(a.active), [local.point])
-    everything = frozenset(range(smaller.inequalities))
-    for step in STEPS:
-        ahead = local.point + step * way * problem.scales
-        reached, point = smaller.restore(everything, ahead)
-        moved = float(np.linalg.norm((point - ahead) / problem.scales))
-        fall = float(local.values[-1] - problem.energy.value(point))
-        if not (reached and moved <= step / 4 and problem.equations_hold(point, ON)):
-            return False
-        if step < STEPS[0] and not fall >= rate * step / 2:
-            return False
-    return True
 
 
 def _leads_down(a: Analysis, way: Array) -> bool:
@@ -231,7 +229,8 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
         hessian, exact = _hessian_with(local, numbers, a.gradients, values), False
         tangent = Rows(a.gradients[held], local.rank_tolerance).null_space
         curvature = find_curvature(hessian, tangent, local.gradients[[]], a.small_curvature)
-        if curvature.least < -a.small_curvature or a.weak:
+        left = abs(local.gradients[-1] - values @ unit_rows(a.gradients)).max()
+        if curvature.least < -a.small_curvature or a.weak or left > local.small:
             return undecided(len(hessian), "the multipliers are not unique")
         flat = curvature.flat
         if not flat.shape[1]:
@@ -271,22 +270,24 @@ def _second_order(a: Analysis, held: list[int], values: Array) -> Decision:
 def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array]:
     """Return positions of independent functions that alone balance the energy, and multipliers.
 
-    Non-negative least squares ends with independent columns; the face of these functions contains
-    that of all.
+    Equations that imply the others come first, as the face has to lie on them.  Along them
+    non-negative least squares end with independent columns; the face contains that of all.
     """
     from scipy.optimize import nnls
 
-    k, units = len(a.active), unit_rows(a.gradients)
+    k, units, slope = len(a.active), unit_rows(a.gradients), a.local.gradients[-1]
     equations = [i for i in strong if i >= k]
-    shares, _ = nnls(np.vstack([units[strong], -units[equations]]).T, a.local.gradients[-1])
+    chosen = independent_rows(units[equations], a.local.rank_tolerance)
+    along = null_space(units[equations], a.local.rank_tolerance)
+    rates = units @ along
+    others = [i for i in strong if i < k and np.linalg.norm(rates[i]) > a.local.rank_tolerance]
+    shares = (
+        nnls(rates[others].T, slope @ along)[0] if others and along.size else [0.0] * len(others)
+    )
+    used = [i for i, share in zip(others, shares, strict=True) if share > 0]
+    used += sorted(equations[i] for i in chosen)
     values = np.zeros(len(units))
-    values[strong] = shares[: len(strong)]
-    values[equations] -= shares[len(strong) :]
-    used = [i for i in strong if values[i] != 0]
-    spanned = rank(units[used], a.local.rank_tolerance)
-    for i in equations:  # one that carries nothing still belongs to the face
-        if i not in used and rank(units[[*used, i]], a.local.rank_tolerance) > spanned:
-            used, spanned = [*used, i], spanned + 1
+    values[used] = np.linalg.lstsq(units[used].T, slope, rcond=None)[0]
     return used, values
 
 

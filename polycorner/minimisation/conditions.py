@@ -13,15 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner.minimisation.copositivity import least_directions
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.polyhedra.cones import Rows, linear_programme, unit_rows
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-# A curvature up to this multiple of the tolerance is not trusted, as it is positive beside an
-# inflection, too; the direction is then treated as flat.
-NEARLY_FLAT = 30.0
-# Nor is one at which Newton's step, what is left of the gradient over the curvature, is longer than
-# this, in scale units: at a degenerate point nearby, both vanish.
+# No curvature is trusted at which Newton's step, what is left of the gradient over the curvature,
+# is longer than this, in scale units: at a degenerate point nearby, both vanish.
 REACHED = 1e-9
 
 
@@ -104,6 +102,8 @@ def _central_multipliers(
     if distance > small or abs(values).max() > most:
         return Multipliers(least, least, least, exist=False, residual=residual)
     lower, upper, centre = _ranges(rows.relations, k, values)
+    if abs(gradient - centre @ units).max() > max(small, residual):
+        centre = values  # over so long a way, nearly dependent rows are not dependent
     return Multipliers(centre, lower, upper, exist=True, residual=residual)
 
 

@@ -153,7 +153,7 @@ def constancy(
     ----------
     problem : Problem
     piece : frozenset of int
-        Inequalities that must hold.
+        Inequalities that must hold, beside all equations.
     q : (n,) array
     face : Face
         Its ``moving`` directions are followed, and generic mixtures of them.
@@ -203,7 +203,7 @@ def _followed(
         if found is None or abs((found - guess)[: len(q)]).max() > BENT * step:
             break
         values, gradients = problem.evaluate(found[: len(q)] * problem.scales, 1)
-        if not _is_inside(piece, values, gradients):
+        if not _is_inside(piece, problem.inequalities, values, gradients):
             break
         pull = gradients[-1] - found[len(q) :] @ gradients[list(face.rows)]
         slope = abs(face.moving.T @ pull).max()
@@ -241,9 +241,10 @@ def _leads_to(
     return bool(abs(here - found).max() <= SAME * (1 + abs(found).max()))
 
 
-def _is_inside(piece: Piece, values: Array, gradients: Array) -> bool:
+def _is_inside(piece: Piece, inequalities: int, values: Array, gradients: Array) -> bool:
     away = distances(values[:-1], gradients[:-1])
-    return bool(np.isfinite(values).all() and (away[sorted(piece)] >= -INSIDE).all())
+    held = (away[sorted(piece)] >= -INSIDE).all() and (abs(away[inequalities:]) <= INSIDE).all()
+    return bool(np.isfinite(values).all() and held)
 
 
 def _corrected(problem: Problem, face: Face, start: Array, w: Array, state: Array) -> Array | None:

@@ -28,9 +28,8 @@ from polycorner.minimisation.degeneracy import (
     order_for,
     symmetric,
     tangent_of,
-    vague,
 )
-from polycorner.minimisation.germs import CLEAR, ROUNDING, reduce_energy
+from polycorner.minimisation.germs import CLEAR, ROUNDING, missed, reduce_energy, vague
 from polycorner.minimisation.jets import NotAnalyticError
 from polycorner.minimisation.signs import Sign, Signed, signed
 from polycorner.minimisation.verdicts import Verdict
@@ -115,7 +114,7 @@ def _on_ray(s: Situation, closed: tuple[int, ...], way: Array) -> Decision:
     coefficients = germ.coefficients.copy()
     coefficients[1] = 0.0 if abs(coefficients[1]) <= s.small else coefficients[1]
     order, direction = germ.domain.order, tangent_of(germ, np.ones(1))
-    passing = vague(germ, coefficients, s.near(face))
+    passing = vague(germ, coefficients, missed(germ, 0, s.near(face)))
     for degree in range(1, order + 1):
         c, noise = coefficients[degree], germ.noise[degree]
         if abs(c) <= ROUNDING * noise:

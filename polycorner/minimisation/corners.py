@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from polycorner.minimisation.degeneracy import undecided
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.findings import OPEN, Analysis, Local
 from polycorner.minimisation.steadiness import is_steady
 from polycorner.minimisation.verdicts import Verdict
@@ -46,8 +47,9 @@ def beside_inflection(a: Analysis) -> Analysis:
 
     Beside an inflection the wall may lie on either side of it.
     """
-    if not is_steady(a.local, a.active, a.gradients, a.multipliers, a.curvature):
+    strict = a.verdict is Verdict.STRICT_MINIMUM
+    point = a.local, a.active, a.gradients, a.multipliers, a.curvature
+    if not is_steady(*point, least=NEARLY_FLAT * a.small_curvature if strict else np.inf):
         reason = "the second order changes as much as it is over a tiny distance"
         return replace(a, verdict=Verdict.UNDECIDED, decision=undecided(len(a.local.point), reason))
-    strict = a.verdict is Verdict.STRICT_MINIMUM
     return replace(a, verdict=Verdict.WEAK_MINIMUM) if strict else a

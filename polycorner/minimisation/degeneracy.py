@@ -10,7 +10,6 @@ order, faster than anything changes on it.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polycorner.minimisation.constancy import (
     Constancy,
@@ -19,7 +18,16 @@ from polycorner.minimisation.constancy import (
     symmetric_directions,
     without,
 )
-from polycorner.minimisation.germs import CLEAR, ROUNDING, Face, Germ, reduce_energy
+from polycorner.minimisation.germs import (
+    CLEAR,
+    MOVE,
+    ROUNDING,
+    Face,
+    Germ,
+    missed,
+    reduce_energy,
+    vague,
+)
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.signs import Sign, Signed, sign_near_zero, signed
 from polycorner.minimisation.verdicts import Verdict
@@ -31,8 +39,7 @@ from polycorner.values import Value
 
 ORDERS = {1: 16, 2: 10, 3: 8, 4: 6}  # degree of the series by its number of variables
 ORDER, MOST = 4, 12  # the degree beyond, and the most variables
-MOVE = 0.01  # distance in scale units by which the degenerate point may be missed
-CLIMBS = 1e-6  # relative rate at which a form grows into the cone from an isolated zero
+REGULAR = 1e-6  # distance in scale units by which a point may be missed that is not degenerate
 FAR = 0.5  # distance in scale units over which constancy suffices in brief
 FALLS = 1e-12  # relative fall of the energy that is seen
 FEASIBLE = 1e-9  # scaled violation that is rounding
@@ -282,6 +289,7 @@ def classify(germ: Germ, half: int, small: float, near: Array) -> Signed:
     domain, m = germ.domain, germ.domain.variables
     coefficients, noise = germ.coefficients.copy(), germ.noise
     if half:
+        near = missed(germ, half, near)
         coefficients[(domain.degrees == 1) & (abs(coefficients) <= small)] = 0.0
     found = []
     for degree in range(2, domain.order + 1):
@@ -301,12 +309,6 @@ def classify(germ: Germ, half: int, small: float, near: Array) -> Signed:
     if (abs(coefficients) <= ROUNDING * noise).all():
         return Signed(Sign.ZERO, 0, np.eye(m)[0], (1,) * m, np.vstack([np.eye(m), -np.eye(m)]))
     return signed(Sign.UNKNOWN, 0, np.zeros(m))
-
-
-def vague(germ: Germ, coefficients: Array, near: Array) -> NDArray[np.bool_]:
-    """Return the mask of the coefficients that may vanish where all variables change a little."""
-    sizes = abs(coefficients)
-    return np.asarray(sizes <= germ.domain.shifted(sizes, near) - sizes)
 
 
 def _sign(germ: Germ, coefficients: Array, noise: Array, half: int, near: Array) -> Signed:
@@ -338,11 +340,11 @@ def _centred(germ: Germ, degree: int) -> tuple[Array, Array] | None:
         slopes = np.array([domain.derivative(form, i)[lower] for i in range(m)]).T
         move = np.linalg.lstsq(slopes, -coefficients[lower], rcond=1e-8)[0]
         total += move
-        if abs(total).max() > MOVE:
+        if abs(total).max() > (REGULAR if degree == 2 else MOVE):
             return None
         inverse = np.linalg.pinv(slopes, rcond=1e-8)
-        vague = abs(inverse) @ noise[lower]
-        blur = sum(domain.derivative(abs(coefficients), i) * vague[i] for i in range(m))
+        unsure = abs(inverse) @ noise[lower]
+        blur = sum(domain.derivative(abs(coefficients), i) * unsure[i] for i in range(m))
         noise = domain.shifted(noise, abs(move)) + blur
         coefficients = domain.shifted(coefficients, move)
     return coefficients, noise

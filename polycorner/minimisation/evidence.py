@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.minimisation.conditions import find_curvature
 from polycorner.minimisation.findings import Analysis
-from polycorner.polyhedra.cones import unit_rows
+from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.spaces.manifold import Array
 
 PASSES = 60  # of Dinkelbach's method, which converges faster than linearly
@@ -19,7 +19,11 @@ def steepest_descent(a: Analysis) -> tuple[float, Array]:
     """
     from scipy.optimize import nnls
 
-    units, slope = unit_rows(a.gradients), a.local.gradients[-1]
+    slope, whole = a.local.gradients[-1], Rows(a.gradients, a.local.rank_tolerance)
+    dependent = len(whole.units) > 0 and not whole.independent
+    units = (
+        whole.truncated(a.local.rank_tolerance * whole.singular[0]) if dependent else whole.units
+    )
     units[list(a.blind)] = 0.0
     rows = np.vstack([units, -units[len(a.active) :]])
     rest = slope - (nnls(rows.T, slope)[0] @ rows if len(rows) else 0.0)

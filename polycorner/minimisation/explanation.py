@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from polycorner.minimisation.conditions import NEARLY_FLAT
 from polycorner.minimisation.copositivity import MAX_RAYS
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.evidence import (
     implied_functions,
     least_curvature,
@@ -260,6 +260,8 @@ def _second_order(a: Analysis) -> Iterator[str]:
             f"Stationary to first order, the energy decreases to second order {where}: "
             f"the curvature there is {number(least, DIGITS)} per squared scale unit."
         )
+        if a.verdict is Verdict.UNDECIDED:
+            yield _higher(a)
         if not a.multipliers.unique:
             yield "Another choice of the multipliers may still prove a minimum."
     elif a.curvature.flat.shape[1]:

@@ -25,7 +25,7 @@ from polycorner.spaces.manifold import Array
 EVALUATIONS = 400  # limit of each least-squares minimisation
 STATIONARY = 1e-6  # slope of the violation, relative to its size, that counts as zero
 REFINEMENTS = 30  # steps of Newton's method at the end
-MOVES = (1e-2, 1.0)  # lengths of random steps off a stationary point, in scale units
+MOVES = (1e-2, 1.0, 10.0, 10.0, 100.0, 100.0)  # random steps off a stationary point, in scale units
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +88,9 @@ class _Violation:
     def ends(self, u: Array) -> Iterator[Array]:
         """Yield ends of minimisations, ever lower.
 
-        A stationary point of the violation may be a saddle of it; random steps of several lengths
-        lead away from such a point.  In a long valley only Newton's method comes to the end.
+        A stationary point of the violation may be a saddle of it, or lie beside a set that is not
+        empty elsewhere; random steps of several lengths lead away.  In a long valley only Newton's
+        method comes to the end.
         """
         rng = np.random.default_rng(0)
         u, size = self.least(u)

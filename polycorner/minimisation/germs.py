@@ -11,6 +11,7 @@ differs from it by squares.  With series ``q`` and ``lam`` right to degree ``k``
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.minimisation.jets import function_series
 from polycorner.minimisation.problem import Problem
@@ -22,6 +23,7 @@ from polycorner.values import Value
 ROUNDING = 1e3  # propagated rounding errors below which a coefficient counts as zero
 CLEAR = 1e6  # and above which it counts as different from zero
 POINT = 4 * EPSILON  # relative rounding of a point's coordinates
+MOVE = 0.01  # distance in scale units by which a degenerate point may be missed: searches are slow
 REGULAR = 1e12  # condition of the linear system up to which it is regular
 
 
@@ -78,6 +80,26 @@ class Germ(Value):
         """Return ``q(w)`` in scaled coordinates."""
         exponents = self.domain.exponents[: self.points.shape[1]]
         return np.asarray(self.points @ np.prod(w**exponents, axis=1))
+
+
+def vague(germ: Germ, coefficients: Array, near: Array) -> NDArray[np.bool_]:
+    """Return the mask of the coefficients that may vanish where all variables change a little."""
+    sizes = abs(coefficients)
+    return np.asarray(sizes <= germ.domain.shifted(sizes, near) - sizes)
+
+
+def missed(germ: Germ, half: int, near: Array) -> Array:
+    """Return ``near``, or more where the slope along a free variable is none for its curvature.
+
+    At the distance ``h`` of a point of order ``p`` they are ``p h^(p-1)`` and ``p (p-1) h^(p-2)``.
+    """
+    powers, near = germ.domain.exponents, near.copy()
+    for i in range(half, germ.domain.variables):
+        alone = powers.sum(axis=1) == powers[:, i]
+        slope, bend = (abs(germ.coefficients[alone & (powers[:, i] == k)][0]) for k in (1, 2))
+        if 0 < slope < MOVE * bend:
+            near[i] = max(near[i], germ.domain.order / 2 * slope / bend)
+    return near
 
 
 def reduce_energy(

@@ -6,11 +6,10 @@ finite group that is nearest to the known points of the first,
 1. their invariants agree: they are one point, up to the symmetry; or
 2. the straight segment between them stays in the polyhedron and on the level of the energy; or
 3. one can walk from the first to the second along directions in which the energy is flat, every
-   step ending in a minimisation that stays on the level, none crossing a wall.
+   step ending in Newton's method or a descent that stays on the level, none crossing a wall.
 
-The third is tried only where more directions are flat than the symmetry explains.  Points that
-none of these connects stay apart: a winding locus may be counted more than once.  Two points
-separated by a wall or a barrier thinner than the samples' distance may be counted as one.
+The third is tried only where more directions are flat than the symmetry explains.  Points that none
+of these connects stay apart, and points separated by less than the samples' distance may be one.
 """
 
 import math
@@ -22,8 +21,10 @@ from numpy.typing import NDArray
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.methods import minimise
+from polycorner.minimisation.polishing import SETTLED
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import rank
+from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
@@ -108,9 +109,12 @@ class Quotient:
         )
         if not (abs(energies - energy) <= slack).all():
             return False
-        m = self.problem.inequalities
-        inside = self.problem.polyhedron.implicit_of(away[:, :m]) >= -MISS
-        return bool(inside.all() and (abs(away[:, m:]) <= MISS).all())
+        return self._holds(away)
+
+    def _holds(self, away: Array) -> bool:
+        inside, off = np.split(away, [self.problem.inequalities], axis=1)
+        enters = self.problem.polyhedron.implicit_of(inside) >= -MISS
+        return bool(enters.all() and (abs(off) <= MISS).all())
 
     def _along(self, points: Array) -> tuple[Array, Array]:
         """Return the scaled distances to all functions at points, and the energies there."""
@@ -135,24 +139,23 @@ class Quotient:
             miss = goal - self.place(p)
             if abs(miss).max() <= SAME:
                 return True
-            step = self._towards(p, miss, slack)
-            reached = None if step is None else self._stepped(p, step, goal, energy, slack)
+            way = self._towards(p, miss, slack)
+            reached = None if way is None else self._stepped(p, *way, goal, energy, slack)
             if reached is None:
                 return False
             p = reached
         return False
 
-    def _towards(self, p: Array, miss: Array, slack: float) -> Array | None:
-        """Return the step along flat directions that best reduces ``miss``; None if none does.
+    def _towards(self, p: Array, miss: Array, slack: float) -> tuple[Array, Piece] | None:
+        """Return the step along flat directions that best reduces ``miss``, and what is active.
 
-        Near a crossing of loci all curvatures are small: those are flat that change the energy by
-        no more than ``slack``.
+        Near a crossing of loci all curvatures are small: up to ``slack`` they are flat.
         """
         analysis = analyse(self.problem, p, TOLERANCE, RANK_TOLERANCE, higher="none")
         curvature = analysis.curvature
         level = max(analysis.small_curvature, slack)
         flat = curvature.vectors[:, abs(curvature.values) <= level]
-        if not flat.shape[1]:
+        if not flat.shape[1] or curvature.least < -level:
             return None
         moves = 1e-5 * flat.T * self.problem.scales
         slopes = [(self.place(p + v) - self.place(p - v)) / 2e-5 for v in moves]
@@ -160,26 +163,40 @@ class Quotient:
         if np.linalg.norm(miss - weights @ slopes) > (1 - LEAST) * np.linalg.norm(miss):
             return None
         step = flat @ weights
-        return np.asarray(step * min(1.0, STRIDE / max(abs(step).max(), 1e-300)))
+        step = step * min(1.0, STRIDE / max(abs(step).max(), 1e-300))
+        return step, frozenset(analysis.active)
 
     def _stepped(
-        self, p: Array, step: Array, goal: Array, energy: float, slack: float
+        self, p: Array, step: Array, active: Piece, goal: Array, energy: float, slack: float
     ) -> Array | None:
         """Return the minimum near a fraction of ``p + step`` if that is nearer to the goal."""
         manifold = self.problem.polyhedron.manifold
         before = float(np.linalg.norm(goal - self.place(p)))
         for part in PARTS:
+            length = part * abs(step).max()
             if not self._is_clear(p, part * step):
                 continue
-            length = part * abs(step).max()
             guess = manifold.moved(p, part * step * self.problem.scales)
-            found = minimise(self.problem.polyhedron, self.problem.energy, guess)
-            away = manifold.chord(found.point, guess) / self.problem.scales
-            level = found.search is None and abs(found.energy - energy) <= slack
-            gain = before - float(np.linalg.norm(goal - self.place(found.point)))
-            if level and abs(away).max() <= 0.5 * length and gain >= GAIN * min(length, before):
-                return found.point
+            point = self._settled(guess, active, 0.5 * length, (energy, slack))
+            left = np.inf if point is None else float(np.linalg.norm(goal - self.place(point)))
+            if before - left >= GAIN * min(length, before):
+                return point
         return None
+
+    def _settled(
+        self, q: Array, active: Piece, near: float, level: tuple[float, float]
+    ) -> Array | None:
+        """Return a point near ``q`` on a level, by Newton's method or else by a longer descent."""
+        point, last = self.problem.on_face(active, q)
+        settled = last < SETTLED and self._holds(self._along(point[None])[0])
+        if not settled or self._apart(point, q) > near:
+            found = minimise(self.problem.polyhedron, self.problem.energy, q)
+            point, settled = found.point, found.search is None
+        same = abs(self.problem.energy.value(point) - level[0]) <= level[1]
+        return point if settled and same and self._apart(point, q) <= near else None
+
+    def _apart(self, p: Array, q: Array) -> float:
+        return float(abs(self.problem.polyhedron.manifold.chord(p, q) / self.problem.scales).max())
 
 
 @dataclass(eq=False)
@@ -194,10 +211,8 @@ class Locus:
         The energy, and the difference up to which another energy is equal to it.
     wide : bool
         Whether the energy is flat in more directions than the symmetry explains.
-    points : list of (n,) arrays
-        One, or a net of points of the locus.
-    images : list of (n,) arrays
-        All images of these.
+    points, images : list of (n,) arrays
+        One, or a net of points of the locus, and all images of these.
     places : (k, d) array
         Their invariants; see :meth:`Quotient.place`.
     count : int
@@ -220,8 +235,7 @@ class Locus:
         return math.sqrt(apart[k]), k
 
 
-# A locus with its distance from a point and the index of its nearest image.
-Near = tuple[float, int, Locus]
+Near = tuple[float, int, Locus]  # with the distance from a point and the nearest image's index
 
 
 @dataclass(eq=False)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.continuation import go_on
 from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.domain_edges import domain_edge
 from polycorner.minimisation.escapes import escape
@@ -20,7 +21,7 @@ from polycorner.minimisation.rescaling import PATIENCE, advice, rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.sparse_methods import sparse_descent, sparse_on_face
 from polycorner.minimisation.verdicts import Verdict
-from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+from polycorner.polyhedra.polyhedron import MAX_SELECTIONS, Piece, Polyhedron
 from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
 from polycorner.spaces.manifold import Array
 
@@ -182,18 +183,17 @@ def stationary_on(
 def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> Endpoint:
     """Descend in one branch of the and/or tree after another until none leads lower."""
     d = problem.polyhedron
-    first, *others = (
-        d.selections(d.values(q).tolist())
-        if d.is_union
-        else [frozenset(range(problem.inequalities))]
-    )
-    end = descent(problem, first, q, limit)
-    for piece in others:
+    everything = frozenset(range(problem.inequalities))
+    values = d.values(q).tolist()
+    # Parts that hold here need not lead to a point at which all of a branch does.
+    pieces = [*d.selections(values), *d.selections(values, np.inf)] if d.is_union else [everything]
+    pieces = list(dict.fromkeys(pieces))
+    for piece in pieces:
+        end = descent(problem, piece, q, limit)
         if end.failure is not Verdict.INFEASIBLE:
             break
-        end = descent(problem, piece, q, limit)
-    if end.failure is Verdict.INFEASIBLE:
-        end = _descend_from_outside(problem, (first, *others), q, descent, limit)
+    else:
+        end = _descend_from_outside(problem, pieces, q, descent, limit)
     if not d.is_union:
         return end
     spent = end.iterations
@@ -208,7 +208,7 @@ def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> 
 
 
 def _descend_from_outside(
-    problem: Problem, pieces: tuple[Piece, ...], q: Array, descent: Descent, limit: int
+    problem: Problem, pieces: list[Piece], q: Array, descent: Descent, limit: int
 ) -> Endpoint:
     """Descend from a point of least violation; INFEASIBLE is said where that is stationary."""
     ends = []
@@ -217,7 +217,7 @@ def _descend_from_outside(
         if found.feasible:
             return descent(problem, piece, found.point, limit)
         ends.append(found)
-    empty = all(end.stationary for end in ends)
+    empty = all(end.stationary for end in ends) and len(pieces) < MAX_SELECTIONS
     failure = Verdict.INFEASIBLE if empty else Verdict.NOT_CONVERGED
     return Endpoint(ends[0].point, 0, failure)
 
@@ -271,6 +271,7 @@ def _diagnosing(method: Method) -> Descent:
         end = plain(problem, piece, q, limit)
         if end.failure is not None and problem.rows - problem.inequalities > 2:
             end = _without_dependent(problem, piece, q, plain, limit, end)
+        end = go_on(problem, piece, end, plain, limit)
         if end.failure is None and not end.flat:
             return end
         if end.failure is Verdict.INFEASIBLE:

@@ -1,6 +1,7 @@
 """Multi-start search for all local minima, each reported once up to a symmetry."""
 
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -110,7 +111,8 @@ def minima(
         loci.merge()
     except KeyboardInterrupt:
         interrupted = True
-    return _outcome(loci.loci, failures, len(points), interrupted=interrupted)
+    outcome = _outcome(loci.loci, failures, len(points), interrupted=interrupted)
+    return replace(outcome, modulo=symmetry is not None)
 
 
 def _is_minimum(locus: Locus) -> bool:

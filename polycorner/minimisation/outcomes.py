@@ -32,6 +32,8 @@ class Minima(Checked, Printed, Sequence[Certificate]):
         Number of descents done, and number of starts.
     interrupted : bool
         Whether the search was interrupted: starts may be left, and loci not yet merged.
+    modulo : bool
+        Whether minima are counted up to a symmetry that was given.
     """
 
     certificates: tuple[Certificate, ...]
@@ -42,6 +44,7 @@ class Minima(Checked, Printed, Sequence[Certificate]):
     descents: int
     starts: int
     interrupted: bool = False
+    modulo: bool = False
 
     @overload
     def __getitem__(self, index: int) -> Certificate: ...
@@ -97,7 +100,10 @@ def _statement(found: Minima) -> Iterator[str]:
     cut = f" (interrupted, {found.starts - found.descents} left)" if found.interrupted else ""
     lost = sum(found.elsewhere.values())
     where = f"; {lost} ended in no minimum" if lost else ""
-    yield f"{len(found)} minima, up to the symmetry, from {found.descents} starts{cut}{where}."
+    minima = "1 minimum" if len(found) == 1 else f"{len(found)} minima"
+    modulo = ", up to the symmetry," if found.modulo else ""
+    starts = "1 start" if found.descents == 1 else f"{found.descents} starts"
+    yield f"{minima}{modulo} from {starts}{cut}{where}."
     if not found:
         return
     r = found.richness

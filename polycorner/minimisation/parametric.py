@@ -20,7 +20,7 @@ from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.conditions import NEARLY_FLAT
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.spaces.manifold import Array, Manifold
 

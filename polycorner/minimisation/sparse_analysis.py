@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
-from polycorner.minimisation.conditions import NEARLY_FLAT, Curvature, Multipliers
+from polycorner.minimisation.conditions import Curvature, Multipliers
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.sparse.factorisation import lengths, rank, unit
 from polycorner.minimisation.sparse.optimality import (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from polycorner.minimisation.conditions import NEARLY_FLAT
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.polishing import Endpoint
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.sparse.descent import descend

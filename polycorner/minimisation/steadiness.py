@@ -13,7 +13,8 @@ from polycorner.spaces.manifold import Array
 # Steps, relative to the coordinates, over which curvatures must be steady, and how small one must
 # be, relative to the largest, to be looked at.
 BESIDE = 1e-6
-FAINT = 1e-6
+FAINT = 1e-3
+FARTHEST = 0.01  # scale units up to which Newton's step says how far a degenerate point may be
 
 
 def steady(
@@ -48,12 +49,15 @@ def is_steady(
     gradients: Array,
     multipliers: Multipliers,
     curvature: Curvature,
+    *,
+    least: float,
 ) -> bool:
-    """Whether the largest curvature, of either sign, is as much a little further on."""
-    largest = abs(curvature.values) == abs(curvature.values).max(initial=0.0)
-    if not abs(curvature.values).any():
+    """Whether the largest curvature and those beyond ``least`` are as much a little further on."""
+    sizes = abs(curvature.values)
+    if not sizes.any():
         return True
-    return not _changes(local, active, gradients, multipliers, curvature, largest).any()
+    tried = (sizes > least) | (sizes == sizes.max())
+    return not _changes(local, active, gradients, multipliers, curvature, tried).any()
 
 
 def _changes(
@@ -64,14 +68,21 @@ def _changes(
     curvature: Curvature,
     tried: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return the mask of the directions tried in which the curvature changes beside the point."""
+    """Return the mask of the directions tried in which the curvature changes beside the point.
+
+    At the distance ``h`` from where curvature and slope vanish together as ``h^(p - 2)`` and
+    ``h^(p - 1)``, Newton's step has the length ``h / (p - 1)``.
+    """
     values, ways = curvature.values[tried], curvature.vectors[:, tried].T
-    reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
     numbers = [*active, *local.sections]
     with np.errstate(all="ignore"):
-        points = local.point + reach * np.vstack([ways, -ways]) * local.problem.scales
-        hessians = local.problem.evaluate(points, 2)[2]
         sizes = np.maximum(np.sqrt((gradients * gradients).sum(axis=1)), 1e-300)
+        left = local.gradients[-1] - (multipliers.values / sizes) @ gradients
+        newton = np.nan_to_num(abs(ways @ left) / abs(values))
+        reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
+        ahead = ways * np.clip(2 * newton, reach, max(reach, FARTHEST))[:, None]
+        points = local.point + np.vstack([ahead, -ahead]) * local.problem.scales
+        hessians = local.problem.evaluate(points, 2)[2]
         both = np.vstack([ways, ways])[:, :, None]
         bends = (both.transpose(0, 2, 1)[:, None] @ hessians @ both[:, None])[:, :, 0, 0]
         moved = bends[:, -1] - bends[:, numbers] @ (multipliers.values / sizes)

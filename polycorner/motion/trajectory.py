@@ -200,7 +200,9 @@ class Trajectory(Checked, Printed):
 
 def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
     effort = path.effort
-    yield "bodies", f"{path.q.shape[1]}, of {path.q.shape[2]} coordinates"
+    count, size = path.q.shape[1:]
+    each = " each" if count > 1 else ""
+    yield "bodies", f"{count}, with {size} coordinate{'s' if size > 1 else ''}{each}"
     unfinished = "" if path.finished else f"; unfinished, {path.t_end:g} s were asked for"
     instants = f"in {len(path)} instants{unfinished}"
     yield "time", f"{path.times[0]:g} s to {path.times[-1]:g} s, {instants}"

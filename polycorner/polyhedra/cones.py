@@ -24,15 +24,17 @@ class Rows:
     ----------
     units : (k, n) array
         The rows divided by their lengths.
+    singular : (min(k, n),) array
+        The singular values, descending.
     rank : int
         Number of singular values above the tolerance.
     """
 
     def __init__(self, matrix: Array, tolerance: float) -> None:
         self.units = unit_rows(matrix)
-        self._left, self._singular, self._right = np.linalg.svd(self.units)
-        top = float(self._singular[0]) if self._singular.size else 0.0
-        self.rank = int((self._singular > tolerance * top).sum()) if top > 0 else 0
+        self._left, self.singular, self._right = np.linalg.svd(self.units)
+        top = float(self.singular[0]) if self.singular.size else 0.0
+        self.rank = int((self.singular > tolerance * top).sum()) if top > 0 else 0
 
     @property
     def independent(self) -> bool:
@@ -49,15 +51,20 @@ class Rows:
         """Orthonormal basis, as columns ``(k, k - rank)``, of the rows' linear relations."""
         return np.asarray(self._left[:, self.rank :])
 
+    def truncated(self, level: float) -> Array:
+        """Return the unit rows without the parts with singular values up to a level."""
+        r = int((self.singular > level).sum())
+        return np.asarray((self._left[:, :r] * self.singular[:r]) @ self._right[:r])
+
     def opening(self, k: int) -> Array:
         """Return the shortest vector with slope 1 along unit row ``k`` and 0 along the others."""
         r = self.rank
-        return np.asarray(self._right[:r].T @ (self._left[k, :r] / self._singular[:r]))
+        return np.asarray(self._right[:r].T @ (self._left[k, :r] / self.singular[:r]))
 
     def weights(self, vector: Array) -> Array:
         """Return the shortest least-squares weights of the unit rows that sum to ``vector``."""
         r = self.rank
-        parts = (self._right[:r] @ vector) / self._singular[:r]
+        parts = (self._right[:r] @ vector) / self.singular[:r]
         return np.asarray(self._left[:, :r] @ parts)
 
 

@@ -20,7 +20,7 @@ NEAR = Family.of(
 
 def mixture(first, second):
     """Members of the ideal of two functions."""
-    mixed = (a + b * (x + z) ** 2) * first + (c + d * y) * second
+    mixed = a * (1 + b * (x + z) ** 2) * first + (c + d * y) * second  # zero on no other set
     return Family.of({"mixed": mixed}, ["x", "y", "z"], ["a", "b", "c", "d"])
 
 

@@ -55,3 +55,37 @@ def test_a_wall_beside_an_inflection(sign, power, gap, at, push):
     else:  # beside the wall, but within the tolerance of it, the point itself is no minimum
         beside = set() if at == -1.0 else {Verdict.SADDLE}
         assert c.verdict in {*MINIMA, *beside, Verdict.UNDECIDED}
+
+
+@pytest.mark.parametrize("bend", [1, 30, 300, 3000])
+@pytest.mark.parametrize("at", [1e-8, 2e-8, 1e-7, 1e-6, -2e-8, -1e-6])
+def test_beside_an_inflection_along_a_curved_wall_no_minimum_is_seen(bend, at):
+    """Along ``y = x^2`` the energy is ``bend x^3``, which no weak contact across it holds."""
+    space = Manifold.euclidean("x y z")
+    z = space.symbols[2]
+    D = Polyhedron(space, {"curved": y - x**2, "weak": z})
+    assert not certify(D, y - x**2 + bend * x**3 + z**2, [at, at * at, 0]).is_minimum
+
+
+@pytest.mark.parametrize("at", [0, 1e-10, 1e-9, -1e-9])
+def test_beside_a_weak_contact_a_minimum_stays_one(at):
+    space = Manifold.euclidean("x y z")
+    z = space.symbols[2]
+    D = Polyhedron(space, {"curved": y - x**2, "weak": z})
+    assert certify(D, y + x**3 + z**2, [at, at * at, 0]).verdict is Verdict.WEAK_MINIMUM
+
+
+def test_a_point_short_of_the_end_of_a_steep_valley_is_no_minimum():
+    """Along ``y = x^2`` the energy is ``x^2 + (1 - x)^2 / 100``, least at ``1 / 101``."""
+    D = Polyhedron(M, {"far": x + 50})
+    energy = 10**10 * (y - x**2) ** 2 + (1 - x) ** 2 / 100 + y
+    assert not certify(D, energy, [0.01571306, 0.01571306**2 - 5e-11]).is_minimum
+    assert certify(D, energy, [0.0099, 0.0099**2 - 5e-11]).verdict is not Verdict.SADDLE
+
+
+def test_a_function_that_says_nothing_takes_no_multipliers_away():
+    D = Polyhedron(M, {"product": -x * y, "x": x, "y": y})
+    c = certify(D, x**2 + y**2 - 4 * x * y, [0, 0])
+    assert c.verdict is Verdict.UNDECIDED
+    assert "no multipliers exist" not in c.explain()
+    assert "a function whose gradient vanishes" in c.explain()

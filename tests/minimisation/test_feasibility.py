@@ -5,7 +5,7 @@ import sympy as sp
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from polycorner import AnyOf, Manifold, Polyhedron, SmoothFunction, Verdict, minimise
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, Verdict, minimise
 from polycorner.formulas import Family
 
 LINE, PLANE, SPACE = (Manifold.euclidean(names) for names in ("x", "x y", "x y z"))
@@ -125,3 +125,39 @@ def test_an_empty_disc_is_explained_without_a_distance(p, q, order):
     text = found.explain()
     assert "its gradient vanishes there" in text
     assert "scale units" not in text
+
+
+def test_a_stationary_violation_beside_a_set_is_not_emptiness():
+    """At (1.5, 1.5) no step lowers the violation of both, which are satisfied at (-1, -5)."""
+    D = Polyhedron(PLANE, {"hyperbola": x * y - x - y, "line": 3 - x - y})
+    assert minimise(D, x**2 + y**2, [0.1, 9.9]).is_minimum
+
+
+def test_parts_that_hold_may_exclude_each_other():
+    """Where ``x >= 1`` holds, no part of the second union does; ``x <= -1`` has points of both."""
+    D = Polyhedron(PLANE, [AnyOf(x - 1, -1 - x), AnyOf(-2 - x, -5 - x)])
+    found = minimise(D, x**2 + y**2, [2.0, 0.0])
+    assert found.point == pytest.approx([-2, 0], abs=1e-9)
+
+
+INSIDE = [3 * x - y - 3, -x + y / 2 + 4, -x - y + 7]
+BARD = Manifold.euclidean("x y k l m")
+FORCES = BARD.symbols[2:]
+
+
+@pytest.mark.parametrize("kind", ["products", "branches"])
+@pytest.mark.parametrize("method", ["newton", "slsqp"])
+def test_a_follower_that_minimises_is_a_system_of_complementarities(kind, method):
+    """Bard's convex two-level problem has the minimum 17 at (1, 0), reached from the origin."""
+    pairs = list(zip(INSIDE, FORCES, strict=True))
+    balance = {"balance": 2 * (y - 1) - 1.5 * x + FORCES[0] - FORCES[1] / 2 + FORCES[2]}
+    parts = [x, y, *INSIDE, *FORCES]
+    if kind == "products":
+        balance |= {f"c{i}": gap * force for i, (gap, force) in enumerate(pairs)}
+    else:
+        parts += [AnyOf(AllOf(gap, -gap), AllOf(force, -force)) for gap, force in pairs]
+    found = minimise(
+        Polyhedron(BARD, parts, balance), (x - 5) ** 2 + (2 * y + 1) ** 2, [0] * 5, method=method
+    )
+    assert found.energy == pytest.approx(17, abs=1e-6)
+    assert found.is_minimum

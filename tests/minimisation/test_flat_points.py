@@ -59,6 +59,24 @@ def test_a_descent_goes_on_along_a_curved_face():
     assert found.active == ("floor", "left")
 
 
+FALLING = {
+    "cubic": x**3 + y,
+    "cubic under a bent floor": x**3 + x**2 * y + y,
+    "cubic with a minimum": x**4 + x**3 + y,
+    "order five": x**5 + y,
+}
+
+
+@pytest.mark.parametrize("start", [(0.3, 0.2), (0.5, 0.0), (1e-3, 1e-3), (1.0, 1.0)], ids=str)
+@pytest.mark.parametrize("kind", FALLING)
+def test_a_descent_goes_on_along_a_floor_that_holds_it(kind, start):
+    """What holds the point on the floor does not hold it along the floor."""
+    D = Polyhedron(PLANE, {"floor": y, "left": x + 2})
+    found = minimise(D, FALLING[kind], start)
+    assert found.verdict.name == "STRICT_MINIMUM"
+    assert found.point[0] < -0.7
+
+
 def test_a_barrier_is_not_crossed():
     """A flat minimum stays the end of its basin, although a lower one lies close."""
     found = minimise(BOX, x**4 * (x - sp.Rational(1, 20)) * (x - sp.Rational(1, 10)) + y**2, [0, 0])

@@ -224,9 +224,15 @@ def test_what_is_no_minimum_is_counted_by_its_verdict():
     assert [c.verdict for c in flat.others] == [Verdict.UNDECIDED]
     for found in (slope, empty, flat):
         assert found.completeness == (
-            f"0 minima, up to the symmetry, from {found.starts} starts; "
-            f"{found.starts} ended in no minimum."
+            f"0 minima from {found.starts} starts; {found.starts} ended in no minimum."
         )
+
+
+def test_the_statement_names_a_symmetry_only_where_one_was_given():
+    bowl, start = X**2 + Y**2, [[0.5, 0.5]]
+    assert minima(HALF_PLANE, bowl, starts=start).completeness.startswith("1 minimum from 1 start.")
+    given = minima(HALF_PLANE, bowl, starts=start, symmetry=Symmetry())
+    assert given.completeness.startswith("1 minimum, up to the symmetry, from 1 start.")
 
 
 def test_two_lines_of_minima_that_cross_are_one_locus():
@@ -253,7 +259,7 @@ def test_the_statement_says_what_is_estimated_and_assumed():
     text = " ".join(str(found).split())
     assert text.endswith(found.completeness)
     for part in (
-        "2 minima, up to the symmetry, from 60 starts.",
+        "2 minima from 60 starts.",
         "Estimated coverage 100.00% (Good-Turing); estimated number of minima 2, ",
         "independent draws from one distribution",
         f"a share of less than {found.richness.overlooked:.2g}",

@@ -23,10 +23,11 @@ from polycorner.minimisation.descent.linear_algebra import (
     svd,
 )
 from polycorner.minimisation.descent.newton import RANK, polish
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 
 EXACT = 1e-13  # scaled violation allowed after Newton's method
 FLAT, MINIMUM, SADDLE, MOVING, REJECTED = 4, 3, 2, 1, 0  # outcomes of `classify`
-CURVED = 1e-8  # relative curvature beyond which a stationary point is a saddle, or a minimum
+CURVED = 1e-8  # relative curvature beyond which a stationary point is a saddle
 RADII = (1e-3, 1e-2, 1e-1)  # steps in which flat directions are followed, in scale units
 # Relative differences up to which values are the same, and gradients: curvatures above `CURVED`
 # gain less from such a difference than values may differ.
@@ -36,7 +37,7 @@ MIXTURES = 4  # mixtures of flat directions to follow, per direction, where ther
 
 @compiled
 def least_curvatures(F, J, H, lam, on, m):
-    """Return the least relative curvature along the face and the directions of least curvature.
+    """Return the least curvature along the face, relative to the energy's size, and its directions.
 
     The first direction has the least curvature; more follow if it vanishes in several.  It is not a
     number where derivatives are not finite, or huge.
@@ -50,7 +51,7 @@ def least_curvatures(F, J, H, lam, on, m):
         _, s, V = svd(A)
         cut = RANK * largest(s)
     L = lagrangian_hessian(H, lam)
-    reference = max(largest_entry(L), largest_entry(H[total])) + 1e-300
+    reference = max(largest_entry(L), largest_entry(H[total]), largest(J[total])) + 1e-300
     if not reference < HUGE:
         return np.nan, np.zeros((1, n))
     M = np.zeros((n, n))
@@ -133,7 +134,7 @@ def classify(problem, use, on, m, u, F, J, H, size, energy):
         return REJECTED, v, lam, directions
     if least < -CURVED:
         return SADDLE, v, lam, directions
-    return MINIMUM if least > CURVED else FLAT, v, lam, directions
+    return MINIMUM if least > NEARLY_FLAT * CURVED else FLAT, v, lam, directions
 
 
 @compiled
