@@ -99,7 +99,7 @@ def test_ctrl_c_keeps_what_was_found():
     assert found["edges"]
     assert "unfinished, kept in" in shown
     process = started(*search, "--resume", "--budget", "3", stderr=subprocess.PIPE)
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate()
     later = json.loads(out)
     assert (process.returncode, later["complete"]) == (0, "budget")
     assert len(later["edges"]) == len(found["edges"]) + 3
@@ -115,7 +115,7 @@ def test_a_terminal_shows_progress_and_a_pipe_does_not():
     assert json.loads(out)["complete"] == "exhausted"
     assert re.search(r"searching spheres .* \d+ of \d+ edges, .*2 corners", shown)
     process = started("spheres", "--count", "6", "--json", stderr=subprocess.PIPE)
-    piped, err = process.communicate(timeout=300)
+    piped, err = process.communicate()
     assert (process.returncode, piped, err) == (0, out, "")
 
 

@@ -116,13 +116,12 @@ def test_interrupted_it_resumes_with_resume_and_only_then(capsys, tmp_path, blow
         stderr=subprocess.PIPE,
         text=True,
     ) as running:
-        until = time.monotonic() + 60
-        while running.poll() is None and time.monotonic() < until:
+        while running.poll() is None:
             if calls.exists() and calls.stat().st_size > 40:
                 break
             time.sleep(0.02)
         running.send_signal(blow)
-        printed, err = running.communicate(timeout=60)
+        printed, err = running.communicate()
     if blow == signal.SIGINT:
         assert running.returncode == 130
         assert "kept in" in err

@@ -66,7 +66,7 @@ def on_terminal(*arguments, interrupt_at=None):
         while process.poll() is None and not re.search(interrupt_at, plain(shown)):
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=300)
+    out, _ = process.communicate()
     reader.join()
     os.close(terminal)
     return process.returncode, out, plain(shown)

@@ -19,6 +19,7 @@ distributed = pytest.importorskip("distributed")
 TESTS = Path(__file__).parents[1]
 GRID = {"a": range(15), "b": range(12)}
 FIXED = {"pause": 0.01}
+PATIENCE = 800  # s, below the limit of a test: a busy machine starts processes slowly
 
 
 @contextmanager
@@ -53,9 +54,9 @@ def cluster(tmp_path, caplog):
             for _ in range(2)
         ]
         client = stack.enter_context(
-            distributed.Client(scheduler_file=address, set_as_default=False, timeout=60)
+            distributed.Client(scheduler_file=address, set_as_default=False, timeout=PATIENCE)
         )
-        client.wait_for_workers(2, timeout=60)
+        client.wait_for_workers(2, timeout=PATIENCE)
         yield client, scheduler, workers
 
 

@@ -304,9 +304,8 @@ def process(store, log, workers=0):
     )
 
 
-def wait_for(log, count, running, limit=60.0):
-    until = time.monotonic() + limit
-    while len(lines(log)) < count and running.poll() is None and time.monotonic() < until:
+def wait_for(log, count, running):
+    while len(lines(log)) < count and running.poll() is None:
         time.sleep(0.01)
 
 
@@ -337,7 +336,7 @@ def test_ctrl_c_keeps_what_is_finished_and_says_that_more_is_pending(tmp_path):
     with process(store, log) as running:
         wait_for(log, 40, running)
         running.send_signal(signal.SIGINT)
-        out, err = running.communicate(timeout=60)
+        out, err = running.communicate()
     assert (out, err, running.returncode) == ("interrupted\n", "", 0)
     status = open_results(store)["status"].values
     assert int((status == 1).sum()) == len(lines(log)) < 300
@@ -356,10 +355,8 @@ def test_killed_with_a_pool_no_worker_is_left_and_few_points_are_lost(tmp_path):
         children = Path(f"/proc/{running.pid}/task/{running.pid}/children")
         workers = children.read_text().split() if children.exists() else []
         running.kill()
-    until = time.monotonic() + 20
-    while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < until:
+    while any(Path(f"/proc/{pid}").exists() for pid in workers):  # up to the limit of a test
         time.sleep(0.05)
-    assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
     fixed = {"log": str(log), "pause": 0.002}
     found = sweep(sweep_functions.drawn, WHOLE, rng=4, store=store, fixed=fixed)
     same_bits(found, sweep(sweep_functions.drawn, WHOLE, rng=4))

@@ -125,7 +125,7 @@ def stopped_by(number, folder):
             if line.split() == ["3", "S1"]:
                 process.send_signal(number)
                 break
-        rest, _ = process.communicate(timeout=300)
+        rest, _ = process.communicate()
     return process, rest
 
 
