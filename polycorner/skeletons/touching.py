@@ -113,7 +113,7 @@ def touched(quotient: Shared, starts: Sequence[Start]) -> list[tuple[int, int, A
 def _candidates(quotient: Quotient, starts: Sequence[Start]) -> Iterator[tuple[int, int, Array]]:
     """Yield walks, functions that may have a minimum zero, once each, and points near it."""
     q, t = (np.array([getattr(s, name) for s in starts]) for name in ("q", "direction"))
-    held = np.array([s.held for s in starts])
+    held = np.array([s.held for s in starts], dtype=np.intp)  # which may be none
     walking, on = np.arange(len(starts)), _is_held(held, quotient.count)
     seen = on.copy()
     scales = quotient.polyhedron.manifold.scale_array
@@ -150,7 +150,7 @@ def _polished(
     """Yield those of the candidates at which Newton's method finds a minimum zero."""
     walks, rows = (np.array([f[i] for f in found]) for i in (0, 1))
     q = np.array([f[2] for f in found])
-    held = np.array([starts[b].held for b in walks])
+    held = np.array([starts[b].held for b in walks], dtype=np.intp)
     on = _is_held(held, quotient.count)
     scales = quotient.polyhedron.manifold.scale_array
     going = np.arange(len(found))
@@ -223,6 +223,6 @@ def _split(quotient: Quotient, q: Array, normals: Array) -> tuple[Array, Array, 
     r = every.shape[1]
     full, factor = np.linalg.qr(every.transpose(0, 2, 1), mode="complete")
     factor = factor[:, :r]
-    fits = abs(np.diagonal(factor, axis1=1, axis2=2)).min(axis=1) > INDEPENDENT
+    fits = abs(np.diagonal(factor, axis1=1, axis2=2)).min(axis=1, initial=1.0) > INDEPENDENT
     factor = np.where(fits[:, None, None], factor, np.eye(r))
     return full[:, :, :r], factor, full[:, :, r:], fits

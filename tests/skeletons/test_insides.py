@@ -116,3 +116,16 @@ def test_only_a_finished_search_has_faces_to_examine():
     part = skeleton(Polyhedron(SPACE, box), [(0.9, 0.9, 0.1)], budget=1)
     with pytest.raises(ValueError, match="skeleton: expected the result of a finished search"):
         examine_faces(part)
+
+
+def test_the_face_of_a_plane_set_is_examined_too():
+    """No function is held there, and nothing touches zero inside beside the isolated point."""
+    plane = Manifold.euclidean("u v")
+    u, v = plane.symbols
+    triangle = {"left": u, "low": v, "slope": 1 - u - v}
+    pit = (u - 0.2) ** 2 + (v - 0.3) ** 2
+    for walls in (triangle, {**triangle, "hole": pit - 0.01}):
+        atlas = skeleton(Polyhedron(plane, walls), [[0.05, 0.9]])
+        examined = examine_faces(atlas)
+        assert len(examined.corners) == len(atlas.corners) == 3
+        assert examined.complete is Completeness.EXHAUSTED

@@ -42,7 +42,6 @@ REASONS = {
         Shaking.restored UnevenFriction.restored Wobble.restored""",
     "runs until it is interrupted": "viewer.serve",
     "a group is judged by the polyhedron that takes it": "AllOf AnyOf",
-    "faces of a polyhedron in the plane are not examined": "skeletons.examine_faces",
 }
 EXEMPT = {name: reason for reason, names in REASONS.items() for name in names.split()}
 OPEN = {

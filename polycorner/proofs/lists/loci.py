@@ -141,7 +141,7 @@ def _shown(
     image = krawczyk([slopes[0][i] for i in places], form, inverse, unknowns, centre)
     if not all(x.contains_interior(y) for x, y in zip(unknowns, image, strict=True)):
         return None
-    ends = np.array([outward(x) for x in image])
+    ends = np.array([outward(x) for x in image]).reshape(-1, 2)  # none where nothing moves
     return Locus(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])
 
 

@@ -34,6 +34,8 @@ def wider(x: "Ball") -> "Ball":
 
 def inertia(rows: "list[list[Ball]]") -> tuple[int, int] | None:
     """Return the numbers of negative and positive eigenvalues of a symmetric matrix of balls."""
+    if not rows:  # nothing may move
+        return 0, 0
     middle = np.array([[float(x.mid()) for x in row] for row in rows])
     if not np.isfinite(middle).all():
         return None

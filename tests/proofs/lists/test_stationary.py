@@ -315,6 +315,14 @@ def test_loci_along_coordinates_that_the_energy_does_not_read():
     assert d.contains(locus.sample)
 
 
+def test_the_whole_set_is_a_locus_of_a_constant_energy(tmp_path):
+    disc = Polyhedron(PLANE, {"disc": 1 - X**2 - Y**2})
+    found = stationary_points(disc, sympy.Integer(1), box=SIDES)
+    assert found.complete
+    assert (len(found), len(found.loci)) == (0, 1)
+    assert disc.contains(found.loci[0].sample)
+
+
 @pytest.mark.parametrize(
     ("parts", "energy"),
     [
