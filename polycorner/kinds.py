@@ -129,8 +129,14 @@ def kind_of(annotation: Any, module: str) -> Kind:
         return _array(get_args(parts[1])[0] if len(parts) > 1 and get_args(parts[1]) else None)
     if isinstance(annotation, _Named):
         name = annotation.name
-        return Kind(_a(name), lambda v: any(c.__name__ == name for c in type(v).__mro__), True)
+        if name == "Expr":  # numbers are expressions, too
+            return _either([Kind("an expression", _named(name)), Kind(*WORDS[float])])
+        return Kind(_a(name), _named(name), True)
     return _of_class(origin, parts, module)
+
+
+def _named(name: str) -> Test:
+    return lambda value: any(c.__name__ == name for c in type(value).__mro__)
 
 
 def _or_list(kind: Kind) -> Kind:

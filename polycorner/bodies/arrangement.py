@@ -30,7 +30,6 @@ from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.kinds import check_fields, checked
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -125,8 +124,10 @@ class Arrangement(Checked):
         for argument, several in (("bodies", self.named), ("fixed", self.fixed)):
             for body in several.values():
                 checks.instance(argument, body, Body, "disc(1.0)")
+        for wall in self.walls.values():
+            if not isinstance(wall, Wall):
+                refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
-        check_fields(self)
         check_together(self.named, self.fixed, self.walls)
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
@@ -208,7 +209,6 @@ class Arrangement(Checked):
             for function, point in within(self.manifold, name, wall, member)
         ]
 
-    @checked
     def system(
         self,
         *,

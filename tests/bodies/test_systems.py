@@ -306,7 +306,7 @@ def masses(mass, centre, inertia):
         (
             lambda: Arrangement([disc(1)] * 2).system(gravity=[0, sympy.I * time_symbol()]),
             ValueError,
-            "gravity: expected 2",
+            "gravity: expected a formula of real values",
         ),
         (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
         (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),

@@ -14,6 +14,7 @@ from polycorner import AnyOf, Manifold, Polyhedron, Symmetry
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.symmetry import Element
 from polycorner.proofs import stationary_points
+from polycorner.proofs.lists.checker import __main__ as checker
 from polycorner.proofs.lists.domains import domain
 from polycorner.proofs.lists.members import OUT, judged
 from polycorner.proofs.lists.search import Search
@@ -321,6 +322,7 @@ def test_the_whole_set_is_a_locus_of_a_constant_energy(tmp_path):
     assert found.complete
     assert (len(found), len(found.loci)) == (0, 1)
     assert disc.contains(found.loci[0].sample)
+    assert checker.main([str(found.save(tmp_path / "constant.zip"))]) == 0
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,8 @@ def definite(rows: list[list[arb]]) -> bool:
 
 def zero(equations: Callable[..., Any], unknowns: list[arb]) -> list[arb] | None:
     """Return a small enclosure of the only zero in a box by Krawczyk's operator, or None."""
+    if not unknowns:  # a space of no dimension is one point
+        return []
     shown = False
     for _ in range(STEPS):
         centre = [x.mid() for x in unknowns]

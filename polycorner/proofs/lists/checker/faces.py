@@ -29,9 +29,11 @@ class Face:
                 [side[i] for i in places] for side in (self.lower, self.upper)
             )
         sharp = sides(record, ("sharp_lower", "sharp_upper"), len(places) + len(self.rows) - 1)
-        starts = filter(None, map(self.start, (1, 4, 16)))
-        solved = next(filter(None, (zero(self.equations, start) for start in starts)), None)
-        need(solved, f"{self.name}: no single solution with positive multipliers is shown")
+        starts = (start for start in map(self.start, (1, 4, 16)) if start is not None)
+        tried = (zero(self.equations, start) for start in starts)
+        solved = next((found for found in tried if found is not None), None)
+        shown = solved is not None
+        need(shown, f"{self.name}: no single solution with positive multipliers is shown")
         self.unknowns: list[arb] = solved or []
         self.placed(sharp, record, self.negative(), self.active)
         if active is None:
