@@ -6,6 +6,7 @@
 
 import os
 import signal
+from pathlib import Path
 
 import chromium
 import matplotlib as mpl
@@ -16,6 +17,7 @@ from linear_algebra import Disturbed
 from polycorner.formulas.cache import cache_folder
 
 mpl.use("Agg")
+collect_ignore = ["support/disturbed"]  # which is run by other processes
 
 # A shell starts background jobs with Ctrl-C ignored; tests that send it need it to interrupt.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -51,7 +53,11 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     seed = config.getoption("--disturbed")
     if seed is not None:
-        Disturbed(seed).install(pytest.MonkeyPatch())
+        Disturbed(seed).install()
+        here = Path(__file__).parent / "support"  # for processes that tests start
+        paths = [str(here / "disturbed"), str(here), os.environ.get("PYTHONPATH", "")]
+        os.environ["POLYCORNER_DISTURBED"] = str(seed)
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
 
 
 @pytest.fixture(scope="module")

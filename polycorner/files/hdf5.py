@@ -59,7 +59,8 @@ def _faults(dataset: Any, *, is_read: bool) -> Iterator[str]:
         yield "has no shape"
         return
     chunks = how.get_chunk() if how.get_layout() == h5py.h5d.CHUNKED else ()
-    if any(size > extent for size, extent in zip(chunks, shape, strict=bool(chunks))):
+    sizes = zip(chunks, shape, strict=bool(chunks))
+    if math.prod(shape) and any(size > extent for size, extent in sizes):
         yield "has pieces larger than itself"
     filters = [how.get_filter(k)[0] for k in range(how.get_nfilters())]
     if not set(filters) <= {DEFLATE, SHUFFLE} or len(set(filters)) < len(filters):

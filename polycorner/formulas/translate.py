@@ -91,7 +91,7 @@ class Translator:
     def _number(self, e: "sympy.Basic") -> int:
         if e.is_Float:
             double = float(e)
-            fits = math.isfinite(double) and (double != 0 or e == 0)
+            fits = math.isfinite(double) and (double != 0 or bool(e.is_zero))  # Float(0) == 0 is False
         else:
             fits = representable((int(e.p), int(e.q)))
         if not fits:

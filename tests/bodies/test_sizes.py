@@ -67,9 +67,10 @@ def test_gaps_are_those_of_thinner_bodies(seed, make, r):
 
 
 def test_a_ball_and_a_rod_in_a_pipe():
-    """Side by side, they grow to a quarter of its width."""
+    """Side by side, they grow to a quarter of its width; lids keep them from sliding apart."""
     rod = capsule([0, 0, -1], [0, 0, 1], 0.45)
-    a = Arrangement([rod], {"pipe": Cylinder(1.0, axis=[0, 0, 1])}, {"core": rod})
+    lids = {"low": HalfSpace([0, 0, 1], [0, 0, -2]), "high": HalfSpace([0, 0, -1], [0, 0, 2])}
+    a = Arrangement([rod], {"pipe": Cylinder(1.0, axis=[0, 0, 1]), **lids}, {"core": rod})
     d = thinned(a)
     t = d.manifold.symbols[-1]
     placed = a.point({"1": ([0.6, 0.1, 0], Rotation.from_rotvec([0.02, 0.01, 0]))})

@@ -225,7 +225,8 @@ def test_the_size_is_a_number(size):
 
 @pytest.mark.parametrize("size", [0.0, -1, math.nan, math.inf])
 def test_the_size_is_positive_and_finite(size):
-    with pytest.raises(ValueError, match=r"^size: expected a number > 0; got "):
+    finite = "finite " if math.isinf(size) else ""
+    with pytest.raises(ValueError, match=rf"^size: expected a {finite}number > 0; got "):
         Tutorial(size)
 
 

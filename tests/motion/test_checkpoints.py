@@ -397,5 +397,5 @@ def test_any_system_continues(kind, tmp_path):
 
 @pytest.mark.parametrize("seconds", [-1.0, math.nan, "often"])
 def test_seconds_are_checked(seconds):
-    with pytest.raises((TypeError, ValueError), match=r"^seconds: expected a number >= 0"):
+    with pytest.raises((TypeError, ValueError), match=r"^seconds: expected a number"):
         Checkpoint("state", seconds)

@@ -101,14 +101,14 @@ class TestRounding:
     @pytest.mark.parametrize(("polyhedron", "expected"), SHAPES)
     def test_regular_and_degenerate_corners(self, polyhedron, expected, seed, monkeypatch):
         start = np.full(polyhedron.dimension, 0.2)
-        Disturbed(seed).install(monkeypatch)
+        Disturbed(seed).install(monkeypatch.setattr)
         atlas = skeleton(polyhedron, [start])
         assert counts(atlas) == expected
         assert atlas.complete is Completeness.EXHAUSTED
 
     @pytest.mark.parametrize("seed", range(8))
     def test_crossings(self, seed, monkeypatch):
-        Disturbed(seed).install(monkeypatch)
+        Disturbed(seed).install(monkeypatch.setattr)
         check_quarters(skeleton(quarters(0.0), [[0.5, 0.2]]), (0, 0))
 
     @pytest.mark.parametrize("seed", range(4))
@@ -116,7 +116,7 @@ class TestRounding:
         """Rigid motions of collinear spheres span five dimensions, not six."""
         model = SphereCluster(3)
         line = np.array([[-1.0, 0, 0], [0, 0, 0], [1, 0, 0]]).ravel()
-        Disturbed(seed).install(monkeypatch)
+        Disturbed(seed).install(monkeypatch.setattr)
         atlas = skeleton(model.polyhedron, [line, model.stacked()], symmetry=model.symmetry)
         assert len(atlas.corners) == 1
         check_edges(atlas)

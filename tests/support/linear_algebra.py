@@ -36,7 +36,7 @@ class Disturbed:
         self.table = np.clip(np.random.default_rng(seed).standard_normal(TABLE), -3, 3)
         self.orthonormal = np.linalg.qr
 
-    def install(self, monkeypatch):
+    def install(self, put=setattr):
         """Put the disturbed functions in place of those of NumPy and SciPy."""
         import scipy.linalg
         from scipy.linalg import lapack
@@ -53,7 +53,7 @@ class Disturbed:
         ]
         for module, names, disturb in plans:
             for name in names:
-                monkeypatch.setattr(module, name, disturb(getattr(module, name)))
+                put(module, name, disturb(getattr(module, name)))
         return self
 
     def draw(self, shape, array, turn=0):

@@ -46,7 +46,7 @@ WRONG = [
     (lambda _: pair_scene(DRUM, [math.nan] * 6), ValueError, "q"),
     (lambda at: write_scene(pair_scene(DRUM, NESTED), at / "a.obj"), ValueError, "path"),
     (lambda at: write_page("", at / "page.txt"), ValueError, "path"),
-    (lambda at: write_movie(None, at / "motion.avi"), ValueError, "movie"),
+    (lambda at: write_movie(None, at / "motion.avi"), TypeError, "run"),
     (lambda _: descent(UNION, X, [0.5]), ValueError, "polyhedron"),
 ]
 
