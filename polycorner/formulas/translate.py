@@ -91,7 +91,9 @@ class Translator:
     def _number(self, e: "sympy.Basic") -> int:
         if e.is_Float:
             double = float(e)
-            fits = math.isfinite(double) and (double != 0 or bool(e.is_zero))  # Float(0) == 0 is False
+            fits = math.isfinite(double) and (
+                double != 0 or bool(e.is_zero)
+            )  # Float(0) == 0 is False
         else:
             fits = representable((int(e.p), int(e.q)))
         if not fits:

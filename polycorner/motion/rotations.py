@@ -4,7 +4,6 @@ A body turns with ``a' = a (0, omega) / 2``, ``omega`` in its own axes, so that
 ``omega = 2 Im(a* a')``; in the axes of space it is ``2 Im(a' a*)`` ([MLS] ch. 2).
 """
 
-from collections.abc import Sequence
 from threading import Lock
 from typing import TYPE_CHECKING, Literal
 
@@ -54,7 +53,7 @@ def angular_velocity(
 
 @checked
 def rotational_energy(
-    manifold: Manifold, inertia: Sequence[float], name: str | None = None
+    manifold: Manifold, inertia: ArrayLike, name: str | None = None
 ) -> "sympy.Expr":
     """Return the kinetic energy ``omega J omega / 2`` of a rotation.
 
@@ -64,7 +63,7 @@ def rotational_energy(
     Parameters
     ----------
     manifold : Manifold
-    inertia : sequence of float
+    inertia : (3,) or (3, 3) array
         The three moments of inertia ``J`` about the axes of the body, positive, or the symmetric
         matrix ``(3, 3)`` of a body in other axes.
     name : str, optional
