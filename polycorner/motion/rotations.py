@@ -8,6 +8,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from polycorner.checks import choice, instance, reals, refuse
 from polycorner.kinds import checked
