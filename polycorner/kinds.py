@@ -6,6 +6,7 @@ iterables) is checked by the function itself.  A name that is known to a type ch
 ``sympy.Expr``, stands for every class of that name.
 """
 
+import ast
 import builtins
 import os
 import sys
@@ -16,6 +17,7 @@ from functools import cache, wraps
 from inspect import Parameter, signature
 from itertools import islice
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any, ForwardRef, Literal, NoReturn, TypeVar, Union, get_args, get_origin
 
 import numpy as np
@@ -189,7 +191,7 @@ def _tuple(kinds: Sequence[Kind], several: bool) -> Kind:
 
     def fits(value: Any) -> bool:
         return (
-            isinstance(value, tuple | list)
+            (isinstance(value, tuple | list) or (is_array(value) and value.ndim == 1))
             and len(value) == len(tests)
             and all(test is None or test(v) for test, v in zip(tests, value, strict=True))
         )
@@ -227,6 +229,8 @@ def _is_plain(value: Any) -> bool:
 
 
 def _is_number(value: Any, kind: type) -> bool:
+    if is_array(value) and value.ndim == 0:
+        value = value[()]
     if isinstance(value, bool) or not isinstance(value, kind):
         return False
     try:
@@ -282,9 +286,22 @@ class _Either:
 
 
 class _Names(dict[str, Any]):
-    """Names of a module; any other stands for a class."""
+    """Names of a module, those for a type checker included; any other stands for a class."""
 
     def __missing__(self, name: str) -> Any:
         if name in UNIONS:
             return Any
+        source = _imports(self["__file__"]).get(name)
+        if source is not None and source.partition(".")[0] == "polycorner":
+            # Another name for a type, such as a pair of numbers, is not that of a class.
+            found = getattr(sys.modules.get(source), name, Any)
+            return _Named(name) if isinstance(found, type) else found
         return getattr(builtins, name, None) or sys.modules.get(name) or _Named(name)
+
+
+@cache
+def _imports(file: str) -> dict[str, str]:
+    """Return the names that a module imports from others, and those, also for a type checker."""
+    statements = ast.walk(ast.parse(Path(file).read_text(encoding="utf-8")))
+    imports = [node for node in statements if isinstance(node, ast.ImportFrom)]
+    return {name.asname or name.name: str(node.module) for node in imports for name in node.names}

@@ -110,7 +110,8 @@ def _occupied() -> bool:
     for name in closed:  # in the order of their numbers: the lowest is taken first
         opened = os.open(os.devnull, os.O_RDWR)
         os.set_inheritable(opened, True)
-        setattr(sys, name, os.fdopen(opened, "r" if name == "stdin" else "w", encoding="utf-8"))
+        mode = {"stdin": "r"}.get(name, "w")
+        setattr(sys, name, os.fdopen(opened, mode, encoding="utf-8"))
     return "stdout" in closed
 
 

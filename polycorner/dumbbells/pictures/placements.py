@@ -58,7 +58,7 @@ def relative_placements(
 
 @checked
 def relative_coordinates(
-    pair: DumbbellPair, q: ArrayLike, *, mean_heading: float | None = None
+    pair: DumbbellPair, q: ArrayLike, *, mean_heading: ArrayLike | None = None
 ) -> Array:
     """Return the relative placements ``(x, y, delta)`` of placements ``(..., 6)``.
 

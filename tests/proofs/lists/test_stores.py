@@ -175,7 +175,7 @@ def test_folders_with_something_else_are_refused(tmp_path):
         small(tmp_path)
     with pytest.raises(ValueError, match=r"store: expected a folder; .* is a file"):
         small(tmp_path / "notes.txt")
-    with pytest.raises(TypeError, match="store: expected the path of a folder"):
+    with pytest.raises(TypeError, match="store: expected text or a path"):
         small(3)
 
 
