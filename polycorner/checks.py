@@ -191,7 +191,8 @@ def reals(argument: str, value: Any) -> NDArray[np.float64]:
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
-    if isinstance(value, np.ma.MaskedArray):
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):
         msg = f"{argument}: expected real numbers; got a masked array"
         raise TypeError(msg)
     try:

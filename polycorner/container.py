@@ -30,6 +30,7 @@ import numpy as np
 
 from polycorner import __version__
 from polycorner.atomic import write_atomically
+from polycorner.errors import PolycornerError
 
 JSON = (b' "polycorner": "', b'"}\n')
 XML = (b"<!-- polycorner ", b" -->\n")
@@ -145,7 +146,7 @@ class Kind:
             return read_arrays(content)
 
 
-class FileError(ValueError):
+class FileError(PolycornerError, ValueError):
     """A file that is refused, in a sentence that names it."""
 
 

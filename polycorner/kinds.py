@@ -14,7 +14,7 @@ import types
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache, wraps
-from inspect import Parameter, signature
+from inspect import Parameter, get_annotations, signature
 from itertools import islice
 from numbers import Integral, Real
 from pathlib import Path
@@ -129,10 +129,10 @@ def kind_of(annotation: Any, module: str) -> Kind:
         return Kind(listed(map(repr, parts)), lambda v: isinstance(v, str))  # which word: `choice`
     if origin is np.ndarray:
         return _array(get_args(parts[1])[0] if len(parts) > 1 and get_args(parts[1]) else None)
-    if isinstance(annotation, _Named):
-        name = annotation.name
-        if name == "Expr":  # numbers are expressions, too
-            return _either([Kind("an expression", _named(name)), Kind(*WORDS[float])])
+    name = annotation.name if isinstance(annotation, _Named) else ""
+    if "Expr" in (name, getattr(annotation, "__name__", "")):  # numbers are expressions, too
+        return _either([Kind("an expression", _named("Expr")), Kind(*WORDS[float])])
+    if name:
         return Kind(_a(name), _named(name), True)
     return _of_class(origin, parts, module)
 
@@ -155,7 +155,7 @@ def _of_class(origin: Any, parts: Sequence[Any], module: str) -> Kind:
     if origin is Callable:
         return Kind("a function", callable)
     if getattr(origin, "_is_protocol", False) and origin.__module__ != "collections.abc":
-        return Kind("a function", callable) if "__call__" in vars(origin) else Kind(OPEN, None)
+        return Kind("a function", callable) if "__call__" in vars(origin) else _like(origin)
     if not isinstance(origin, type) or origin in (Any, object):
         return Kind(OPEN, None)
     if issubclass(origin, tuple) and parts:
@@ -165,6 +165,16 @@ def _of_class(origin: Any, parts: Sequence[Any], module: str) -> Kind:
     if issubclass(origin, Collection) and len(parts) == 1:
         return _collection(origin, kind_of(parts[0], module))
     return Kind(_a(origin.__name__), lambda value: isinstance(value, origin), by_class=True)
+
+
+def _like(protocol: type) -> Kind:
+    names = [n for n in (*get_annotations(protocol), *vars(protocol)) if not n.startswith("_")]
+
+    def fits(value: Any) -> bool:  # without computing properties
+        own = getattr(value, "__dict__", ())
+        return all(name in own or hasattr(type(value), name) for name in names)
+
+    return Kind(f"something with {' and '.join(names)}", fits, by_class=True)
 
 
 def _either(kinds: Sequence[Kind]) -> Kind:
@@ -191,7 +201,7 @@ def _tuple(kinds: Sequence[Kind], several: bool) -> Kind:
 
     def fits(value: Any) -> bool:
         return (
-            (isinstance(value, tuple | list) or (is_array(value) and value.ndim == 1))
+            (isinstance(value, tuple | list) or _is_plain(value))
             and len(value) == len(tests)
             and all(test is None or test(v) for test, v in zip(tests, value, strict=True))
         )
@@ -205,10 +215,15 @@ def _collection(origin: type, kind: Kind) -> Kind:
     is_like = like.get(origin, lambda _: False)
 
     def fits(value: Any) -> bool:
+        if isinstance(value, np.ndarray):
+            if not _is_plain(value):
+                return False
+            if not len(value):  # what it would contain
+                value = np.zeros((1, *value.shape[1:]), value.dtype)
         return (
             (isinstance(value, origin) or is_like(value))
             and not isinstance(value, str | bytes | Mapping)
-            and (test is None or is_array(value) or all(map(test, islice(value, LOOKED_AT))))
+            and (test is None or all(map(test, islice(value, LOOKED_AT))))
         )
 
     return Kind(words if kind.words == OPEN else f"{words}, each {kind.words}", fits)
@@ -225,7 +240,7 @@ def _mapping(origin: Any, key: Kind, value: Kind) -> Kind:
 
 
 def _is_plain(value: Any) -> bool:
-    return is_array(value) and value.dtype.kind in "biuf"
+    return is_array(value) and value.ndim > 0 and value.dtype.kind in "biuf"
 
 
 def _is_number(value: Any, kind: type) -> bool:

@@ -195,7 +195,10 @@ def workers_of(executor: Any) -> Workers:
     if executor is None:
         return Workers(Inline(), lambda: 1, largest=1, ahead=1)
     if isinstance(executor, int):
-        return Processes(whole("executor", executor, least=1))
+        # The stubs lack it.
+        from multiprocessing.synchronize import SEM_VALUE_MAX  # type: ignore[attr-defined]
+
+        return Processes(whole("executor", executor, least=1, most=SEM_VALUE_MAX - 1))
     if isinstance(executor, Executor):
         count = getattr(executor, "_max_workers", None) or os.cpu_count() or 1
         return Workers(executor, lambda: int(count))

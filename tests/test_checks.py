@@ -1,13 +1,16 @@
 """Guards: every refusal names the argument, and nothing in range is refused."""
 
 import math
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner import checks
+from polycorner import checks, kinds
 
 REFUSED = {
     "whole-float": (checks.whole, (2.0,), {}, TypeError),
@@ -64,3 +67,71 @@ def test_the_sentence_for_a_missing_extra_fits_a_package_and_a_checkout():
 def test_an_infinity_in_range_is_said_to_be_none():
     with pytest.raises(ValueError, match=r"^thing: expected a finite number > 0 in mm; got inf$"):
         checks.real("thing", math.inf, above=0, unit="mm")
+
+
+class _Shape(Protocol):
+    points: Any
+
+    @property
+    def faces(self) -> Any: ...
+
+
+class _Cube:
+    def __init__(self):
+        self.points = ()
+
+    @property
+    def faces(self):
+        raise AssertionError  # whatever it costs, it is not computed
+
+
+@kinds.checked
+def _given(
+    expression: "sympy.Expr" = 0,
+    shapes: Sequence[_Cube] = (),
+    counts: Sequence[int] = (),
+    pairs: Sequence[tuple[float, float]] = (),
+    shape: _Shape | None = None,
+) -> None:
+    """Take what is of the kinds that the annotations name."""
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"expression": 1},
+        {"expression": sympy.Symbol("x")},
+        {"shapes": [_Cube()]},
+        {"counts": np.arange(3)},
+        {"counts": np.empty(0, dtype=int)},
+        {"pairs": np.ones((3, 2))},
+        {"shape": _Cube()},
+    ],
+)
+def test_what_an_annotation_means_is_taken(named):
+    _given(**named)
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        {"expression": "x"},
+        {"shapes": np.ones(3)},
+        {"shapes": np.empty(0)},
+        {"counts": np.ones(3)},
+        {"counts": np.ma.array([1, 2], mask=[True, False])},
+        {"pairs": np.ones((3, 3))},
+        {"pairs": np.float64(1.0)},
+        {"shape": 1.0},
+        {"shape": _Cube},
+    ],
+)
+def test_what_it_does_not_mean_is_refused(named):
+    (name,) = named
+    with pytest.raises(TypeError, match=rf"^{name}: expected "):
+        _given(**named)
+
+
+def test_masks_in_lists_are_not_lost():
+    with pytest.raises(TypeError, match=r"^q: expected real numbers; got a masked array"):
+        checks.reals("q", [np.ma.array([0.0, 1.0], mask=[True, False])])

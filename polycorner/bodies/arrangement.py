@@ -119,14 +119,14 @@ class Arrangement(Checked):
     def __post_init__(self) -> None:
         object.__setattr__(self, "bodies", named(self.bodies))
         for argument in ("walls", "fixed"):
-            value = dict(checks.mapping(argument, getattr(self, argument)))
-            object.__setattr__(self, argument, value)
+            object.__setattr__(self, argument, dict(checks.mapping(argument, vars(self)[argument])))
         for argument, several in (("bodies", self.named), ("fixed", self.fixed)):
             for body in several.values():
                 checks.instance(argument, body, Body, "disc(1.0)")
         for wall in self.walls.values():
             if not isinstance(wall, Wall):
                 refuse("walls", "half-spaces and cylinders", wall, TypeError)
+        checks.instance("unit", self.unit, str)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
         check_together(self.named, self.fixed, self.walls)
         if self.period is not None:
@@ -269,7 +269,7 @@ class Arrangement(Checked):
         """
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
-        known = masses_of(self.placements, density, masses or {})
+        known = masses_of(self.placements, density, {} if masses is None else masses)
         laws = energies(self.placements, known, gravity, self.turning)
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
@@ -289,7 +289,7 @@ class Arrangement(Checked):
             restitution=restitution,
             count=count,
             between=family,
-            exits=exits or {},
+            exits={} if exits is None else exits,
         )
 
     @cached_property

@@ -150,6 +150,8 @@ def _pull(gravity: Any, dimension: int, turning: Array) -> "tuple[list[float], l
 
     expected = f"{dimension} finite numbers, or expressions of time_symbol()"
     now = time_symbol()
+    if isinstance(gravity, np.ma.MaskedArray):
+        refuse("gravity", expected, gravity, TypeError)
     try:
         given = [as_expression("gravity", component) for component in gravity]
     except TypeError:

@@ -104,7 +104,8 @@ def lattice(given: Any, dimension: int) -> Lattice:
     if given is None:
         return Lattice(np.full(dimension, math.inf))
     expected = f"{dimension} lengths > 0, or None for a direction without"
-    if isinstance(given, str) or np.ndim(given) != 1 or len(given) != dimension:
+    several = isinstance(given, Sequence) or (isinstance(given, np.ndarray) and given.ndim == 1)
+    if isinstance(given, str | bytes) or not several or len(given) != dimension:
         refuse("period", expected, given)
     lengths = [
         math.inf

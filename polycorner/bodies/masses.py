@@ -100,7 +100,8 @@ def mass_of(body: Body, density: float = 1.0) -> Mass:
     second = (second + second.T) / 2  # where moments cancel, rounding errors need not
     inertia = np.trace(second) * np.eye(len(centre)) - second
     planar = len(centre) == 2
-    return Mass(density * mass, centre, density * (np.trace(second) if planar else inertia))
+    with checks.about("density"):
+        return Mass(density * mass, centre, density * (np.trace(second) if planar else inertia))
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ def check_room(
     for name, wall in walls.items():
         across, _ = wall.fixed_by()
         if np.abs(across @ lattice.directions.T).max(initial=0.0) > FLAT:
-            refuse("walls", "walls parallel to the periodic directions", name)
+            refuse("walls", "walls parallel to the directions that have a period", name)
     for p in placements:
         least = float(min(lattice.lengths))
         thickest = 2 * max(part.thickness for part in p.body.parts.values())

@@ -16,7 +16,7 @@ from polycorner.bodies.gaps import points_of
 from polycorner.bodies.kernels import together
 from polycorner.bodies.pairs import Member, Tree, apart
 from polycorner.bodies.walls import HalfSpace
-from polycorner.checks import instance, refuse
+from polycorner.checks import about, instance, refuse
 from polycorner.formulas import cache
 from polycorner.formulas.compositions import substituted
 from polycorner.formulas.families import Family
@@ -83,7 +83,8 @@ def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True)
     sharp = [body for body, radius in radii.items() if radius == 0]
     if sharp:
         refuse("arrangement", "rounded bodies, which have a radius", sharp[0])
-    last = Manifold.euclidean([name], scale=arrangement.scale, unit=arrangement.unit)
+    with about("name"):
+        last = Manifold.euclidean([name], scale=arrangement.scale, unit=arrangement.unit)
     manifold = arrangement.manifold * last
     gaps = [
         _lifted(
@@ -145,7 +146,8 @@ def scaled(
     instance("arrangement", arrangement, Arrangement)
     least = checks.real("least", least, above=0, below=1)
     unit = arrangement.scale / max(body.size for body in arrangement.named.values())
-    manifold = arrangement.manifold * Manifold.euclidean([name], scale=unit)
+    with about("name"):
+        manifold = arrangement.manifold * Manifold.euclidean([name], scale=unit)
     gaps = [
         _lifted(
             apart(arrangement.manifold, one, two, excluded=excluded),

@@ -104,7 +104,7 @@ class Cylinder(Checked):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", checks.real("radius", self.radius, above=0))
-        point = self.point
+        point = checks.reals("point", self.point)
         if self.axis is not None:
             axis = _vector("axis", self.axis, 3)
             object.__setattr__(self, "axis", axis / np.linalg.norm(axis))

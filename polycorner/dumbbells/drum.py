@@ -31,6 +31,7 @@ from polycorner.kinds import checked
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts, PairLaw
 from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.mechanics import MechanicalSystem, State
+from polycorner.motion.simulation import SHORTEST_STEP
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
@@ -110,7 +111,8 @@ class DumbbellDrum(MechanicalSystem):
         for name in ("sliding", "rolling", "rubbing"):
             object.__setattr__(self, name, _coefficients(name, getattr(self, name)))
         real("tilt", self.tilt, above=-math.pi / 2, below=math.pi / 2, unit="rad")
-        real("spin", self.spin, unit="rad/s")
+        most = math.tau / SHORTEST_STEP  # one turn in the shortest step
+        real("spin", self.spin, least=-most, most=most, unit="rad/s")
         real("restitution", self.restitution, least=0, most=1)
         real("ball_mass", self.ball_mass, above=0, unit="g")
         real("top", self.top, above=0, infinite=True, unit="mm")
@@ -217,7 +219,7 @@ class DumbbellDrum(MechanicalSystem):
         longest = math.sqrt(2 * FREE_FALL * self.rod_radius / gravity)
         if shaking is not None and shaking.longest_step < longest:
             return shaking.longest_step, "a tenth of the shortest period of shaking"
-        return longest, "in which a ball falls by a tenth of the rod's radius"
+        return longest, "in which a ball falls by a tenth of rod_radius"
 
     def described(self) -> dict[str, Any]:
         """Return the parameters of the drum by name."""

@@ -5,7 +5,7 @@ non-overlapping placements out of ``M x M``; the energy is the height of the bal
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -18,11 +18,13 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import TOLERANCE
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
 Chirality = Literal["L", "R"]
+LONGEST = 1 / TOLERANCE  # l / r, above which a ball is smaller than what counts as zero
 
 
 @dataclass(frozen=True)
@@ -62,21 +64,15 @@ class DumbbellPair(Checked):
     rod_weight: float = 0.0
 
     def __post_init__(self) -> None:
-        number = {
-            name: checks.real(name, getattr(self, name), above=0, unit="mm")
-            for name in ("ball_radius", "rod_radius", "length")
-        }
-        r = number["ball_radius"]
-        number["rod_radius"] = checks.real(
-            "rod_radius", self.rod_radius, above=0, below=r, unit="mm"
-        )
-        radius = checks.real("drum_radius", self.drum_radius, above=r, infinite=True, unit="mm")
+        r = checks.real("ball_radius", self.ball_radius, above=0, unit="mm")
+        less, more = "mm, less than ball_radius", "mm, more than ball_radius"
+        t = checks.real("rod_radius", self.rod_radius, above=0, below=r, unit=less)
+        radius = checks.real("drum_radius", self.drum_radius, above=r, infinite=True, unit=more)
         widest = 2 * (radius - r)  # the longest chord of the cylinder of ball centres
-        number["length"] = checks.real("length", self.length, least=2 * r, most=widest, unit="mm")
-        number["drum_radius"] = radius
-        number["rod_weight"] = checks.real("rod_weight", self.rod_weight, least=0)
-        for name, value in number.items():
-            object.__setattr__(self, name, value)
+        length = checks.real("length", self.length, least=2 * r, most=widest, unit="mm")
+        weight = checks.real("rod_weight", self.rod_weight, least=0)
+        for field, value in zip(fields(self), (length, r, t, radius, weight), strict=True):
+            object.__setattr__(self, field.name, value)
 
     @property
     def is_plane(self) -> bool:
@@ -231,8 +227,10 @@ class DumbbellPair(Checked):
         documentation, page "Heading"); ``theta_s`` in radians.
         """
         p = self.ball_radius + self.rod_radius
-        along = self.length - math.sqrt(4 * self.ball_radius**2 - p**2)
-        heading = math.atan2(2 * along * p, along**2 + self.length**2 - p**2) / 2
+        diameter = 2 * self.ball_radius
+        along = self.length - math.sqrt(diameter - p) * math.sqrt(diameter + p)
+        s, d = p / self.length, along / self.length
+        heading = math.atan2(2 * d * s, d**2 + 1 - s**2) / 2
         return heading, along, p
 
     def nested(
@@ -251,15 +249,14 @@ class DumbbellPair(Checked):
             Exact in the plane; in the drum, to within terms of order ``1/R^2``.
         """
         sign = 1 if checks.choice("chirality", chirality, ("R", "L")) == "R" else -1
-        gap = (
-            self.ball_radius / 10
-            if clearance is None
-            else checks.real("clearance", clearance, unit="mm")
-        )
+        clearance = self.ball_radius / 10 if clearance is None else clearance
+        gap = checks.real("clearance", clearance, unit="mm")
         angle, _, p = self.plane_corner()
         theta = sign * angle if heading is None else checks.real("heading", heading)
         across = p + gap
-        along = self.length - math.sqrt(max((2 * self.ball_radius + gap) ** 2 - across**2, 0.0))
+        # sqrt((2 r + gap)^2 - across^2), whose squares may be too large for doubles
+        least, middle = self.ball_radius - self.rod_radius, self.ball_radius + p / 2 + gap
+        along = self.length - math.sqrt(2 * least) * math.sqrt(max(middle, 0.0))
         axis = np.array([math.sin(theta), math.cos(theta)])
         normal = sign * np.array([-math.cos(theta), math.sin(theta)])
         return self._pair(along * axis + across * normal, theta)
@@ -291,6 +288,8 @@ class DumbbellPair(Checked):
         heading : float, optional
             Mean heading in radians; default random.
         """
+        if heading is not None:
+            checks.real("heading", heading)
         reach = self.length + 4 * self.ball_radius
         found = np.empty((0, 6))
         while len(found) < count:
@@ -307,7 +306,9 @@ class DumbbellPair(Checked):
 
     def side_by_side(self, *, clearance: float = 0.0) -> Array:
         """Return two dumbbells on parallel meridians, ball beside ball, ``clearance`` mm apart."""
-        apart = 2 * self.ball_radius + checks.real("clearance", clearance, unit="mm")
+        r, widest = self.ball_radius, math.inf if self.is_plane else 2 * self.centre_radius
+        gap = checks.real("clearance", clearance, least=-2 * r, most=widest - 2 * r, unit="mm")
+        apart = 2 * r + gap
         if not self.is_plane:
             apart = 2 * self.centre_radius * math.asin(apart / (2 * self.centre_radius))
         return self._pair(np.array([apart, 0.0]), 0.0)

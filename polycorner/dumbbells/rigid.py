@@ -25,6 +25,7 @@ from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
 from polycorner.kinds import checked
 from polycorner.motion.contacts import Friction
 from polycorner.motion.mechanics import State
+from polycorner.motion.simulation import LONGEST
 from polycorner.motion.system import System
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
@@ -182,6 +183,8 @@ class RigidDumbbells(Checked):
             Times in s; default 0.
         """
         given, instants = _many(q), finite(reals("t", t), "t")
+        if abs(instants).max(initial=0.0) > LONGEST:
+            refuse("t", f"times up to {LONGEST:g} s", t)
         places = given.reshape(-1, SIZE)
         try:
             times = np.broadcast_to(instants, given.shape[:-1])

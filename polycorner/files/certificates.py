@@ -120,6 +120,8 @@ def load_certificate(
         first that does.
     """
     check_tolerance("tolerance", tolerance)
+    if polyhedron is not None and energy is not None:
+        pose(polyhedron, energy)
     content = KIND.load_json(path)
     with KIND.reading(path):
         HEADER("", content)
@@ -131,7 +133,9 @@ def load_certificate(
             found = _certificate(content, polyhedron, energy)
             differs = next(_differences(content, found, tolerance), "")
     if differs:
-        raise KIND.refusal(path, f"is of another problem, or was not computed here: {differs}")
+        raise KIND.refusal(
+            path, f"is of another polyhedron or energy, or was not computed here: {differs}"
+        )
     return found
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from polycorner.checks import names
+from polycorner.checks import about, names, refuse
 from polycorner.formulas.expressions import as_expression, kinks
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
@@ -108,10 +108,11 @@ class Family(Checked):
         stationary: Iterable[str] = (),
     ) -> "Family":
         """Return the family of given expressions, checking every symbol at once."""
-        variables, parameters = tuple(variables), tuple(parameters)
+        variables, parameters = _names("variables", variables), _names("parameters", parameters)
         _check_new("parameters", parameters, variables)
         _check_new("definitions", tuple(definitions or ()), variables + parameters)
-        given = {name: as_expression(name, e) for name, e in expressions.items()}
+        with about("expressions"):
+            given = {name: as_expression(name, e) for name, e in expressions.items()}
         known = {name: as_expression(name, e) for name, e in (definitions or {}).items()}
         written, held = Written(known, given), tuple(stationary)
         family = cls(tuple(given), variables, parameters, written, unit=unit, stationary=held)
@@ -190,6 +191,13 @@ def _is_importable(function: Any) -> bool:
         return _is_importable(function.func)
     module = sys.modules.get(getattr(function, "__module__", ""))
     return getattr(module, getattr(function, "__qualname__", ""), None) is function
+
+
+def _names(argument: str, given: Iterable[Any]) -> tuple[str, ...]:
+    names = tuple(given) if isinstance(given, Iterable) else ()
+    if isinstance(given, str | bytes) or not all(isinstance(n, str) for n in names):
+        refuse(argument, "names of symbols", given, TypeError)
+    return names
 
 
 def _check_new(argument: str, names: Sequence[str], taken: Sequence[str]) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.checks import reals
 from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
 from polycorner.formulas.periodicity import check_function
 from polycorner.kinds import checked
@@ -27,7 +28,7 @@ def _words(argument: str, names: Sequence[str] | None) -> tuple[str, ...]:
         return ()
     if isinstance(names, str) or not isinstance(names, Sequence):
         checks.refuse(argument, "a sequence of coordinate names", names, TypeError)
-    return tuple(names)
+    return tuple(checks.instance(argument, name, str) for name in names)
 
 
 class SmoothFunction(Value):
@@ -91,7 +92,8 @@ class SmoothFunction(Value):
         values = {str(symbol): value for symbol, value in (parameters or {}).items()}
         formal = _words("variables", variables) or manifold.names
         bound = _words("reads", reads) or formal
-        family = Family.of({name: expression}, formal, values, definitions, unit=unit)
+        expressions = {name: as_expression(name, expression)}
+        family = Family.of(expressions, formal, values, definitions, unit=unit)
         self._bind(family, name, manifold, bound, tuple(values.values()))
         check_function(self)
 

@@ -117,7 +117,7 @@ class Translator:
         """Return the node of a symbol."""
         if name not in self.names:
             msg = (
-                f"{self.subject}: the symbol {name} is no coordinate and no parameter; "
+                f"{self.subject}: the symbol {name} is none of the variables and no parameter; "
                 f"known are {', '.join(self.known)}"
             )
             raise ValueError(msg)

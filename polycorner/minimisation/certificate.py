@@ -10,7 +10,7 @@ first order              ``dE = sum lam_i df_i + sum mu_j dh_j``
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
@@ -90,7 +90,7 @@ class Certificate(Checked, Printed):
     rank_tolerance: float = RANK_TOLERANCE
     method: str = "certify"
     iterations: int = 0
-    search: Verdict | None = field(default=None)
+    search: Verdict | None = None
     note: str = ""
 
     def __post_init__(self) -> None:
@@ -103,8 +103,7 @@ class Certificate(Checked, Printed):
     def found(self) -> Analysis | SparseAnalysis:
         """First and second order at the point, with sparse matrices for a large polyhedron."""
         if self.problem.is_sparse:
-            tolerances = self.tolerance, self.rank_tolerance
-            return analyse_sparse(self.problem, self.point, *tolerances)
+            return analyse_sparse(self.problem, self.point, self.tolerance, self.rank_tolerance)
         return self.analysis
 
     @cached_property
@@ -253,10 +252,9 @@ class Certificate(Checked, Printed):
             f"{name} = {number(x, 6)} {angle_unit(period)}".rstrip()
             for name, period, x in zip(manifold.names, manifold.periods, self.point, strict=True)
         )
-        active = names(self.active, 40) or "nothing"
         return (
             f"Certificate({self.verdict.name} at {point}; energy {number(self.energy, 6)}; "
-            f"on {active})"
+            f"on {names(self.active, 40) or 'nothing'})"
         )
 
     def _sheet(self) -> Sheet:

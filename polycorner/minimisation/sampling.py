@@ -64,7 +64,7 @@ def _bounds(problem: Problem, box: Any) -> tuple[Array, Array]:
     """Return the lower and the upper bounds of a box."""
     manifold = problem.polyhedron.manifold
     given = [None] * problem.dimension if box is None else box
-    if not isinstance(given, Sequence | np.ndarray) or len(given) != problem.dimension:
+    if not isinstance(given, Sequence | np.ndarray) or _length(given) != problem.dimension:
         msg = (
             f"box: expected bounds (low, high) for each of {', '.join(manifold.names)}; got {box!r}"
         )
@@ -84,8 +84,12 @@ def _bounds(problem: Problem, box: Any) -> tuple[Array, Array]:
     return low, high
 
 
+def _length(several: Any) -> int:
+    return 0 if isinstance(several, np.ndarray) and not several.ndim else len(several)
+
+
 def _is_interval(pair: Any) -> bool:
-    if not isinstance(pair, Sequence | np.ndarray) or len(pair) != 2:
+    if not isinstance(pair, Sequence | np.ndarray) or _length(pair) != 2:
         return False
     if not all(isinstance(x, Real) and np.isfinite(float(x)) for x in pair):
         return False

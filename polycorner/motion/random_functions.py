@@ -147,7 +147,8 @@ def field_modes(
     periodic = math.isfinite(circumference)
     length = real("correlation_length", correlation_length, above=0)
     if periodic:
-        real("correlation_length", length, least=FINEST * circumference)
+        finest = FINEST * circumference
+        real("correlation_length", length, least=finest, unit="the unit of circumference")
     first, second = (_stratified(modes, rng) for _ in range(2))
     along = _normal(second) / length
     if not periodic:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import instance, mapping, names, real, reals, refuse, whole
+from polycorner.checks import names, real, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
@@ -23,8 +23,6 @@ from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy
-
-UNSTABLE = "beyond which the motion is unstable"
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,14 +116,13 @@ class System(MechanicalSystem):
     exits: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        instance("polyhedron", self.polyhedron, Polyhedron)
-        if self.polyhedron.is_union:
-            expected = "an intersection of inequalities and equations, such as a convex piece"
-            refuse("polyhedron", expected, self.polyhedron)
         object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
         object.__setattr__(self, "potential", as_expression("potential", self.potential))
         object.__setattr__(self, "forces", as_expressions("forces", self.forces))
         check_fields(self)
+        if self.polyhedron.is_union:
+            expected = "an intersection of inequalities and equations, such as a convex piece"
+            refuse("polyhedron", expected, self.polyhedron)
         object.__setattr__(self, "friction", tuple(self.friction))
         for friction in self.friction:
             if isinstance(friction.load, str) and friction.load not in self._normals:
@@ -142,7 +139,7 @@ class System(MechanicalSystem):
         super().__post_init__()
 
     def _check_single(self, argument: str) -> None:
-        given = mapping(argument, getattr(self, argument))
+        given = getattr(self, argument)
         names(argument, given, self.manifold.names)
         if len(given) > 1:
             refuse(argument, "one coordinate", sorted(given))
@@ -289,7 +286,6 @@ class System(MechanicalSystem):
             )
             raise ValueError(msg)
 
-    @checked
     def sticks(self, q: Array, v: Array) -> NDArray[np.bool_]:
         """Return for each friction contact whether its slip is zero, ``(..., F)``."""
         if not self.friction:
@@ -320,7 +316,8 @@ class System(MechanicalSystem):
             highest_square(law, known, scales, q, v, bends(held, q))
             for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
         )
-        return (2 / math.sqrt(squared) if squared > 1e-12 else math.inf), UNSTABLE
+        longest = 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
+        return longest, "beyond which the motion is unstable"
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.shapes import Body, Part
 from polycorner.bodies.walls import Cylinder, HalfSpace
-from polycorner.checks import instance, refuse
+from polycorner.checks import instance, refuse, whole
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 
@@ -64,7 +64,7 @@ def draw_arrangement(
     places = np.atleast_2d(arrangement.manifold.points(points, "points"))
     if titles is not None and len(titles) != len(places):
         refuse("titles", f"{len(places)} titles, one for each point", len(titles))
-    columns = min(columns, len(places))
+    columns = min(whole("columns", columns, least=1), len(places))
     rows = math.ceil(len(places) / columns)
     figure = Figure(figsize=(CELL * columns, (CELL + 0.2) * rows), layout="constrained")
     space = {"projection": "3d"} if arrangement.dimension == 3 else {}

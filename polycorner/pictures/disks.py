@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from polycorner.checks import refuse
+from polycorner.checks import refuse, whole
 from polycorner.kinds import checked
 from polycorner.models.disks.configurations import CriticalConfiguration
 from polycorner.models.disks.disks import TorusDisks
@@ -44,7 +44,7 @@ def draw_critical(
     """
     if not configurations:
         refuse("configurations", "at least one", configurations)
-    rows = math.ceil(len(configurations) / columns)
+    rows = math.ceil(len(configurations) / whole("columns", columns, least=1))
     columns = math.ceil(len(configurations) / rows)
     figure = Figure(figsize=(2.5 * columns, 3.0 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, squeeze=False)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 
 if TYPE_CHECKING:
     from polycorner.proofs import Proof
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 COLOURS = {"proved": "#009E73", "failed": "#D55E00", "undecided": "#E69F00"}
 
 
+@checked
 def draw_cells(proof: "Proof", units: Mapping[str, str] | None = None) -> Figure:
     """Draw the cells of a proof over one or two parameters, coloured by what was decided.
 

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
-from polycorner.checks import instance, reals, refuse, whole
+from polycorner.checks import MOST, instance, reals, refuse, whole
+from polycorner.pictures.arguments import labelled, pair, several
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, stratum_at
 from polycorner.spaces.arguments import finite
@@ -72,7 +73,8 @@ def draw_region(
     """
     _check_planar(polyhedron)
     left, right, bottom, top = _bounds(bounds)
-    resolution = whole("resolution", resolution, least=2)
+    resolution = whole("resolution", resolution, least=2, most=MOST)
+    instance("title", title, str)
     marked, held = _points("corners", corners), _points("minima", minima)
     lines = _polylines(edges)
     unit = max(right - left, top - bottom)
@@ -201,8 +203,7 @@ def _bounds(bounds: Any) -> tuple[float, float, float, float]:
 
 def _points(argument: str, given: Labelled) -> list[tuple[str, Array]]:
     marked = []
-    for entry in given:
-        label, point = _pair(argument, entry)
+    for label, point in labelled(argument, given):
         if point.shape != (2,):
             refuse(argument, "points of shape (2,)", point.shape)
         marked.append((label, point))
@@ -211,16 +212,10 @@ def _points(argument: str, given: Labelled) -> list[tuple[str, Array]]:
 
 def _polylines(edges: Edges) -> list[tuple[str, Array]]:
     lines = []
-    for entry in edges:
+    for entry in several("edges", edges):
         named = isinstance(entry, tuple) and len(entry) == 2 and isinstance(entry[0], str)
-        label, line = _pair("edges", entry if named else ("", entry))
+        label, line = pair("edges", entry if named else ("", entry))
         if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2:
             refuse("edges", "polylines of shape (k, 2) with k >= 2", line.shape)
         lines.append((label, line))
     return lines
-
-
-def _pair(argument: str, entry: Any) -> tuple[str, Array]:
-    if not isinstance(entry, tuple) or len(entry) != 2 or not isinstance(entry[0], str):
-        refuse(argument, "pairs of a label and numbers", entry, TypeError)
-    return entry[0], finite(reals(argument, entry[1]), argument)

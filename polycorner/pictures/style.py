@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from polycorner.atomic import atomic
+from polycorner.checks import listed, refuse
 from polycorner.kinds import checked
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito).
@@ -31,8 +32,10 @@ def bridged(shown: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 @checked
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG and return its path."""
-    FigureCanvasAgg(figure)
+    """Write a figure, in the format that the suffix names, and return its path."""
+    formats = FigureCanvasAgg(figure).get_supported_filetypes()
+    if path.suffix[1:].lower() not in formats:
+        refuse("path", f"a name ending in .{listed(formats)}", path.name)
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=150)
     return path

@@ -102,7 +102,7 @@ class Programmes:
 def _on(polyhedron: Polyhedron, height: Any) -> SmoothFunction:
     if isinstance(height, SmoothFunction):
         return height
-    return SmoothFunction("height", height, polyhedron.manifold)
+    return SmoothFunction("height on the polyhedron", height, polyhedron.manifold)
 
 
 def _affine(argument: str, functions: Iterable[SmoothFunction], n: int) -> Array:

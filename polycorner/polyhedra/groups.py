@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Union
 
+from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.periodicity import check_function
@@ -25,6 +26,9 @@ class _Group(Value):
     """Parts joined by one word; an immutable value."""
 
     def __init__(self, *parts: Part) -> None:
+        for part in parts:
+            if not isinstance(part, _Group | SmoothFunction | _Plain):
+                as_expression("parts", part)
         self.parts = parts
 
     def __repr__(self) -> str:
@@ -95,7 +99,8 @@ class _Collection:
         if label in self.plain:
             msg = f"{self.argument}: expected distinct names; got {label} more than once"
             raise ValueError(msg)
-        self.plain[label] = part
+        argument = f"{self.argument}[{name!r}]" if name else label
+        self.plain[label] = as_expression(argument, part)
         return _Plain(label)
 
     def _on_manifold(self, function: SmoothFunction, name: str) -> SmoothFunction:

@@ -74,6 +74,11 @@ class Symmetry(Checked):
     relabel: Callable[[Array, Array, float], Sequence[Relabelling]] | None = None
     fields: Sequence[Any] = ()
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for field in self.fields:
+            _check_field("fields", field)
+
     @cached_property
     def _compiled(self) -> "dict[Manifold, list[tuple[SmoothFunction, ...]]]":
         """The vector fields on the manifolds they were evaluated on."""
@@ -94,6 +99,7 @@ class Symmetry(Checked):
     @checked
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
+        q = _placed("q", q, manifold)
         if self.tangents is not None:
             return np.asarray(self.tangents(q), dtype=np.float64) / manifold.scale_array
         if manifold not in self._compiled:
@@ -104,6 +110,7 @@ class Symmetry(Checked):
     @checked
     def displacement(self, manifold: Manifold, p: Array, q: Array) -> Array:
         """Return the displacement from one continuous orbit to another, by the invariants."""
+        p, q = _placed("p", p, manifold), _placed("q", q, manifold)
         if self.invariants is None:
             return manifold.chord(p, q) / manifold.scale_array
         return self.invariants(p) - self.invariants(q)
@@ -116,6 +123,7 @@ class Symmetry(Checked):
     @checked
     def separations(self, manifold: Manifold, p: Array, points: Array) -> Array:
         """Return how far the orbit of ``p`` is apart from those of points ``(k, n)``, ``(k,)``."""
+        p, points = _placed("p", p, manifold), _placed("points", points, manifold)
         if self.invariants is None:
             apart = manifold.chord(p, points) / manifold.scale_array
         else:
@@ -129,6 +137,7 @@ class Symmetry(Checked):
         Distances alone exclude the others; nothing is excluded where relabellings or invariants
         are functions of the user's.
         """
+        p, points = _placed("p", p, manifold), _placed("points", points, manifold)
         if self.relabel is not None or self.invariants is not None:
             return list(range(len(points)))
         moved = np.array([element.apply(p) for element in self.group])
@@ -141,6 +150,7 @@ class Symmetry(Checked):
         self, manifold: Manifold, p: Array, q: Array, tolerance: float
     ) -> list[Relabelling]:
         """Return every relabelling that carries ``p`` to the orbit of ``q``; none if none does."""
+        p, q = _placed("p", p, manifold), _placed("q", q, manifold)
         if self.key is not None and abs(self.key(p) - self.key(q)).max() > tolerance:
             return []
         if self.relabel is not None:
@@ -150,6 +160,19 @@ class Symmetry(Checked):
             for element in self.group
             if self.separation(manifold, element.apply(p), q) <= tolerance
         ]
+
+
+def _placed(argument: str, given: Array, manifold: Manifold) -> Array:
+    array = checks.reals(argument, given)
+    if array.shape[-1:] != (manifold.size,):
+        checks.refuse(argument, f"coordinates {', '.join(manifold.names)}", array.shape)
+    return array
+
+
+def _check_field(argument: str, components: Any) -> None:
+    if isinstance(components, str) or not isinstance(components, Iterable):
+        expected = "components by name, or a sequence of them"
+        checks.refuse(argument, expected, components, TypeError)
 
 
 def _same(q: Array) -> Array:
@@ -207,10 +230,7 @@ def vector_field(manifold: Manifold, components: Any) -> "tuple[SmoothFunction, 
     if isinstance(components, Mapping) and components:
         checks.names("symmetry", components, manifold.names)
         components = [components.get(name, 0) for name in manifold.names]
-    if isinstance(components, str | Mapping) or not isinstance(components, Iterable):
-        checks.refuse(
-            "symmetry", "components by name, or a sequence of them", components, TypeError
-        )
+    _check_field("symmetry", components if not isinstance(components, Mapping) else "")
     given = list(components)
     if len(given) != manifold.size:
         expected = f"{manifold.size} components, for {', '.join(manifold.names)}"

@@ -104,7 +104,11 @@ def skeleton(
         checks.instance("symmetry", symmetry, Symmetry)
     check_tolerance("tolerance", tolerance)
     checks.real("extent", extent, above=0, infinite=True, unit="scale units")
-    points = polyhedron.manifold.points(np.atleast_2d(reals("starts", starts)), "starts")
+    points, names = np.atleast_2d(reals("starts", starts)), polyhedron.manifold.names
+    if points.shape[-1] != len(names):
+        expected = f"shape (..., {len(names)}) for the coordinates of the polyhedron"
+        checks.refuse("starts", f"{expected}, {', '.join(names)}", points.shape)
+    points = polyhedron.manifold.points(points, "starts")
     if points.ndim != 2:
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import instance, refuse
-from polycorner.kinds import checked
+from polycorner.checks import instance, refuse, whole
 from polycorner.values import Checked, cached_property
 
 Scalar: TypeAlias = bool | int | float | str
@@ -51,6 +51,8 @@ def _scalars(values: Any) -> tuple[Scalar, ...]:
     if not isinstance(values, Iterable) or isinstance(values, str):
         refuse("values", "a list of numbers or of texts", values, TypeError)
     scalars = list(values)
+    if not all(isinstance(value, str | Real | np.bool_) for value in scalars):
+        refuse("values", "a list of numbers or of texts", values, TypeError)
     array = np.array(scalars)
     if array.ndim != 1 or array.dtype.kind not in "biufU" or not len(array):
         refuse("values", "a list of numbers or of texts", values, TypeError)
@@ -101,10 +103,9 @@ class Grid(Checked):
         """Number of points."""
         return math.prod(self.shape)
 
-    @checked
     def point(self, number: int) -> dict[str, Scalar]:
         """Return the parameters of a point."""
-        index = np.unravel_index(number, self.shape)
+        index = np.unravel_index(whole("number", number, least=0, most=self.size - 1), self.shape)
         return {
             name: axis.values[int(k)]
             for (name, axis), k in zip(self.axes.items(), index, strict=True)

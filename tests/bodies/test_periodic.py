@@ -296,7 +296,7 @@ def test_without_a_period_nothing_changes():
         (
             lambda: Arrangement([ROD], {"a": HalfSpace([1, 1], [0, 0])}, period=[3, None]),
             ValueError,
-            "walls: expected walls parallel to the periodic directions; got 'a'",
+            "walls: expected walls parallel to the directions that have a period; got 'a'",
         ),
         (
             lambda: Arrangement([ROD], {"a": Cylinder(3.0)}, period=[3, None]),

@@ -213,3 +213,17 @@ class TestHeading:
     def test_one_turns_a_or_b(self, which):
         with pytest.raises((TypeError, ValueError), match=r"^which: expected 'A' or 'B'"):
             DRUM.half_turn(DRUM.nested("R"), which)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e150, 1e300])
+def test_nested_pairs_scale_with_their_size(size):
+    unit = DumbbellPair(16.0, 3.0, 1.5).nested("R", clearance=0.25)
+    q = DumbbellPair(16 * size, 3 * size, 1.5 * size).nested("R", clearance=0.25 * size)
+    lengths = np.array([size, size, 1.0] * 2)
+    np.testing.assert_allclose(q / lengths, unit, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("clearance", [-6.1, 1e308])
+def test_balls_farther_apart_than_the_drum_is_wide_are_refused(clearance):
+    with pytest.raises(ValueError, match=r"^clearance: expected a number >= -6 and <= 238 in mm"):
+        DumbbellPair(16.0, 3.0, 1.5, 125.0).side_by_side(clearance=clearance)

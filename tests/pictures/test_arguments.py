@@ -85,7 +85,7 @@ WRONG = [
     (motion(frames=2.5), TypeError, "frames"),
     (motion(frames=True), TypeError, "frames"),
     (lambda _: draw_critical(TorusDisks(2), []), ValueError, "configurations"),
-    (lambda _: draw_cells(SimpleNamespace(parameters={})), ValueError, "proof"),
+    (lambda _: draw_cells(SimpleNamespace(parameters={})), TypeError, "proof"),
     (lambda _: draw_solid(BALL, points=[(0, 0, 1)], labels=["a", "b"]), ValueError, "labels"),
     (surface(bounds=[(-2, 2), (2, -2), (0, 1)]), ValueError, "bounds"),
     (surface(bounds=[(-2, 2), (-2, 2)]), ValueError, "bounds"),

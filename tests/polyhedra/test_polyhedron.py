@@ -277,11 +277,10 @@ class TestRefusals:
             ("x", "f1"),
             (["x"], "f1"),
             ([x, "y"], "f2"),
-            ({"wall": "x"}, "wall"),
-            (AnyOf(x, "y"), "f2"),
+            ({"wall": "x"}, r"parts\['wall'\]"),
             ([x >= 0], "f1"),
             ([x, [y]], "f2"),
-            ({"wall": {"x": x}}, "wall"),
+            ({"wall": {"x": x}}, r"parts\['wall'\]"),
             ({x}, "f1"),
             (None, "f1"),
             (True, "f1"),
@@ -291,6 +290,11 @@ class TestRefusals:
     def test_what_is_no_function_is_refused_by_name(self, parts, name):
         with pytest.raises(TypeError, match=f"^{name}: expected "):
             Polyhedron(PLANE, parts)
+
+    @pytest.mark.parametrize("group", [AllOf, AnyOf])
+    def test_groups_refuse_at_once_what_is_no_function(self, group):
+        with pytest.raises(TypeError, match=r"^parts: expected a SymPy expression; got 'y'"):
+            group(x, "y")
 
     def test_strings_are_no_equations_either(self):
         with pytest.raises(TypeError, match="h1: expected a SymPy expression"):

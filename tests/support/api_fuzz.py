@@ -41,7 +41,6 @@ REASONS = {
     "reads what described() or record() told": """CriticalSearch.restored OutOfRound.restored
         Shaking.restored UnevenFriction.restored Wobble.restored""",
     "runs until it is interrupted": "viewer.serve",
-    "a group is judged by the polyhedron that takes it": "AllOf AnyOf",
 }
 EXEMPT = {name: reason for reason, names in REASONS.items() for name in names.split()}
 OPEN = {

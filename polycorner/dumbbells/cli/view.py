@@ -186,6 +186,8 @@ def _serve(make: "Callable[[], Application]", host: str, port: int, *, browser: 
         listener = viewer_server.bound(host, port)
     except viewer_server.PortTakenError as error:
         fail(f"--port: {error.strerror}")
+    except ValueError:
+        fail(f"--host: {host} is not the name of a machine")
     except OSError as error:
         fail(f"--host: {host} cannot be listened on ({error.strerror or error})")
     with listener:

@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Sizes, chirality, gaps
 from polycorner.dumbbells.dynamics.singles import APART
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality
 from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import simulate
+from polycorner.motion.simulation import SHORTEST_STEP, simulate
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value, cached_property
@@ -223,6 +224,7 @@ def follow_pairs(
     interval: float = 0.1,
 ) -> DyadPaths:
     """Follow pairs of dumbbells from rest at ``places``, ``(2 n, 3)``; see :class:`DyadPaths`."""
+    real("dt", dt, least=SHORTEST_STEP, unit="s")
     many = replace(drum, count=len(np.asarray(places)))
     start, every = many.state(places), max(1, round(interval / dt))
     return DyadPaths(simulate(many, start, duration, dt, every=every, noise=noise, solver=SOLVER))

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from polycorner.checks import instance, real, refuse
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.critical import Branch, branches, critical_rod_radius
 from polycorner.dumbbells.statics.minima import paper_heading
@@ -29,7 +30,9 @@ def draw_bifurcation(pair: DumbbellPair, rods: tuple[float, float] | None = None
     radius.
     """
     r = pair.ball_radius
-    low, high = rods or (0.3 * r, 0.9995 * r)
+    low, high = (0.3 * r, 0.9995 * r) if rods is None else rods
+    if not 0 < low < high < r:
+        refuse("rods", f"two increasing radii > 0 and < {r:g} mm", rods)
     found = critical_rod_radius(pair)
     critical = [found] if found is not None and low < found < high else []
     cuts = [side for t in critical for side in (t - BESIDE * r, t + BESIDE * r)]
@@ -152,6 +155,13 @@ def draw_critical(
     ``D``: a ball touches both balls of the other dumbbell before it reaches the rod.  ``pairs`` are
     marked with stars.
     """
+    real("ball_radius", ball_radius, above=0, unit="mm")
+    real("longest", longest, above=3)
+    if math.isinf(longest * ball_radius):
+        refuse("longest", f"a finite length, in units of ball_radius = {ball_radius:g} mm", longest)
+    for drum in drums:
+        real("drums", drum, above=ball_radius, infinite=True, unit="mm")
+    pairs = [instance("pairs", pair, DumbbellPair) for pair in pairs]
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     axes = figure.add_subplot()
     lengths = np.linspace(2.0, longest, 400)

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import Sizes, dyads, mean_heading
 from polycorner.dumbbells.pictures.bodies import rod_outlines
@@ -154,8 +155,10 @@ class DrumView:
         Of the figure, in inches.
     """
 
+    @checked
     def __init__(self, run: Trajectory, *, width: float = 7.0) -> None:
         self.run = run
+        real("width", width, above=0)
         self.sizes = Sizes.of(run)
         (left, right), (low, high) = self._extent()
         height = (width - 1.6) * (high - low) / (right - left) + 1.6

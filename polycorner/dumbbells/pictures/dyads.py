@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
+from polycorner.checks import real, refuse
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import contact_point, rod_outlines
 from polycorner.dumbbells.pictures.symbols import multiplier_unit, sizes_in_words
@@ -43,6 +44,10 @@ def draw_heading(pair: DumbbellPair, lengths: Sequence[float], rods: Sequence[fl
     Computed curves are drawn full where the corner is a certified minimum and dotted where it is
     not; the paper's ``+-arctan(r/l)`` is dashed.
     """
+    if not len(lengths):
+        refuse("lengths", "at least one", lengths)
+    for rod in rods:
+        real("rods", rod, above=0, below=pair.ball_radius, unit="mm")
     figure = Figure(figsize=(7, 6), layout="constrained")
     axes = figure.add_subplot()
     lengths_array = np.asarray(lengths, dtype=np.float64)

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from polycorner.checks import refuse
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import KINDS, BunchRun
 from polycorner.dumbbells.dynamics.dyads import heading_at_shift
@@ -34,6 +35,8 @@ def draw_steady_headings(found: Sequence[Steady]) -> Figure:
     of the edge along the rods.  Second panel: the shift along the axis, between the ends of that
     edge.
     """
+    if not found:
+        refuse("found", "at least one", found)
     figure, drum = Figure(figsize=(12.5, 5.6), layout="constrained"), found[0].drum
     first, second = figure.subplots(1, 2)
     lengths = np.array([one.drum.length for one in found])
@@ -160,6 +163,8 @@ def draw_exits(runs: Mapping[str, BunchRun]) -> Figure:
 
     Below: the numbers in right and left dyads and of single dumbbells in the drum.
     """
+    if not runs:
+        refuse("runs", "at least one", runs)
     figure = Figure(figsize=(6.2 * len(runs), 7.2), layout="constrained")
     grid = figure.subplots(2, len(runs), squeeze=False)
     for (above, below), (name, one) in zip(grid.T, runs.items(), strict=True):

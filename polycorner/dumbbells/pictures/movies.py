@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from polycorner.atomic import atomic
-from polycorner.checks import missing_extra, refuse
+from polycorner.checks import MOST, missing_extra, refuse, whole
 from polycorner.dumbbells.pictures.drum import DrumView
 from polycorner.kinds import checked
 from polycorner.motion.trajectory import Trajectory
@@ -38,7 +38,7 @@ def movie_suffix() -> str:
     return ".mp4" if can_encode() else ".gif"
 
 
-def check_movie(path: str | os.PathLike[str]) -> None:
+def check_movie(path: str | os.PathLike[str], argument: str = "movie") -> None:
     """Raise for a file name whose format cannot be written.
 
     Raises
@@ -48,15 +48,15 @@ def check_movie(path: str | os.PathLike[str]) -> None:
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        refuse("movie", "a file name that ends in .mp4 or .gif", os.fspath(path))
+        refuse(argument, "a file name that ends in .mp4 or .gif", os.fspath(path))
     if suffix == ".mp4" and not can_encode():
-        msg = f"movie: {missing_extra('imageio-ffmpeg', 'movies')}; .gif files need no extra"
+        msg = f"{argument}: {missing_extra('imageio-ffmpeg', 'movies')}; .gif files need no extra"
         raise ValueError(msg)
 
 
 def chosen_frames(count: int, most: int = FRAMES) -> list[int]:
     """Return the numbers of the instants shown, the first and the last included."""
-    shown = min(count, most)
+    shown = min(count, whole("frames", most, least=1))
     return sorted({round(k) for k in np.linspace(0, count - 1, shown).tolist()})
 
 
@@ -88,7 +88,8 @@ def write_movie(
     OSError
         If the file cannot be written, as on a full disk; nothing is left of it then.
     """
-    check_movie(path)
+    check_movie(path, "path")
+    whole("rate", rate, least=1, most=MOST)
     target = Path(path)
     numbers = chosen_frames(len(run), frames)
     suffix = target.suffix.lower()

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import refuse
+from polycorner.checks import real, reals, refuse
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.kinds import checked
 from polycorner.pictures.solids.charts import Gaps
@@ -43,7 +43,7 @@ def relative_placements(
     ValueError
         In the drum without a mean heading, where other headings are not congruent.
     """
-    p = np.asarray(points, dtype=np.float64)
+    p = _rows("points", points, 3)
     q = np.zeros((*p.shape[:-1], 6))
     if mean_heading is None:
         if not pair.is_plane:
@@ -52,7 +52,7 @@ def relative_placements(
         return q
     half = p / 2 if pair.is_plane else p / np.array([2 * pair.centre_radius, 2.0, 2.0])
     q[..., :3], q[..., 3:] = -half, half
-    q[..., [2, 5]] += mean_heading
+    q[..., [2, 5]] += real("mean_heading", mean_heading)
     return q
 
 
@@ -64,9 +64,9 @@ def relative_coordinates(
 
     The inverse of :func:`relative_placements` up to congruence and, at fixed mean heading, up to
     the names of balls: a placement with the opposite mean heading is turned by half a turn.
-    ``delta`` is not wrapped.
+    ``delta`` is not wrapped.  Every placement may have a mean heading of its own, ``(...)``.
     """
-    points = np.asarray(q, dtype=np.float64)
+    points = _rows("q", q, 6)
     apart = points[..., 3:] - points[..., :3]
     if mean_heading is None:
         s, c = np.sin(points[..., 2]), np.cos(points[..., 2])
@@ -82,8 +82,15 @@ def relative_coordinates(
             axis=-1,
         )
     mean = (points[..., 2] + points[..., 5]) / 2
-    sign = np.sign(np.cos(mean - mean_heading))[..., None]
+    sign = np.sign(np.cos(mean - reals("mean_heading", mean_heading)))[..., None]
     return np.asarray(apart * np.concatenate([sign, sign, np.ones_like(sign)], axis=-1))
+
+
+def _rows(argument: str, given: ArrayLike, size: int) -> Array:
+    array = reals(argument, given)
+    if array.shape[-1:] != (size,):
+        refuse(argument, f"shape (..., {size})", array.shape)
+    return array
 
 
 def relative_gap(pair: DumbbellPair, *, mean_heading: float | None = None) -> Function:
@@ -161,7 +168,9 @@ def forbidden_solid(
     half = math.isclose(period, math.pi)
     if half and mean_heading is not None:
         refuse("period", "2 pi, the only one at fixed mean heading", period)
-    low = -period / 2 if start is None else float(start)
+    low = -period / 2 if start is None else real("start", start)
+    if low + period == low:
+        refuse("start", "an angle to which doubles can add a period", start)
     if isinstance(resolution, int | np.integer):
         turn = max(FEWEST_CELLS, resolution // 2) if half else resolution
         resolution = (resolution, resolution, turn)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from polycorner.atomic import write_atomically
+from polycorner.checks import about, real
 from polycorner.dumbbells.pictures.placements import (
     forbidden_solid,
     relative_coordinates,
@@ -56,11 +57,13 @@ def relative_curves(
     naming : callable, optional
         Name of an edge from the names of its contacts; default :func:`contacts_in_words`.
     """
+    real("period", period, above=0)
     curves: list[tuple[str, Array]] = []
     for edge in atlas.skeleton.edges:
         line = traced(atlas.skeleton, edge)
         points = relative_coordinates(atlas.pair, line, mean_heading=atlas.heading)
-        label = naming(edge.active)
+        with about("naming"):
+            label = naming(edge.active)
         for piece in _cut(atlas, points, period):
             curves += [(label, image) for image in _images(atlas, piece)]
     kept: list[tuple[str, Array]] = []

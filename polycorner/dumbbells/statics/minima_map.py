@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner import checks
-from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.pair import LONGEST, DumbbellPair
 from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
 from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Minima, certify, minima
@@ -249,7 +249,7 @@ def minima_map(
     rods : (n,) array, optional
         ``t/r``, increasing and strictly between 0 and 1.
     lengths : (m,) array, optional
-        ``l/r``, increasing and at least 2.
+        ``l/r``, increasing, at least 2 and below 1e8.
     starts : int, optional
         Number of starts for each pair.
     rng : Generator or int, optional
@@ -270,7 +270,7 @@ def minima_map(
     axes = (
         checks.increasing("curvatures", curvatures, least=0, below=2),
         checks.increasing("rods", rods, above=0, below=1),
-        checks.increasing("lengths", lengths, least=2),
+        checks.increasing("lengths", lengths, least=2, below=LONGEST),
     )
     generator = checks.generator("rng", rng)
     survey = _Survey(tuple(len(axis) for axis in axes), starts)

@@ -154,5 +154,6 @@ def long_rod_length(ball_radius: float, rod_radius: float) -> float:
     balls before it reaches the rod, and no rod is ever touched.
     """
     checks.real("ball_radius", ball_radius, above=0)
-    checks.real("rod_radius", rod_radius, least=0, most=ball_radius)
-    return 2 * math.sqrt(4 * ball_radius**2 - (ball_radius + rod_radius) ** 2)
+    checks.real("rod_radius", rod_radius, least=0, most=ball_radius, unit="the unit of ball_radius")
+    least, most = ball_radius - rod_radius, 3 * ball_radius + rod_radius
+    return 2 * math.sqrt(least) * math.sqrt(most)

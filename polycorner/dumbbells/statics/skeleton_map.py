@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner import checks
-from polycorner.dumbbells.pair import DumbbellPair
+from polycorner.dumbbells.pair import LONGEST, DumbbellPair
 from polycorner.dumbbells.statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from polycorner.dumbbells.symmetries import relabellings
 from polycorner.kinds import checked
@@ -151,7 +151,7 @@ def pair_map(
     Parameters
     ----------
     lengths : (m,) array
-        ``l/r``, increasing and at least 2.
+        ``l/r``, increasing, at least 2 and below 1e8.
     rods : (n,) array
         ``t/r``, increasing and strictly between 0 and 1.
     tolerance : float, optional
@@ -165,7 +165,7 @@ def pair_map(
     TypeError, ValueError
         For arguments of a wrong kind, shape or range.
     """
-    across = checks.increasing("lengths", lengths, least=2)
+    across = checks.increasing("lengths", lengths, least=2, below=LONGEST)
     up = checks.increasing("rods", rods, above=0, below=1)
     checks.real("tolerance", tolerance, above=0)
     survey = _Survey(float(tolerance), progress, len(across) * len(up) + len(up))

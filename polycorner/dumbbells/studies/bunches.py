@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import choice, whole
+from polycorner.checks import choice, real, whole
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed, kicks_of
 from polycorner.kinds import checked
+from polycorner.motion.simulation import LONGEST
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ def bunch(
     from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch, scattered
 
     whole("start", start, least=0)
+    real("duration", duration, least=0, most=LONGEST, unit="s")
     drum = DumbbellDrum(
         length,
         ball_radius,

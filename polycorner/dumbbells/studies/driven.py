@@ -8,6 +8,7 @@ import numpy as np
 
 from polycorner.checks import choice, real, refuse
 from polycorner.kinds import checked
+from polycorner.motion.simulation import LONGEST
 from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ SHAKEN = ("shaking across", "shaking along", "shaking up")
 KINDS = ("kicks", "chatter", *SHAKEN, "out of round", "wobble", "uneven friction")
 LOWEST = 0.1  # least frequency of shaking over the greatest
 CORNER = "ball rod rod"  # contacts of a nested pair
+TURN = 360.0  # degrees, the largest heading at the start
 CLOSE = 0.1  # mm, up to which a contact of a pair that rattles counts as closed
 
 
@@ -110,7 +112,9 @@ def driven(
     from polycorner.dumbbells.dynamics.steady import steady
 
     real("tilt", tilt, unit="deg")
-    real("duration", duration, above=0, unit="s")
+    real("duration", duration, above=0, most=LONGEST, unit="s")
+    real("lowest", lowest, least=-TURN, most=TURN, unit="deg")
+    real("highest", highest, least=-TURN, most=TURN, unit="deg")
     drum = DumbbellDrum(length, tilt=math.radians(tilt), spin=spin, restitution=restitution)
     drum, noise = disturbed(drum, kind, strength, scale, int(rng.integers(2**63)))
     places = _places(drum, np.radians(np.linspace(lowest, highest, PAIRS)).tolist())

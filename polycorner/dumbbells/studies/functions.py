@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.checks import whole
+from polycorner.checks import real, whole
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
+from polycorner.errors import SolverError
 from polycorner.kinds import checked
+from polycorner.motion.simulation import LONGEST
 
 FIRST, LAST = 2.0, 14.0  # degrees: headings of the first and the last pair at the start
 
@@ -44,7 +46,7 @@ def heading(
     ------
     ValueError
         If there is no such pair.
-    ArithmeticError
+    SolverError
         If the pair has no such corner: a ball does not fit beside the rod.
     """
     pair = DumbbellPair(length, ball_radius, rod_radius, drum_radius)
@@ -52,8 +54,12 @@ def heading(
     certificate, sign = found.certificate, 1 if chirality == "R" else -1
     if not set(CORNER) <= set(certificate.active):
         why = certificate.verdict.value
-        msg = f"expected a corner where {' '.join(CORNER)} touch; got none: {why}"
-        raise ArithmeticError(msg)
+        sizes = f"length = {length:g}, rod_radius = {rod_radius:g}, ball_radius = {ball_radius:g}"
+        msg = (
+            f"{sizes}, drum_radius = {drum_radius:g}: expected a corner where "
+            f"{' '.join(CORNER)} touch; got none: {why}"
+        )
+        raise SolverError(msg)
     residuals = certificate.residuals
     multipliers = found.multipliers
     return {
@@ -117,6 +123,8 @@ def climbing(
     from polycorner.motion.noise import Noise
 
     whole("pairs", pairs, least=1)
+    real("noise", noise, least=0)
+    real("duration", duration, above=0, most=LONGEST, unit="s")
     drum = DumbbellDrum(length, rod_radius=rod_radius, tilt=math.radians(tilt), spin=spin)
     headings = np.radians(np.linspace(FIRST, LAST, pairs)).tolist()
     starts: list[Start] = [("R", angle) for angle in headings]

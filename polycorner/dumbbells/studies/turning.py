@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from polycorner.checks import choice, real
-from polycorner.dumbbells.studies.driven import disturbed
+from polycorner.dumbbells.studies.driven import TURN, disturbed
 from polycorner.kinds import checked
+from polycorner.motion.simulation import LONGEST
 
 PAIRS = 6  # and as many single dumbbells
 PARTS = {"all": ("phi", "eta", "theta"), "rolling": ("phi",), "sliding": ("eta", "theta")}
@@ -76,7 +77,9 @@ def turning(
 
     choice("hand", hand, ("right", "left"))
     kept = PARTS[choice("part", part, tuple(PARTS))]
-    real("duration", duration, above=after, unit="s")
+    real("heading", heading, least=-TURN, most=TURN, unit="deg")
+    real("after", after, least=0, most=LONGEST, unit="s")
+    real("duration", duration, above=after, most=LONGEST, unit="s, more than is left out after")
     sign = 1.0 if hand == "right" else -1.0
     plain = DumbbellDrum(length, tilt=math.radians(tilt), spin=spin, restitution=restitution)
     drum, noise = disturbed(plain, kind, strength, scale, int(rng.integers(2**63)))

@@ -204,9 +204,9 @@ class Board(Value):
 
 def atlas_place(pair: DumbbellPair, q: Array) -> Array:
     """Return relative placements ``(..., 3)`` for drawings, ``delta`` in one period."""
-    heading = None if pair.is_plane else np.asarray((q[..., 2] + q[..., 5]) / 2)
-    given: Any = heading  # each placement in the section at its own mean heading
-    points = relative_coordinates(pair, q, mean_heading=given)
+    # Each placement is in the section at its own mean heading.
+    heading = None if pair.is_plane else (q[..., 2] + q[..., 5]) / 2
+    points = relative_coordinates(pair, q, mean_heading=heading)
     period = math.pi if pair.is_plane else math.tau
     points[..., 2] -= period * np.round(points[..., 2] / period)
     return np.asarray(points * relative_stretch(pair))

@@ -13,12 +13,16 @@ from tornado.httpserver import HTTPServer
 from tornado.iostream import IOStream
 from tornado.web import Application
 
+from polycorner.checks import refuse, whole
+from polycorner.kinds import checked
+
 LOCAL = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = frozenset({"0.0.0.0", "[::]"})
 LARGEST = 16_384  # most bytes of a request's header, and of its body
 MOST = 64  # connections at a time
 IDLE = 20.0  # s to wait for a request, or for the rest of one
 HOST = re.compile(r"(\[[0-9a-fA-F:.]+\]|[0-9a-zA-Z.-]+)(?::[0-9]{1,5})?")
+PORTS = 65535  # the last one
 TRIES = 50  # ports tried after one that is in use
 
 
@@ -108,22 +112,29 @@ async def _serve(
         await server.close_all_connections()
 
 
+@checked
 def bound(host: str, port: int) -> socket.socket:
     """Return a listening socket on an address and a port; port 0 is any free one.
 
     Raises
     ------
+    TypeError, ValueError
+        For anything but text and a port, and for a name that no machine has.
     PortTakenError
         If the port is in use, naming one that is free.
     OSError
         If the address does not belong to this machine.
     """
+    whole("port", port, least=0, most=PORTS)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
         listener.listen(128)
+    except (socket.gaierror, UnicodeError):
+        listener.close()
+        refuse("host", "an address or a name of this machine", host)
     except OSError as error:
         listener.close()
         if error.errno != errno.EADDRINUSE:
@@ -139,7 +150,7 @@ def bound(host: str, port: int) -> socket.socket:
 def _free_after(host: str, port: int) -> int | None:
     """Return the next free port within ``TRIES``, or None."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    for candidate in range(port + 1, min(port + TRIES, 65536)):
+    for candidate in range(port + 1, min(port + TRIES, PORTS + 1)):
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             try:
                 probe.bind((host, candidate))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import refuse
+from polycorner.checks import real, refuse
 from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, minimise
 from polycorner.minimisation.feasibility import approach
@@ -88,6 +88,7 @@ def descent(
     ValueError
         For a polyhedron that is a union, or arguments that :func:`~polycorner.minimise` refuses.
     """
+    real("stride", stride, above=0)
     if polyhedron.is_union:
         refuse("polyhedron", "an intersection", polyhedron)
     problem = pose(polyhedron, energy)

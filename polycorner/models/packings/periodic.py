@@ -64,7 +64,8 @@ class PeriodicPacking(Checked):
         checks.real("box", self.box, above=0)
         object.__setattr__(self, "radii", radii)
         super().__post_init__()
-        if 2 * self._inflation_at(SOFT_DENSITY[self.dimension]) * radii.max() > self.box / 3:
+        jammed = self._inflation_at(SOFT_DENSITY[self.dimension]) / self.box
+        if 2 * jammed * radii.max() > 1 / 3:
             msg = (
                 "radii: expected bodies that are small beside the box, their jammed diameters at "
                 f"most a third of its edge; got {len(radii)} bodies"
@@ -96,9 +97,7 @@ class PeriodicPacking(Checked):
     @checked
     def density(self, inflation: float) -> float:
         """Return the part of the box that the inflated bodies fill."""
-        ball = math.pi if self.dimension == 2 else 4 * math.pi / 3
-        filled = ball * ((inflation * self.radii) ** self.dimension).sum()
-        return float(filled / self.box**self.dimension)
+        return float(self._filled * (inflation / self.box) ** self.dimension)
 
     def scattered(self, rng: "np.random.Generator | int | None" = None) -> Array:
         """Return ``N`` independent uniform centres, ``(N, d)``."""
@@ -159,7 +158,7 @@ class PeriodicPacking(Checked):
         """
         checks.whole("max_programmes", max_programmes, least=1)
         if start is None or isinstance(start, np.random.Generator | int):
-            centres = self.soft_start(start)
+            centres = self.soft_start(checks.generator("start", start))
         else:
             centres = self._centres(start)
         guess = self._inflation_at(0.95)
@@ -178,7 +177,13 @@ class PeriodicPacking(Checked):
         return centres
 
     def _inflation_at(self, density: float) -> float:
-        return float((density / self.density(1.0)) ** (1 / self.dimension))
+        return float(self.box * (density / self._filled) ** (1 / self.dimension))
+
+    @property
+    def _filled(self) -> float:
+        """The area or volume of the bodies as they are given."""
+        ball = math.pi if self.dimension == 2 else 4 * math.pi / 3
+        return float(ball * (self.radii**self.dimension).sum())
 
 
 @dataclass(frozen=True)

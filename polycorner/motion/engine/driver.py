@@ -200,7 +200,7 @@ class Engine:
             for name, gap in zip(body.contacts, self.work.gap[i], strict=True):
                 if np.isnan(gap):
                     return f"the gap {name!r}{where} is not a number"
-        return f"the velocities after t = {self.time:.6g} are not finite"
+        return f"the velocities after t = {self.time:.6g}, dt = {self.dt:.6g} later, are not finite"
 
     def _read(self, count: int) -> EventTable:
         whole, numbers = self.log.entries[:count].copy(), self.log.numbers[:count].copy()

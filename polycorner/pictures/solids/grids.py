@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.checks import refuse
+from polycorner.checks import about, refuse
 from polycorner.spaces.manifold import Array
 
 Function = Callable[[Array], Array]
@@ -72,7 +72,8 @@ def evaluate(function: Function, box: Array, cells: Indices) -> Array:
 
 
 def _at(function: Function, points: Array) -> Array:
-    found = np.asarray(function(points), dtype=np.float64)
+    with about("function"):
+        found = np.asarray(function(points), dtype=np.float64)
     if found.shape != (len(points),) or not np.isfinite(found).all():
         what = "numbers that are not finite" if found.shape == (len(points),) else found.shape
         msg = f"function: expected a finite number for each of {len(points)} points; got {what}"

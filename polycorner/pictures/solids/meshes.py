@@ -13,6 +13,7 @@ from polycorner.atomic import atomic
 from polycorner.checks import refuse
 from polycorner.errors import SolverError
 from polycorner.kinds import checked
+from polycorner.pictures import arguments
 from polycorner.pictures.solids.grids import (
     AXES,
     Bounds,
@@ -197,17 +198,18 @@ def write_mesh(
     suffix = path.suffix.lower()
     if suffix not in (".glb", ".ply"):
         refuse("path", "a name ending in .glb or .ply", path.name)
-    marks = np.asarray(points, dtype=np.float64).reshape(-1, AXES)
+    marks = arguments.points("points", points)
+    lines = [(name, arguments.points("curves", curve)) for name, curve in curves]
     if suffix == ".ply" and (len(curves) or len(marks) or facts):
         refuse("path", "a name ending in .glb for curves, points and facts", path.name)
-    factors, made = np.asarray(scale, dtype=np.float64), _objects()
+    factors, made = arguments.factors("scale", scale), _objects()
     scene = made.Scene(metadata=dict(facts or {}))
     solid = made.Trimesh(np.asarray(mesh.vertices) * factors, mesh.faces, process=False)
     scene.add_geometry(solid, geom_name="solid")
-    for name, curve in curves:
-        for number, piece in enumerate(_unbroken(curve)):
-            line = made.path.entities.Line(np.arange(len(piece)))
-            drawn = made.path.Path3D([line], piece * factors, process=False)
+    for name, line in lines:
+        for number, piece in enumerate(_unbroken(line)):
+            order = made.path.entities.Line(np.arange(len(piece)))
+            drawn = made.path.Path3D([order], piece * factors, process=False)
             scene.add_geometry(drawn, geom_name=f"{name} {number + 1}")
     if len(marks):
         scene.add_geometry(made.PointCloud(marks * factors), geom_name="points")
@@ -315,9 +317,8 @@ def _objects() -> Any:
     return trimesh
 
 
-def _unbroken(curve: ArrayLike) -> list[Array]:
+def _unbroken(line: Array) -> list[Array]:
     """Return the pieces of a polyline between rows of NaN, those of two points and more."""
-    line = np.asarray(curve, dtype=np.float64)
     gaps = np.flatnonzero(np.isnan(line).any(axis=1))
     pieces = np.split(line, gaps)
     whole = [piece[~np.isnan(piece).any(axis=1)] for piece in pieces]

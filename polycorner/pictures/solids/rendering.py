@@ -7,13 +7,16 @@ from itertools import cycle
 from typing import Any, Protocol
 
 import numpy as np
+from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import refuse
+from polycorner.checks import about, instance, refuse
 from polycorner.kinds import checked
+from polycorner.pictures import arguments
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked
 
@@ -96,7 +99,7 @@ def draw_solid(
     ValueError
         If there are labels but not one for each point.
     """
-    marks = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    marks = arguments.points("points", points)
     if len(labels) not in {0, len(marks)}:
         refuse("labels", f"one for each of {len(marks)} points", list(labels))
     figure = Figure(figsize=(7.2, 7.2))
@@ -134,12 +137,23 @@ def place_solid(
     palette : mapping from str to str
         Colours of the curves by their labels.  The rest is as for :func:`draw_solid`.
     """
+    instance("axes", axes, Axes3D)
+    lines = [(label, arguments.points("curves", curve)) for label, curve in curves]
+    places = arguments.points("marks", [point for _, point in marks])
+    for label, line in lines:
+        if not len(line):
+            refuse("curves", "polylines of one point at least", line)
+        if not is_color_like(palette.get(label)):
+            refuse("palette", f"a colour for {label!r}", palette.get(label))
+    with about("caps"):
+        cut = np.zeros(len(mesh.faces), bool) if caps is None else np.asarray(caps)
+    if cut.shape != (len(mesh.faces),) or cut.dtype != bool:
+        refuse("caps", f"a truth value for each of {len(mesh.faces)} faces", caps)
     box = _Box(mesh, view or View())
     depth = _Depth(mesh, box)
     _frame(axes, box, names)
-    _draw_faces(axes, mesh, np.zeros(len(mesh.faces), bool) if caps is None else caps, box)
-    _draw_curves(axes, curves, palette, box, depth)
-    places = np.array([point for _, point in marks], dtype=np.float64).reshape(-1, 3)
+    _draw_faces(axes, mesh, cut, box)
+    _draw_curves(axes, lines, palette, box, depth)
     _draw_points(axes, places, [label for label, _ in marks], box, depth)
 
 
@@ -151,7 +165,7 @@ def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
     longer horizontal side of the box), since the inverted edges of the true surface lie beneath
     it; by one side where the mesh has parts, and so edges.  Rows of NaN are not visible.
     """
-    return _Depth(mesh, _Box(mesh, view)).sees(np.asarray(points, dtype=np.float64))
+    return _Depth(mesh, _Box(mesh, view)).sees(arguments.points("points", points))
 
 
 class _Box:
@@ -283,14 +297,13 @@ def _smooth_normals(corners: Array, faces: Indices) -> Array:
 
 def _draw_curves(
     axes: Any,
-    curves: Sequence[tuple[str, ArrayLike]],
+    curves: Sequence[tuple[str, Array]],
     palette: Mapping[str, str],
     box: _Box,
     depth: _Depth,
 ) -> None:
     named = set[str]()
-    for label, curve in curves:
-        line = np.asarray(curve, dtype=np.float64)
+    for label, line in curves:
         key, colour = None if label in named else label, palette[label]
         named.add(label)
         seen = _settled(depth.sees(line))

@@ -6,14 +6,17 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike
 
+from polycorner.checks import about
 from polycorner.errors import SolverError
 from polycorner.kinds import checked
+from polycorner.pictures import arguments
 from polycorner.pictures.solids.charts import Chart, Gaps
 from polycorner.pictures.solids.creases import Cut, cut_along_creases, edges_of
 from polycorner.pictures.solids.edge_collapse import Labelled, collapsed, labelled
 from polycorner.pictures.solids.edge_flips import flipped
 from polycorner.pictures.solids.grids import Bounds, Indices, Mask
 from polycorner.pictures.solids.meshes import Isosurface, closed_mesh, isosurface
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
@@ -83,10 +86,11 @@ class SharpSurface(Isosurface):
         from scipy.spatial import cKDTree
 
         sides = self.bounds[:, 1] - self.bounds[:, 0]
-        inside = np.asarray(corners, dtype=np.float64).reshape(-1, 3) - self.bounds[:, 0]
+        factors = arguments.factors("scale", scale)
+        inside = finite(arguments.points("corners", corners), "corners") - self.bounds[:, 0]
         inside = np.where(self.periodic, inside % sides, inside)
         vertices = np.asarray(self.mesh.vertices) - self.bounds[:, 0]
-        away, _ = cKDTree(vertices * scale).query(inside * np.asarray(scale))
+        away, _ = cKDTree(vertices * factors).query(inside * factors)
         return float(np.max(away, initial=0.0))
 
 
@@ -132,7 +136,8 @@ def sharp_surface(
     """
 
     def least(points: Array) -> Array:
-        return np.asarray(gaps(points, 0)[0].min(axis=-1))
+        with about("gaps"):
+            return np.asarray(gaps(points, 0)[0].min(axis=-1))
 
     rough = isosurface(least, bounds, resolution, periodic)
     chart = Chart(gaps, rough.bounds[:, 0], rough.spacing)

@@ -135,7 +135,9 @@ def _sides(manifold: Manifold, box: Any) -> dict[str, Any]:
     if isinstance(box, str) or not isinstance(box, Sequence | np.ndarray):
         checks.refuse("box", "sides in the order of the coordinates, or by name", box, TypeError)
     if len(box) != manifold.size:
-        checks.refuse("box", f"{manifold.size} sides, one for each coordinate", len(box))
+        checks.refuse(
+            "box", f"{manifold.size} sides, one for each coordinate of the polyhedron", len(box)
+        )
     return dict(zip(manifold.names, box, strict=True))
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from polycorner import checks
+from polycorner.formulas.ranges import LARGEST
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.minimisation.problem import Problem, pose
@@ -184,6 +185,9 @@ def begun(
     problem = pose(polyhedron, energy)
     found = domain(polyhedron.manifold, box)
     checks.real("resolution", resolution, above=0)
+    value = float(problem.energy.value((found.lower + found.upper) / 2))
+    if abs(value) > 2.0**LARGEST:
+        checks.refuse("energy", f"values up to 2^{LARGEST:g}, which are enclosed", value)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
     sides = check_parameters(problem, parameters)[0]

@@ -227,11 +227,11 @@ def test_frames_are_spread_over_the_record(count, most):
 
 
 def test_a_movie_that_cannot_be_written_gets_a_sentence(two, tmp_path, monkeypatch):
-    with pytest.raises(ValueError, match=r"^movie: expected a file name that ends in \.mp4 or"):
+    with pytest.raises(ValueError, match=r"^path: expected a file name that ends in \.mp4 or"):
         movies.write_movie(two, tmp_path / "two.avi")
     monkeypatch.setattr(movies, "can_encode", lambda: False)
     assert movies.movie_suffix() == ".gif"
-    with pytest.raises(ValueError, match=r"^movie: .*polycorner\[movies\]"):
+    with pytest.raises(ValueError, match=r"^path: .*polycorner\[movies\]"):
         movies.write_movie(two, tmp_path / "two.mp4")
     assert list(tmp_path.iterdir()) == []
 
