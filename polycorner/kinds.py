@@ -201,7 +201,7 @@ def _tuple(kinds: Sequence[Kind], several: bool) -> Kind:
 
     def fits(value: Any) -> bool:
         return (
-            (isinstance(value, tuple | list) or _is_plain(value))
+            (isinstance(value, tuple | list) or (_is_plain(value) and value.ndim == 1))
             and len(value) == len(tests)
             and all(test is None or test(v) for test, v in zip(tests, value, strict=True))
         )

@@ -4,6 +4,7 @@
 ``--disturbed 1`` runs the tests on linear algebra with other last bits (`linear_algebra`).
 """
 
+import json
 import os
 import signal
 from pathlib import Path
@@ -17,6 +18,11 @@ from linear_algebra import Disturbed
 from polycorner.formulas.cache import cache_folder
 
 mpl.use("Agg")
+HERE = Path(__file__).parent
+# Tests that took long, in s on two cores; `make durations` measures anew.  From SLOW on they count
+# as slow.
+DURATIONS = json.loads((HERE / "durations.json").read_text())
+SLOW = 8.0
 collect_ignore = ["support/disturbed"]  # which is run by other processes
 
 # A shell starts background jobs with Ctrl-C ignored; tests that send it need it to interrupt.
@@ -54,10 +60,17 @@ def pytest_configure(config):
     seed = config.getoption("--disturbed")
     if seed is not None:
         Disturbed(seed).install()
-        here = Path(__file__).parent / "support"  # for processes that tests start
+        here = HERE / "support"  # for processes that tests start
         paths = [str(here / "disturbed"), str(here), os.environ.get("PYTHONPATH", "")]
         os.environ["POLYCORNER_DISTURBED"] = str(seed)
         os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if DURATIONS.get(item.nodeid, 0.0) >= SLOW:
+            item.add_marker("slow")
 
 
 @pytest.fixture(scope="module")

@@ -60,7 +60,10 @@ CASES = {
         "d",
         lambda e, _: SmoothFunction("f", x, M, definitions={"d": e}),
     ),
-    "SmoothFunction.quantity.expression": ("expression", lambda e, _: SmoothFunction.quantity("f", e, M)),
+    "SmoothFunction.quantity.expression": (
+        "expression",
+        lambda e, _: SmoothFunction.quantity("f", e, M),
+    ),
     "Polyhedron.parts": ("f", lambda e, _: Polyhedron(M, {"f": e})),
     "Polyhedron.equations": ("h", lambda e, _: Polyhedron(M, {"f": x}, {"h": e})),
     "AllOf.parts": ("f1", lambda e, _: Polyhedron(M, AllOf(e, x))),

@@ -19,7 +19,8 @@ def identity(case):
 
 
 def main(report, kept):
-    seconds = {identity(case): float(case.get("time")) for case in ET.parse(report).iter("testcase")}
+    cases = ET.parse(report).iter("testcase")
+    seconds = {identity(case): float(case.get("time")) for case in cases}
     long = {name: round(taken, 1) for name, taken in seconds.items() if taken >= LEAST}
     Path(kept).write_text(json.dumps(dict(sorted(long.items())), indent=0) + "\n")
 
