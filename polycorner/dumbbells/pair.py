@@ -6,7 +6,7 @@ non-overlapping placements out of ``M x M``; the energy is the height of the bal
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -69,7 +69,8 @@ class DumbbellPair(Checked):
         t = checks.real("rod_radius", self.rod_radius, above=0, below=r, unit=less)
         radius = checks.real("drum_radius", self.drum_radius, above=r, infinite=True, unit=more)
         widest = 2 * (radius - r)  # the longest chord of the cylinder of ball centres
-        length = checks.real("length", self.length, least=2 * r, most=widest, unit="mm")
+        length = checks.real("length", self.length, above=0, unit="mm")
+        checks.real("length", length, least=2 * r, most=widest, unit="mm")
         weight = checks.real("rod_weight", self.rod_weight, least=0)
         for field, value in zip(fields(self), (length, r, t, radius, weight), strict=True):
             object.__setattr__(self, field.name, value)
@@ -288,14 +289,13 @@ class DumbbellPair(Checked):
         heading : float, optional
             Mean heading in radians; default random.
         """
-        if heading is not None:
-            checks.real("heading", heading)
         reach = self.length + 4 * self.ball_radius
         found = np.empty((0, 6))
         while len(found) < count:
             offset = rng.uniform(-reach, reach, (4 * count, 2)) / 2
             turn = rng.uniform(-math.pi, math.pi, 4 * count)
-            mean = rng.uniform(-math.pi, math.pi, 4 * count) if heading is None else heading
+            mean: Any = rng.uniform(-math.pi, math.pi, 4 * count)
+            mean = mean if heading is None else checks.real("heading", heading)
             across = offset[:, 0] if self.is_plane else offset[:, 0] / self.centre_radius
             half = np.stack([across, offset[:, 1], turn], axis=-1) / 2
             middle = np.zeros((4 * count, 3))

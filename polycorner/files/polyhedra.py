@@ -7,6 +7,7 @@ from typing import Any
 from polycorner import forms
 from polycorner.container import number, read_number
 from polycorner.files.formulas import formula_text, read_formula, symbols
+from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf
@@ -150,9 +151,9 @@ def _read_family(entry: Mapping[str, Any]) -> Family:
     known = symbols([*variables, *parameters, *entry["definitions"]])
 
     def read(texts: Mapping[str, str]) -> dict[str, Any]:
-        return {
-            name: read_formula(text, known, f"formula {name!r}") for name, text in texts.items()
-        }
+        given = {f"formula {name!r}": text for name, text in texts.items()}
+        found = [as_expression(of, read_formula(text, known, of)) for of, text in given.items()]
+        return dict(zip(texts, found, strict=True))
 
     return Family.of(
         read(entry["formulas"]),

@@ -122,7 +122,8 @@ class SmoothFunction(Value):
 
         An angle is such a quantity: a function on the line that is wound on the circle.
         """
-        return cls.member(Family.of({name: expression}, manifold.names), name, manifold)
+        expressions = {name: as_expression(name, expression)}
+        return cls.member(Family.of(expressions, manifold.names), name, manifold)
 
     @classmethod
     @checked
@@ -178,8 +179,7 @@ class SmoothFunction(Value):
             checks.refuse("reads", f"{different} {', '.join(manifold.names)}", reads)
         numbers = finite(reals("parameters", parameters or np.empty(0)), "parameters")
         if numbers.shape != (len(family.parameters),):
-            msg = f"parameters: expected {len(family.parameters)} numbers; got {numbers.shape}"
-            raise ValueError(msg)
+            checks.refuse("parameters", f"{len(family.parameters)} numbers", numbers.shape)
         self._family, self.member_name, self.manifold = family, name, manifold
         self.name = label or name
         places = tuple([known[coordinate] for coordinate in reads])

@@ -76,7 +76,7 @@ def test_climb_rates_are_slopes_of_the_paths_and_noise_is_the_points_own():
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
-    [({"noise": -1.0}, "chatter: expected"), ({"pairs": 0}, "pairs: expected")],
+    [({"noise": -1.0}, "noise: expected"), ({"pairs": 0}, "pairs: expected")],
 )
 def test_climbing_names_what_is_wrong(wrong, words):
     given = {"noise": 0.1, "tilt": 7.0, "rng": np.random.default_rng(1)} | wrong
@@ -129,7 +129,7 @@ def test_members_of_a_bunch_are_counted():
         ({"rubbing": -0.1}, "rubbing: expected"),
         ({"top": 0.0}, "top: expected"),
         ({"dt": 0.1}, "dt: expected"),
-        ({"duration": math.nan}, "t_end: expected"),
+        ({"duration": math.nan}, "duration: expected"),
     ],
 )
 def test_bunches_name_what_is_wrong(wrong, words):

@@ -97,7 +97,10 @@ class PeriodicPacking(Checked):
     @checked
     def density(self, inflation: float) -> float:
         """Return the part of the box that the inflated bodies fill."""
-        return float(self._filled * (inflation / self.box) ** self.dimension)
+        found = self._filled * math.prod([inflation / self.box] * self.dimension)
+        if not math.isfinite(found):
+            checks.refuse("inflation", "one of a finite density", inflation)
+        return found
 
     def scattered(self, rng: "np.random.Generator | int | None" = None) -> Array:
         """Return ``N`` independent uniform centres, ``(N, d)``."""
