@@ -47,7 +47,7 @@ test durations disturbed cores thorough: export OMP_NUM_THREADS = 1
 test: .venv/.dev ## tests and doctests, without those marked slow
 	@$(PYTEST) -n auto --dist worksteal -m "not slow"
 
-durations: .venv/.dev ## all tests, recording which take long: from 8 s on `make test` leaves them out
+durations: .venv/.dev ## all tests, recording which take long: from 10 s on `make test` leaves them out
 	@$(PYTEST) -n auto --dist worksteal -q --junitxml=out/tests.xml || true
 	@.venv/bin/python tests/support/durations.py out/tests.xml tests/durations.json
 

@@ -22,7 +22,7 @@ HERE = Path(__file__).parent
 # Tests that took long, in s on two cores; `make durations` measures anew.  From SLOW on they count
 # as slow.
 DURATIONS = json.loads((HERE / "durations.json").read_text())
-SLOW = 8.0
+SLOW = 10.0
 collect_ignore = ["support/disturbed"]  # which is run by other processes
 
 # A shell starts background jobs with Ctrl-C ignored; tests that send it need it to interrupt.

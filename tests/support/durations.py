@@ -12,7 +12,7 @@ def identity(case):
     """Return pytest's name of a case: its file, classes and name."""
     parts = case.get("classname").split(".")
     for k in range(len(parts), 0, -1):
-        file = Path(*parts[:k]).with_suffix(".py")
+        file = Path("/".join(parts[:k]) + ".py")
         if file.exists():
             return "::".join([file.as_posix(), *parts[k:], case.get("name")])
     return case.get("name")
