@@ -1,5 +1,8 @@
 """Small linear systems, many at a time, in floating point."""
 
+from collections.abc import Callable
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,15 +20,24 @@ def bordered(bent: Array, rows: Array) -> Array:
 
 def solved(matrix: Array, right: Array) -> Array:
     """Return the solutions ``(B, N)`` of linear systems, NaN for those that are singular."""
-    fine, found = _regular(matrix), np.full_like(right, np.nan)
-    found[fine] = np.linalg.solve(matrix[fine], right[fine][:, :, None])[:, :, 0]
-    return found
+    columns = right[:, :, None]
+    return _each(np.linalg.solve, np.full_like(columns, np.nan), matrix, columns)[:, :, 0]
 
 
 def inverted(matrix: Array) -> Array:
     """Return the inverses ``(B, N, N)``, NaN for matrices that are singular."""
-    fine, found = _regular(matrix), np.full_like(matrix, np.nan)
-    found[fine] = np.linalg.inv(matrix[fine])
+    return _each(np.linalg.inv, np.full_like(matrix, np.nan), matrix)
+
+
+def _each(function: Callable[..., Array], found: Array, *arrays: Array) -> Array:
+    """Put results of a function into an array, where the matrix is not singular."""
+    fine = _regular(arrays[0])
+    try:
+        found[fine] = function(*(array[fine] for array in arrays))
+    except np.linalg.LinAlgError:  # a pivot was zero after all: rounding decides that
+        for k in np.flatnonzero(fine):
+            with suppress(np.linalg.LinAlgError):
+                found[k] = function(*(array[k] for array in arrays))
     return found
 
 
