@@ -195,7 +195,7 @@ def _is_importable(function: Any) -> bool:
 
 def _names(argument: str, given: Iterable[Any]) -> tuple[str, ...]:
     names = tuple(given) if isinstance(given, Iterable) else ()
-    if isinstance(given, str | bytes) or not all(isinstance(n, str) for n in names):
+    if not isinstance(given, Iterable) or not all(isinstance(name, str) for name in names):
         refuse(argument, "names of symbols", given, TypeError)
     return names
 

@@ -89,11 +89,8 @@ class Translator:
         return rule(e)
 
     def _number(self, e: "sympy.Basic") -> int:
-        if e.is_Float:
-            double = float(e)
-            fits = math.isfinite(double) and (
-                double != 0 or bool(e.is_zero)
-            )  # Float(0) == 0 is False
+        if e.is_Float:  # rounded as doubles are: one that is too small is zero
+            fits = math.isfinite(float(e))
         else:
             fits = representable((int(e.p), int(e.q)))
         if not fits:

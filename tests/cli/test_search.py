@@ -10,9 +10,17 @@ from contextlib import contextmanager
 import pytest
 from atlas_commands import answer, on_terminal, run, started
 
+from polycorner.formulas.cache import cache_folder
 from polycorner.models import CriticalSearch
 
 pytestmark = pytest.mark.usefixtures("own_searches")
+
+
+@pytest.fixture(autouse=True)
+def _nothing_kept(own_searches):
+    """Begin without searches that another test left unfinished."""
+    for state in cache_folder().glob("atlas-*"):
+        state.unlink()
 
 
 @pytest.mark.parametrize(

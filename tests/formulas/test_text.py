@@ -66,8 +66,8 @@ CASES = {
     ),
     "Polyhedron.parts": ("f", lambda e, _: Polyhedron(M, {"f": e})),
     "Polyhedron.equations": ("h", lambda e, _: Polyhedron(M, {"f": x}, {"h": e})),
-    "AllOf.parts": ("f1", lambda e, _: Polyhedron(M, AllOf(e, x))),
-    "AnyOf.parts": ("f1", lambda e, _: Polyhedron(M, AnyOf(e, x))),
+    "AllOf.parts": ("parts", lambda e, _: Polyhedron(M, AllOf(e, x))),
+    "AnyOf.parts": ("parts", lambda e, _: Polyhedron(M, AnyOf(e, x))),
     "Symmetry.fields": (
         "x",
         lambda e, _: prove(certificate(), symmetry=Symmetry(fields=[{"x": e}])),
