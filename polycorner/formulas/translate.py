@@ -89,10 +89,8 @@ class Translator:
         return rule(e)
 
     def _number(self, e: "sympy.Basic") -> int:
-        if e.is_Float:  # rounded as doubles are: one that is too small is zero
-            fits = math.isfinite(float(e))
-        else:
-            fits = representable((int(e.p), int(e.q)))
+        # Floats are rounded as doubles are: one that is too small is zero.
+        fits = math.isfinite(float(e)) if e.is_Float else representable((int(e.p), int(e.q)))
         if not fits:
             msg = (
                 f"{self.subject}: expected numbers that double precision can hold, between "

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("own_searches")
 
 
 @pytest.fixture(autouse=True)
-def _nothing_kept(own_searches):
+def _nothing_kept(own_searches):  # noqa: ARG001 - in whose folder they are
     """Begin without searches that another test left unfinished."""
     for state in cache_folder().glob("atlas-*"):
         state.unlink()
