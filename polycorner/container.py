@@ -20,8 +20,8 @@ import os
 import platform
 import re
 import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,27 @@ BINARY = (b"\npolycorner ", b"\n")
 _SEAL = re.compile(rb"(?P<name>[a-z ]+) (?P<version>\d{1,9}) sha256 (?P<digest>[0-9a-f]{64})")
 _WORDS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 SHOWN = 300  # characters of what is wrong with a file
+
+
+@contextmanager
+def one_sentence(refusal: Callable[[str], Exception]) -> Iterator[None]:
+    """Raise the refusal of a file, made of what is wrong, for whatever reading it raises.
+
+    What is wrong may come to light anywhere in the libraries that are used, as an error of any
+    class.
+    """
+    try:
+        yield
+    except FileError:
+        raise
+    except Exception as error:
+        plain = isinstance(error, ValueError | TypeError) and str(error)
+        raise refusal(_shortened(plain or repr(error))) from error
+
+
+def _shortened(why: object) -> str:
+    sentence = " ".join(str(why).split())  # what libraries report may have lines
+    return sentence if len(sentence) <= SHOWN else f"{sentence[: SHOWN - 3]}..."
 
 
 @dataclass(frozen=True)
@@ -63,24 +84,12 @@ class Kind:
 
     def refusal(self, path: str | os.PathLike[str], why: object) -> ValueError:
         """Return the error for a file that is not of this kind, or is damaged."""
-        sentence = " ".join(str(why).split())  # what libraries report may have lines
-        shown = sentence if len(sentence) <= SHOWN else f"{sentence[: SHOWN - 3]}..."
-        return FileError(f"path: expected a {self.name} that {self.writer} wrote; {path} {shown}")
+        msg = f"path: expected a {self.name} that {self.writer} wrote; {path} {_shortened(why)}"
+        return FileError(msg)
 
-    @contextmanager
-    def reading(self, path: str | os.PathLike[str]) -> Iterator[None]:
-        """Turn whatever the content of a file makes a reader raise into one sentence naming it.
-
-        What is wrong may come to light anywhere in the libraries that are used, as an error of any
-        class.
-        """
-        try:
-            yield
-        except FileError:
-            raise
-        except Exception as error:
-            plain = isinstance(error, ValueError | TypeError) and str(error)
-            raise self.refusal(path, f"is damaged ({plain or repr(error)})") from error
+    def reading(self, path: str | os.PathLike[str]) -> AbstractContextManager[None]:
+        """Turn whatever the content of a file makes a reader raise into one sentence naming it."""
+        return one_sentence(lambda why: self.refusal(path, f"is damaged ({why})"))
 
     def save(self, path: str | os.PathLike[str], body: bytes) -> Path:
         """Write bytes with their last line, atomically.

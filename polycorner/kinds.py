@@ -82,30 +82,28 @@ def checked(function: F) -> F:
     Traceback (most recent call last):
     TypeError: count: expected a whole number; got '4'
     """
-    parameters = signature(function).parameters
-    names = [
-        name
-        for name, p in parameters.items()
-        if p.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
-    ]
-    kinds: dict[str, Kind] = {}
 
     @wraps(function)
     def call(*given: Any, **named: Any) -> Any:
-        if not kinds:
-            known = {
-                n: _or_list(kind_of(p.annotation, function.__module__))
-                for n, p in parameters.items()
-            }
-            kinds.update(known)
-        for name, value in zip(names, given, strict=False):
-            kinds[name].check(name, value)
+        kinds = _kinds(function)
+        for (name, kind), value in zip(kinds.items(), given, strict=False):
+            kind.check(name, value)
         for name, value in named.items():
             if name in kinds:
                 kinds[name].check(name, value)
         return function(*given, **named)
 
-    return call  # type: ignore[return-value]
+    return call  # type: ignore[return-value] # a wrapper of the same signature
+
+
+@cache
+def _kinds(function: Callable[..., Any]) -> dict[str, Kind]:
+    """Return the kinds of a function's arguments, when it is first called."""
+    return {
+        name: _or_list(kind_of(p.annotation, function.__module__))
+        for name, p in signature(function).parameters.items()
+        if p.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    }
 
 
 def kind_of(annotation: Any, module: str) -> Kind:
@@ -113,6 +111,7 @@ def kind_of(annotation: Any, module: str) -> Kind:
     if isinstance(annotation, ForwardRef):
         annotation = annotation.__forward_arg__
     if isinstance(annotation, str):
+        # Text of the package's own source, as `inspect` evaluates it, where all names are known.
         annotation = eval(annotation, {}, _Names(vars(sys.modules[module])))
         return kind_of(annotation, module)
     if annotation is Parameter.empty:
@@ -249,7 +248,7 @@ def _is_number(value: Any, kind: type) -> bool:
     if isinstance(value, bool) or not isinstance(value, kind):
         return False
     try:
-        float(value)  # type: ignore[arg-type]
+        float(value)  # type: ignore[arg-type] # of the kind that was asked for
     except OverflowError:
         return False
     return True

@@ -5,12 +5,13 @@ Whoever forges a store can give it checksums that fit; zarr follows whatever the
 
 import json
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
 from polycorner import checks, forms
+from polycorner.container import one_sentence
 from polycorner.sweeps.grid import Axis, Grid
 from polycorner.sweeps.points import Column
 from polycorner.sweeps.tables import TEXT, Variable, coordinates, variables
@@ -31,15 +32,10 @@ _COLUMN = {
 }
 
 
-@contextmanager
-def reading(path: str | os.PathLike[str]) -> Iterator[None]:
+def reading(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
     """Turn whatever the content of a file makes a reader raise into one sentence naming it."""
-    try:
-        yield
-    except Exception as error:
-        words = " ".join(repr(error).split())[:300]
-        msg = f"store: expected a store of a sweep; {path} is damaged ({words})"
-        raise ValueError(msg) from error
+    said = f"store: expected a store of a sweep; {path} is damaged"
+    return one_sentence(lambda why: ValueError(f"{said} ({why})"))
 
 
 def check_root(document: Any) -> None:

@@ -22,7 +22,7 @@ import os
 import re
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from polycorner import __version__, checks
 from polycorner.atomic import is_part, write_atomically
-from polycorner.container import read_arrays
+from polycorner.container import one_sentence, read_arrays
 from polycorner.formulas.cache import sources_digest
 from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.records import (
@@ -210,15 +210,9 @@ class Store:
         self._files, self._marks = dict(root["files"]), search.tree.marks
         self._count = 1 + max(int(name.split("-")[1].split(".")[0]) for name in self._files)
 
-    @contextmanager
-    def _reading(self, name: str) -> Iterator[None]:
-        """Turn whatever the content of a file makes a reader raise into one sentence naming it."""
-        try:
-            yield
-        except Exception as error:
-            words = " ".join(repr(error).split())[:300]
-            msg = f"store: expected files as they were written; {self.path / name} ({words})"
-            raise ValueError(msg) from error
+    def _reading(self, name: str) -> AbstractContextManager[None]:
+        said = f"store: expected files as they were written; {self.path / name}"
+        return one_sentence(lambda why: ValueError(f"{said} ({why})"))
 
 
 # What has to be the same, in words.
