@@ -14,7 +14,8 @@ from polycorner.spaces.manifold import Array
 # Bounds for each coordinate; None for a whole circle or sphere.
 Box = Sequence[tuple[float, float] | None]
 
-TRIES = 10_000  # samples a start before a box is reported to miss the polyhedron
+TRIES = 10_000  # samples a start before they are moved into the polyhedron instead
+RESTORED = 100  # samples a start that are moved before a box is reported to miss the polyhedron
 
 
 def start_points(
@@ -44,7 +45,10 @@ def start_points(
 def _sampled(
     problem: Problem, count: int, low: Array, high: Array, rng: np.random.Generator
 ) -> Array:
-    """Return uniform samples with satisfied inequalities and a finite energy."""
+    """Return uniform samples with satisfied inequalities and a finite energy.
+
+    Where none satisfies them, as in a set without interior, samples are moved into branches.
+    """
     d = problem.polyhedron
     found = np.empty((0, problem.dimension))
     tries = 0
@@ -55,9 +59,28 @@ def _sampled(
         found = np.concatenate([found, q[inside]])
         tries += len(q)
         if tries > TRIES * (len(found) + 1):
-            msg = f"box: expected one that meets the polyhedron; {len(found)} of {tries} points do"
-            raise ValueError(msg)
+            return _moved(problem, count, tries, (low, high), rng)
     return found[:count]
+
+
+def _moved(
+    problem: Problem, count: int, tries: int, box: tuple[Array, Array], rng: np.random.Generator
+) -> Array:
+    """Return points of the set in a box, restored from uniform samples, a random branch each."""
+    d, (low, high) = problem.polyhedron, box
+    pieces = d.signs_to_pieces([0] * len(d.functions))
+    found: list[Array] = []
+    for _ in range(RESTORED * count):
+        q = rng.uniform(low, high)
+        q = d.manifold.factors.scattered(q, rng) if d.manifold.factors else q
+        reached, point = problem.restore(pieces[rng.integers(len(pieces))], q)
+        aside = d.manifold.difference(point, np.clip(point, low, high))
+        if reached and not aside.any() and np.isfinite(problem.energy.value(point)):
+            found.append(point)
+        if len(found) == count:
+            return np.array(found)
+    msg = f"box: expected one that meets the polyhedron; {len(found)} of {tries} points do"
+    raise ValueError(msg)
 
 
 def _bounds(problem: Problem, box: Any) -> tuple[Array, Array]:

@@ -14,7 +14,8 @@ from polycorner.proofs.lists.corner_lists import CornerList, CornerPoint
 from polycorner.proofs.lists.corner_points import Candidate, candidates, with_images
 from polycorner.proofs.lists.corner_records import corner_record
 from polycorner.proofs.lists.corner_search import CornerSearch
-from polycorner.proofs.lists.enumeration import MOST_BOXES, RESOLUTION, begun, undecided
+from polycorner.proofs.lists.enumeration import MOST_BOXES, RESOLUTION, begun
+from polycorner.proofs.lists.listing import undecided
 from polycorner.proofs.lists.members import full
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tips import Tip
@@ -48,7 +49,9 @@ def corners(
     Parameters
     ----------
     polyhedron : Polyhedron
-        The set ``D``; and/or trees and equations are allowed.
+        The set ``D``; and/or trees and equations are allowed.  Of inequalities that are positive
+        multiples of each other the first stands for all of them, and ``f >= 0`` with ``-f >= 0``
+        in every branch is the equation ``f = 0``.
     box, symmetry, resolution, max_boxes, max_seconds, workers, progress
         As for :func:`stationary_points`.  With coordinates fixed, corners are points isolated
         modulo the continuous symmetry.

@@ -1,7 +1,9 @@
-"""The search for all stationary points, its symmetries, and what is made of the regions found."""
+"""The search for all stationary points: its arguments, its symmetries, its run."""
 
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -15,19 +17,16 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.proofs.arguments import check_parameters
-from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
-from polycorner.proofs.lists.loci import Locus
-from polycorner.proofs.lists.members import OPEN, Listed, Member, full, images, moved, settled
-from polycorner.proofs.lists.multiples import without_multiples
+from polycorner.proofs.lists.listing import listed
+from polycorner.proofs.lists.multiples import pieces, without_multiples
 from polycorner.proofs.lists.parameters import with_parameters
 from polycorner.proofs.lists.quotients import unreached
-from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Search
-from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
+from polycorner.proofs.lists.stationary import StationaryList
 from polycorner.proofs.lists.stores import Store
-from polycorner.spaces.manifold import Array
+from polycorner.proofs.lists.unions import united
 
 if TYPE_CHECKING:
     import os
@@ -67,7 +66,8 @@ def stationary_points(
     ----------
     polyhedron : Polyhedron
         The set ``D``; and/or trees and equations are allowed.  Of inequalities that are positive
-        multiples of each other the first stands for all of them.
+        multiples of each other the first stands for all of them, and ``f >= 0`` with ``-f >= 0``
+        in one branch is the equation ``f = 0``.
     energy : SmoothFunction or SymPy expression
         The energy ``E``.
     box : sequence or mapping
@@ -78,7 +78,8 @@ def stationary_points(
     symmetry : Symmetry, optional
         Its ``elements`` (signed permutations of the coordinates with shifts by half periods) have
         to preserve ``D``, ``E`` and the box, which is checked with the formulas; only a
-        part of the box that contains a point of each orbit is then searched.
+        part of the box that contains a point of each orbit is then searched.  Not taken where
+        branches have equations of their own.
     parameters : mapping from str to (float, float), optional
         Intervals of parameters of the functions, by name.  What is proved then holds for each of
         their values: one stationary point in each listed box, and no others.  Wide intervals leave
@@ -90,7 +91,8 @@ def stationary_points(
         Largest side, in the manifold's scales, of boxes that are left undecided.
     max_boxes, max_seconds : optional
         Where the search ends at the latest; boxes that wait then are undecided.  Boxes of earlier
-        calls with the same store count, seconds do not.
+        calls with the same store count, seconds do not.  Branches with equations of their own are
+        searched one after another, each to this limit.
     workers : int, optional
         Threads that examine boxes at a time.  The result is the same for every number.
     store : path, optional
@@ -126,16 +128,45 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    search = prepared(
-        polyhedron, energy, box, symmetry, resolution, parameters, minima_only=minima_only
-    )
+    checks.instance("minima_only", minima_only, bool)
+    question = _asked(polyhedron, energy, box, symmetry, resolution, parameters)
+    branches = pieces(question.problem.polyhedron)
+    several = len(branches.parts) > 1
+    if several and symmetry is not None:
+        expected = "None, as branches of the polyhedron have equations of their own"
+        checks.refuse("symmetry", expected, symmetry)
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
 
-    kept = None if store is None else Store(store, search)
+    searches, stop = [], threading.Event()
+    with first_interrupt(stop.set):
+        for k, part in enumerate(branches.parts):
+            search = question.begun(Search, part, minima_only=minima_only)
+            searches.append(search)
+            folder = store if store is None or not several else Path(store) / f"piece_{k}"
+            kept = None if folder is None else Store(folder, search)
+            try:
+                _run(search, kept, max_boxes, max_seconds, workers, stop, progress)
+            finally:
+                if kept:
+                    kept.close()
+    posed = pose(polyhedron, energy)
+    return united(posed, searches, branches.alike) if several else listed(searches[0], posed)
+
+
+def _run(
+    search: Search,
+    kept: Store | None,
+    max_boxes: int,
+    max_seconds: float,
+    workers: int,
+    stop: threading.Event,
+    progress: Progress,
+) -> None:
+    """Run a search to its end, saving it by the clock."""
 
     def report(s: Search) -> None:
         if kept:
@@ -143,45 +174,40 @@ def stationary_points(
         note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
         progress(float(s.tally.boxes), None, note)
 
-    stop = threading.Event()
-    try:
-        with first_interrupt(stop.set):
-            search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
-        if kept:
-            kept.save()
-    finally:
-        if kept:
-            kept.close()
-    return listed(search, pose(polyhedron, energy))
+    search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
+    if kept:
+        kept.save()
 
 
-def prepared(
+@dataclass(frozen=True)
+class _Question:
+    """What is asked, after its arguments were checked, parameters among the coordinates."""
+
+    problem: Problem
+    domain: Domain
+    resolution: float
+    symmetry: Symmetry | None
+
+    def begun(self, kind: type[S], polyhedron: Polyhedron, *, minima_only: bool = False) -> S:
+        """Return a search in a polyhedron that has not begun."""
+        same = polyhedron is self.problem.polyhedron
+        problem = self.problem if same else pose(polyhedron, self.problem.energy)
+        motions, maps = _motions(problem, self.domain, self.symmetry)
+        about = problem, self.domain, self.resolution
+        search = kind(*about, motions=motions, maps=maps, minima_only=minima_only)
+        _check_fixed(search, self.symmetry)
+        return search
+
+
+def _asked(
     polyhedron: Polyhedron,
     energy: "Energy",
     box: Any,
     symmetry: Symmetry | None,
     resolution: float,
     parameters: "Mapping[str, Interval] | None" = None,
-    *,
-    minima_only: bool = False,
-) -> Search:
-    """Return a search that has not begun, after checking its arguments."""
-    arguments = polyhedron, energy, box, symmetry, resolution, parameters
-    return begun(Search, *arguments, minima_only=minima_only)
-
-
-def begun(
-    kind: type[S],
-    polyhedron: Polyhedron,
-    energy: "Energy",
-    box: Any,
-    symmetry: Symmetry | None,
-    resolution: float,
-    parameters: "Mapping[str, Interval] | None" = None,
-    *,
-    minima_only: bool = False,
-) -> S:
-    """Return a search of some kind, after checking its arguments."""
+) -> _Question:
+    """Return what is asked, after checking it."""
     problem = pose(polyhedron, energy)
     found = domain(polyhedron.manifold, box)
     checks.real("resolution", resolution, above=0)
@@ -193,14 +219,20 @@ def begun(
     sides = check_parameters(problem, parameters)[0]
     if sides:
         problem, found, symmetry = with_parameters(problem, found, symmetry, sides)
-    reduced = without_multiples(problem.polyhedron)  # for all values of the parameters
-    if reduced is not problem.polyhedron:
-        problem = pose(reduced, problem.energy)
-    motions, maps = _motions(problem, found, symmetry)
-    checks.instance("minima_only", minima_only, bool)
-    search = kind(problem, found, resolution, motions=motions, maps=maps, minima_only=minima_only)
-    _check_fixed(search, symmetry)
-    return search
+    return _Question(problem, found, resolution, symmetry)
+
+
+def begun(
+    kind: type[S],
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    box: Any,
+    symmetry: Symmetry | None,
+    resolution: float,
+) -> S:
+    """Return a search in the whole of a set that has not begun, after checking its arguments."""
+    question = _asked(polyhedron, energy, box, symmetry, resolution)
+    return question.begun(kind, without_multiples(question.problem.polyhedron))
 
 
 def _motions(
@@ -234,87 +266,3 @@ def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:
         checks.refuse(
             "box", f"an interval for {names}, or a continuous symmetry that moves it", "one value"
         )
-
-
-def listed(search: Search, problem: Problem) -> StationaryList:
-    """Return what a search found for a problem, in whose coordinates parameters are left out."""
-    points: list[StationaryPoint] = []
-    open_points: list[StationaryPoint] = []
-    known, orbits, (members, ways) = Listed(search), 0, settled(search)
-    for _, member in members:
-        before = known.has(member)
-        if before:
-            continue  # an image of one before
-        known.add(member)
-        if member.place == OPEN or before is None:
-            open_points.append(_point(search, member, orbits))
-            continue
-        points.append(_point(search, member, orbits))
-        for image in images(search, member):
-            alike = known.has(image)
-            if not alike:
-                known.add(image)
-                (points if alike is False else open_points).append(_point(search, image, orbits))
-        orbits += 1
-    loci = tuple(locus_of(search, place) for place in _loci(search))
-    if search.minima_only:
-        loci = tuple(place for place in loci if place.is_minimum)
-    n, names = problem.dimension, search.domain.manifold.names
-    return StationaryList(
-        problem,
-        Domain(problem.polyhedron.manifold, search.domain.lower[:n], search.domain.upper[:n]),
-        {names[i]: side for i, side in search.domain.held.items()},
-        tuple(points),
-        loci,
-        undecided(search)[:, :, :n],
-        tuple(open_points),
-        search.tally,
-        record(search, members, ways),
-        search.minima_only,
-    )
-
-
-def undecided(search: Search) -> Array:
-    """Return the boxes that are left or wait, ``(k, 2, n)``."""
-    parts: list[Boxes] = [*search.undecided, search.waiting]
-    lower = np.concatenate([p.lower for p in parts])
-    upper = np.concatenate([p.upper for p in parts])
-    return np.stack([lower, upper], axis=1)
-
-
-def _loci(search: Search) -> list[Locus]:
-    """Return the loci that were found and their images, each once."""
-    domain, z = search.domain, search.reads
-    found: list[Locus] = []
-    for place in search.loci:
-        for g in (None, *search.motions):
-            image = place if g is None else _locus_image(search, place, g)
-            sharp = image.sharp_lower, image.sharp_upper
-            if not domain.misses(*sharp, z) and not any(
-                domain.within(*sharp, other.lower, other.upper, z) for other in found
-            ):
-                found.append(image)
-    return found
-
-
-def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
-    z, ends = list(place.z), []
-    for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
-        sides = search.domain.lower.copy(), search.domain.upper.copy()
-        sides[0][z], sides[1][z] = lower, upper
-        ends += [side[z] for side in moved(g, *sides, search.domain.manifold)]
-    sample = None if place.sample is None else g(place.sample, search.domain.manifold)
-    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
-
-
-def _point(search: Search, member: Member, orbit: int) -> StationaryPoint:
-    region = member.region
-    lower, upper = full(search, region)
-    n, d = len(search.domain.free), search.problem.polyhedron
-    more = tuple(d.names[i] for i in sorted(member.zeros.difference(region.active)))
-    active = tuple(d.names[i] for i in region.active)
-    ends = zip(region.sharp_lower[n:].tolist(), region.sharp_upper[n:].tolist(), strict=True)
-    multipliers = dict(zip((*active, *d.equation_names), ends, strict=True))
-    some = slice(0, len(lower) - len(search.domain.parameters))
-    index = region.index if region.index == 0 or not more else None
-    return StationaryPoint(lower[some], upper[some], active, multipliers, index, orbit, more)

@@ -1,14 +1,19 @@
-"""Inequalities that say the same: positive multiples of each other, of which one is kept.
+"""Inequalities that say the same, or together say that a function vanishes.
 
-Where such functions vanish their gradients are dependent, on whole faces.
+Of positive multiples of each other one is kept; a multiple of an equation holds wherever that does;
+and ``f >= 0`` with ``-f >= 0`` in one branch is the equation ``f = 0``.  Where such functions
+vanish their gradients are dependent, on whole faces.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.proofs.lists.branches import conjunctions
 from polycorner.proofs.lists.images import expanded
 
 if TYPE_CHECKING:
@@ -17,13 +22,58 @@ if TYPE_CHECKING:
 PROBES = 4  # points at which functions are compared before their formulas are
 CLOSE = 1e-9
 
+Literal = tuple[int, int]  # a function, equations after inequalities, and a sign
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A set as a union of polyhedra, in none of which functions are multiples of each other.
+
+    Attributes
+    ----------
+    parts : tuple of Polyhedron
+        Branches with the same equations are one part.
+    alike : mapping from str to str
+        The name of the function of which each one is a multiple, by name.
+    """
+
+    parts: tuple[Polyhedron, ...]
+    alike: Mapping[str, str]
+
+
+def pieces(polyhedron: Polyhedron) -> Pieces:
+    """Return a set as a union of polyhedra without multiples."""
+    m = len(polyhedron.functions)
+    literals = _literals(polyhedron)
+    names = (*polyhedron.names, *polyhedron.equation_names)
+    alike = {name: names[i] for name, (i, _) in zip(names, literals, strict=True)}
+    if not _has_equations(literals, m):
+        return Pieces((_of_the_first(polyhedron, literals),), alike)
+    branches: dict[frozenset[int], list[frozenset[Literal]]] = {}
+    for mask in conjunctions(polyhedron):
+        required = {literals[i] for i in np.flatnonzero(mask)}
+        held = frozenset(i for i, sign in required if i < m and (i, -sign) in required)
+        rest = frozenset(one for one in required if one[0] < m and one[0] not in held)
+        branches.setdefault(held, []).append(rest)
+    parts = [_part(polyhedron, literals, held, rests) for held, rests in branches.items()]
+    return Pieces(tuple(parts), alike)
+
 
 def without_multiples(polyhedron: Polyhedron) -> Polyhedron:
-    """Return the same set, of functions of which none is seen to be a multiple of another.
+    """Return the same set as one polyhedron, in which equations of single branches remain."""
+    found = pieces(polyhedron).parts
+    return found[0] if len(found) == 1 else _of_the_first(polyhedron, _literals(polyhedron))
 
-    The first of several stands for all of them.
-    """
-    first = _first(polyhedron)
+
+def _has_equations(literals: list[Literal], m: int) -> bool:
+    """Whether some inequality is a multiple of an equation, or the opposite of another one."""
+    signs = dict.fromkeys(literals[:m])
+    return any(i >= m or (i, -sign) in signs for i, sign in signs)
+
+
+def _of_the_first(polyhedron: Polyhedron, literals: list[Literal]) -> Polyhedron:
+    """Return the set with the first of positive multiples in the place of each of them."""
+    first = [literals.index(one) for one in literals[: len(polyhedron.functions)]]
     if first == list(range(len(first))):
         return polyhedron
 
@@ -41,27 +91,53 @@ def without_multiples(polyhedron: Polyhedron) -> Polyhedron:
     )
 
 
-def _first(polyhedron: Polyhedron) -> list[int]:
-    """Return for each function the first of which it is a positive multiple."""
+def _part(
+    polyhedron: Polyhedron,
+    literals: list[Literal],
+    held: frozenset[int],
+    rests: list[frozenset[Literal]],
+) -> Polyhedron:
+    """Return the union of branches that have the same equations."""
+    functions = polyhedron.functions
+    least = [rest for rest in dict.fromkeys(rests) if not any(other < rest for other in rests)]
+    branches = [[functions[k] for k in sorted(map(literals.index, rest))] for rest in least]
+    parts = [AnyOf(*(AllOf(*branch) for branch in branches))] if all(branches) else []
+    equations = [*polyhedron.stated, *(functions[i] for i in sorted(held))]
+    return Polyhedron(polyhedron.manifold, parts, equations, annotations=polyhedron.annotations)
+
+
+def _literals(polyhedron: Polyhedron) -> list[Literal]:
+    """Return for each function one of which it is a multiple, and the sign of the multiple.
+
+    This is the first inequality, or an equation if there is such a one.
+    """
     rng = np.random.default_rng(0)
     size = polyhedron.manifold.size
     points = rng.uniform(-1, 1, (PROBES, size)) * polyhedron.manifold.scale_array
+    functions = (*polyhedron.functions, *polyhedron.equations)
+    m, stated = len(polyhedron.functions), len(polyhedron.stated)
     with np.errstate(all="ignore"):
-        values = polyhedron.values(points).T
+        values = np.vstack([polyhedron.values(points).T, polyhedron.equation_values(points).T])
         units = values / np.linalg.norm(values, axis=1, keepdims=True)
-    found: list[int] = []
-    for j, f in enumerate(polyhedron.functions):
-        alike = (i for i in range(j) if found[i] == i and abs(units[i] - units[j]).max() < CLOSE)
-        found.append(next((i for i in alike if _is_multiple(f, polyhedron.functions[i])), j))
-    return found
+    found: dict[int, Literal] = {}
+    for j in (*range(m, m + stated), *range(m)):
+        found[j] = (j, 1)
+        for i in [i for i, (first, _) in found.items() if first == i and i != j]:
+            near = [s for s in (1, -1) if abs(units[i] - s * units[j]).max() < CLOSE]
+            if near and (sign := _multiple(functions[j], functions[i])):
+                found[j] = (i, sign)
+                break
+    return [found.get(j, (j, 1)) for j in range(len(functions))]
 
 
-def _is_multiple(f: "SmoothFunction", g: "SmoothFunction") -> bool:
-    """Whether expanded formulas show that one function is a positive multiple of another."""
+def _multiple(f: "SmoothFunction", g: "SmoothFunction") -> int:
+    """Return the sign of ``c`` if expanded formulas show that ``f = c g``, and 0 if not."""
     import sympy
 
     one, other = expanded(f), expanded(g)
     ratio = sympy.cancel(one / other) if other != 0 else sympy.Integer(0)
-    if not (ratio.is_number and ratio.is_positive):
-        return False
-    return bool(sympy.expand(one - ratio * other, deep=True) == 0)
+    if not (ratio.is_number and (ratio.is_positive or ratio.is_negative)):
+        return 0
+    if sympy.expand(one - ratio * other, deep=True) != 0:
+        return 0
+    return 1 if ratio.is_positive else -1

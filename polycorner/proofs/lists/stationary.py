@@ -122,8 +122,8 @@ class StationaryList(Printed, Checked):
         KKT points of faces for which it is not decided whether they lie in the polyhedron.
     tally : Tally
         Numbers of boxes.
-    record : Record
-        The proof, for :meth:`save`.
+    record : Record or None
+        The proof, for :meth:`save`; None for a union of branches with equations of their own.
     minima_only : bool
         Whether only local minima are listed.
     """
@@ -136,7 +136,7 @@ class StationaryList(Printed, Checked):
     undecided: Array
     open_points: tuple[StationaryPoint, ...]
     tally: Tally
-    record: Record
+    record: Record | None
     minima_only: bool = False
 
     @property
@@ -255,10 +255,14 @@ class StationaryList(Printed, Checked):
         Raises
         ------
         ValueError
-            If the name does not end in ``.zip``.
+            If the name does not end in ``.zip``, and for a union of branches with equations of
+            their own, which are saved one by one.
         OSError
             If the file could not be written.
         """
+        if self.record is None:
+            msg = "save: expected a list of one polyhedron; got one of branches with equations"
+            raise ValueError(msg)
         return save(path, self.record)
 
 

@@ -74,10 +74,11 @@ def vertices(lines):
 @settings(max_examples=10)
 @given(half_planes)
 def test_polygons_have_the_vertices_of_rational_arithmetic(lines):
-    """Redundant lines through a vertex are listed with it."""
+    """Redundant lines through a vertex are listed with it, but for two that are an equation."""
     d = Polyhedron(PLANE, [c - a * X - b * Y for a, b, c in lines])
     found = corners(d, box=SIDES, max_boxes=2000)
-    expected = vertices(lines)
+    equations = {f"f{i + 1}" for i, (a, b, c) in enumerate(lines) if (-a, -b, -c) in lines}
+    expected = {q: names - equations for q, names in vertices(lines).items()}
     shown = {
         tuple(Fraction(x).limit_denominator(100) for x in p.point.tolist()): frozenset(p.active)
         for p in found
@@ -125,7 +126,6 @@ def test_an_apex_and_the_tip_of_a_pyramid():
     ("parts", "count"),
     [
         ([U, V, U + V, 1 - W, 2 + W - U], 2),  # three planes through a line
-        ([U - V, V - U, W, 1 - U], 1),  # a plane as two inequalities
         ([1 - U**2 - V**2 - W**2, 1 - (U - 1) ** 2 - V**2 - W**2, U - R(1, 2), V], 2),  # a pencil
         ([U, V, U + V], 0),
     ],
@@ -143,6 +143,13 @@ def test_functions_that_are_combinations_of_others(parts, count, tmp_path):
     fine, line = verdict(changed(path, other_weights))
     assert not fine
     assert "is none" in line
+
+
+def test_a_plane_as_two_inequalities_is_an_equation(tmp_path):
+    found = corners(Polyhedron(SPACE, {"a": U - V, "b": V - U, "c": W, "d": 1 - U}), box=CUBE)
+    assert found.complete
+    assert [(p.point.tolist(), set(p.active)) for p in found] == [([1, 1, 0], {"c", "d"})]
+    assert verdict(found.save(tmp_path / "corners.zip"))[0]
 
 
 @pytest.mark.parametrize(

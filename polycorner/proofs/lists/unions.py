@@ -1,0 +1,164 @@
+"""Lists of a set that is a union of pieces with equations of their own, from the lists of these.
+
+The tangent cone of a finite union of closed sets is the union of their tangent cones.  A point is
+therefore stationary in the union, or a strict local minimum of it, if and only if it is in each
+piece that contains it.
+
+Let ``p`` be the point of a region of one piece.  It solves the KKT equations of all functions of
+its face, equations included, whatever the signs of multipliers; so it is the point of a region of
+another piece if that carries the same functions and its box contains ``p``, and it is not
+stationary in another piece that contains it if nothing of that piece's list is near.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from polycorner.minimisation.problem import Problem
+from polycorner.proofs.lists.domains import ROUNDING, Domain
+from polycorner.proofs.lists.listing import listed, point_of, undecided
+from polycorner.proofs.lists.members import IN, OPEN, OUT, Member, full, inside, settled
+from polycorner.proofs.lists.search import Search, Tally
+from polycorner.proofs.lists.stationary import StationaryList, StationaryLocus, StationaryPoint
+from polycorner.spaces.manifold import Array
+
+Names = frozenset[str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A search that has ended, its list, and its members by the functions of their faces."""
+
+    search: Search
+    found: StationaryList
+    members: tuple[Member, ...]
+    alike: Mapping[str, str]
+
+    def face(self, member: Member) -> Names:
+        """Return the functions that carry the point of a region, by their names in all pieces."""
+        d = self.search.problem.polyhedron
+        names = (*(d.names[i] for i in member.region.active), *d.equation_names)
+        return frozenset(self.alike[name] for name in names)
+
+    def zeros(self, member: Member) -> Names:
+        """Return the functions that vanish at the point of a region."""
+        names = self.search.problem.polyhedron.names
+        return self.face(member) | {self.alike[names[i]] for i in member.zeros}
+
+    def place(self, lower: Array, upper: Array, zeros: Names) -> str:
+        """Return whether points of a box at which some functions vanish lie in the piece."""
+        d, m = self.search.problem.polyhedron, self.search.problem.inequalities
+        low, high = self.search.functions.values(lower[None], upper[None])
+        names = (*d.names, *d.equation_names)
+        zero = np.array([self.alike[name] in zeros for name in names], dtype=np.bool_)
+        below, above = (high[0, : len(names)] < 0) & ~zero, (low[0, : len(names)] > 0) & ~zero
+        possible = [c for c in self.search.conj if not (below[:m] & c).any()]
+        if not possible or (below | above)[m:].any():
+            return OUT
+        sure = any(not (c & ~(above | zero)[:m]).any() for c in possible)
+        return IN if sure and zero[m:].all() else OPEN
+
+    def is_empty_near(self, lower: Array, upper: Array) -> bool:
+        """Whether nothing that may be stationary in the piece lies near the points of a box."""
+        domain = self.search.domain
+        boxes = [full(self.search, member.region) for member in self.members]
+        boxes += [(box[0], box[1]) for box in undecided(self.search)]
+        boxes += [_sides(domain, locus) for locus in self.found.loci]
+        return all(_apart(domain, lower, upper, *box) for box in boxes)
+
+
+def united(
+    problem: Problem, searches: Sequence[Search], alike: Mapping[str, str]
+) -> StationaryList:
+    """Return the list of a union from the searches in its pieces, which have ended."""
+    every = []
+    for search in searches:
+        members = tuple(member for _, member in settled(search)[0])
+        every.append(_Piece(search, listed(search, search.problem), members, alike))
+    points: list[StationaryPoint] = []
+    open_points: list[StationaryPoint] = []
+    loci: list[StationaryLocus] = []
+    rest = [undecided(piece.search) for piece in every]
+    for k, piece in enumerate(every):
+        others = (every[:k], every[k + 1 :])
+        for member in piece.members:
+            place, minimum = _judged(piece, member, others)
+            if place != OUT:
+                to = points if place == IN else open_points
+                point = point_of(piece.search, member, len(to))
+                to.append(point if minimum else replace(point, index=None))
+        for locus in piece.found.loci:
+            sides = _sides(piece.search.domain, locus)
+            if all(p.place(*sides, frozenset()) == OUT for p in every if p is not piece):
+                loci.append(locus)
+            else:
+                rest.append(np.array([sides]))
+    first = every[0].found
+    return StationaryList(
+        problem,
+        first.domain,
+        first.parameters,
+        tuple(points),
+        tuple(loci),
+        np.concatenate(rest)[:, :, : problem.dimension],
+        tuple(open_points),
+        _total([piece.search.tally for piece in every]),
+        None,
+        first.minima_only,
+    )
+
+
+def _judged(
+    piece: _Piece, member: Member, others: tuple[Sequence[_Piece], Sequence[_Piece]]
+) -> tuple[str, bool]:
+    """Return whether a point of a piece is stationary in the union, and whether its index counts.
+
+    In a point of several pieces it does if it is 0 in all of them.
+    """
+    place, several = member.place, [member]
+    zeros, (lower, upper) = piece.zeros(member), full(piece.search, member.region)
+    for earlier, pieces in zip((True, False), others, strict=True):
+        for other in pieces:
+            there = other.place(lower, upper, zeros)
+            if there == OUT:
+                continue
+            same = _same(piece, member, other)
+            if same is not None and there == IN:
+                if earlier:
+                    return OUT, False  # it is told with the other piece
+                place = same.place if place == IN else place
+                several.append(same)
+            elif same is None and there == IN and other.is_empty_near(lower, upper):
+                return OUT, False
+            else:
+                place = OPEN
+    return place, len(several) == 1 or all(one.region.index == 0 for one in several)
+
+
+def _same(piece: _Piece, member: Member, other: _Piece) -> Member | None:
+    """Return the member of another piece whose point is that of a region."""
+    face = piece.face(member)
+    alike = (one for one in other.members if other.face(one) == face)
+    return next((o for o in alike if inside(other.search, member.region, o.region)), None)
+
+
+def _sides(domain: Domain, locus: StationaryLocus) -> tuple[Array, Array]:
+    """Return the sides of a locus in all coordinates."""
+    lower, upper = domain.lower.copy(), domain.upper.copy()
+    for name, low in locus.lower.items():
+        i = domain.manifold.names.index(name)
+        lower[i], upper[i] = low, locus.upper[name]
+    return lower, upper
+
+
+def _apart(domain: Domain, low: Array, high: Array, left: Array, right: Array) -> bool:
+    """Whether two boxes are disjoint, on circles as well."""
+    middle = 0.5 * (left + right) - 0.5 * (low + high)
+    turn = middle - domain.manifold.wrap(middle)
+    slack = ROUNDING * domain.manifold.scale_array
+    return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
+
+
+def _total(tallies: Sequence[Tally]) -> Tally:
+    return Tally(*(sum(getattr(t, f.name) for t in tallies) for f in fields(Tally)))
