@@ -4,7 +4,7 @@ PYTEST := .venv/bin/python -m pytest
 NUMERICAL := $(addprefix tests/, polyhedra skeletons minimisation proofs bodies models motion spaces intervals)
 
 .DEFAULT_GOAL := help
-.PHONY: help env env-pip dyad paper test durations disturbed cores thorough intermediate lint format types imports docs links bench trials constraints clean
+.PHONY: help env env-pip dyad paper test wider costs disturbed cores thorough intermediate lint format types imports docs links bench trials constraints clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -41,20 +41,22 @@ paper: .venv/.runtime ## every claim of the paper checked, slow ones too; the re
 # ----------------------------------------------------------------------------------------- check
 
 # The workers already use every core; threads inside the linear algebra would only compete.
-test durations disturbed cores thorough: export OPENBLAS_NUM_THREADS = 1
-test durations disturbed cores thorough: export OMP_NUM_THREADS = 1
+test wider costs disturbed cores thorough: export OPENBLAS_NUM_THREADS = 1
+test wider costs disturbed cores thorough: export OMP_NUM_THREADS = 1
 
-test: .venv/.dev ## tests and doctests, without those marked slow
-	@$(PYTEST) -n auto --dist worksteal -m "not slow"
+test: .venv/.dev ## the cheap tests and doctests of every room, in minutes
+	@$(PYTEST) -n auto --dist worksteal -m quick tests polycorner
 
-durations: .venv/.dev ## all tests, recording which take long: from 10 s on `make test` leaves them out
-	@$(PYTEST) -n auto --dist worksteal -q --junitxml=out/tests.xml || true
-	@.venv/bin/python tests/support/durations.py out/tests.xml tests/durations.json
+wider: .venv/.dev ## what `make test` leaves out, without what is slow
+	@$(PYTEST) -n auto --dist worksteal -m "not quick and not slow"
+
+costs: .venv/.dev ## all tests, recording what each costs: `make test` runs the quick ones
+	@$(PYTEST) -n auto --dist worksteal -q --costs
 
 disturbed: .venv/.dev ## what rests on linear algebra, again with other last bits
 	@HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "not slow" --disturbed 1 $(NUMERICAL)
 
-cores: .venv/.dev ## `make test` with the linear algebra of each kind of processor (x86 only; hours)
+cores: .venv/.dev ## what is not slow with the linear algebra of each processor (x86 only; hours)
 	@set -e; for core in Prescott Haswell Zen SkylakeX; do echo "$$core"; \
 	    OPENBLAS_CORETYPE=$$core $(PYTEST) -n auto --dist worksteal -q -m "not slow"; done
 

@@ -4,12 +4,12 @@
 ``--disturbed 1`` runs the tests on linear algebra with other last bits (`linear_algebra`).
 """
 
-import json
 import os
 import signal
 from pathlib import Path
 
 import chromium
+import costs
 import matplotlib as mpl
 import pytest
 from hypothesis import HealthCheck, settings
@@ -19,10 +19,6 @@ from polycorner.formulas.cache import cache_folder
 
 mpl.use("Agg")
 HERE = Path(__file__).parent
-# Tests that took long, in s on two cores; `make durations` measures anew.  From SLOW on they count
-# as slow.
-DURATIONS = json.loads((HERE / "durations.json").read_text())
-SLOW = 10.0
 collect_ignore = ["support/disturbed"]  # which is run by other processes
 
 # A shell starts background jobs with Ctrl-C ignored; tests that send it need it to interrupt.
@@ -54,9 +50,14 @@ def pytest_addoption(parser):
         metavar="SEED",
         help="round linear algebra as another processor might",
     )
+    parser.addoption(
+        "--costs", action="store_true", help="record what tests cost, from which tiers are made"
+    )
 
 
 def pytest_configure(config):
+    if config.getoption("--costs"):
+        config.pluginmanager.register(costs.Recorder(costs.FILE))
     seed = config.getoption("--disturbed")
     if seed is not None:
         Disturbed(seed).install()
@@ -68,9 +69,7 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    for item in items:
-        if DURATIONS.get(item.nodeid, 0.0) >= SLOW:
-            item.add_marker("slow")
+    costs.assign_tiers(items)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import mpmath
 import numpy as np
@@ -27,11 +28,16 @@ CORNER = ("A2B1", "A2b", "aB1")
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 PLANE = replace(PAIR, drum_radius=math.inf)
 L, LETTER_R, T = sympy.symbols("l r t", positive=True)
-THICKNESS = sympy.lambdify((L, LETTER_R), plane_critical_formula())
-LENGTH = sympy.lambdify((LETTER_R, T), plane_critical_formula("length"))
 lengths = st.floats(6.05, 60)
 drums = st.sampled_from([9.0, 12.0, 30.0, 125.0, math.inf])
 few = settings(max_examples=8)
+
+
+@cache
+def critical_in_the_plane(unknown):
+    """The closed form as a function of l and r, or of r and t."""
+    known = {"rod_radius": (L, LETTER_R), "length": (LETTER_R, T)}[unknown]
+    return sympy.lambdify(known, plane_critical_formula(unknown))
 
 
 def on_face(pair, chirality="R"):
@@ -56,7 +62,8 @@ def bisected(pair):
 def test_newtons_method_in_every_drum_gives_the_closed_form_of_the_plane(length, drum):
     pair = DumbbellPair(min(length, 2 * (drum - 3)), 3.0, 1.0, drum)
     found = critical_corner(pair)
-    assert found.value == pytest.approx(THICKNESS(pair.length, 3.0), abs=1e-9)
+    expected = critical_in_the_plane("rod_radius")(pair.length, 3.0)
+    assert found.value == pytest.approx(expected, abs=1e-9)
     assert found.contacts == ("A2b", "aB1")
     assert found.minimum_below
     assert not found.minimum_above
@@ -128,15 +135,15 @@ def test_closed_form_holds_in_drums_to_forty_digits(drum):
 
 @given(st.floats(6.5, 60))
 def test_length_and_thickness_are_inverse(length):
-    thickness = THICKNESS(length, 3.0)
-    assert LENGTH(3.0, thickness) == pytest.approx(length, rel=1e-9)
+    thickness = critical_in_the_plane("rod_radius")(length, 3.0)
+    assert critical_in_the_plane("length")(3.0, thickness) == pytest.approx(length, rel=1e-9)
 
 
 @few
 @given(st.floats(2.2, 2.97), drums)
 def test_critical_length(thickness, drum):
     pair = DumbbellPair(6.0, 3.0, thickness, drum)
-    expected = LENGTH(3.0, thickness)
+    expected = critical_in_the_plane("length")(3.0, thickness)
     if expected > 2 * (drum - 3):
         assert critical_length(pair) is None
     else:
@@ -214,7 +221,7 @@ def test_the_pass(length, drum, chirality):
     assert int((top.curvatures < -1e-6).sum()) == 1
     a1, a2, b1, b2 = pair.ball_centres(top.point)
     np.testing.assert_allclose([a1[0], b2[0], a2[1] - b1[1]], 0, atol=1e-7)
-    critical = THICKNESS(pair.length, 3.0)
+    critical = critical_in_the_plane("rod_radius")(pair.length, 3.0)
     gaps = pair.polyhedron.values(top.point)[[pair.polyhedron.names.index(n) for n in CORNER[1:]]]
     np.testing.assert_allclose(gaps, critical - 1.0, atol=1e-9)
 

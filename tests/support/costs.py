@@ -1,0 +1,124 @@
+"""Tiers of tests from what they cost: processor time, recorded by ``make costs``.
+
+``tests/costs.json`` has two entries, ``seconds``, the processor time of each test that took long
+enough to matter (its own and that of the processes it started), and ``processes``, the tests that
+started any.  A test that is not in the file is new or cheap.
+"""
+
+import json
+import resource
+import sys
+from collections import Counter
+from multiprocessing import util
+from pathlib import Path
+
+import pytest
+
+FILE = Path(__file__).parents[1] / "costs.json"
+LEAST = 0.05  # s, below which a test is not written
+QUICK = 0.25  # s, up to which `make test` runs a test
+CHEAP = 2.0  # s, up to which it runs the cheapest test of a file that has no quick one
+SLOW = 6.0  # s, from which only `make thorough` runs a test
+STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # events of sys.audit
+
+
+def processor_seconds() -> tuple[float, float]:
+    """Return the processor time of this process and of those it started and waited for, in s."""
+    own, others = (resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return own.ru_utime + own.ru_stime, others.ru_utime + others.ru_stime
+
+
+class Recorder:
+    """Measures each test where it runs, and writes the costs where the reports arrive."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.seconds: Counter[str] = Counter()
+        self.run: set[str] = set()
+        self.processes: set[str] = set()
+        self.started = 0
+        self.last = (0.0, 0.0)
+        sys.addaudithook(self._hear)
+        self.spawn = util.spawnv_passfds  # of which no event tells
+        util.spawnv_passfds = self._spawn
+
+    def _hear(self, event: str, arguments: tuple[object, ...]) -> None:
+        if event in STARTS and "ldconfig" not in str(arguments[:1]):  # ctypes looks for a library
+            self.started += 1
+
+    def _spawn(self, *arguments):
+        self.started += 1
+        return self.spawn(*arguments)
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_logstart(self):
+        self.started, self.last = 0, processor_seconds()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self):
+        report = yield
+        now = processor_seconds()
+        own, others = now[0] - self.last[0], now[1] - self.last[1]
+        # A process that an earlier test started may be waited for in this one.
+        report.cost = (own + (others if self.started else 0.0), self.started > 0)
+        self.last = now
+        return report
+
+    def pytest_runtest_logreport(self, report):
+        seconds, processes = report.cost
+        self.seconds[report.nodeid] += seconds
+        if report.when == "call" and not report.skipped:
+            self.run.add(report.nodeid)
+        if processes:
+            self.processes.add(report.nodeid)
+
+    def pytest_sessionfinish(self, session):
+        if not hasattr(session.config, "workerinput"):
+            self.write()
+
+    def write(self) -> None:
+        """Replace the records of the tests that ran, and keep the others."""
+        seconds, processes = read(self.path)
+        for name in self.run:
+            seconds.pop(name, None)
+            if self.seconds[name] >= LEAST:
+                seconds[name] = float(f"{self.seconds[name]:.2g}")
+        processes = (processes - self.run) | (self.processes & self.run)
+        costs = {"seconds": dict(sorted(seconds.items())), "processes": sorted(processes)}
+        self.path.write_text(json.dumps(costs, indent=0) + "\n")
+
+
+def read(path: Path = FILE) -> tuple[dict[str, float], set[str]]:
+    """Return what tests cost, in s, and which start processes."""
+    if not path.exists():
+        return {}, set()
+    costs = json.loads(path.read_text())
+    return costs["seconds"], set(costs["processes"])
+
+
+def is_page(item) -> bool:
+    """Tell a page of the documentation, whose examples are tests."""
+    return item.path.suffix == ".md"
+
+
+def needs_browser(item) -> bool:
+    """Tell a test that opens a page in a browser, also where there is none."""
+    return "tab" in getattr(item, "fixturenames", ())
+
+
+def assign_tiers(items) -> None:
+    """Mark each test ``slow`` or ``quick`` or neither, by what it cost when it was recorded."""
+    seconds, processes = read()
+    cheapest: dict[Path, tuple[float, str]] = {}
+    for item in items:
+        cost = seconds.get(item.nodeid, 0.0)
+        if cost >= SLOW:
+            item.add_marker("slow")
+        marked = item.get_closest_marker("slow")
+        if not (marked or item.nodeid in processes or is_page(item) or needs_browser(item)):
+            item.alone = cost
+            cheapest[item.path] = min(cheapest.get(item.path, (CHEAP, "")), (cost, item.nodeid))
+    for item in items:
+        cost = getattr(item, "alone", None)
+        if cost is not None and (cost <= QUICK or item.nodeid == cheapest[item.path][1]):
+            item.add_marker("quick")

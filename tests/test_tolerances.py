@@ -1,0 +1,68 @@
+"""The ladder of tolerances: its default, its order, and what it is made of."""
+
+import itertools
+import math
+import sys
+from dataclasses import fields
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner.tolerances import DEFAULT, MEASURED, STRICT, Tolerances
+
+EPSILON = sys.float_info.epsilon
+exponents = st.floats(-10, -4)
+
+
+def is_ascending(*numbers):
+    return all(a < b for a, b in itertools.pairwise(numbers))
+
+
+def test_the_default_is_that_of_the_two_public_numbers():
+    """To the bit: nothing changes for those who give no tolerance."""
+    assert Tolerances.of() == Tolerances() == DEFAULT
+    assert (DEFAULT.corner, DEFAULT.beside, DEFAULT.multiplier) == (1e-5, 1e-3, 1e-9)
+
+
+@given(exponents)
+def test_the_order_is_kept(exponent):
+    t = Tolerances.of(10**exponent)
+    assert is_ascending(EPSILON, t.rounding, t.held, t.feasible, t.zero, t.same, t.corner)
+    assert is_ascending(t.corner, t.near, t.beside, 1)
+    assert is_ascending(t.settled**2, t.held)
+    assert is_ascending(EPSILON, t.difference**2)
+    assert is_ascending(math.sqrt(EPSILON), t.dependent, t.rank)
+    assert is_ascending(t.multiplier, t.stationary)
+    assert is_ascending(t.curvature, t.flat)
+    assert t.zero == pytest.approx(10**exponent)
+
+
+@given(exponents, exponents)
+def test_a_larger_tolerance_makes_no_number_smaller(one, other):
+    least, most = sorted((one, other))
+    few, many = Tolerances.of(10**least), Tolerances.of(10**most)
+    assert all(getattr(few, f.name) <= getattr(many, f.name) for f in fields(Tolerances))
+
+
+@given(st.floats(-7.5, -2))
+def test_the_rank_tolerance_moves_what_is_dependent_and_nothing_else(exponent):
+    t = Tolerances.of(rank_tolerance=10**exponent)
+    assert t.rank == pytest.approx(10**exponent)
+    assert t.dependent == pytest.approx(t.rank / 10)
+    others = [f.name for f in fields(t) if f.name not in ("rank", "dependent")]
+    assert all(getattr(t, name) == getattr(DEFAULT, name) for name in others)
+
+
+def test_the_presets_differ_from_the_default_in_the_tolerance():
+    assert STRICT == Tolerances.of(1e-10)
+    assert MEASURED == Tolerances.of(1e-5)
+
+
+@pytest.mark.parametrize("argument", ["tolerance", "rank_tolerance"])
+@pytest.mark.parametrize("value", [0.0, -1e-8, 1.0, math.nan, math.inf])
+def test_a_number_that_is_no_tolerance_is_refused(argument, value):
+    with pytest.raises(ValueError, match=rf"^{argument}: expected a number"):
+        Tolerances.of(**{argument: value})
+    with pytest.raises(TypeError, match=rf"^{argument}: "):
+        Tolerances.of(**{argument: "small"})
