@@ -41,15 +41,19 @@ def mistakes():
                 yield name, flag, (value,) * option.nargs
 
 
-@pytest.mark.parametrize(("name", "flag", "values"), list(mistakes()), ids=str)
-def test_a_wrong_value_is_one_sentence(capsys, monkeypatch, tmp_path, name, flag, values):
+@pytest.mark.parametrize("command", sorted({name for name, _, _ in mistakes()}))
+def test_a_wrong_value_is_one_sentence(capsys, monkeypatch, tmp_path, subtests, command):
     monkeypatch.chdir(tmp_path)
-    line = (*name.split(), *NEEDED.get(name, ()), flag, *values)
-    code, out, err = commands.run(capsys, *line)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith("polycorner: ")
-    assert flag in err
-    assert list(tmp_path.iterdir()) == []
+    for name, flag, values in mistakes():
+        if name != command:
+            continue
+        with subtests.test(flag=flag, values=values):
+            line = (*name.split(), *NEEDED.get(name, ()), flag, *values)
+            code, out, err = commands.run(capsys, *line)
+            assert (code, out, err.count("\n")) == (2, "", 1)
+            assert err.startswith("polycorner: ")
+            assert flag in err
+            assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
