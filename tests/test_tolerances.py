@@ -2,8 +2,10 @@
 
 import itertools
 import math
+import re
 import sys
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -66,3 +68,20 @@ def test_a_number_that_is_no_tolerance_is_refused(argument, value):
         Tolerances.of(**{argument: value})
     with pytest.raises(TypeError, match=rf"^{argument}: "):
         Tolerances.of(**{argument: "small"})
+
+
+def test_the_page_has_every_number_with_its_rule():
+    """Each cell such as ``1e-6 s^(3/4)`` is what the code makes of other tolerances."""
+    page = (Path(__file__).parents[1] / "docs" / "tolerances.md").read_text()
+    rules = dict(re.findall(r"^\| `(\w+)` \| `([^`]+)` \|", page, flags=re.MULTILINE))
+    assert list(rules) == [f.name for f in fields(Tolerances)]
+    powers = {"": 0.0, "s": 1.0, "s^(1/2)": 0.5, "s^(3/4)": 0.75}
+    for exponent in (-10, -8, -5):
+        s, changed = 10.0 ** (exponent + 8), Tolerances.of(10.0**exponent, 1e-5)
+        for name, rule in rules.items():
+            number, _, factor = rule.partition(" ")
+            if number == "rank_tolerance":
+                expected = 1e-5
+            else:
+                expected = float(number) * (10.0 if factor == "r" else s ** powers[factor])
+            assert getattr(changed, name) == pytest.approx(expected), name
