@@ -1,6 +1,7 @@
 # `make` lists the targets.  A target that needs the environment builds it first.
 
 PYTEST := .venv/bin/python -m pytest
+TIER := not slow
 NUMERICAL := $(addprefix tests/, polyhedra skeletons minimisation proofs bodies models motion spaces intervals)
 
 .DEFAULT_GOAL := help
@@ -53,8 +54,8 @@ wider: .venv/.dev ## what `make test` leaves out, without what is slow
 costs: .venv/.dev ## all tests, recording what each costs: `make test` runs the quick ones
 	@$(PYTEST) -n auto --dist worksteal -q --costs
 
-disturbed: .venv/.dev ## what rests on linear algebra, again with other last bits
-	@HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "not slow" --disturbed 1 $(NUMERICAL)
+disturbed: .venv/.dev ## what rests on linear algebra, again with other last bits; TIER=quick in part
+	@HYPOTHESIS_PROFILE=brief $(PYTEST) -n auto --dist worksteal -q -m "$(TIER)" --disturbed 1 $(NUMERICAL)
 
 cores: .venv/.dev ## what is not slow with the linear algebra of each processor (x86 only; hours)
 	@set -e; for core in Prescott Haswell Zen SkylakeX; do echo "$$core"; \

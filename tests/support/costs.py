@@ -18,7 +18,8 @@ FILE = Path(__file__).parents[1] / "costs.json"
 LEAST = 0.05  # s, below which a test is not written
 QUICK = 0.25  # s, up to which `make test` runs a test
 CHEAP = 2.0  # s, up to which it runs the cheapest test of a file that has no quick one
-SLOW = 6.0  # s, from which only `make thorough` runs a test
+SLOW = 2.5  # s, from which only `make thorough` runs a test
+LONG = 10.0  # s, up to which `make wider` runs the cheapest test of a file all the same
 STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # events of sys.audit
 
 
@@ -73,12 +74,13 @@ class Recorder:
             self.processes.add(report.nodeid)
 
     def pytest_sessionfinish(self, session):
+        options = session.config.option
         if not hasattr(session.config, "workerinput"):
-            self.write()
+            self.write(keep=bool(options.keyword or options.markexpr or options.file_or_dir))
 
-    def write(self) -> None:
-        """Replace the records of the tests that ran, and keep the others."""
-        seconds, processes = read(self.path)
+    def write(self, *, keep: bool) -> None:
+        """Replace the records of the tests that ran; keep the others if some were chosen."""
+        seconds, processes = read(self.path) if keep else ({}, set())
         for name in self.run:
             seconds.pop(name, None)
             if self.seconds[name] >= LEAST:
@@ -109,16 +111,27 @@ def needs_browser(item) -> bool:
 def assign_tiers(items) -> None:
     """Mark each test ``slow`` or ``quick`` or neither, by what it cost when it was recorded."""
     seconds, processes = read()
-    cheapest: dict[Path, tuple[float, str]] = {}
-    for item in items:
-        cost = seconds.get(item.nodeid, 0.0)
-        if cost >= SLOW:
+    costs = {item: seconds.get(item.nodeid, 0.0) for item in items}
+    inside = [
+        item
+        for item in items
+        if not (item.nodeid in processes or is_page(item) or needs_browser(item))
+    ]
+    cheapest, cheapest_inside = cheapest_of_files(costs, items), cheapest_of_files(costs, inside)
+    for item, cost in costs.items():
+        if cost >= (LONG if item in cheapest else SLOW):
             item.add_marker("slow")
+    for item in inside:
         marked = item.get_closest_marker("slow")
-        if not (marked or item.nodeid in processes or is_page(item) or needs_browser(item)):
-            item.alone = cost
-            cheapest[item.path] = min(cheapest.get(item.path, (CHEAP, "")), (cost, item.nodeid))
-    for item in items:
-        cost = getattr(item, "alone", None)
-        if cost is not None and (cost <= QUICK or item.nodeid == cheapest[item.path][1]):
+        if not marked and costs[item] <= (CHEAP if item in cheapest_inside else QUICK):
             item.add_marker("quick")
+
+
+def cheapest_of_files(costs, items):
+    """Return the cheapest test of each file."""
+    found = {}
+    for item in items:
+        other = found.setdefault(item.path, item)
+        if costs[item] < costs[other]:
+            found[item.path] = item
+    return set(found.values())
