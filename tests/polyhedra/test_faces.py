@@ -1,0 +1,76 @@
+"""Ways onto faces: where they end, how, and that they are the shortest."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from polycorner import Manifold, Polyhedron
+from polycorner.polyhedra.faces import End, Face
+
+SPACE = Manifold(("x", "y", "z"), scales=(1.0, 2.0, 5.0))
+X, Y, Z = SPACE.symbols
+SPHERE = Polyhedron(SPACE, [1 - X**2 - (Y / 2) ** 2 - (Z / 5) ** 2, Z, X - Y / 2], [Y])
+numbers = st.floats(-2, 2)
+
+
+@given(st.tuples(numbers, numbers, numbers).filter(lambda u: 0.1 < math.hypot(*u)))
+def test_the_nearest_point_of_a_sphere_is_on_the_ray(u):
+    """In scaled coordinates the first function is that of the unit sphere."""
+    q = np.array(u) * SPACE.scale_array
+    found = Face.of(SPHERE, [0]).project(q)
+    assert found.settled
+    assert np.allclose(found.point / SPACE.scale_array, np.array(u) / math.hypot(*u), atol=1e-9)
+    assert abs(SPHERE.values(found.point)[0]) < 1e-13
+
+
+def test_inequalities_and_equations_are_held_together():
+    found = Face.of(SPHERE, [0, 1, 3]).project(np.array([0.7, 0.3, 0.2]))
+    assert found.settled
+    assert np.allclose(found.point, [1, 0, 0], atol=1e-14)
+    assert found.first > 1e-3 > found.last
+
+
+def test_the_first_step_is_the_shortest_to_the_linearised_zeros():
+    """By the normal equations, from the definition."""
+    q = np.array([0.9, 0.4, 1.0])
+    values, slopes = SPHERE.values(q), SPHERE.gradients(q) * SPACE.scale_array
+    a, f = slopes[[0, 2]], values[[0, 2]]
+    step = -a.T @ np.linalg.solve(a @ a.T, f)
+    found = Face.of(SPHERE, [0, 2]).project(q, steps=1)
+    assert found.end is End.UNSETTLED
+    assert np.allclose(found.point, q + step * SPACE.scale_array, atol=1e-14)
+    assert found.first == pytest.approx(np.linalg.norm(step))
+
+
+def test_steps_may_be_confined_to_some_directions():
+    along = np.array([[0.0], [0.0], [1.0]])
+    found = Face.of(SPHERE, [0]).project(np.array([0.6, 0.0, 3.0]), along=along)
+    assert found.settled
+    assert np.allclose(found.point, [0.6, 0.0, 4.0], atol=1e-12)
+
+
+def test_a_double_root_is_approached_though_slowly():
+    """Convergence is linear, each step half of the one before."""
+    line = Manifold.euclidean("t")
+    (t,) = line.symbols
+    found = Face.of(Polyhedron(line, [t**2]), [0]).project(np.array([1.0]), steps=60)
+    assert abs(found.point[0]) < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("formula", "start", "limits", "end"),
+    [
+        (X**2 + 1, [0.5, 0, 0], {}, End.UNSETTLED),
+        (X - 100, [0, 0, 0], {"reach": 10.0}, End.FAR),
+        (X - 100, [0, 0, 0], {"stride": 1.0, "steps": 10}, End.UNSETTLED),
+        (X - 100, [0, 0, 0], {"stride": 1.0, "steps": 120}, End.SETTLED),
+        (X**0.5 - 3, [-1.0, 0, 0], {}, End.NOT_FINITE),
+    ],
+)
+def test_a_way_that_fails_says_how(formula, start, limits, end):
+    found = Face.of(Polyhedron(SPACE, [formula]), [0]).project(np.array(start, float), **limits)
+    assert found.end is end
+    assert found.settled == (end is End.SETTLED)
