@@ -80,18 +80,18 @@ class Tolerances:
         """
         checks.real("tolerance", tolerance, above=0, below=1)
         checks.real("rank_tolerance", rank_tolerance, above=0, below=1)
-        s, r = tolerance / TOLERANCE, rank_tolerance / RANK_TOLERANCE
+        s = tolerance / TOLERANCE
         return cls(
-            zero=1e-8 * s,
-            feasible=1e-10 * s,
-            held=1e-11 * s**0.75,
+            zero=tolerance,
+            feasible=max(1e-10 * s, cls.rounding),
+            held=max(1e-11 * s**0.75, cls.rounding),
             same=1e-6 * s**0.75,
             near=1e-4 * s**0.5,
-            stationary=1e-8 * s,
-            curvature=1e-8 * s,
+            stationary=tolerance,
+            curvature=tolerance,
             level=1e-9 * s,
-            rank=1e-6 * r,
-            dependent=1e-7 * r,
+            rank=rank_tolerance,
+            dependent=rank_tolerance / 10,
         )
 
     @property

@@ -14,7 +14,7 @@ from polycorner.proofs.hypotheses import INACTIVE, check_hypotheses, without_enc
 from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import SUBJECT, newton
 from polycorner.proofs.krawczyk import Enclosure, enclose
-from polycorner.proofs.statements import ConditionResult, Status
+from polycorner.proofs.statements import Claim, ConditionResult, Status, undecided
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
@@ -123,10 +123,14 @@ def _on_face(
     if isinstance(posed, Undecided):
         return Attempt(face, posed, posed, without_enclosure(posed), bits)
     best: Attempt | None = None
+    others = [i for i in certificate.analysis.active if i not in face]
     for doublings in range(MOST_DOUBLINGS + 1):
         enclosure = _enclosed(certificate, posed, bits)
         with precision(bits):
-            result = Attempt(face, posed, enclosure, _checked(posed, enclosure), bits)
+            found = _checked(posed, enclosure)
+            if others and not isinstance(enclosure, Undecided):
+                found = _of_a_choice(posed.claim, others, enclosure, found)
+            result = Attempt(face, posed, enclosure, found, bits)
             if best is None or result.rank >= best.rank:
                 best = result
             if isinstance(enclosure, Undecided):
@@ -143,6 +147,25 @@ def _checked(posed: Posed, enclosure: Enclosure | Undecided) -> Mapping[str, Con
     if isinstance(enclosure, Undecided):
         return without_enclosure(enclosure, symmetric=bool(posed.claim.fields))
     return check_hypotheses(posed.claim, enclosure)
+
+
+def _of_a_choice(
+    claim: Claim, others: Sequence[int], enclosure: Enclosure, found: Mapping[str, ConditionResult]
+) -> Mapping[str, ConditionResult]:
+    """Return what is known where a face leaves out active functions, which may support as well.
+
+    Where these are positive nothing else can, and a condition that is violated refutes the
+    minimum; elsewhere the functions of another choice may meet it.
+    """
+    values = claim.system.formulas.values(enclosure.neighbourhood(), others)
+    closed = [i for i, value in zip(others, values, strict=True) if not value > 0]
+    if not closed:
+        return found
+    about = f"{', '.join(claim.named(closed))} may support as well, in another choice of functions"
+    return {
+        name: undecided(f"{result.reason}; {about}") if result.status is Status.FAILED else result
+        for name, result in found.items()
+    }
 
 
 def bits_for(digits: int) -> int:
@@ -182,7 +205,7 @@ def _sharp(enclosure: Enclosure, digits: int) -> bool:
     )
 
 
-def _explained(certificate: Certificate, undecided: Undecided) -> Undecided:
+def _explained(certificate: Certificate, open_: Undecided) -> Undecided:
     """Add hints from the certificate at why the equations may be singular."""
     hints = []
     if not certificate.licq:
@@ -190,4 +213,4 @@ def _explained(certificate: Certificate, undecided: Undecided) -> Undecided:
     flat = [label for label, kind in certificate.entrapment.items() if kind is Entrapment.FREE]
     if flat:
         hints.append(f"the energy is flat along {', '.join(flat)}")
-    return Undecided(undecided.name, "; ".join([undecided.reason, *hints]))
+    return Undecided(open_.name, "; ".join([open_.reason, *hints]))
