@@ -10,7 +10,6 @@ import numpy as np
 import scipy.linalg
 
 from polycorner.bodies.exchanges import elements
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.isometries import isometries
 from polycorner.bodies.lattices import Lattice
@@ -28,6 +27,7 @@ from polycorner.bodies.shapes import Body
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Congruences(Value):
         rows += [velocity(v) - velocity(np.zeros(d)) for v in self.lattice.directions]
         if any(p.frame is Frame.SHIFTED and not p.is_round for p in self.placements):
             rows.append(np.eye(rows[0].shape[1])[d:])
-        basis = scipy.linalg.null_space(np.concatenate(rows), rcond=FLAT).T
+        basis = scipy.linalg.null_space(np.concatenate(rows), rcond=DEFAULT.alike).T
         return reduced(basis) if len(basis) else basis
 
     def symmetry(self, polyhedron: Polyhedron, *, full: bool = False) -> Symmetry:
@@ -131,7 +131,9 @@ class Congruences(Value):
         """Translations as a projection, a point that rotations keep, the axes they keep."""
         d = self.dimension
         free = self.motions[:, d:]
-        pure = scipy.linalg.null_space(free.T, rcond=FLAT).T @ self.motions if len(free) else free
+        pure = free
+        if len(free):
+            pure = scipy.linalg.null_space(free.T, rcond=DEFAULT.alike).T @ self.motions
         shifts = scipy.linalg.orth(pure[:, :d].T) if len(pure) else np.zeros((d, 0))
         along: Array = shifts @ shifts.T
         across = np.eye(d) - along
@@ -141,7 +143,9 @@ class Congruences(Value):
             matrix = np.concatenate([across @ spin(m[d:], d) for m in rotations])
             target = -np.concatenate([across @ m[:d] for m in rotations])
             centre = np.linalg.lstsq(matrix, target, rcond=None)[0]
-        turning = np.linalg.matrix_rank(rotations[:, d:], tol=FLAT) if len(rotations) else 0
+        turning = 0
+        if len(rotations):
+            turning = np.linalg.matrix_rank(rotations[:, d:], tol=DEFAULT.alike)
         if d == 3 and turning == 1:
             axis = rotations[0, d:]
             return along, centre, (axis / np.linalg.norm(axis))[None]

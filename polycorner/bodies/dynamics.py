@@ -38,11 +38,11 @@ from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.rotations import rotational_energy
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     import sympy
 
-SAME = 1e-9  # relative deviation that counts as none
 Coefficient = float | tuple[float, float]  # static and dynamic
 Coefficients = Coefficient | Mapping[str, Coefficient]
 
@@ -66,7 +66,7 @@ def masses_of(placements: tuple[Placement, ...], density: float, given: Any) -> 
 
 def _as_round_as_the_body(p: Placement, mass: Mass) -> bool:
     """Whether the coordinates of a body tell how its mass is placed."""
-    size = SAME * p.body.size
+    size = DEFAULT.alike * p.body.size
     if p.frame is Frame.SHIFTED and p.is_round:
         return bool(np.abs(mass.centre).max() <= size)
     if p.frame is not Frame.AXIAL:
@@ -76,7 +76,7 @@ def _as_round_as_the_body(p: Placement, mass: Mass) -> bool:
     across = (np.trace(mass.inertia) - along) / 2
     even = across * np.eye(3) + (along - across) * np.outer(p.axis, p.axis)
     skew = np.abs(mass.inertia - even).max()
-    return bool(np.abs(off).max() <= size and skew <= SAME * np.trace(mass.inertia))
+    return bool(np.abs(off).max() <= size and skew <= DEFAULT.alike * np.trace(mass.inertia))
 
 
 def energies(

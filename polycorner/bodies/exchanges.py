@@ -15,19 +15,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Element
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
 Isometry = tuple[Array, Array]  # p -> shift + matrix p
 
 MOST_ELEMENTS = 10_000
-SAME = 1e-6  # relative distance up to which points are one
 SAMPLES = 12  # random points at which functions are told apart
 
 
@@ -148,7 +147,7 @@ def _own_turns(p: Placement, whole: Array) -> list[Isometry]:
     found = [] if mirror or p.frame is Frame.SHIFTED else [(np.zeros(d), np.eye(d))]
     for turn in candidates:
         shift = middle - turn @ middle
-        known = any(np.abs(turn - other).max() <= SAME for _, other in found)
+        known = any(np.abs(turn - other).max() <= DEFAULT.same for _, other in found)
         if not known and carries(body, body, shift, turn):
             found.append((shift, turn))
     return found
@@ -172,13 +171,13 @@ def _candidates(source: Array, target: Array) -> Iterator[Array]:
     lengths, others = (np.linalg.norm(some, axis=1) for some in (source, target))
     first = int(np.argmax(lengths))
     if d == 2:
-        for other in target[abs(others - lengths[first]) <= FLAT * lengths[first]]:
+        for other in target[abs(others - lengths[first]) <= DEFAULT.alike * lengths[first]]:
             yield _plane_frame(other) @ _plane_frame(source[first]).T
         return
     apart = np.linalg.norm(np.cross(source, source[first]), axis=1)
     second = int(np.argmax(apart))
     own = _space_frame(source[first], source[second])
-    tolerance = SAME * lengths[first] ** 2
+    tolerance = DEFAULT.same * lengths[first] ** 2
     wanted = (source @ source.T)[np.ix_([first, second], [first, second])]
     gram = target @ target.T
     for i, j in permutations(range(len(target)), 2):
@@ -197,7 +196,7 @@ def carries(body: Body, onto: Body, shift: Array, turn: Array) -> bool:
             if len(other.points) != len(image) or not math.isclose(other.radius, part.radius):
                 continue
             away = np.linalg.norm(other.points[:, None] - image, axis=-1)
-            if max(away.min(axis=0).max(), away.min(axis=1).max()) <= SAME * body.size:
+            if max(away.min(axis=0).max(), away.min(axis=1).max()) <= DEFAULT.same * body.size:
                 left.remove(other)
                 break
         else:

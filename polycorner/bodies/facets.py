@@ -7,9 +7,8 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
-
-FLAT = 1e-9  # relative distance that counts as none
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,7 @@ def _space(points: Array) -> Facets:
     for plane in ConvexHull(points).equations:
         normal = plane[:3]
         height = points @ normal
-        on = tuple(np.flatnonzero(height >= height.max() - FLAT * size).tolist())
+        on = tuple(np.flatnonzero(height >= height.max() - DEFAULT.alike * size).tolist())
         # Qhull divides faces into triangles; those of one face have its vertices.
         if on not in members:
             members.append(on)

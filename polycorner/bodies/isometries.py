@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.bodies.exchanges import Isometry, carries
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -58,7 +58,7 @@ def _signed_permutations(d: int) -> Iterator[Array]:
 def _class(matrix: Array, rotations: Array) -> "Hashable":
     """Return what isometries have in common that differ by rotations of the whole."""
     mirrors = bool(np.linalg.det(matrix) < 0)
-    rank = np.linalg.matrix_rank(rotations, tol=FLAT) if len(rotations) else 0
+    rank = np.linalg.matrix_rank(rotations, tol=DEFAULT.alike) if len(rotations) else 0
     if rank == 0:
         return matrix.tobytes()
     if rank == 1 and len(matrix) == 3:
@@ -69,7 +69,7 @@ def _class(matrix: Array, rotations: Array) -> "Hashable":
 
 def _keeps_lattice(matrix: Array, lattice: Lattice) -> bool:
     finite = np.where(np.isfinite(lattice.lengths), lattice.lengths, 0.0)
-    return bool(np.allclose(abs(matrix) @ finite, finite, rtol=FLAT, atol=0))
+    return bool(np.allclose(abs(matrix) @ finite, finite, rtol=DEFAULT.alike, atol=0))
 
 
 def _translation(matrix: Array, walls: Sequence[Wall], fixed: Sequence[Body]) -> Array | None:
@@ -87,7 +87,8 @@ def _translation(matrix: Array, walls: Sequence[Wall], fixed: Sequence[Body]) ->
     normals = np.array([normal for normal, _ in rows]).reshape(-1, d)
     wanted = np.array([offset for _, offset in rows])
     shift: Array = np.linalg.lstsq(normals, wanted, rcond=None)[0]
-    if np.abs(normals @ shift - wanted).max(initial=0) > FLAT * (1 + np.abs(wanted).max(initial=0)):
+    away = np.abs(normals @ shift - wanted).max(initial=0)
+    if away > DEFAULT.alike * (1 + np.abs(wanted).max(initial=0)):
         return None
     kept = all(any(carries(body, other, shift, matrix) for other in fixed) for body in fixed)
     return shift if kept else None
@@ -109,7 +110,7 @@ def _offsets(walls: Sequence[HalfSpace], normal: Array) -> list[float]:
     return sorted(
         float(wall.normal @ wall.point)
         for wall in walls
-        if np.abs(wall.normal - normal).max() <= FLAT
+        if np.abs(wall.normal - normal).max() <= DEFAULT.alike
     )
 
 
@@ -131,10 +132,10 @@ def _cylinders(matrix: Array, walls: Sequence[Cylinder]) -> Rows | None:
 
 def _fits(matrix: Array, wall: Cylinder, other: Cylinder) -> bool:
     """Whether an isometry without a translation makes two walls parallel, of equal radii."""
-    if abs(wall.radius - other.radius) > FLAT * wall.radius:
+    if abs(wall.radius - other.radius) > DEFAULT.alike * wall.radius:
         return False
     if wall.waves or other.waves:
         return wall is other and bool((matrix == np.eye(len(matrix))).all())
     if wall.axis is None or other.axis is None:
         return wall.axis is other.axis
-    return bool(abs(abs(other.axis @ matrix @ wall.axis) - 1) <= FLAT)
+    return bool(abs(abs(other.axis @ matrix @ wall.axis) - 1) <= DEFAULT.alike)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.shapes import Body, Part
 from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value, cached_property
 
 # The gap of two bodies jumps where their displacement is half a multiple of the period; they are
@@ -124,7 +124,7 @@ def _plain(length: ArrayLike) -> Any:
 def middle(points: Array) -> Array:
     """Return the mean of points, exactly zero where it is so up to rounding."""
     found = np.asarray(points.mean(axis=0))
-    return np.where(abs(found) > FLAT * abs(points).max(), found, 0.0)
+    return np.where(abs(found) > DEFAULT.alike * abs(points).max(), found, 0.0)
 
 
 def radius(points: Array, parts: Sequence[Part]) -> float:

@@ -22,9 +22,8 @@ from polycorner.bodies.shapes import Body, Part
 from polycorner.checks import refuse
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
-
-FLAT = 1e-9  # angle below which triangles are parts of one face
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +201,7 @@ def _polyhedral(part: Part) -> Iterator[_Piece]:
             missing[vertex] -= _angle(points[a] - points[vertex], points[b] - points[vertex])
             other = hull.neighbors[face, k]  # across the side from a to b
             turn = _angle(normals[face], normals[other])
-            if face < other and turn > FLAT:
+            if face < other and turn > DEFAULT.alike:
                 both, along = normals[face] + normals[other], _unit(points[b] - points[a])
                 yield _wedge(points[a], points[b], r, turn, _unit(both))
                 for end, outward in ((a, along), (b, -along)):

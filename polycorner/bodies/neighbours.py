@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.images import Image
 from polycorner.bodies.lattices import CLEAR, Lattice, radius, reaches
 from polycorner.bodies.pairs import Member, apart, members
@@ -16,11 +15,11 @@ from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     import sympy
 
-ROUNDING = 1e-9  # of the size of a body, by which it may overlap its own image
 
 Pair = tuple[Member, Member]
 
@@ -83,7 +82,7 @@ def check_room(
     """Raise ValueError for walls that change over a period, bodies that overlap their own image."""
     for name, wall in walls.items():
         across, _ = wall.fixed_by()
-        if np.abs(across @ lattice.directions.T).max(initial=0.0) > FLAT:
+        if np.abs(across @ lattice.directions.T).max(initial=0.0) > DEFAULT.alike:
             refuse("walls", "walls parallel to the directions that have a period", name)
     for p in placements:
         least = float(min(lattice.lengths))
@@ -122,6 +121,6 @@ def _overlaps(lattice: Lattice, p: Placement) -> bool:
         image = members("image", p.body.moved(lattice.shift(whole)), None)
         gaps = [apart(p.manifold, *pair) for pair in product(members(p.name, p.body, p), image)]
         d = Polyhedron(p.manifold, AllOf(*gaps))
-        if not d.contains(origin, tolerance=ROUNDING * p.body.size):
+        if not d.contains(origin, tolerance=DEFAULT.alike * p.body.size):
             return True
     return False

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from polycorner.bodies import gaps
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.gaps import FIRST, SECOND
 from polycorner.bodies.images import Image, nearest_image, own
@@ -27,6 +26,7 @@ from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
 Tree = AllOf | AnyOf | SmoothFunction
@@ -243,7 +243,7 @@ def separated(manifold: Manifold, one: Member, two: Member) -> Tree:
     first, second = _faces(one.part), _faces(two.part)
     if not (one.frame.turns or two.frame.turns):
         # A face and its opposite of the other body are parallel for good, and say the same.
-        first = [f for f in first if all(f.normal @ g.normal > FLAT - 1 for g in second)]
+        first = [f for f in first if all(f.normal @ g.normal > DEFAULT.alike - 1 for g in second)]
     branches = [_outside(manifold, one, two, face) for face in second]
     branches += [_outside(manifold, two, one, face) for face in first]
     if one.part.dimension == 3:

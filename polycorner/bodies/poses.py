@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.shapes import Body
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
 
@@ -123,7 +123,7 @@ def _carrying(a: Array, b: Array) -> Array:
     """Return a rotation that carries the unit vector ``a`` to ``b``."""
     across = np.cross(a, b)
     sine, cosine = float(np.linalg.norm(across)), float(a @ b)
-    if sine <= FLAT:
+    if sine <= DEFAULT.alike:
         across = np.cross(a, np.eye(3)[np.argmin(abs(a))])
         sine = float(np.linalg.norm(across))
         angle = 0.0 if cosine > 0 else math.pi

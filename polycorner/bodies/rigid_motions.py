@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.bodies.facets import FLAT
 from polycorner.bodies.frames import Frame
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 
 def spin(omega: Array, d: int) -> Array:
@@ -31,14 +31,14 @@ def reduced(basis: Array) -> Array:
         if row == len(reduced):
             break
         pivot = row + int(np.argmax(abs(reduced[row:, column])))
-        if abs(reduced[pivot, column]) <= FLAT:
+        if abs(reduced[pivot, column]) <= DEFAULT.alike:
             continue
         reduced[[row, pivot]] = reduced[[pivot, row]]
         reduced[row] /= reduced[row, column]
         others = np.arange(len(reduced)) != row
         reduced[others] -= np.outer(reduced[others, column], reduced[row])
         row += 1
-    return np.where(abs(reduced) <= FLAT, 0.0, reduced)
+    return np.where(abs(reduced) <= DEFAULT.alike, 0.0, reduced)
 
 
 def number(x: float) -> Any:

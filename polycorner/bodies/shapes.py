@@ -15,10 +15,11 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from polycorner import checks
-from polycorner.bodies.facets import FLAT, Facets, facets
+from polycorner.bodies.facets import Facets, facets
 from polycorner.checks import refuse
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
 
 Turn = float | Rotation
@@ -107,7 +108,7 @@ class Body(Checked):
             return np.zeros(self.dimension)
         along: Array = self.markers[np.argmax(lengths)] / lengths.max()
         away = self.markers - np.outer(self.markers @ along, along)
-        return along if np.linalg.norm(away, axis=1).max() <= FLAT * self.size else None
+        return along if np.linalg.norm(away, axis=1).max() <= DEFAULT.alike * self.size else None
 
     def moved(self, by: ArrayLike | None = None, turn: Turn | None = None) -> "Body":
         """Return the body turned about the origin, then shifted.
@@ -134,8 +135,8 @@ class Body(Checked):
         pairs = zip(self.parts.values(), other.parts.values(), strict=True)
         return all(
             a.points.shape == b.points.shape
-            and np.allclose(a.points, b.points, rtol=0, atol=FLAT * self.size)
-            and math.isclose(a.radius, b.radius, rel_tol=FLAT)
+            and np.allclose(a.points, b.points, rtol=0, atol=DEFAULT.alike * self.size)
+            and math.isclose(a.radius, b.radius, rel_tol=DEFAULT.alike)
             for a, b in pairs
         )
 
@@ -212,7 +213,7 @@ def polygon(vertices: ArrayLike, radius: float = 0.0) -> Body:
     if _turns(points)[0].sum() < 0:
         points = points[::-1]
     turns, ways = _turns(points)
-    flat = FLAT * np.ptp(points, axis=0).max() ** 2
+    flat = DEFAULT.alike * np.ptp(points, axis=0).max() ** 2
     if turns.min() <= flat:
         k = int(np.argmin(turns))
         place = ", ".join(f"{x:g}" for x in points[k])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import instance
+from polycorner import checks
 from polycorner.container import JSON, Kind, number, read_number
 from polycorner.files.polyhedra import (
     Entries,
@@ -22,14 +22,13 @@ from polycorner.forms import number as real
 from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Verdict
 from polycorner.minimisation.problem import pose
-from polycorner.polyhedra.strata import check_tolerance
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
 KIND = Kind("certificate", "save_certificate", JSON)
-TOLERANCE = 1e-9
 HEADER = entries(
     {
         "coordinates": many(entries({"value": real()})),
@@ -67,7 +66,7 @@ def save_certificate(certificate: Certificate, path: str | os.PathLike[str]) -> 
     OSError
         If the file cannot be written.
     """
-    c = instance("certificate", certificate, Certificate)
+    c = checks.instance("certificate", certificate, Certificate)
     polyhedron, energy = c.problem.polyhedron, c.problem.energy
     point = zip(manifold_entry(polyhedron.manifold), c.point.tolist(), strict=True)
     entries = {
@@ -91,7 +90,7 @@ def load_certificate(
     polyhedron: "Polyhedron | None" = None,
     energy: "Energy | None" = None,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DEFAULT.alike,
 ) -> Certificate:
     """Read a certificate back and certify its point again.
 
@@ -119,7 +118,7 @@ def load_certificate(
         Naming the file, if it is no certificate or was changed, or if results differ, naming the
         first that does.
     """
-    check_tolerance("tolerance", tolerance)
+    checks.real("tolerance", tolerance, above=0, below=1)
     if polyhedron is not None and energy is not None:
         pose(polyhedron, energy)
     content = KIND.load_json(path)

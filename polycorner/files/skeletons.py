@@ -26,9 +26,9 @@ from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.walks import End
+from polycorner.tolerances import DEFAULT
 
 KIND = Kind("skeleton", "save_skeleton", JSON)
-VALUES = 1e-9  # largest difference of values at corners, relative to the value and the slope
 
 
 @checked
@@ -188,7 +188,7 @@ def _differences(content: Entries, explorer: Explorer) -> Iterator[str]:
     for k, (record, entry) in enumerate(zip(explorer.records, content["corners"], strict=True)):
         values = np.array([read_number(x) for x in entry["values"]])
         found, slopes = record.point.values, np.linalg.norm(record.point.gradients, axis=1)
-        allowed = VALUES * np.maximum(slopes, abs(found))
+        allowed = DEFAULT.alike * np.maximum(slopes, abs(found))
         for i in np.flatnonzero(~np.isclose(values, found, 0.0, allowed, equal_nan=True)):
             yield f"{names[i]!r} at corner {k}: written {values[i]:.12g}, found {found[i]:.12g}"
 

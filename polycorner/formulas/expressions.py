@@ -12,6 +12,7 @@ import numpy as np
 from polycorner.checks import mapping, refuse
 from polycorner.errors import NonsmoothWarning
 from polycorner.spaces.manifold import Manifold
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     import sympy
@@ -20,7 +21,6 @@ KINKED = frozenset({"Abs", "Min", "Max", "Piecewise"})
 SHOWN = 60  # characters of a formula in a warning
 LONGEST = 2000  # symbols, numbers and operations of a formula that is written out
 SAMPLES = 16  # points at which a period is tested
-CHANGE = 1e-7  # relative change over a period that is rounding
 SPREAD = 2.0  # size, in scale units, of the region of the lines that is sampled
 
 
@@ -147,7 +147,7 @@ def _is_periodic(expression: "sympy.Basic", x: "sympy.Symbol", period: float) ->
             slope = part.args[0].diff(x)
             turns = float(slope) * period / math.tau if slope.is_number else math.nan
             turns *= 2 if type(part).__name__ == "tan" else 1
-            if abs(turns - np.round(turns)) <= CHANGE:
+            if abs(turns - np.round(turns)) <= DEFAULT.same / 10:
                 continue
         if part == x:
             return False
@@ -176,7 +176,7 @@ def _sample(
             period = manifold.periods[reads[x.name]]
             after = _values(function, places + period * np.array([s == x for s in symbols]))
             apart = abs(after - before) / (1 + abs(before) + abs(after))
-            if (apart > CHANGE).any():
+            if (apart > DEFAULT.same / 10).any():
                 k = int(np.nanargmax(apart))
                 at = ", ".join(f"{s} = {v:.4g}" for s, v in zip(symbols, places[k], strict=True))
                 msg = (

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.formulas.expressions import CHANGE, SAMPLES, SPREAD
+from polycorner.formulas.expressions import SAMPLES, SPREAD
 from polycorner.spaces.manifold import Manifold
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     import sympy
@@ -52,6 +53,6 @@ def _differ(one: Any, other: Any, manifold: Manifold, parameters: Mapping[str, f
     for u in rng.uniform(-SPREAD, SPREAD, (SAMPLES, manifold.size)):
         with np.errstate(all="ignore"):
             a, b = both(*manifold.onto(u * manifold.scale_array))
-        if abs(a - b) > CHANGE * (1 + abs(a) + abs(b)):
+        if abs(a - b) > DEFAULT.same / 10 * (1 + abs(a) + abs(b)):
             return True
     return False

@@ -22,6 +22,7 @@ from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
     Point = tuple[float, float]
 
-THIN = 1e-9  # area of a wedge, relative to its longest side squared, that counts as none
 PINS = (
     (1.2, 6.9, 0.3),
     (3.0, 7.1, 0.3),
@@ -224,7 +224,7 @@ def _check(board: Pinball) -> None:
     for wedge in board.wedges:
         corners = np.array(wedge)
         longest = max(math.dist(corners[i], corners[i - 1]) for i in range(3))
-        if abs(_double_area(corners)) <= THIN * longest**2:
+        if abs(_double_area(corners)) <= DEFAULT.alike * longest**2:
             msg = f"wedges: expected three corners that are not in line; got {wedge}"
             raise ValueError(msg)
     for cup in board.cups:

@@ -16,13 +16,12 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value, cached_property
 
 if TYPE_CHECKING:
     import sympy
 
-SAME = 1e-12  # relative size of a pencil's line that counts as none
-ON_BOUNDARY = 1e-9  # distance, as a fraction of the scales, within which a corner is on a wall
 MAX_TRIES = 100_000  # random points without one inside, after which a set counts as too thin
 
 
@@ -94,12 +93,12 @@ class Wall(Value):
         line, offset = one[1] - share * two[1], one[2] - share * two[2]
         size = math.hypot(*line)
         a, b, c = two
-        if size <= SAME * (math.hypot(*one[1]) + math.hypot(*b)):
+        if size <= 10 * DEFAULT.rounding * (math.hypot(*one[1]) + math.hypot(*b)):
             return np.empty((0, 2))
         along = np.array([-line[1], line[0]]) / size
         foot = -offset / size**2 * line
         slope, level = float(along @ (2 * a * foot + b)), float(a * (foot @ foot) + foot @ b + c)
-        if a == 0 and abs(slope) <= SAME:
+        if a == 0 and abs(slope) <= 10 * DEFAULT.rounding:
             return np.empty((0, 2))
         return foot + np.outer(_roots(a, slope, level), along)
 
@@ -144,14 +143,14 @@ def meeting_corners(polyhedron: Polyhedron, walls: Sequence[Wall]) -> Array:
 
     Candidates are the points that two walls share; those on a face of dimension zero stay.
     """
-    reach = ON_BOUNDARY * max(polyhedron.manifold.scales)
+    reach = DEFAULT.zero / 10 * max(polyhedron.manifold.scales)
     found: list[Array] = []
     for one, two in combinations(walls, 2):
         for point in one.meetings(two):
             known = any(abs(point - other).max() <= reach for other in found)
             if known or not polyhedron.contains(point, tolerance=reach):
                 continue
-            if stratum_at(polyhedron, point, tolerance=ON_BOUNDARY).dimension == 0:
+            if stratum_at(polyhedron, point, tolerance=DEFAULT.zero / 10).dimension == 0:
                 found.append(point)
     return np.array(found).reshape(-1, 2)
 

@@ -14,10 +14,10 @@ from polycorner.motion.formulation import moment
 from polycorner.motion.mechanics import OVERLAP, State
 from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
 MOST_MODES = 4096  # that are examined
-ALIKE = 1e-6  # difference of accelerations, relative to the largest, up to which they are the same
 SOLVED, UNBOUNDED = 0, 3  # of linear programmes
 TURN = 1e-3  # scaled displacement over which the turn of slips is differentiated
 FAR = 1e12  # distance from which the projection onto a set is the force that opposes most
@@ -283,7 +283,7 @@ class _Problem:
         """Return whether two accelerations are different, by ``a' M a``."""
         free = np.linalg.solve(self.mass, self.force)
         square = [a @ self.mass @ a for a in (one - other, one, other, free)]
-        return bool(square[0] > ALIKE**2 * max(square[1:]))
+        return bool(square[0] > DEFAULT.same**2 * max(square[1:]))
 
 
 def _turns(system: System, state: State) -> Array:

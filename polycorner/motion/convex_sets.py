@@ -11,12 +11,10 @@ from polycorner.checks import reals
 from polycorner.kinds import checked
 from polycorner.spaces.arguments import finite, scalar
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 INTERVAL, DISC, ELLIPSE, CUT_DISC, POLYGON = range(5)
 Code = tuple[int, tuple[float, float, float, float], Array]
-
-# Tolerance of inclusions, and of corners on an edge, relative to the size of the sets.
-ROUNDING = 1e-12
 
 
 class ConvexSet(ABC):
@@ -104,7 +102,7 @@ class ConvexSet(ABC):
     @checked
     def covers(self, inner: "ConvexSet") -> bool:
         """Whether another set of the same dimension is a subset of ``C``, up to rounding."""
-        return bool((self._gauge(inner.tips) <= 1 + ROUNDING).all())
+        return bool((self._gauge(inner.tips) <= 1 + 10 * DEFAULT.rounding).all())
 
     @abstractmethod
     def _support(self, s: Array) -> Array: ...

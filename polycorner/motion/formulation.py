@@ -14,13 +14,13 @@ from polycorner.motion import lagrange
 from polycorner.motion.degrees import degree
 from polycorner.motion.lagrange import EquationsOfMotion
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy
 
 
-SAME = 1e-9  # relative change of a derivative that is none
 TIME = "time"  # name of the symbol of the time in applied forces
 
 
@@ -238,7 +238,7 @@ class Formulation:
         slopes = Bundle(functions[0].manifold, functions).evaluate(draws, 1)[1][:, :, k:]
         sizes, changes = (np.abs(a).max(axis=(0, 2)) for a in (slopes, np.diff(slopes, axis=0)))
         for function, size, change in zip(functions, sizes, changes, strict=True):
-            if change > SAME * size:
+            if change > DEFAULT.alike * size:
                 msg = f"slip: expected an affine function of the velocities; got {function.name!r}"
                 raise ValueError(msg)
 

@@ -11,7 +11,6 @@ from polycorner.checks import reals, whole
 from polycorner.kinds import checked
 from polycorner.motion.convex_sets import (
     POLYGON,
-    ROUNDING,
     Code,
     ConvexSet,
     coefficient,
@@ -20,6 +19,7 @@ from polycorner.motion.convex_sets import (
 )
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 
 @dataclass(frozen=True, init=False)
@@ -96,7 +96,7 @@ class ConvexPolygon(ConvexSet):
     def covers(self, inner: ConvexSet) -> bool:
         """Whether the support of a set along the edges' normals stays within the edges."""
         normals, distances = self.edges
-        slack = ROUNDING * abs(self.tips).max()
+        slack = 10 * DEFAULT.rounding * abs(self.tips).max()
         return bool((inner.support(normals) <= distances + slack).all())
 
 
@@ -175,7 +175,7 @@ def _corners(values: ArrayLike, argument: str) -> Array:
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
         msg = f"{argument}: expected at least three points, shape (k, 2); got shape {points.shape}"
         raise ValueError(msg)
-    slack = ROUNDING * float(abs(points).max())
+    slack = 10 * DEFAULT.rounding * float(abs(points).max())
     around = points - points.mean(axis=0)
     corners = points[np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
     while len(corners) > 2:

@@ -70,6 +70,7 @@ from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import Noise, Solver
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     from polycorner.motion.checkpoints import Checkpoint, SavedRun
@@ -82,7 +83,6 @@ LONGEST = 1e12  # s
 MOST_KICKS = 10_000  # random forces of one coordinate in a step
 MOST_STEPS = 10**15
 SHORTEST_STEP = 1e-50  # s, by which gaps are divided
-ROUNDING = 1e-12  # relative, within which a duration is a whole number of steps
 
 
 @checked
@@ -179,7 +179,7 @@ def _steps(duration: float, dt: float) -> tuple[int, float]:
     if duration > MOST_STEPS * dt:
         refuse("dt", f"at least {duration / MOST_STEPS:.3g} s, for t_end to be reached", dt)
     steps = round(duration / dt)
-    if abs(steps * dt - duration) <= ROUNDING * duration:
+    if abs(steps * dt - duration) <= 10 * DEFAULT.rounding * duration:
         return steps, dt
     steps = math.ceil(duration / dt)
     return steps, duration / steps

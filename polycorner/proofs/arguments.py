@@ -14,9 +14,9 @@ from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Problem
 from polycorner.proofs.parameter_boxes import Interval
+from polycorner.tolerances import DEFAULT
 
 CHECK_BITS = 128
-SAME = 1e-5  # relative change of a value since certification that counts as none
 
 
 def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
@@ -34,7 +34,7 @@ def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
     for name, before, value, size in zip(formulas.names, seen, now, sizes, strict=True):
         if not (isfinite(before) and value.is_finite() and isfinite(size)):
             continue
-        if abs(float(value.mid()) - before) > SAME * size + float(value.rad()):
+        if abs(float(value.mid()) - before) > 1e4 * DEFAULT.alike * size + float(value.rad()):
             msg = (
                 f"certificate: expected the problem it was made for; {name} was {before:g} at its "
                 f"point and is {float(value.mid()):g} now"

@@ -15,13 +15,13 @@ from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import SUBJECT, newton
 from polycorner.proofs.krawczyk import Enclosure, enclose
 from polycorner.proofs.statements import Claim, ConditionResult, Status, undecided
+from polycorner.tolerances import Tolerances
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
 BITS_PER_DIGIT = 3.3220
 GUARD_BITS = 64
-NEARBY = 1e-3  # distance of the exact solution from a certificate's point, in scale units
 MOST_FACES = 8  # on which a proof is tried
 MOST_DOUBLINGS = 3  # of the precision, until every condition is decided
 MOST_SINGULAR = 1  # of the precision, where the equations seem to be singular
@@ -180,7 +180,7 @@ def _enclosed(certificate: Certificate, posed: Posed, bits: int) -> Enclosure | 
     if isinstance(centre, Undecided):
         return _explained(certificate, centre)
     away = _distance(certificate, centre)
-    if not away <= NEARBY:
+    if not away <= Tolerances.of(certificate.tolerance).beside:
         return Undecided(
             FAR, f"the nearest solution found is {away:.1e} scale units from the point"
         )

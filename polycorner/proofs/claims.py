@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from polycorner.spaces.manifold import Array
 
 MOST_SUBSETS = 1000  # of one size that are examined
-DEPENDENT = 1e-6  # sine of the angle up to which a field depends on the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +120,7 @@ def pose_claim(
         kept, refused = _invariant(forms, declared, box)
         for basis in translations(forms):
             kept += generators(problem.polyhedron.manifold, [basis])
-        fields, gauges = _independent(kept, box, problem.scales)
+        fields, gauges = _independent(kept, box, problem.scales, certificate.rank_tolerance)
         system = System(formulas, rows, gauges, point, _units(certificate, rows, gauges))
         multipliers = _multipliers(certificate, rows)
         start = [ball(x) for x in (*point, *multipliers, *[0.0] * len(gauges))]
@@ -169,9 +168,12 @@ def _invariant(
 
 
 def _independent(
-    fields: Sequence[Generator], box: Box, scales: "Array"
+    fields: Sequence[Generator], box: Box, scales: "Array", rank_tolerance: float
 ) -> tuple[tuple[Generator, ...], tuple[tuple[float, ...], ...]]:
-    """Return fields with independent vectors at the point, and a normal for each."""
+    """Return fields with independent vectors at the point, and a normal for each.
+
+    ``rank_tolerance`` is the sine of the angle up to which a field depends on the others.
+    """
     chosen: list[Generator] = []
     units: list[Array] = []
     gauges: list[tuple[float, ...]] = []
@@ -186,7 +188,7 @@ def _independent(
         rest = vector / size
         for unit in units:
             rest = rest - (rest @ unit) * unit
-        if np.linalg.norm(rest) > DEPENDENT:
+        if np.linalg.norm(rest) > rank_tolerance:
             chosen.append(field)
             units.append(rest / np.linalg.norm(rest))
             normal = vector / scales

@@ -78,7 +78,8 @@ def prove(
     Parameters
     ----------
     certificate : Certificate
-        The claim; the exact minimum is sought within ``1e-3`` scale units of its point.
+        The claim; the exact minimum is sought within ``1e-3`` scale units of its point, or
+        ``1e-3 (tolerance / 1e-8)**(3/8)`` for a certificate with another tolerance.
     digits : int, optional
         Significant digits of the enclosures, 1 to 10000; default 30.
     parameters : mapping from str to (float, float), optional

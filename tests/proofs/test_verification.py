@@ -232,6 +232,29 @@ def test_one_symmetry_serves_the_search_and_the_proof():
     assert prove(found, symmetry=turn).proved
 
 
+def test_fields_that_enclose_a_small_angle_are_one_within_the_rank_tolerance():
+    """Of an angle of 1e-4; the other direction is then that of a translation that was found."""
+    m = Manifold.euclidean("x y z")
+    x = m.symbols[0]
+    fields = Symmetry(fields=[(0, 1, 0), (0, 1, sp.Rational(1, 10_000))])
+    told = [
+        prove(certify(Polyhedron(m, [1 - x]), x**2, np.zeros(3), rank_tolerance=r), symmetry=fields)
+        for r in (1e-5, 1e-3)
+    ]
+    assert all(p.proved for p in told)
+    assert told[0].symmetry == ("d/dy", "d/dy + 1/10000 d/dz")
+    assert told[1].symmetry == ("d/dy", "d/dz")
+
+
+def test_the_minimum_may_be_farther_from_a_point_of_a_larger_tolerance():
+    """It is 2e-3 away; the limit is 1e-3, or 1e-3 (1e-6 / 1e-8)^(3/8) = 5.6e-3."""
+    m = Manifold.euclidean("x")
+    (x,) = m.symbols
+    D, energy = Polyhedron(m, [1 - x]), (x - sp.Rational(2, 1000)) ** 2
+    told = [prove(certify(D, energy, [0.0], tolerance=t)) for t in (1e-8, 1e-6)]
+    assert [p.proved for p in told] == [False, True]
+
+
 def test_a_flat_direction_that_is_no_symmetry_is_named():
     p = proof_at({"f": x**2 + y**2 - 1}, x**2 + y**2, [1, 0])
     assert p.conditions[UNIQUE] == "undecided"

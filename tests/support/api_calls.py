@@ -240,6 +240,7 @@ CALLS = {
     "Proof.enclose": lambda: {"expression": of.X + of.Y},
     "CornerList.save": lambda: {"path": of.new("corners.zip")},
     "CornerList.skeleton": dict,
+    "StationaryList.certificates": dict,
     "StationaryList.save": lambda: {"path": of.new("points.zip")},
     # skeletons
     "skeleton": lambda: {"polyhedron": of.square(), "starts": [[0.5, 0.5]]},

@@ -12,8 +12,9 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_escapes, hold_times
 from polycorner.kinds import checked
 from polycorner.minimisation import Entrapment
+from polycorner.minimisation.abundance import NORMAL
 from polycorner.models.wells.escape import overdamped_escape_time
-from polycorner.models.wells.holding import NORMAL, Comparison, Escapes, kick_of, ladder, rests
+from polycorner.models.wells.holding import Comparison, Escapes, kick_of, ladder, rests
 from polycorner.models.wells.wells import KINDS, Well
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import simulate

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from polycorner.models.disks.critical_points import judged
 from polycorner.models.disks.torus import IMAGES, Pairs, components, translates, uncut
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
-SAME = 1e-6
 TRIES, PLACES = 40, 500
 
 
@@ -182,7 +182,7 @@ def with_rattlers(
         while len(centres) < 2 * model.count:
             places = rng.random((PLACES, 2))
             room = _room(model, centres.reshape(-1, 2), places) - 2 * c.radius
-            fits = np.flatnonzero(room > SAME)
+            fits = np.flatnonzero(room > DEFAULT.same)
             if not len(fits):
                 break
             chosen = np.argmax(room) if attempt == 0 else rng.choice(fits)

@@ -10,7 +10,6 @@ import numpy as np
 
 from polycorner import checks, forms
 from polycorner.models.disks.configurations import (
-    SAME,
     CriticalConfiguration,
     Disks,
     coincide,
@@ -23,6 +22,7 @@ from polycorner.models.disks.critical_points import solved
 from polycorner.models.disks.smoothing import Candidate, candidates, smooth
 from polycorner.models.disks.torus import OWN
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
 STARTS_PER_DISK, ROUNDS = 80, 8
@@ -181,7 +181,7 @@ def _add(
     if new is None:
         return
     for k, old in enumerate(found):
-        if coincide(model, old, new, SAME):
+        if coincide(model, old, new, DEFAULT.same):
             kept = min(old, new, key=lambda c: len(c.contacts))
             found[k] = replace(kept, hits=old.hits + new.hits)
             return

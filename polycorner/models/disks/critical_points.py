@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, linear_programme, null_space
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 # (B, n) points and an order to values (B, m), gradients (B, m, n), Hessians (B, m, n, n).
 Functions = Callable[[Array, int], tuple[Array, ...]]
 
-ACTIVE, EXACT, RANK = 1e-9, 1e-12, 1e-7
 REACH, NEWTON_STEPS, CENTRING_STEPS = 0.1, 12, 60
 
 
@@ -69,7 +69,7 @@ def solved(
         d, g, h = (part[0, chosen] for part in functions(x[None, :n], 2))
         stress = x[n + 1 :]
         residual = np.concatenate([d - x[n], stress @ g, [stress.sum() - 1]])
-        if abs(residual).max() < EXACT / 10:
+        if abs(residual).max() < DEFAULT.rounding:
             break
         jacobian = np.zeros((m + n + 1, n + 1 + m))
         jacobian[:m, :n], jacobian[:m, n] = g, -1
@@ -80,7 +80,7 @@ def solved(
         # are small near it; steps along them would not converge.
         x = x - np.linalg.lstsq(jacobian, residual, rcond=1e-4)[0]
     near = abs(x[:n] - point).max() < REACH
-    return x[:n] if near and abs(residual).max() < 10 * EXACT else None
+    return x[:n] if near and abs(residual).max() < DEFAULT.held else None
 
 
 def judged(functions: Functions, point: Array, symmetries: Array) -> CriticalPoint | None:
@@ -100,14 +100,14 @@ def judged(functions: Functions, point: Array, symmetries: Array) -> CriticalPoi
     """
     values, gradients, hessians = (part[0] for part in functions(point[None], 2))
     value = float(values.min())
-    active = np.flatnonzero(values <= value + ACTIVE)
-    if np.ptp(values[active]) > 10 * EXACT:
+    active = np.flatnonzero(values <= value + DEFAULT.level)
+    if np.ptp(values[active]) > DEFAULT.held:
         return None
     stress, stresses = balance(gradients[active])
     if not stresses:
         return None
     loaded = stress > 0
-    free = null_space(np.vstack([gradients[active[loaded]], symmetries]), RANK)
+    free = null_space(np.vstack([gradients[active[loaded]], symmetries]), DEFAULT.dependent)
     forms = np.einsum("in,kij,jm->knm", free, hessians[active[loaded]], free)
     index = _positive(np.tensordot(stress[loaded], forms, 1))
     fewest = min(
@@ -121,7 +121,7 @@ def judged(functions: Functions, point: Array, symmetries: Array) -> CriticalPoi
 
 def _positive(form: Array) -> int:
     curvature = np.linalg.eigvalsh(form)
-    return int((curvature > RANK * max(1.0, abs(form).max(initial=0.0))).sum())
+    return int((curvature > DEFAULT.dependent * max(1.0, abs(form).max(initial=0.0))).sum())
 
 
 def balance(gradients: Array) -> tuple[Array, int]:
@@ -159,7 +159,7 @@ def balance(gradients: Array) -> tuple[Array, int]:
     rows = gradients[loaded]
     relations = _relations(rows)
     central = _central(relations, found[:count][loaded])
-    if central is None or abs(central @ rows).max() > ACTIVE:
+    if central is None or abs(central @ rows).max() > DEFAULT.level:
         return stress, 0
     stress[loaded] = central
     return stress, relations.shape[1]
@@ -171,14 +171,14 @@ def extreme_stresses(gradients: Array) -> list[Array]:
     Every stress is a sum of multiples of them; each sums to 1.
     """
     relations = _relations(gradients)
-    stresses = [relations @ ray for ray, _ in extreme_rays(relations, RANK)]
+    stresses = [relations @ ray for ray, _ in extreme_rays(relations, DEFAULT.dependent)]
     return [stress / stress.sum() for stress in stresses]
 
 
 def _relations(gradients: Array) -> Array:
     """Return a basis, as columns, of the weights whose combination of the gradients is zero."""
     sizes = np.linalg.norm(gradients, axis=1)
-    return np.asarray(Rows(gradients, RANK).relations / sizes[:, None])
+    return np.asarray(Rows(gradients, DEFAULT.dependent).relations / sizes[:, None])
 
 
 def _central(relations: Array, start: Array) -> Array | None:
@@ -188,12 +188,12 @@ def _central(relations: Array, start: Array) -> Array | None:
     if not len(weights) or stress.min() <= 0:
         return None
     weights = weights / stress.sum()
-    along = null_space(relations.sum(axis=0)[None], RANK)
+    along = null_space(relations.sum(axis=0)[None], DEFAULT.dependent)
     for _ in range(CENTRING_STEPS if along.shape[1] else 0):
         inner = (relations @ along) / (relations @ weights)[:, None]
         step = np.linalg.lstsq(inner, np.ones(len(inner)))[0]
         decrement = float(np.linalg.norm(inner @ step))
         weights = weights + along @ step / (1 + decrement)
-        if decrement < EXACT:
+        if decrement < 10 * DEFAULT.rounding:
             break
     return np.asarray(relations @ weights)

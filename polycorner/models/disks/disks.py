@@ -15,7 +15,7 @@ from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
-from polycorner.models.disks.configurations import SAME, CriticalConfiguration, coincide
+from polycorner.models.disks.configurations import CriticalConfiguration, coincide
 from polycorner.models.disks.critical import CriticalSearch
 from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrapped
 from polycorner.polyhedra.groups import AllOf
@@ -23,6 +23,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.progress import Progress
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
 
 Lattice = Literal["square", "hexagonal"]
@@ -291,7 +292,7 @@ class TorusDisks(Checked):
         first: CriticalConfiguration,
         second: CriticalConfiguration,
         *,
-        tolerance: float = SAME,
+        tolerance: float = DEFAULT.same,
     ) -> bool:
         """Whether two critical configurations are equal; see :meth:`critical`."""
         return coincide(self, first, second, tolerance)

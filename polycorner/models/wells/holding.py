@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from polycorner.minimisation.abundance import NORMAL
 from polycorner.models.wells.escape import mean_escape_time
 from polycorner.models.wells.wells import KINDS, Well
 from polycorner.motion.noise import Noise
@@ -30,7 +31,6 @@ from polycorner.motion.simulation import simulate, start
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-NORMAL = 1.959964  # 97.5th percentile of the standard normal distribution
 LOOKS = 200  # least number of times that a run is interrupted to remove masses that have escaped
 
 

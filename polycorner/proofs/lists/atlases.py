@@ -10,9 +10,9 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.parts import Completeness
-from polycorner.skeletons.registry import SAME
 from polycorner.skeletons.search import skeleton
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import TOLERANCE, Tolerances
 
 
 def proved_skeleton(
@@ -22,6 +22,7 @@ def proved_skeleton(
     *,
     complete: bool,
     starts: Sequence[Any] = (),
+    tolerance: float = TOLERANCE,
     **options: Any,
 ) -> Skeleton:
     """Return the skeleton found from corners, and whether its corners are proved to be all.
@@ -37,13 +38,16 @@ def proved_skeleton(
         Whether the list is complete.
     starts : sequence of (n,) arrays, optional
         Points of the set from which the search sets out as well.
+    tolerance : float, optional
+        Distance, in scale units, up to which a function counts as zero; corners of either side are
+        compared with what belongs to it.
     options
         Of :func:`polycorner.skeleton`.
     """
     rows = [*points, *(np.asarray(q, dtype=float) for q in starts)]
-    size = polyhedron.manifold.size
-    found = skeleton(polyhedron, np.reshape(rows, (-1, size)), symmetry=symmetry, **options)
-    notes = list(_mismatches(found, points, symmetry))
+    around = np.reshape(rows, (-1, polyhedron.manifold.size))
+    found = skeleton(polyhedron, around, symmetry=symmetry, tolerance=tolerance, **options)
+    notes = _mismatches(found, points, symmetry, Tolerances.of(tolerance).corner)
     if not complete:
         notes.append("the list of corners is not complete")
     proved = not notes and found.complete is Completeness.EXHAUSTED
@@ -54,11 +58,13 @@ def proved_skeleton(
     )
 
 
-def _mismatches(found: Skeleton, points: Sequence[Array], symmetry: Symmetry) -> list[str]:
+def _mismatches(
+    found: Skeleton, points: Sequence[Array], symmetry: Symmetry, reach: float
+) -> list[str]:
     """Return sentences on the corners of one side that are not those of the other."""
     manifold = found.polyhedron.manifold
     pairs = [
-        [bool(symmetry.relabellings(manifold, q, corner.point, SAME)) for corner in found.corners]
+        [bool(symmetry.relabellings(manifold, q, corner.point, reach)) for corner in found.corners]
         for q in points
     ]
     table = np.reshape(np.array(pairs, dtype=bool), (len(points), len(found.corners)))

@@ -16,6 +16,7 @@ from polycorner.proofs.lists.loci import locus, met
 from polycorner.proofs.lists.screening import Screen
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 Mapped: TypeAlias = Callable[..., Iterable[Any]]
 
@@ -24,7 +25,6 @@ ATTEMPTS = 1024  # candidates that are tried in one round
 WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 EVERY = 2  # bisections of every coordinate between two attempts at a box
 LOCUS = (-1,)  # in place of the functions of a face
-COARSE = 1e-7  # distance in scale units below which only one of several candidates is tried
 MANY = 48  # candidates for which it is worth compiling second derivatives
 
 
@@ -162,7 +162,7 @@ class Attempts:
         """Try regions about approximate KKT points of a face, each once."""
         fresh, grid = list[int](), set[bytes]()
         for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
-            place = np.rint(q / (COARSE * self.setting.problem.scales)).tobytes()
+            place = np.rint(q / (DEFAULT.same / 10 * self.setting.problem.scales)).tobytes()
             if place not in grid and self._is_new(q, active, size):
                 grid.add(place)
                 fresh.append(i)

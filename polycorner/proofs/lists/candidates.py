@@ -10,9 +10,9 @@ from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.batches import bordered, solved
 from polycorner.proofs.lists.branches import Mask
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 MOST_STEPS = 20
-SETTLED = 1e-13  # length of a step in scale units at which the method ends
 STRIDE = 0.5  # longest step in scale units
 RELEVANT = 1e-6  # share of the largest force at which a function counts as active
 
@@ -108,8 +108,8 @@ def newton(
         q[going[:, None], free] += change[:, :n] * units
         lam[going] += change[:, n:]
         away = abs((q[going] - start[going])[:, free] / units).max(axis=1, initial=0.0)
-        found[going[(length < SETTLED) & (away <= reach[going])]] = True
-        going = going[(length >= SETTLED) & (away <= 2 * reach[going])]
+        found[going[(length < DEFAULT.rounding) & (away <= reach[going])]] = True
+        going = going[(length >= DEFAULT.rounding) & (away <= 2 * reach[going])]
         if not going.size:
             break
     most = count - (problem.rows - 1 - problem.inequalities)

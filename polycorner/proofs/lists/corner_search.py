@@ -13,24 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.proofs.lists.acceptance import Region
-from polycorner.proofs.lists.attempts import Mapped
+from polycorner.proofs.lists.attempts import WIDER, Mapped
 from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.dependence import Enclosures, Places, Truths
 from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.levels import Levels, Rows, levels
+from polycorner.proofs.lists.pinning import STRAY
 from polycorner.proofs.lists.relations import Relation, relation
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.tips import Tip, tips
 from polycorner.spaces.manifold import Array
 
 ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
-WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 SMALL = 0.05  # side in scale units of boxes in which singular corners are sought
 NEWTON = 12
 MOST_SETS = 200  # of one size that relations are sought in
-STRAY = 4.0  # sides of a box that a vertex may be away from its middle
 
 
 @dataclass(frozen=True, eq=False)

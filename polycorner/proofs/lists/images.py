@@ -21,13 +21,13 @@ from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.intermediate import carried
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     import sympy
 
 MARGIN = 1e-9  # by which w . q has to grow, in scale units
 MOST_ELEMENTS = 4096
-CLOSE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def motion(manifold: Manifold, apply: Callable[[Array], Array], argument: str) -
     probe = np.array([0.1 * (k + 1) / n for k in range(n)]) * steps
     error = abs(manifold.difference(np.asarray(apply(probe)), found(probe, manifold)))
     same = bool((periods[order] == periods).all()) and sorted(order.tolist()) == list(range(n))
-    if not same or error.max() > CLOSE * max(1.0, abs(probe).max()):
+    if not same or error.max() > DEFAULT.alike * max(1.0, abs(probe).max()):
         checks.refuse(
             argument, "a signed permutation of the coordinates with shifts by half periods", apply
         )

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.loci import Locus
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
-SAME = 1e-9  # distance in scale units below which points are the same
 AGAIN = 1 / 64  # of the widest region that was tried in vain: a smaller one is worth trying
 FIRST = 64  # rows that a growing array has room for
 
@@ -77,7 +77,7 @@ class Tried:
         if active not in self._rows:
             return False
         found = self._rows[active].array
-        near = (abs(found[:, :-1] - q) <= SAME * self.scales).all(axis=1)
+        near = (abs(found[:, :-1] - q) <= DEFAULT.alike * self.scales).all(axis=1)
         return bool((near & (found[:, -1] * AGAIN < widest) & (widest <= found[:, -1])).any())
 
     def items(self) -> list[tuple[tuple[int, ...], list[list[float]]]]:

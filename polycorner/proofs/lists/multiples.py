@@ -15,12 +15,12 @@ from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.proofs.lists.branches import conjunctions
 from polycorner.proofs.lists.images import expanded
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     from polycorner.formulas.functions import SmoothFunction
 
 PROBES = 4  # points at which functions are compared before their formulas are
-CLOSE = 1e-9
 
 Literal = tuple[int, int]  # a function, equations after inequalities, and a sign
 
@@ -123,7 +123,7 @@ def _literals(polyhedron: Polyhedron) -> list[Literal]:
     for j in (*range(m, m + stated), *range(m)):
         found[j] = (j, 1)
         for i in [i for i, (first, _) in found.items() if first == i and i != j]:
-            near = [s for s in (1, -1) if abs(units[i] - s * units[j]).max() < CLOSE]
+            near = [s for s in (1, -1) if abs(units[i] - s * units[j]).max() < DEFAULT.alike]
             if near and (sign := _multiple(functions[j], functions[i])):
                 found[j] = (i, sign)
                 break

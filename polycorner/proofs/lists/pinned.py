@@ -46,6 +46,7 @@ from polycorner.proofs.lists.coincidences import ZERO, Place, signs
 from polycorner.proofs.lists.operators import BITS, outward
 from polycorner.proofs.lists.vertices import Vertices
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
@@ -55,7 +56,6 @@ SHRINKINGS = 8  # of a box
 LEAST_SHARE, MOST_SHARE = 0.25, 0.9  # of a box that the next one reaches
 ENOUGH = 1.001  # by how much a reach has to be large enough, roundings included
 SHARE = 0.8  # of the reach at which a box would just do
-NEAR = 1e-10  # value of a function in relation to its gradient, in scale units, that may be 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ def pinned(
 def _independent(slopes: Array) -> tuple[int, ...] | None:
     """Return as many rows as there are columns whose gradients are far from dependent, or None."""
     longest = float(np.linalg.norm(slopes, axis=1).max(initial=0.0))
-    chosen = independent_rows(slopes, NEAR * longest)
+    chosen = independent_rows(slopes, DEFAULT.alike / 10 * longest)
     return tuple(sorted(chosen)) if len(chosen) == slopes.shape[1] else None
 
 

@@ -8,10 +8,11 @@ from polycorner.proofs.lists.attempts import WIDER, Attempts
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.examination import Examined
 from polycorner.proofs.lists.known import Known
-from polycorner.proofs.lists.pinned import NEAR, Pinned, pinned
+from polycorner.proofs.lists.pinned import Pinned, pinned
 from polycorner.proofs.lists.redundancy import MOST_ITEMS, MOST_SETS, largest_sets, starts
 from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 NEWTON = 6  # steps towards a point where all functions of a box vanish
 STRAY = 4.0  # sides of a box that such a point may be away from its middle
@@ -40,7 +41,7 @@ def pin(setting: Setting, known: Known, e: Examined, attempts: Attempts) -> None
         q[:, free] += step * units[free]
     values, slopes = _vanishing(setting, q, masks)
     sizes = abs(slopes).max(axis=(1, 2), initial=0.0)
-    fine = abs(values).max(axis=1, initial=0.0) <= NEAR * sizes
+    fine = abs(values).max(axis=1, initial=0.0) <= DEFAULT.feasible * sizes
     fine &= (abs(q - boxes.middles) / units)[:, free].max(axis=1) <= STRAY * widths
     for i in np.flatnonzero(fine):
         rows, reach = tuple(np.flatnonzero(masks[i]).tolist()), WIDER * float(widths[i])

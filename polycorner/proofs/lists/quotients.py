@@ -22,8 +22,7 @@ from polycorner.proofs.invariance import Generator, annihilated, generators, tra
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.operators import BITS
 from polycorner.spaces.manifold import Array
-
-INDEPENDENT = 1e-9  # least singular value, over the largest, of rows that count as independent
+from polycorner.tolerances import DEFAULT
 
 
 def unreached(formulas: Formulas, domain: Domain, fields: Sequence[object]) -> list[int]:
@@ -75,7 +74,7 @@ def _moves(rows: Sequence[Array], done: Sequence[int], new: int) -> bool:
 
 
 def _rank(matrix: Array) -> int:
-    return int(np.linalg.matrix_rank(matrix, rtol=INDEPENDENT)) if matrix.size else 0
+    return int(np.linalg.matrix_rank(matrix, rtol=DEFAULT.alike)) if matrix.size else 0
 
 
 def _is_complete(field: Generator) -> bool:

@@ -12,10 +12,10 @@ import numpy as np
 
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.images import expanded
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
 MORE = 6  # points at which values are compared, beyond the number of functions
-NULL = 1e-10  # singular values that count as zero, relative to the largest
 MOST_DENOMINATOR = 10_000
 
 
@@ -51,7 +51,7 @@ def relation(problem: Problem, rows: Sequence[int]) -> Relation | None:
     if not np.isfinite(values).all():
         return None
     sizes, vectors = np.linalg.svd(values)[1:]
-    if not sizes[-1] <= NULL * sizes[0]:
+    if not sizes[-1] <= DEFAULT.alike / 10 * sizes[0]:
         return None
     guess = vectors[-1] / vectors[-1][abs(vectors[-1]).argmax()]
     weights = [Fraction(x).limit_denominator(MOST_DENOMINATOR) for x in guess.tolist()]

@@ -14,7 +14,8 @@ from polycorner.proofs.lists.records import Record, save
 from polycorner.proofs.lists.search import Search, Tally
 from polycorner.proofs.parameter_boxes import Interval, shown_box
 from polycorner.spaces.manifold import Array
-from polycorner.values import Checked, cached_property
+from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import os
@@ -158,9 +159,16 @@ class StationaryList(Printed, Checked):
         """Iterate over the isolated points."""
         return iter(self.points)
 
-    @cached_property
-    def certificates(self) -> tuple[Certificate, ...]:
-        """Certificates at the middles of the isolated points.
+    @checked
+    def certificates(
+        self, *, tolerance: float = TOLERANCE, rank_tolerance: float = RANK_TOLERANCE
+    ) -> tuple[Certificate, ...]:
+        """Return certificates at the middles of the isolated points.
+
+        Parameters
+        ----------
+        tolerance, rank_tolerance : float, optional
+            As for :func:`polycorner.certify`.
 
         Raises
         ------
@@ -171,7 +179,8 @@ class StationaryList(Printed, Checked):
             msg = "certificates: expected a list for one value of each parameter; got intervals"
             raise ValueError(msg)
         d, energy = self.problem.polyhedron, self.problem.energy
-        return tuple(certify(d, energy, p.point) for p in self.points)
+        options = {"tolerance": tolerance, "rank_tolerance": rank_tolerance}
+        return tuple(certify(d, energy, p.point, **options) for p in self.points)
 
     @property
     def undecided_volume(self) -> float:

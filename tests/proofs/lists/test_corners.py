@@ -19,6 +19,7 @@ from polycorner.models.tutorial import Tutorial
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import corners
 from polycorner.skeletons import Completeness
+from polycorner.tolerances import Tolerances
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
@@ -44,6 +45,15 @@ def test_the_tutorial_region_has_seven_corners_and_its_skeleton_has_no_others():
     assert atlas.complete is Completeness.CORNERS_PROVED
     assert not atlas.notes
     assert (len(atlas.corners), len(atlas.edges), atlas.euler_characteristic) == (7, 7, 1)
+
+
+def test_corners_that_are_one_within_the_tolerance_are_not_told_apart():
+    """A strip of the width 1e-4, which lies between the limits for corners to be one."""
+    strip = Polyhedron(PLANE, [X, R(1, 10_000) - X, Y, 1 - Y])
+    found = corners(strip, box=SIDES)
+    assert Tolerances().corner < 1e-4 < Tolerances.of(1e-6).corner
+    assert found.skeleton().complete is Completeness.CORNERS_PROVED
+    assert found.skeleton(tolerance=1e-6).complete is not Completeness.CORNERS_PROVED
 
 
 # Half-planes a x + b y <= c with small whole numbers: their lines often meet in one point.

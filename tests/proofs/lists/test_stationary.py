@@ -255,6 +255,16 @@ def test_lists_are_values(himmelblau, tmp_path):
     assert not himmelblau.points[0].lower.flags.writeable
 
 
+def test_certificates_of_a_list_are_made_with_its_tolerances():
+    """Another function is 1e-6 away, and two gradients enclose an angle of about 1e-4."""
+    parts = {"floor": Y, "ramp": Y + X / 10_000, "shelf": Y + sympy.Rational(1, 10**6)}
+    found = stationary_points(Polyhedron(PLANE, parts), 2 * Y + X / 10_000, box=[(-1, 1), (-1, 1)])
+    ((one,), (wide,)) = found.certificates(), found.certificates(tolerance=1e-5)
+    assert (one.active, wide.active) == (("floor", "ramp"), ("floor", "ramp", "shelf"))
+    (flat,) = found.certificates(rank_tolerance=1e-3)
+    assert (one.licq, flat.licq) == (True, False)
+
+
 def test_a_place_is_left_out_where_a_distance_is_zero():
     """The energy is stationary at the centre, which is outside; no root is analytic there."""
     across, along = sympy.sin(X) - sympy.sin(1) / 3, Y - sympy.sqrt(3) / 3
