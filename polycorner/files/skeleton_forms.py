@@ -30,7 +30,6 @@ from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import ISLAND
-from polycorner.skeletons.registry import NEAR
 from polycorner.skeletons.search import UNFINISHED
 from polycorner.skeletons.tracing import FIGURE
 from polycorner.skeletons.vertex_figures import corner_rank
@@ -68,7 +67,11 @@ def check_sizes(content: Mapping[str, Any], n: int, m: int) -> None:
         "notes": many(text),
         "lost": forms.flag,
     }
-    later = {"patches": many(row(active, point)), "origins": many(point)}
+    later = {
+        "rank tolerance": number(above=0, below=1),
+        "patches": many(row(active, point)),
+        "origins": many(point),
+    }
     entries(header, later)("", content)
 
 
@@ -78,7 +81,7 @@ def unlike(quotient: Quotient, points: Array, active: frozenset[int]) -> str:
     To the distance within which the search takes points for each other; functions that close with
     slope zero vanish to its square.
     """
-    d, near = quotient.polyhedron, max(NEAR, quotient.tolerance)
+    d, near = quotient.polyhedron, quotient.tolerances.near
     values, gradients = d.bundle.evaluate(points, 1)
     gradients = gradients * d.manifold.scale_array
     m = len(d.functions)

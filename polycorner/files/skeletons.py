@@ -26,7 +26,7 @@ from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
 from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.walks import End
-from polycorner.tolerances import DEFAULT
+from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, Tolerances
 
 KIND = Kind("skeleton", "save_skeleton", JSON)
 
@@ -68,7 +68,8 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
         "complete": skeleton.complete.name,
         "polyhedron": polyhedron_entry(skeleton.polyhedron),
         "symmetry": _symmetry(explorer.polyhedron, explorer.symmetry, points),
-        "tolerance": explorer.quotient.tolerance,
+        "tolerance": explorer.quotient.tolerances.zero,
+        "rank tolerance": explorer.quotient.tolerances.rank,
         "extent": number(explorer.quotient.extent),
         "corners": [_corner(explorer, record) for record in explorer.records],
         "edges": [_curve(curve) for curve in explorer.curves],
@@ -150,8 +151,9 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> "
     if written != here:
         words = [", ".join(f"{k} {v}" for k, v in entry.items()) for entry in (written, here)]
         return f"symmetry: written {words[0]}, found {words[1]}"
-    points, tolerance = starts + edges + corners, float(content["tolerance"])
-    quotient = Quotient.near(polyhedron, symmetry, tolerance, extent, points)
+    given = float(content["tolerance"]), float(content.get("rank tolerance", RANK_TOLERANCE))
+    points, tolerances = starts + edges + corners, Tolerances.of(*given)
+    quotient = Quotient.near(polyhedron, symmetry, tolerances, extent, points)
     explorer = Explorer(quotient, [], read_generator("random", content["random"]))
     for k, (corner, q) in enumerate(zip(content["corners"], corners, strict=True)):
         active = frozenset(map(polyhedron.names.index, corner["active"]))

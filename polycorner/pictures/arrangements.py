@@ -19,13 +19,13 @@ from polycorner.bodies.walls import Cylinder, HalfSpace
 from polycorner.checks import instance, refuse, whole
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
 FIXED, OUTSIDE, OUTLINE = "0.55", "0.85", "0.2"
 CELL = 2.4  # width of a picture in inches
 MARGIN = 0.15  # around bodies, of their extent
-ACROSS = 1e-9  # by which the normal of a wall across an axis may deviate from it
 ARC = 33  # points of a full circle of an outline
 WALL = 360  # points of the inside of a circle or cylinder
 BALL = 300  # points of a ball
@@ -116,7 +116,7 @@ def _between_walls(arrangement: Arrangement) -> tuple[Array, Array]:
     """Return where walls across each axis are, on either side; infinite where there is none."""
     below, above = np.full(2, -np.inf), np.full(2, np.inf)
     for wall in arrangement.walls.values():
-        if isinstance(wall, HalfSpace) and np.abs(wall.normal).max() > 1 - ACROSS:
+        if isinstance(wall, HalfSpace) and np.abs(wall.normal).max() > 1 - DEFAULT.alike:
             axis = int(np.abs(wall.normal).argmax())
             if wall.normal[axis] > 0:
                 below[axis] = max(below[axis], wall.point[axis])

@@ -15,15 +15,14 @@ from numpy.typing import ArrayLike
 from polycorner.checks import instance, reals, refuse, whole
 from polycorner.kinds import checked
 from polycorner.models.spheres import SphereCluster
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 BALL, SINGULAR_BALL = "#56B4E9", "#E69F00"  # Okabe and Ito
 BAR, OPENING, CLOSING = "0.25", "#D55E00", "#009E73"
 RADIUS = 0.3  # of a drawn ball, in diameters of a sphere: small enough to show the contacts
 THICKNESS = 0.09  # of a bar
-CLOSE = 1e-6  # tolerance of contacts and of symmetries
 RINGS = (24, 12)  # circles that shade a ball, if there are few pictures and if there are many
 LIGHT = np.array([-0.3, 0.35])  # the brightest point of a ball, in radii from its middle
 FOG, HAZE = 0.45, 1.5  # largest fading of a ball, and the depth at which it is reached
@@ -75,7 +74,7 @@ def draw_clusters(
         bars = dict.fromkeys(_touching(model, q), BAR)
         colour = SINGULAR_BALL if k in special else BALL
         _draw(axes, shape, bars, colour, RINGS[len(clusters) > FEW])
-        order = len(model.symmetry.relabellings(model.manifold, q, q, CLOSE))
+        order = len(model.symmetry.relabellings(model.manifold, q, q, DEFAULT.same))
         remark = "\nsingular" if k in special else ""
         axes.set_title(f"{names[k]}  order {order}{remark}", fontsize=9, pad=2)
     kinds = f"{len(clusters)} clusters" if len(clusters) > 1 else "A cluster"
@@ -130,7 +129,7 @@ def draw_motion(model: SphereCluster, polyline: ArrayLike, frames: int = 6) -> F
 
 
 def _touching(model: SphereCluster, q: Array) -> list[Pair]:
-    i, j = np.nonzero(np.triu(model.contacts(q, tolerance=CLOSE)))
+    i, j = np.nonzero(np.triu(model.contacts(q, tolerance=DEFAULT.same)))
     return list(zip(i.tolist(), j.tolist(), strict=True))
 
 
@@ -194,7 +193,7 @@ def _closed(model: SphereCluster, q: Array, rows: list[int]) -> Array:
     """Return a point near ``q`` at which the gaps of some contacts vanish."""
     for _ in range(NEWTON if rows else 0):
         gaps, slopes = model.polyhedron.values(q)[rows], model.polyhedron.gradients(q)[rows]
-        q = q - np.linalg.lstsq(slopes, gaps, rcond=RANK_TOLERANCE)[0]
+        q = q - np.linalg.lstsq(slopes, gaps, rcond=DEFAULT.rank)[0]
     return q
 
 

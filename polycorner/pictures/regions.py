@@ -17,6 +17,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import LocalType, stratum_at
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 Labelled = Sequence[tuple[str, ArrayLike]]
 Edges = Sequence[ArrayLike | tuple[str, ArrayLike]]
@@ -25,7 +26,6 @@ SHADE, SIDE = "0.88", "#0072B2"
 MINIMA = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 CORNERS = (("locally convex corner", "black"), ("locally concave corner", "white"))
 LENGTH = 7.0  # inches of the longer side of the axes
-ON_CORNER = 1e-6  # tolerance within which a drawn corner is looked up
 OFF = 9.0  # points between a mark and its label
 NEAR = 0.01  # radius, relative to the drawn part, of the circle that finds the region beside a mark
 AROUND = 2 * np.pi * np.arange(72) / 72
@@ -171,7 +171,7 @@ def _inwards(polyhedron: Polyhedron, point: Array, unit: float) -> Array:
 
 
 def _is_union(polyhedron: Polyhedron, point: Array) -> bool:
-    stratum = stratum_at(polyhedron, point, tolerance=ON_CORNER)
+    stratum = stratum_at(polyhedron, point, tolerance=DEFAULT.same)
     return stratum.local_type is LocalType.UNION
 
 

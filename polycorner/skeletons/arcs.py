@@ -5,7 +5,6 @@ from itertools import pairwise
 import numpy as np
 
 from polycorner.polyhedra.cones import null_space, unit_rows
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.dependence import held_at
 from polycorner.skeletons.points import Quotient
 from polycorner.spaces.manifold import Array
@@ -115,4 +114,5 @@ class _Arcs:
     def _orbit(self, q: Array) -> Array:
         """Return an orthonormal basis of the directions of the orbit."""
         orbit = unit_rows(self.quotient.symmetry.directions(self.quotient.polyhedron.manifold, q))
-        return np.asarray(null_space(null_space(orbit, RANK_TOLERANCE).T, RANK_TOLERANCE).T)
+        limit = self.quotient.tolerances.rank
+        return np.asarray(null_space(null_space(orbit, limit).T, limit).T)

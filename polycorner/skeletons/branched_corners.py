@@ -14,7 +14,7 @@ from math import comb
 
 import numpy as np
 
-from polycorner.skeletons.branches import MAX_SETS, PERSISTS, Branches
+from polycorner.skeletons.branches import MAX_SETS, Branches
 from polycorner.skeletons.dependence import dependent_at, follow_edge
 from polycorner.skeletons.folds import DISTANCES, fold_figure
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Sample, projected
@@ -69,7 +69,7 @@ def dependent_rays(
             continue
         way = curve[1] * np.sign(curve[1] @ (branches.frame @ y))
         there = _placed(point, curve[0], way, distance)
-        if there is None or abs(there.distances[sorted(held)]).max() > PERSISTS:
+        if there is None or abs(there.distances[sorted(held)]).max() > branches.tolerances.held:
             if there is None or not branches.excludes(held, there):
                 yield held
             continue

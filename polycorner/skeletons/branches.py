@@ -14,7 +14,7 @@ along which gradients are independent leaves along such a zero, simple or not, f
 
 A form that vanishes on a plane says nothing; then the weighted sum is of third order or more, and
 ``d`` is where it changes sign on a small circle, beside which the other functions stay zero.  Sums
-below ``1e-11`` at ``1e-3`` count as zero along a whole surface.
+below ``1e-11`` at ``1e-3`` (by default) count as zero along a whole surface.
 
 Where the form of a set with one relation is semidefinite and has one null direction, that is the
 direction of an edge along which the relation persists, or of a cusp; ``N + 1 - k`` functions with
@@ -30,10 +30,9 @@ from math import comb
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.dependence import unit_hessians
 from polycorner.skeletons.points import EvaluatedPoint, projected
-from polycorner.skeletons.quadrics import FLAT, common_zeros
+from polycorner.skeletons.quadrics import common_zeros
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.spheres_about import Link
 from polycorner.spaces.manifold import Array
@@ -45,11 +44,6 @@ CLEAR = 1e-3
 OPENING = 3
 # Most sets of functions that are tried, of those in a span.
 MAX_SETS = 20_000
-# Distance in scale units at which, and from zero to which, a relation is seen to persist.
-BESIDE, PERSISTS = 1e-3, 1e-11
-# Weighted sum of functions, some of which are farther from zero than that, which has a sign.
-ROUNDING = 1e-13
-
 # Radius in scale units of a circle on which sums of higher order change sign, its points, and the
 # part of the largest sum that may be a zero.
 ROUND, AROUND, NEARLY = 3e-3, 72, 1e-2
@@ -78,10 +72,11 @@ class Branches:
 
     def __init__(self, point: EvaluatedPoint, rows: list[int]) -> None:
         self.point, self.rows = point, rows
-        self.frame = null_space(point.matrix([]), RANK_TOLERANCE)
+        self.tolerances, self.frame = point.quotient.tolerances, point.frame
+        self.limit = self.tolerances.rank
         self.slopes = unit_rows(point.gradients[rows]) @ self.frame
         self.full = int(self.frame.shape[1])
-        every = Rows(self.slopes, RANK_TOLERANCE)
+        every = Rows(self.slopes, self.limit)
         self.relations, self.free = every.relations, self.full - every.rank
         # Second derivatives shrink with a link's radius.
         sphere = self.point.quotient.polyhedron
@@ -110,7 +105,7 @@ class Branches:
             if some.null_space.shape[1] > 1 and not self._enters(opened, some):
                 continue
             forms = self._forms(held, some)
-            zeros = common_zeros(forms)
+            zeros = common_zeros(forms, self.limit)
             lines = [d for zero in zeros or () for d in (zero, -zero)]
             if zeros is None and not self._is_explained(forms, held, some):
                 found = self._of_higher_order(forms, held, some)
@@ -128,7 +123,7 @@ class Branches:
             if len(opened) < least:
                 continue
             values, axes = _positive(self._forms(held, some)[0])
-            if values[1] > max(FLAT, CLEAR * values[-1]) and abs(values[0]) <= FLAT:
+            if values[1] > max(self.limit, CLEAR * values[-1]) and abs(values[0]) <= self.limit:
                 for d in (axes[:, 0], -axes[:, 0]):
                     yield from self._entering(some.null_space @ d, opened, held)
 
@@ -140,11 +135,12 @@ class Branches:
         two positive directions or more, whole surfaces do.
         """
         rows = sorted(held)
-        some = Rows(self.slopes[[self.rows.index(i) for i in rows]], RANK_TOLERANCE)
+        some = Rows(self.slopes[[self.rows.index(i) for i in rows]], self.limit)
         form = self._forms(rows, some)[0]
         away = some.relations[:, 0] @ there.distances[rows]
         rest = float(away * np.sign(np.trace(form)))
-        return rest > ROUNDING or (len(form) > 2 and rest < -ROUNDING)
+        rounding = self.tolerances.rounding
+        return rest > rounding or (len(form) > 2 and rest < -rounding)
 
     def _semidefinite(self, most: int) -> Iterator[tuple[int, ...]]:
         """Yield sets of up to ``most`` functions without which there is one relation.
@@ -176,28 +172,28 @@ class Branches:
         spans = set()
         for base in combinations(range(len(self.rows)), lost):
             axes = self.relations[list(base)]
-            if lost and rank(axes, RANK_TOLERANCE) < lost:
+            if lost and rank(axes, self.limit) < lost:
                 continue
-            across = null_space(axes, RANK_TOLERANCE) if lost else np.eye(1)
-            inside = abs(self.relations @ across).max(axis=1) <= RANK_TOLERANCE
+            across = null_space(axes, self.limit) if lost else np.eye(1)
+            inside = abs(self.relations @ across).max(axis=1) <= self.limit
             spans.add(tuple(np.flatnonzero(inside).tolist()))
         return sorted(spans)
 
     def _leaves_one(self, opened: tuple[int, ...]) -> bool:
         """Whether one relation is left without some functions, as few as relations are lost."""
         weights = self.relations[list(opened)]
-        clear = weights[abs(weights).max(axis=1, initial=0.0) > FLAT]
-        return not opened or rank(clear, FLAT) == len(opened)
+        clear = weights[abs(weights).max(axis=1, initial=0.0) > self.limit]
+        return not opened or rank(clear, self.limit) == len(opened)
 
     def _is_semidefinite(self, opened: tuple[int, ...]) -> bool:
         """Whether the form of what is left is nowhere negative, or nowhere positive."""
         values = _positive(self._forms(*self._held(opened))[0])[0]
-        return bool(values.min(initial=0.0) >= -FLAT)
+        return bool(values.min(initial=0.0) >= -self.limit)
 
     def _held(self, opened: tuple[int, ...]) -> tuple[list[int], Rows]:
         """Return the functions that stay zero, and their gradients."""
         left = [i for i in range(len(self.rows)) if i not in opened]
-        return [self.rows[i] for i in left], Rows(self.slopes[left], RANK_TOLERANCE)
+        return [self.rows[i] for i in left], Rows(self.slopes[left], self.limit)
 
     def _forms(self, held: list[int], some: Rows) -> Array:
         rows = [self.rows.index(i) for i in held]
@@ -210,22 +206,23 @@ class Branches:
         The first is that of :meth:`double`.
         """
         values = _positive(forms[0])[0]
-        if len(forms) == 1 and abs(values[0]) <= FLAT < values[1]:
+        if len(forms) == 1 and abs(values[0]) <= self.limit < values[1]:
             return True
         way = some.null_space @ np.random.default_rng(0).standard_normal(some.null_space.shape[1])
         quotient, kept = self.point.quotient, self.point.basis(held)
         scales = quotient.polyhedron.manifold.scale_array
-        q = self.point.q + BESIDE * scales * (self.frame @ (way / np.linalg.norm(way)))
-        there = projected(quotient, q, kept, BESIDE / 2)
-        return there is not None and abs(there.distances[held]).max() <= PERSISTS
+        beside = self.tolerances.beside  # where a relation is seen to persist
+        q = self.point.q + beside * scales * (self.frame @ (way / np.linalg.norm(way)))
+        there = projected(quotient, q, kept, beside / 2)
+        return there is not None and abs(there.distances[held]).max() <= self.tolerances.held
 
     def _enters(self, opened: tuple[int, ...], some: Rows) -> bool:
         """Whether the others have a null direction along which no function falls to first order."""
         slopes = self.slopes[list(opened)] @ some.null_space
         size = np.linalg.norm(slopes, axis=1)
-        slopes = slopes[size > RANK_TOLERANCE]
-        whole = rank(slopes, RANK_TOLERANCE) == slopes.shape[1]
-        return not whole or bool(extreme_rays(slopes, RANK_TOLERANCE))
+        slopes = slopes[size > self.limit]
+        whole = rank(slopes, self.limit) == slopes.shape[1]
+        return not whole or bool(extreme_rays(slopes, self.limit))
 
     def _of_higher_order(self, forms: Array, held: list[int], some: Rows) -> list[Array] | None:
         """Return where a weighted sum whose form vanishes on a plane changes sign, on a circle.
@@ -233,7 +230,7 @@ class Branches:
         The others stay zero there.  None where there is no such plane, and where the sum may have
         zeros without a change of sign.
         """
-        if forms.shape != (1, 2, 2) or abs(forms).max() > FLAT:
+        if forms.shape != (1, 2, 2) or abs(forms).max() > self.limit:
             return None
         weights, kept = some.relations[:, 0], self.point.basis(held)
         scales = self.point.quotient.polyhedron.manifold.scale_array
@@ -257,7 +254,7 @@ class Branches:
 
     def _entering(self, d: Array, opened: tuple[int, ...], held: list[int]) -> Iterator[Branch]:
         """Yield a direction if no function falls along it to first order."""
-        if (self.slopes[list(opened)] @ d > -RANK_TOLERANCE).all():
+        if (self.slopes[list(opened)] @ d > -self.limit).all():
             yield d, frozenset(held)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling
 from polycorner.skeletons.points import Quotient, projected
-from polycorner.skeletons.registry import SAME
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
@@ -60,6 +59,7 @@ def lies_on(quotient: Quotient, q: Array, curve: Curve) -> bool:
 def _on_arc(quotient: Quotient, q: Array, curve: Curve, k: int) -> bool:
     """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
     symmetry, manifold = quotient.symmetry, quotient.polyhedron.manifold
+    same = quotient.tolerances.corner
     start, end = curve.points[k], curve.points[k + 1]
     q = manifold.image(q, start)
     kept = quotient.at(start).basis(curve.active)
@@ -71,5 +71,5 @@ def _on_arc(quotient: Quotient, q: Array, curve: Curve, k: int) -> bool:
         return float(symmetry.displacement(manifold, p, q) @ along), p
 
     if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
-        return min(symmetry.separation(manifold, q, p) for p in (start, end)) < SAME
-    return symmetry.separation(manifold, q, sign_change(passed)[1]) < SAME
+        return min(symmetry.separation(manifold, q, p) for p in (start, end)) < same
+    return symmetry.separation(manifold, q, sign_change(passed)[1]) < same

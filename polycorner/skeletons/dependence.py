@@ -17,9 +17,8 @@ from itertools import combinations, islice
 import numpy as np
 
 from polycorner.formulas.bundles import Bundle
-from polycorner.polyhedra.cones import Rows, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import Rows, rank, unit_rows
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
@@ -113,7 +112,7 @@ def unit_hessians(point: EvaluatedPoint, rows: list[int]) -> Array:
 
 def curvature(point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array) -> Array:
     """Return the weighted sum of the Hessians of unit-slope functions on a subspace."""
-    frame = null_space(point.matrix([]), RANK_TOLERANCE) @ plane
+    frame = point.frame @ plane
     return np.asarray(frame.T @ np.tensordot(weights, unit_hessians(point, rows), 1) @ frame)
 
 
@@ -132,10 +131,10 @@ def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoi
     quotient, rows = point.quotient, sorted(active)
     if not point.sizes[quotient.held(rows)].all():
         return None  # a relation of one gradient: there is no curve that it follows
-    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    frame, limit = point.frame, quotient.tolerances.rank
     slopes = unit_rows(point.gradients[rows]) @ frame
-    for some in islice(_with_one_relation(slopes), MAX_SETS):
-        related, held = [rows[i] for i in some], Rows(slopes[some], RANK_TOLERANCE)
+    for some in islice(_with_one_relation(slopes, limit), MAX_SETS):
+        related, held = [rows[i] for i in some], Rows(slopes[some], limit)
         form = curvature(point, related, held.relations[:, 0], held.null_space)
         values, axes = np.linalg.eigh(form)
         order = np.argsort(abs(values))
@@ -149,13 +148,13 @@ def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoi
     return None
 
 
-def _with_one_relation(slopes: Array) -> Iterator[list[int]]:
+def _with_one_relation(slopes: Array, limit: float) -> Iterator[list[int]]:
     """Yield the largest sets of rows that have one relation."""
-    relations = Rows(slopes, RANK_TOLERANCE).relations
+    relations = Rows(slopes, limit).relations
     more = relations.shape[1] - 1
-    related = np.flatnonzero(abs(relations).max(axis=1, initial=0.0) > RANK_TOLERANCE)
+    related = np.flatnonzero(abs(relations).max(axis=1, initial=0.0) > limit)
     for lost in combinations(related.tolist(), max(more, 0)):
-        if more >= 0 and (more == 0 or rank(relations[list(lost)], RANK_TOLERANCE) == more):
+        if more >= 0 and (more == 0 or rank(relations[list(lost)], limit) == more):
             yield [i for i in range(len(slopes)) if i not in lost]
 
 

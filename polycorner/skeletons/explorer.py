@@ -214,7 +214,7 @@ class Explorer(Prober):
         self, point: EvaluatedPoint, active: frozenset[int], undirected: list[int]
     ) -> frozenset[Anchor]:
         """Record the singular corner at a point where gradients have no direction, if it is one."""
-        reach = VICINITY * self.quotient.tolerance
+        reach = VICINITY * self.quotient.tolerances.zero
         corner = singular_point(self.quotient, point.q, sorted(active), reach)
         if corner is None or corner.active() is None:
             self._note_undirected(point, undirected)

@@ -40,8 +40,7 @@ from itertools import combinations
 
 import numpy as np
 
-from polycorner.polyhedra.cones import Rows, null_space, unit_rows
-from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.skeletons.dependence import curvature, dependent_at
 from polycorner.skeletons.points import EvaluatedPoint, Sample, projected
 from polycorner.skeletons.sectors import Sector
@@ -54,9 +53,6 @@ DISTANCES = (3e-3, 1e-3, 3e-4)
 
 # Parts of these at which dependent edges are looked for as well: some of them are short.
 PARTS = (1.0, 0.1, 0.01)
-
-# Distance of held functions from zero, in scale units, up to which a relation persists.
-PERSISTS = 1e-11
 
 # Least eigenvalue of ``Q`` relative to the largest: at a cusp, which is known less exactly, a zero
 # one is not seen as zero.
@@ -108,10 +104,12 @@ class _Fold:
     def __init__(self, point: EvaluatedPoint, rows: list[int]) -> None:
         self.point, self.rows = point, rows
         self.scales = point.quotient.polyhedron.manifold.scale_array
-        frame = null_space(point.matrix([]), RANK_TOLERANCE)
-        held = Rows(unit_rows(point.gradients[rows]) @ frame, RANK_TOLERANCE)
+        # Distance of held functions from zero up to which a relation persists.
+        self.limit, self.persists = point.quotient.tolerances.rank, point.quotient.tolerances.held
+        frame = point.frame
+        held = Rows(unit_rows(point.gradients[rows]) @ frame, self.limit)
         weights = held.relations[:, 0]
-        weights = np.where(abs(weights) > RANK_TOLERANCE, weights, 0.0)
+        weights = np.where(abs(weights) > self.limit, weights, 0.0)
         self.free = np.flatnonzero(weights == 0).tolist()
         self.flaps = (frame @ held.null_space).T
         self.openings = np.array([frame @ held.opening(k) for k in self.free])
@@ -133,14 +131,14 @@ class _Fold:
         """Whether ``Q`` is positive on the flaps, and no ``S_kk`` negative if there is one flap."""
         f = len(self.flaps)
         values = np.linalg.eigvalsh(self.form[:f, :f])
-        clear = values[0] > max(RANK_TOLERANCE, CLEAR * values[-1])
-        return bool(clear and (f > 1 or (np.diagonal(self.cross) >= -RANK_TOLERANCE).all()))
+        clear = values[0] > max(self.limit, CLEAR * values[-1])
+        return bool(clear and (f > 1 or (np.diagonal(self.cross) >= -self.limit).all()))
 
     @cached_property
     def dependent(self) -> list[Opening]:
         """What opens along dependent edges."""
         own = np.diagonal(self.cross)
-        single = [(k,) for k, s in zip(self.free, own, strict=True) if abs(s) <= RANK_TOLERANCE]
+        single = [(k,) for k, s in zip(self.free, own, strict=True) if abs(s) <= self.limit]
         found = [*single, *self.pairs]
         return [*found, *(some for some in combinations(self.free, 3) if self._null(some, found))]
 
@@ -150,8 +148,8 @@ class _Fold:
             return False
         values, axes = np.linalg.eigh(self._form_of(some))
         null = axes[:, 0] * np.sign(axes[0, 0])
-        single = abs(values[0]) <= RANK_TOLERANCE < values[1]
-        return bool(single and null.min() > RANK_TOLERANCE)
+        single = abs(values[0]) <= self.limit < values[1]
+        return bool(single and null.min() > self.limit)
 
     def _form_of(self, some: Opening) -> Array:
         """Return the form ``S`` on some functions of weight zero."""
@@ -161,19 +159,19 @@ class _Fold:
     @property
     def pairs(self) -> list[Opening]:
         """Pairs that open along dependent edges."""
-        return [pair for pair, excess in self._pairs() if excess <= RANK_TOLERANCE]
+        return [pair for pair, excess in self._pairs() if excess <= self.limit]
 
     @property
     def thin(self) -> list[Opening]:
         """Pairs that open on a face around the corner."""
-        return [pair for pair, excess in self._pairs() if excess > RANK_TOLERANCE]
+        return [pair for pair, excess in self._pairs() if excess > self.limit]
 
     def _pairs(self) -> Iterator[tuple[Opening, float]]:
         """Yield pairs with ``S_kl <= -sqrt(S_kk S_ll) < 0``, and the difference."""
         own = np.diagonal(self.cross)
-        for i, j in combinations(np.flatnonzero(own > RANK_TOLERANCE).tolist(), 2):
+        for i, j in combinations(np.flatnonzero(own > self.limit).tolist(), 2):
             excess = float(-self.cross[i, j] - np.sqrt(own[i] * own[j]))
-            if excess >= -RANK_TOLERANCE:
+            if excess >= -self.limit:
                 yield (self.free[i], self.free[j]), excess
 
     def rays(self, distance: float) -> dict[Ends, Ray] | None:
@@ -189,7 +187,7 @@ class _Fold:
             ray, rest = self._nearest_dependent(opening, distance)
             if ray is not None:
                 found[opening, 0] = ray
-            elif rest > PERSISTS:
+            elif rest > self.persists:
                 self.dependent.remove(opening)
         return found
 
@@ -211,7 +209,7 @@ class _Fold:
         """Return what :meth:`_dependent_ray` does, at a part of the distance if need be."""
         for part in PARTS:
             ray, rest = self._dependent_ray(opening, part * distance)
-            if ray is not None or rest > PERSISTS:
+            if ray is not None or rest > self.persists:
                 break
         return ray, rest
 
@@ -230,7 +228,7 @@ class _Fold:
         away = sample.distances[self.rows] * [row in held for row in self.rows]
         rest = float(self.weights @ away)
         placed = dependent_at(point.quotient.at(sample.q), held)
-        if abs(away).max() > PERSISTS or sample.active() != held or placed is None:
+        if abs(away).max() > self.persists or sample.active() != held or placed is None:
             return None, rest
         there = Sample.of(placed[0])
         return Ray(way * np.sign(slopes[0]), held, there, distance, dependent=True), rest
@@ -271,7 +269,7 @@ class _Fold:
         elif straight[0] and self.weights[k] == 0:
             mixed = self.cross[self.free.index(j), self.free.index(k)]
             ends = ((j,), 0), ((k,) if straight[1] else (j,), 0)
-            if mixed < -RANK_TOLERANCE and single:
+            if mixed < -self.limit and single:
                 yield from (ends,) * (1 + straight[1])
 
     def _dependent_faces(self) -> Iterator[tuple[Opening, tuple[Ends, ...]]]:
@@ -285,14 +283,14 @@ class _Fold:
             for y, part, own in ((u, one, form_one), (v, other, form_other)):
                 y[[some.index(k) for k in part]] = abs(np.linalg.eigh(own)[1][:, 0])
             values = np.linalg.eigvalsh(form)
-            if values[0] >= -RANK_TOLERANCE and abs(u @ form @ v) <= RANK_TOLERANCE:
+            if values[0] >= -self.limit and abs(u @ form @ v) <= self.limit:
                 yield some, ((one, 0), (other, 0))
 
     def _cones(self) -> Iterator[tuple[int, Array]]:
         """Yield functions with ``S_kk < 0``, which open on a cone, and a direction on it."""
         f = len(self.flaps)
         for i, k in enumerate(self.free):
-            if self.cross[i, i] < -RANK_TOLERANCE:
+            if self.cross[i, i] < -self.limit:
                 t = -np.linalg.solve(self.form[:f, :f], self.form[:f, f + i])
                 t[0] += np.sqrt(-self.cross[i, i] / self.form[0, 0])
                 way = self.openings[i] + t @ self.flaps

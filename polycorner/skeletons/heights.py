@@ -5,8 +5,7 @@ import numpy as np
 from polycorner.skeletons.surfaces import Surface
 from polycorner.spaces.manifold import Array
 
-# Step of differences of invariants, in scale units, and where in a tangent plane it is made.
-STEP = 1e-3
+# Where in a tangent plane differences of invariants are made, in steps.
 STENCIL = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]])
 
 
@@ -18,7 +17,7 @@ class Height:
     """
 
     def __init__(self, surface: Surface, rng: np.random.Generator) -> None:
-        self.surface = surface
+        self.surface, self.step = surface, surface.tolerances.beside
         periods = np.array(surface.manifold.periods)
         n = len(periods)
         self._circles = np.isfinite(periods)
@@ -37,9 +36,9 @@ class Height:
         """Return the slopes ``(k, d)`` along scaled directions ``(k, n, d)``."""
         if not self._invariant:
             return np.asarray(np.einsum("kn,knd->kd", self._gradient(q), directions))
-        steps = np.moveaxis(STEP * self.surface.scales[:, None] * directions, 2, 0)
+        steps = np.moveaxis(self.step * self.surface.scales[:, None] * directions, 2, 0)
         sides = [self._of_invariants(q + s) - self._of_invariants(q - s) for s in steps]
-        return np.stack(sides, axis=-1) / (2 * STEP)
+        return np.stack(sides, axis=-1) / (2 * self.step)
 
     def restricted(self, q: Array, gradients: Array, tangents: Array) -> tuple[Array, Array]:
         """Return slopes ``(k, 2)`` and second derivatives ``(k, 2, 2)`` along the surface.
@@ -64,15 +63,15 @@ class Height:
         return np.einsum("knt,kn->kt", tangents, first), curvature
 
     def _differences(self, q: Array, tangents: Array) -> tuple[Array, Array]:
-        steps: Array = STEP * self.surface.scales * np.einsum("knt,jt->jkn", tangents, STENCIL)
+        steps: Array = self.step * self.surface.scales * np.einsum("knt,jt->jkn", tangents, STENCIL)
         points, _ = self.surface.projected((q + steps).reshape(-1, q.shape[1]))
         heights: Array = self._of_invariants(points).reshape(-1, len(q))
         here, right, left, up, down, over, under = (heights[k] for k in range(len(STENCIL)))
-        slope = np.stack([right - left, up - down], axis=-1) / (2 * STEP)
+        slope = np.stack([right - left, up - down], axis=-1) / (2 * self.step)
         a: Array = right - 2 * here + left
         d: Array = up - 2 * here + down
         b: Array = (over - 2 * here + under - a - d) / 2
-        return slope, np.array([[a, b], [b, d]]).transpose(2, 0, 1) / STEP**2
+        return slope, np.array([[a, b], [b, d]]).transpose(2, 0, 1) / self.step**2
 
     def _gradient(self, q: Array) -> Array:
         waves = np.where(self._circles, -np.sin(self._angles(q)), 1.0)

@@ -27,19 +27,10 @@ HEIGHTS = 8
 # How many times more points a second net has on its rays, which may pass a narrow gap otherwise.
 FINER = 4
 NEWTON = 10
-# Distance across an edge, in scale units, at which the side of a face is told.
-ACROSS = 1e-7
-# Determinant of a Hessian, relative to its entries, below which it counts as degenerate.
-DEGENERATE = 1e-6
 # Parts of the way from the net to a critical point at which it must be on the face.
 WAY = np.linspace(0.1, 1.0, 10)
-PARALLEL = 1e-6
 FAR = 1e9
 HALVINGS = 12
-# Distance in scale units from the end of an edge at which it is looked at last.
-BEFORE = 1e-3
-# Last Newton step, in scale units, to a critical point, and distance of points that are one.
-CONVERGED = 1e-6
 
 
 def face_euler_characteristic(border: Border) -> int | None:
@@ -138,6 +129,7 @@ def _enclosed(surface: Surface, net: Net, border: Border) -> bool:
 def _inside(surface: Surface, net: Net, height: Height) -> int | None:
     """Return the sum of ``(-1)^index`` over the critical points inside the face."""
     starts, radii = _starts(surface, net)
+    settled = 100 * surface.tolerances.settled  # of a last Newton step to a critical point
     q, first = starts, True
     for _ in range(NEWTON):
         _, slope, curvature, tangents = _restricted(surface, height, q)
@@ -156,9 +148,9 @@ def _inside(surface: Surface, net: Net, height: Height) -> int | None:
         away = np.linalg.norm((q - starts) / surface.scales, axis=1)
         keep = found & (away < 4 * radii)
         q, starts, radii, last = q[keep], starts[keep], radii[keep], long[keep]
-        if (last < CONVERGED).all():
+        if (last < settled).all():
             break
-    q = q[last < CONVERGED] if len(q) else q
+    q = q[last < settled] if len(q) else q
     return _signed(surface, net, height, _distinct(surface, q))
 
 
@@ -212,7 +204,7 @@ def _signed(surface: Surface, net: Net, height: Height, q: Array) -> int | None:
     total = 0
     for k in np.flatnonzero(on):
         det, size = np.linalg.det(curvature[k]), np.linalg.norm(curvature[k])
-        if abs(det) < DEGENERATE * size**2 or not _reached(surface, net, q[k]):
+        if abs(det) < surface.tolerances.rank * size**2 or not _reached(surface, net, q[k]):
             return None
         total += 1 if det > 0 else -1
     return total
@@ -270,11 +262,11 @@ def _approached(surface: Surface, active: frozenset[int], points: Array) -> Arra
     Without those that are its ends but for rounding, as where a walk arrives at a tip.
     """
     away = [np.linalg.norm((points - end) / surface.scales, axis=1) for end in points[[0, -1]]]
-    apart = np.minimum(*away) > CONVERGED
+    apart = np.minimum(*away) > surface.tolerances.same
     apart[[0, -1]] = True
     points = points[apart]
     back = points[-2] - points[-1]
-    part = min(0.5, BEFORE / float(np.linalg.norm(back / surface.scales)))
+    part = min(0.5, surface.tolerances.beside / float(np.linalg.norm(back / surface.scales)))
     edge = Surface(surface.quotient, active, points[-2])
     last, _ = edge.projected((points[-1] + part * back)[None])
     return np.concatenate([points[:-1], last, points[-1:]])
@@ -317,9 +309,9 @@ def _sides(
     flat = np.stack([-across[:, 1], across[:, 0]], 1)
     along = np.einsum("knt,kt->kn", tangents, flat)
     along *= np.sign(np.einsum("kn,kn->k", along, chords))[:, None]
-    sides = []
+    sides, across_edge = [], 10 * surface.tolerances.zero
     for sign in (1, -1):
-        p, found = surface.projected(q + sign * ACROSS * surface.scales * normal)
+        p, found = surface.projected(q + sign * across_edge * surface.scales * normal)
         sides.append(found & surface.contains(surface.values(p)))
     if not (sides[0] ^ sides[1]).all():
         return None
@@ -338,8 +330,9 @@ def _at_corner(
     along = np.concatenate([found[0] for found in both if found])
     here, there = (ray[1] for _, ray in rays)
     turn = float(both[0][2][0] @ there)
-    reflex = turn < -PARALLEL
-    if abs(turn) <= PARALLEL and float(here @ there) > 0 and surface.polyhedron.is_union:
+    parallel = surface.tolerances.rank
+    reflex = turn < -parallel
+    if abs(turn) <= parallel and float(here @ there) > 0 and surface.polyhedron.is_union:
         return None
     if (along > 0).all():
         return 0 if reflex else 1

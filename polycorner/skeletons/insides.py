@@ -10,15 +10,12 @@ from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.incidences import Flag, flags_of, groups_of, joins_of
 from polycorner.skeletons.masks import mask_of
 from polycorner.skeletons.partitions import Partition
-from polycorner.skeletons.registry import SAME
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import singular_point
 from polycorner.skeletons.touching import BATCH, Start, touched
 from polycorner.spaces.manifold import Array
 from polycorner.workers import Shared, Workers
 
-# Distance in scale units within which a point that was found is polished.
-REACH = 1e-4
 # Least length of the sum of the directions of two edges that points between them.
 BETWEEN = 1e-2
 
@@ -108,7 +105,7 @@ def _add(explorer: Explorer, q: Array, active: frozenset[int]) -> None:
     """Add the corner at a point where some functions vanish and touch, if it is new."""
     if _is_known(explorer, q, len(active)):
         return
-    found = singular_point(explorer.quotient, q, sorted(active), REACH)
+    found = singular_point(explorer.quotient, q, sorted(active), explorer.quotient.tolerances.near)
     if found is None or found.active() is None:
         explorer.registry.note(
             f"{explorer.registry.written(active)} vanish at a point inside a face, or nearly: "
@@ -124,9 +121,9 @@ def _is_known(explorer: Explorer, q: Array, count: int) -> bool:
     key = explorer.symmetry.key
     if key is None:
         return False
-    here = np.asarray(key(q))
+    here, same = np.asarray(key(q)), explorer.quotient.tolerances.corner
     return any(
-        abs(record.key - here).max() < SAME
+        abs(record.key - here).max() < same
         for record in explorer.records
         if len(record.active) >= count
     )

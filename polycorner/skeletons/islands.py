@@ -196,5 +196,5 @@ def violated(quotient: Quotient, values: Array) -> Iterator[str]:
         if not value >= 0:
             yield f"{name} = {value:.3g}"
     for name, value in zip(polyhedron.equation_names, values[quotient.count :], strict=True):
-        if not abs(value) <= quotient.tolerance:
+        if not abs(value) <= quotient.tolerances.zero:
             yield f"{name} = {value:.3g}"

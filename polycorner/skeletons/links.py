@@ -15,8 +15,7 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 
-from polycorner.polyhedra.cones import null_space, unit_rows
-from polycorner.polyhedra.strata import RANK_TOLERANCE
+from polycorner.polyhedra.cones import unit_rows
 from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.points import EvaluatedPoint, Quotient, Sample, projected
@@ -53,7 +52,7 @@ def singular_figure(
     rank : int
         Rank of their gradients in the quotient.
     """
-    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    frame = point.frame
     full = int(frame.shape[1])
     folded = fold_figure(point, active, rank, full) or branched_figure(point, active, rank, full)
     if folded is not None:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from polycorner.polyhedra.symmetry import Element, renamed
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.registry import SAME
 from polycorner.spaces.manifold import Array
 
 Orbits = tuple[tuple[int, ...], ...]
@@ -81,8 +80,9 @@ class _Images:
         records = self.explorer.records
         active = renamed(self.names(records[k].active), g.names)
         alike = [j for j, other in enumerate(records) if self.names(other.active) == active]
+        same = self.explorer.quotient.tolerances.corner
         return self._nearest(
-            g.apply(records[k].point.q), [(j, records[j].point.q) for j in alike], SAME
+            g.apply(records[k].point.q), [(j, records[j].point.q) for j in alike], same
         )
 
     def edge(self, k: int, g: Element) -> int | None:

@@ -15,22 +15,18 @@ from scipy.linalg.lapack import dgeqrf, dorgqr, dormqr, dtrtrs
 from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import RANK_TOLERANCE, distances, evaluated, local_pieces
+from polycorner.polyhedra.strata import distances, evaluated, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 from polycorner.values import Value, cached_property
 
-# Sizes of Newton steps in scale units: one that is rounding, and one whose square is.
-EXACT = 1e-13
-LAST = 1e-8
 # Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
 SINGULAR = 1e-14
 NEWTON = 8
 WORK = 64  # floats that LAPACK may use to apply reflections to one vector
 # Tolerances within which a gradient must keep its direction.
 VICINITY = 10.0
-# Smallest diagonal entry of the triangular factor for which orbits count as independent.
-DEPENDENT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -43,8 +39,8 @@ class Quotient:
         The set.
     symmetry : Symmetry
         The symmetry to divide by.
-    tolerance : float
-        Distance, in scale units, up to which a function counts as zero.
+    tolerances : Tolerances
+        What counts as zero, equal and dependent.
     extent : float
         Length, in scale units, after which a walk counts as unbounded.
     equations : tuple of int
@@ -54,7 +50,7 @@ class Quotient:
 
     polyhedron: Polyhedron
     symmetry: Symmetry
-    tolerance: float
+    tolerances: Tolerances
     extent: float
     equations: tuple[int, ...]
 
@@ -63,13 +59,13 @@ class Quotient:
         cls,
         polyhedron: Polyhedron,
         symmetry: Symmetry,
-        tolerance: float,
+        tolerances: Tolerances,
         extent: float,
         points: Iterable[Array],
     ) -> "Quotient":
         """Return it with the equations that are independent near some points."""
         equations = independent_equations(polyhedron, points)
-        return cls(polyhedron, symmetry, tolerance, extent, equations)
+        return cls(polyhedron, symmetry, tolerances, extent, equations)
 
     @property
     def count(self) -> int:
@@ -114,18 +110,24 @@ class EvaluatedPoint:
     def active(self) -> frozenset[int] | None:
         """Return the functions that vanish and matter here; None outside the polyhedron."""
         quotient = self.quotient
-        found = local_pieces(quotient.polyhedron, self.values, self.gradients, quotient.tolerance)
+        zero = quotient.tolerances.zero
+        found = local_pieces(quotient.polyhedron, self.values, self.gradients, zero)
         return frozenset().union(*found) if found else None
 
     def matrix(self, rows: Sequence[int]) -> Array:
         """Return unit gradients of given functions, of the equations, and the orbit."""
         return unit_rows(np.vstack([self.gradients[self.quotient.held(rows)], self.orbit]))
 
+    @property
+    def frame(self) -> Array:
+        """Orthonormal columns that span the directions across equations and orbit."""
+        return null_space(self.matrix([]), self.quotient.tolerances.rank)
+
     def basis(self, rows: Iterable[int]) -> list[int]:
         """Return rows whose gradients span those of all rows, modulo equations and orbit."""
         others = sorted(rows)
-        free = null_space(self.matrix([]), RANK_TOLERANCE)
-        chosen = independent_rows(unit_rows(self.gradients[others]) @ free, RANK_TOLERANCE)
+        slopes = unit_rows(self.gradients[others]) @ self.frame
+        chosen = independent_rows(slopes, self.quotient.tolerances.rank)
         return sorted(others[i] for i in chosen)
 
     def vanishing(self, rows: Iterable[int]) -> list[int]:
@@ -135,8 +137,9 @@ class EvaluatedPoint:
         so that rounding decides the direction.
         """
         quotient, others = self.quotient, sorted(rows)
-        steps = VICINITY * quotient.tolerance * unit_rows(self.gradients[others])
-        steps[~steps.any(axis=1)] = VICINITY * quotient.tolerance
+        reach = VICINITY * quotient.tolerances.zero
+        steps = reach * unit_rows(self.gradients[others])
+        steps[~steps.any(axis=1)] = reach
         nearby = self.q + steps * quotient.polyhedron.manifold.scale_array
         moved = [
             evaluated(quotient.polyhedron, q)[1][row] for row, q in zip(others, nearby, strict=True)
@@ -171,9 +174,11 @@ class HeldPoint(EvaluatedPoint):
         super().__init__(quotient, q, values, gradients, orbit)
         self.kept = list(kept)
         self._factorise()
-        if len(self.orbit) and not self.condition > DEPENDENT:
+        if len(self.orbit) and not self.condition > quotient.tolerances.dependent:
             # Orbits are smaller at some points: motions about a line do not move what lies on it.
-            self.orbit = self.orbit[independent_rows(unit_rows(self.orbit), RANK_TOLERANCE)]
+            self.orbit = self.orbit[
+                independent_rows(unit_rows(self.orbit), quotient.tolerances.rank)
+            ]
             self._factorise()
 
     def _factorise(self) -> None:
@@ -261,7 +266,8 @@ def projected(
     values that are not finite.  A step shorter than the square root of the rounding error is
     the last: convergence is quadratic.  All steps are orthogonal to the orbit through the guess.
     """
-    scales = quotient.polyhedron.manifold.scale_array
+    scales, tolerances = quotient.polyhedron.manifold.scale_array, quotient.tolerances
+    settled = tolerances.settled
     moved, last, orbit = 0.0, math.inf, None
     for _ in range(steps):
         frame = HeldPoint(quotient, q, kept, orbit)
@@ -273,10 +279,10 @@ def projected(
         moved += size
         if moved > reach:
             return None
-        if size <= EXACT or (size < LAST and size > last / 2):
+        if size <= tolerances.rounding or (size < settled and size > last / 2):
             return frame if last == math.inf else HeldPoint(quotient, q, kept)
         q, last = q + scales * step, size
-        if size < LAST * min(1.0, frame.condition):
+        if size < settled * min(1.0, frame.condition):
             frame = HeldPoint(quotient, q, kept)
             return frame if frame.finite else None
-    return HeldPoint(quotient, frame.q, kept) if size <= 1e-9 else None
+    return HeldPoint(quotient, frame.q, kept) if size <= settled / 10 else None

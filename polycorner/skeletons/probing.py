@@ -26,8 +26,7 @@ ROUNDS = 3
 SEEDS = 64
 # Part of a chord of an edge within which a point lies on the edge.
 ASIDE = 0.25
-# Distance in scale units from a face at which a walk inside starts, and walks of that kind.
-INSIDE = 1e-5
+# Walks inside from a point of a face.
 WALKS = 6
 # Edges that a point of a face is joined to by straight ways.
 SEEN = 12
@@ -146,7 +145,8 @@ class Prober(EdgeTracer):
         if not size > 0:
             return
         normal = point.gradients[row] / size
-        start = HeldPoint(self.quotient, point.q + INSIDE * self.scales * normal, [])
+        inside = self.quotient.tolerances.corner * self.scales * normal
+        start = HeldPoint(self.quotient, point.q + inside, [])
         if start.active():
             return
         for way in self._ways_inside(start, normal):

@@ -19,12 +19,6 @@ from polycorner.skeletons.vertex_figures import VertexFigure, corner_rank, verte
 from polycorner.spaces.manifold import Array
 from polycorner.workers import Shared
 
-# Distances in scale units: of points that are one corner, of points compared, and of functions from
-# zero at an exact corner.
-SAME = 1e-5
-NEAR = 1e-4
-SLACK = 1e-10
-
 Names = frozenset[str]
 # Rays and sectors at a singular corner, from its active functions and their rank.
 SingularFigure = Callable[[EvaluatedPoint, frozenset[int], int], VertexFigure]
@@ -56,6 +50,7 @@ class CornerRegistry:
     def __init__(self, quotient: Quotient, singular: SingularFigure) -> None:
         self.singular_figure = singular
         self.quotient, self.symmetry = quotient, quotient.symmetry
+        self.tolerances = quotient.tolerances
         self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
         self.records: list[CornerRecord] = []
         self.notes: dict[str, None] = {}
@@ -96,7 +91,7 @@ class CornerRegistry:
         key = self._key(point.q)
         for k in self._alike(point.q, key):
             record = self.records[k]
-            carried = self.symmetry.relabellings(self.manifold, point.q, record.point.q, SAME)
+            carried = self._carried(point.q, record.point.q)
             there = self.names(record.active)
             same = [p for p in carried if renamed(self.names(active), p) == there]
             if same:
@@ -104,7 +99,7 @@ class CornerRegistry:
             if carried:
                 self.note(
                     f"corners {self.written(record.active)} and {self.written(active)} "
-                    f"are closer than {SAME:g} scale units: kept apart"
+                    f"are closer than {self.tolerances.corner:g} scale units: kept apart"
                 )
         return self._add(point, active, key)
 
@@ -112,10 +107,16 @@ class CornerRegistry:
         """Return the positions of the corners that a point may be."""
         if not self.records:
             return []
-        alike = np.flatnonzero(abs(self._known_keys() - key).max(axis=1) <= NEAR)
+        limits = self.tolerances
+        alike = np.flatnonzero(abs(self._known_keys() - key).max(axis=1) <= limits.near)
         points = np.array([self.records[k].point.q for k in alike]).reshape(-1, len(q))
-        found: list[int] = alike[self.symmetry.possible(self.manifold, q, points, SAME)].tolist()
+        possible = self.symmetry.possible(self.manifold, q, points, limits.corner)
+        found: list[int] = alike[possible].tolist()
         return found
+
+    def _carried(self, q: Array, to: Array) -> list[Relabelling]:
+        """Return the relabellings that carry one point to another."""
+        return self.symmetry.relabellings(self.manifold, q, to, self.tolerances.corner)
 
     def _known_keys(self) -> Array:
         """Return the keys of all corners, ``(k, m)``, in an array that doubles as it fills."""
@@ -132,18 +133,19 @@ class CornerRegistry:
         basis = point.basis(active)
         if len(basis) + len(point.matrix([])) < len(point.q):
             return self._refined(point, active)
-        exact = projected(self.quotient, point.q, basis, NEAR)
+        limits = self.tolerances
+        exact = projected(self.quotient, point.q, basis, limits.near)
         if exact is None:
             return point
         away = exact.distances
-        if abs(away[sorted(active)]).max(initial=0.0) > SLACK:
+        if abs(away[sorted(active)]).max(initial=0.0) > limits.feasible:
             self.note(
                 f"{self.written(active)} meet within the tolerance but not in one "
                 f"point: corners closer together than it count as one"
             )
         gaps = {i: away[i] for i in range(self.quotient.count) if i not in active}
-        near = [i for i, gap in gaps.items() if abs(gap) < SAME and not self.polyhedron.is_union]
-        for i in near:
+        near = [i for i, gap in gaps.items() if abs(gap) < limits.corner]
+        for i in near if not self.polyhedron.is_union else ():
             self.note(
                 f"at the corner {self.written(active)} {self.written([i])} is only "
                 f"{abs(gaps[i]):.1g} scale units away: not counted as active"
@@ -155,12 +157,13 @@ class CornerRegistry:
 
         Functions that close with slope zero vanish to the square root of the tolerance only.
         """
-        found = refined(point, active, NEAR)
+        limits = self.tolerances
+        found = refined(point, active, limits.near)
         away = abs(found.distances[: self.quotient.count])
-        near = frozenset(np.flatnonzero(away < SAME).tolist()) - active
+        near = frozenset(np.flatnonzero(away < limits.corner).tolist()) - active
         if near and not self.polyhedron.is_union:
-            whole = refined(found, active | near, math.sqrt(SAME))
-            if abs(whole.distances[sorted(active | near)]).max() < SLACK:
+            whole = refined(found, active | near, math.sqrt(limits.corner))
+            if abs(whole.distances[sorted(active | near)]).max() < limits.feasible:
                 return whole
         return found
 
@@ -177,7 +180,7 @@ class CornerRegistry:
     def _add(
         self, point: EvaluatedPoint, active: frozenset[int], key: Array
     ) -> tuple[int, list[Relabelling]]:
-        stabiliser = self.symmetry.relabellings(self.manifold, point.q, point.q, SAME)
+        stabiliser = self._carried(point.q, point.q)
         self.records.append(CornerRecord(point, active, key, stabiliser))
         return len(self.records) - 1, list(stabiliser)
 
@@ -188,7 +191,9 @@ class CornerRegistry:
             found = whole = vertex_figure(point, active)
             if len(active) > full and not self.polyhedron.is_union:
                 whole = with_branches(found, point, active)
-            if full > SAMPLED or (len(whole.rays) == len(found.rays) and not whole.is_thin):
+            if full > SAMPLED or (
+                len(whole.rays) == len(found.rays) and not whole.is_thin(self.tolerances)
+            ):
                 return whole
             linked = self.singular_figure(point, active, rank)
             return whole if linked.notes else linked

@@ -9,7 +9,6 @@ from polycorner import checks
 from polycorner.checks import reals
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.assembly import assembled
@@ -20,6 +19,7 @@ from polycorner.skeletons.insides import add_inner_corners
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
+from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.workers import Workers, opened
 
 UNFINISHED = (Completeness.BUDGET, Completeness.INTERRUPTED)
@@ -37,6 +37,7 @@ def skeleton(
     progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
     tolerance: float = TOLERANCE,
+    rank_tolerance: float = RANK_TOLERANCE,
     extent: float = EXTENT,
 ) -> Skeleton:
     """Find the corners, edges and faces of a polyhedron.
@@ -72,7 +73,10 @@ def skeleton(
     rng : Generator or int, optional
         Random directions of the descents; default a generator with seed 0.
     tolerance : float, optional
-        Distance, in scale units, up to which a function counts as zero.
+        Distance, in scale units, up to which a function counts as zero.  Edges shorter than ten
+        times that are not found.
+    rank_tolerance : float, optional
+        Singular values of the unit gradients below this fraction of the largest count as zero.
     extent : float, optional
         Length, in scale units, after which an edge counts as running to infinity.
 
@@ -102,7 +106,7 @@ def skeleton(
     checks.instance("polyhedron", polyhedron, Polyhedron)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
-    check_tolerance("tolerance", tolerance)
+    tolerances = Tolerances.of(tolerance, rank_tolerance)
     checks.real("extent", extent, above=0, infinite=True, unit="scale units")
     points, names = np.atleast_2d(reals("starts", starts)), polyhedron.manifold.names
     if points.shape[-1] != len(names):
@@ -113,7 +117,7 @@ def skeleton(
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)
     points = polyhedron.manifold.placed(points, "starts")
-    quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerance, float(extent), points)
+    quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerances, float(extent), points)
     explorer = Explorer(quotient, points, checks.generator("rng", rng))
     return _run(explorer, budget, executor, progress)
 
@@ -126,7 +130,7 @@ def resume(
     executor: Any = None,
     progress: Progress | None = None,
 ) -> Skeleton:
-    """Resume a search that was interrupted or ran out of budget or time.
+    """Resume a search that was interrupted or ran out of budget or time, to the same tolerances.
 
     Parameters
     ----------

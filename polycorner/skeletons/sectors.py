@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.points import EvaluatedPoint, Sample
 from polycorner.spaces.manifold import Array
-
-FLAT = 1e-7  # slope, or deviation of a direction, that counts as zero
+from polycorner.tolerances import Tolerances
 
 
 @dataclass(frozen=True)
@@ -46,9 +44,9 @@ class Ranks:
     the weights of the rows outside ``S`` in the relations: those of ``S`` have no such weights.
     """
 
-    def __init__(self, slopes: Array) -> None:
-        self.count = len(slopes)
-        self.relations = Rows(slopes, RANK_TOLERANCE).relations
+    def __init__(self, slopes: Array, tolerances: Tolerances) -> None:
+        self.count, self.limit = len(slopes), tolerances.rank
+        self.relations = Rows(slopes, self.limit).relations
         self._lost: dict[frozenset[int], int] = {}
 
     def of(self, some: frozenset[int]) -> int:
@@ -59,7 +57,7 @@ class Ranks:
         others = frozenset(range(self.count)).difference(some)
         if others not in self._lost:
             weights = np.linalg.svd(self.relations[sorted(others)], compute_uv=False)
-            self._lost[others] = int((weights > RANK_TOLERANCE).sum())
+            self._lost[others] = int((weights > self.limit).sum())
         return len(some) - related + self._lost[others]
 
 
@@ -70,12 +68,13 @@ def sectors_between(
     if not rays:
         return ()
     n = slopes.shape[1]
-    ranks = Ranks(slopes)
+    tolerances = point.quotient.tolerances
+    ranks = Ranks(slopes, tolerances)
     flats: dict[frozenset[int], set[int]] = {}
     every = np.array(rays)
-    zero = abs(every @ slopes.T) <= FLAT
+    zero = abs(every @ slopes.T) <= tolerances.dependent
     many = zero.astype(np.int64) @ zero.T >= n - 2
-    apart = abs(every @ every.T) < 1 - FLAT
+    apart = abs(every @ every.T) < 1 - tolerances.dependent
     for i, j in np.argwhere(np.triu(many & apart, 1)).tolist():
         shared = frozenset(np.flatnonzero(zero[i] & zero[j]).tolist())
         if shared in flats or ranks.of(shared) == n - 2:
@@ -114,6 +113,6 @@ def _arcs(rays: list[Array], members: list[int]) -> Iterator[tuple[int, int, Arr
 def active_along(point: EvaluatedPoint, rows: list[int], rates: Array) -> frozenset[int] | None:
     """Return the functions active along a direction; None where it leaves the polyhedron."""
     away = point.distances[: point.quotient.count].copy()
-    away[rows] = np.where(abs(rates) > FLAT, rates, 0.0)
+    away[rows] = np.where(abs(rates) > point.quotient.tolerances.dependent, rates, 0.0)
     pieces = point.quotient.polyhedron.signs_to_pieces(np.sign(away).astype(int).tolist())
     return frozenset().union(*pieces) if pieces else None

@@ -19,23 +19,14 @@ from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
 from polycorner.spaces.manifold import Array
 
 STEPS = 60
-# Distance from the chord of a step, relative to it, of a point on it, and how exactly it is placed.
+# Distance from the chord of a step, relative to it, of a point on it.
 ASIDE = 0.2
-SAME = 1e-6
 # Steps after which they must have halved, and size of a step at which they stop.
 PATIENCE = 6
 STILL = 1e-14
 # Functions beside those of a face that may touch it.
 NEAREST = 4
-# Values and weighted sums of unit gradients that count as zero; a weighted sum is of the order of
-# the square root of the rounding error where the set has a cusp.
-ZERO = 1e-13
-DEPENDENT = 1e-7
-# Length of a gradient, relative to second derivatives in scale units, up to which it vanishes.
-NO_DIRECTION = 1e-6
-# Distance in scale units of points that a singular point is compared with, and how much less
-# independent its gradients must be.
-BESIDE = 1e-3
+# How much less independent gradients must be at a singular point than beside it.
 SUNK = 1e-2
 # Range of the ratio of two steps in which convergence counts as linear.
 LINEAR = (0.2, 0.9)
@@ -54,7 +45,8 @@ class SingularPoint(HeldPoint):
         self.values[held] = 0.0
         sizes = np.linalg.norm(self.gradients, axis=1)
         bends = _second(quotient, q)[2]
-        flat = [i for i in held if not sizes[i] > NO_DIRECTION * np.linalg.norm(bends[i])]
+        limit = quotient.tolerances.rank
+        flat = [i for i in held if not sizes[i] > limit * np.linalg.norm(bends[i])]
         self.gradients = self.gradients.copy()
         self.gradients[flat] = 0.0
 
@@ -86,10 +78,10 @@ def singular_point(
     if found is None or not _sinks(quotient, found[0], held):
         return None
     at, way = found
-    scales = quotient.polyhedron.manifold.scale_array
-    for start in (at + BESIDE * scales * way, at - BESIDE * scales * way):
-        other = _solved(quotient, start, held, 2 * BESIDE)
-        if other is not None and np.linalg.norm((other[0] - at) / scales) > BESIDE / 10:
+    scales, beside = quotient.polyhedron.manifold.scale_array, quotient.tolerances.beside
+    for start in (at + beside * scales * way, at - beside * scales * way):
+        other = _solved(quotient, start, held, 2 * beside)
+        if other is not None and np.linalg.norm((other[0] - at) / scales) > beside / 10:
             return None  # dependent all along a curve
     return SingularPoint(quotient, at, kept)
 
@@ -109,7 +101,7 @@ def _solved(
     quotient: Quotient, q: Array, held: list[int], reach: float
 ) -> tuple[Array, Array] | None:
     """Return a solution of the equations, and the unit direction that changes them least."""
-    scales = quotient.polyhedron.manifold.scale_array
+    scales, tolerances = quotient.polyhedron.manifold.scale_array, quotient.tolerances
     start = q
     last: Array = np.zeros(len(q))
     mu: Array = np.zeros(0)
@@ -130,7 +122,9 @@ def _solved(
         full: Array = -np.asarray(np.linalg.lstsq(matrix, missed, rcond=1e-12)[0], np.float64)
         step, size = full[: len(q)], float(np.linalg.norm(full[: len(q)]))
         m = len(held)
-        if abs(missed[:m]).max() < ZERO and max(abs(missed[m:]).max(), size) < DEPENDENT:
+        # A weighted sum is of the order of the square root of rounding where the set has a cusp.
+        related = max(abs(missed[m:]).max(), size) < tolerances.dependent
+        if abs(missed[:m]).max() < tolerances.rounding and related:
             return q + scales * step, _least(matrix[:, : len(q)], orbit)
         ratio = float(step @ last) / max(float(last @ last), 1e-300)
         linear = LINEAR[0] < ratio < LINEAR[1] and size * np.linalg.norm(last) < 1.01 * step @ last
@@ -156,7 +150,8 @@ def dependent_between(
     start: HeldPoint, end: HeldPoint, found: SingularPoint | None
 ) -> SingularPoint | None:
     """Return a point if it lies in the polyhedron, and on a step from start to end."""
-    if found is None or not 0 < part_of_way(start, end, found.q) <= 1 + SAME:
+    most = 1 + start.quotient.tolerances.same
+    if found is None or not 0 < part_of_way(start, end, found.q) <= most:
         return None
     scales = start.quotient.polyhedron.manifold.scale_array
     chord, away = ((q - start.q) / scales for q in (end.q, found.q))
@@ -185,7 +180,7 @@ def _least(matrix: Array, orbit: Array) -> Array:
 
 def _sinks(quotient: Quotient, q: Array, held: list[int]) -> bool:
     """Whether the gradients are more dependent at a point than beside it, along some axis."""
-    beside = BESIDE * np.diag(quotient.polyhedron.manifold.scale_array)
+    beside = quotient.tolerances.beside * np.diag(quotient.polyhedron.manifold.scale_array)
     around = [quotient.at(p).gradients[held] for p in (*(q + beside), *(q - beside))]
     sizes = np.nanmax(np.linalg.norm(around, axis=2), axis=0)
     sizes[sizes == 0] = 1.0

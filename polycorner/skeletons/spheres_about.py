@@ -74,4 +74,4 @@ def link_about(point: EvaluatedPoint, radius: float) -> Quotient:
     quotient, sphere = point.quotient, Link(point, radius)
     extra = range(len(point.values), quotient.count + len(sphere.equation_names))
     equations = (*quotient.equations, *extra)
-    return Quotient(sphere, Symmetry(), quotient.tolerance, EXTENT, equations)
+    return Quotient(sphere, Symmetry(), quotient.tolerances, EXTENT, equations)

@@ -11,15 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.points import NEWTON, Quotient
 from polycorner.spaces.manifold import Array
 
 Flags = NDArray[np.bool_]
 
-EXACT = 1e-11
-# Step of differences of invariants, in scale units.
-DIFFERENCE = 1e-6
 # Points at which it is seen whether invariants are computed for many points at once.
 SAMPLE = 3
 # Radius of a ball, as a part of the distance of a point outside it.
@@ -52,7 +48,7 @@ class Surface:
     ) -> None:
         self.quotient, self.active = quotient, active
         self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
-        self.scales = self.manifold.scale_array
+        self.scales, self.tolerances = self.manifold.scale_array, quotient.tolerances
         self.held = quotient.held(quotient.at(seed).basis(active))
         self.watched = [i for i in range(quotient.count) if i not in active]
         self._at_once: bool | None = None  # whether invariants of many points are found in one call
@@ -120,10 +116,10 @@ class Surface:
             with np.errstate(all="ignore"):
                 target = -values[:, self.held] / sizes
             size = np.asarray(abs(target).max(axis=1))
-            if not (size > EXACT).any():
+            if not (size > self.tolerances.held).any():
                 break
             q = q + self.scales * _shortest(units, np.nan_to_num(target))
-        return q, (size < 1e-8) & np.isfinite(q).all(axis=1)
+        return q, (size < self.tolerances.zero) & np.isfinite(q).all(axis=1)
 
     def room(self, where: Array) -> Array:
         """Return distances of embedded points from the nearest centre of a ball."""
@@ -195,7 +191,7 @@ class Surface:
         if not units.shape[1]:
             return np.tile(np.eye(2), (len(q), 1, 1))
         _, singular, right = np.linalg.svd(np.nan_to_num(units))
-        if (singular[:, -1] < RANK_TOLERANCE * singular[:, 0]).any():
+        if (singular[:, -1] < self.tolerances.rank * singular[:, 0]).any():
             return None
         return np.asarray(right[:, -2:].transpose(0, 2, 1))
 
@@ -214,9 +210,10 @@ class Surface:
         """Return tangents ``(k, n, 2)`` whose images, ``(k, N, 2)``, are orthonormal."""
         if self.quotient.symmetry.invariants is None:
             return tangents, tangents
-        steps = DIFFERENCE * self.scales[:, None] * tangents
+        h = self.tolerances.difference
+        steps = h * self.scales[:, None] * tangents
         sides = [
-            (self.embedded(q + steps[..., i]) - self.embedded(q - steps[..., i])) / (2 * DIFFERENCE)
+            (self.embedded(q + steps[..., i]) - self.embedded(q - steps[..., i])) / (2 * h)
             for i in (0, 1)
         ]
         images, factors = np.linalg.qr(np.stack(sides, axis=-1))

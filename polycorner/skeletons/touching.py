@@ -36,14 +36,8 @@ INDEPENDENT = 1e-4
 CLOSE, WITHIN = 0.35, 0.5
 # Least minimum, and its growth with the square and cube of its distance, that may be zero.
 ZERO, SQUARE, CUBE = 0.02, 0.15, 0.5
-# Least determinant of the Hessian on a face.
-DEFINITE = 1e-6
-# Length of difference quotients, in scale units.
-DIFFERENCE = 1e-6
-# Newton steps, their largest length, and the last one.
-NEWTON, LONGEST, LAST = 20, 0.15, 1e-9
-# Distance from zero of a minimum that is polished further.
-TOUCHES = 1e-6
+# Newton steps, and their largest length.
+NEWTON, LONGEST = 20, 0.15
 # Distance below zero at which a function ends a walk: its points are placed to first order.
 OUTSIDE = 0.02
 
@@ -73,12 +67,15 @@ class _Points:
     forms: Array
     fits: Mask
 
-    def minima(self, which: tuple[Positions, Positions]) -> tuple[Array, Array, Mask]:
-        """Return the ways to minima on the face, their values, and where Hessians are definite."""
+    def minima(self, which: tuple[Positions, Positions], least: float) -> tuple[Array, Array, Mask]:
+        """Return the ways to minima on the face, their values, and where Hessians are definite.
+
+        Their determinants are larger than ``least`` there.
+        """
         b, k = which
         form, slope = self.forms[b, k], self.slopes[b, k]
         determinant = form[:, 0, 0] * form[:, 1, 1] - form[:, 0, 1] * form[:, 1, 0]
-        definite = (determinant > DEFINITE) & (form[:, 0, 0] + form[:, 1, 1] > 0)
+        definite = (determinant > least) & (form[:, 0, 0] + form[:, 1, 1] > 0)
         form = np.where(definite[:, None, None], form, np.eye(2))
         steps: Array = -np.asarray(np.linalg.solve(form, slope[..., None])[..., 0], np.float64)
         return steps, self.gaps[b, k] + (slope * steps).sum(axis=1) / 2, definite
@@ -116,13 +113,13 @@ def _candidates(quotient: Quotient, starts: Sequence[Start]) -> Iterator[tuple[i
     held = np.array([s.held for s in starts], dtype=np.intp)  # which may be none
     walking, on = np.arange(len(starts)), _is_held(held, quotient.count)
     seen = on.copy()
-    scales = quotient.polyhedron.manifold.scale_array
+    scales, limit = quotient.polyhedron.manifold.scale_array, quotient.tolerances.rank
     for _ in range(STEPS):
         here = _located(quotient, q[walking] + STEP * scales * t[walking], held[walking])
         away = np.linalg.norm((here.moved - q[walking]) / scales, axis=1)
         going = here.fits & (away < 2 * STEP)
         b, k = np.nonzero(going[:, None] & ~seen[walking] & (abs(here.gaps) < CLOSE))
-        steps, least, definite = here.minima((b, k))
+        steps, least, definite = here.minima((b, k), limit)
         far = np.linalg.norm(steps, axis=1)
         near = definite & (far < WITHIN) & (abs(least) < ZERO + SQUARE * far**2 + CUBE * far**3)
         for i in np.flatnonzero(near).tolist():
@@ -152,23 +149,24 @@ def _polished(
     q = np.array([f[2] for f in found])
     held = np.array([starts[b].held for b in walks], dtype=np.intp)
     on = _is_held(held, quotient.count)
-    scales = quotient.polyhedron.manifold.scale_array
+    scales, tolerances = quotient.polyhedron.manifold.scale_array, quotient.tolerances
+    last, touches = tolerances.settled / 10, tolerances.same
     going = np.arange(len(found))
     for _ in range(NEWTON):
         here = _located(quotient, q[going], held[going])
         which = (np.arange(len(going)), rows[going])
-        steps, _, definite = here.minima(which)
+        steps, _, definite = here.minima(which, tolerances.rank)
         size = np.linalg.norm(steps, axis=1)
         part = np.minimum(1.0, LONGEST / np.maximum(size, 1e-300))
         fits = here.fits & definite
-        still = np.linalg.norm((here.moved - q[going]) / scales, axis=1) < LAST
-        for i in np.flatnonzero(fits & still & (size < LAST)).tolist():
+        still = np.linalg.norm((here.moved - q[going]) / scales, axis=1) < last
+        for i in np.flatnonzero(fits & still & (size < last)).tolist():
             least = np.where(on[going[i]], 0.0, here.gaps[i]).min()
-            if abs(here.gaps[i, rows[going[i]]]) < TOUCHES and least > -TOUCHES:
+            if abs(here.gaps[i, rows[going[i]]]) < touches and least > -touches:
                 yield int(walks[going[i]]), int(rows[going[i]]), here.moved[i]
         turned = np.einsum("bni,bi->bn", here.frame, steps * part[:, None])
         q[going] = here.moved + scales * turned
-        going = going[fits & ~(still & (size < LAST))]
+        going = going[fits & ~(still & (size < last))]
         if not len(going):
             return
 
@@ -189,9 +187,10 @@ def _located(quotient: Quotient, q: Array, held: Positions) -> _Points:
     target[:, : rows.shape[1], 0] = -np.take_along_axis(away, rows, 1)
     step = (span @ np.linalg.solve(factor.transpose(0, 2, 1), target))[..., 0]
     weights = np.linalg.solve(factor, (units @ span).transpose(0, 2, 1))[:, : rows.shape[1]]
-    nearby = (q + DIFFERENCE * scales * frame[:, :, i] for i in range(2))
+    h = quotient.tolerances.difference
+    nearby = (q + h * scales * frame[:, :, i] for i in range(2))
     turned = [(_evaluated(quotient, p)[1] - slopes) @ frame for p in nearby]
-    bends = np.stack(turned, axis=3) / (DIFFERENCE * sizes[..., None, None])
+    bends = np.stack(turned, axis=3) / (h * sizes[..., None, None])
     of_held = np.take_along_axis(bends, rows[..., None, None], 1)
     flat = (len(q), rows.shape[1], 4)
     forms = bends - (weights.transpose(0, 2, 1) @ of_held.reshape(flat)).reshape(bends.shape)

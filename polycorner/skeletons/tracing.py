@@ -10,14 +10,11 @@ from itertools import chain, islice
 import numpy as np
 
 from polycorner.lookahead import Lookahead
-from polycorner.polyhedra.cones import null_space
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.curves import Curve, EdgeEnd, lies_on
 from polycorner.skeletons.dependence import follow_edge, is_dependent
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.registry import (
-    NEAR,
     BareCorner,
     CornerRecord,
     CornerRegistry,
@@ -212,7 +209,8 @@ class EdgeTracer:
         """
         quotient = walk.last.quotient
         moved = self.manifold.chord(record.point.q, walk.last.q)
-        end = walk.last.q + moved * (abs(moved / self.scales).max() < NEAR)
+        near = self.quotient.tolerances.near
+        end = walk.last.q + moved * (abs(moved / self.scales).max() < near)
         away = np.linalg.norm((walk.points - end) / self.scales, axis=1)
         beyond = np.flatnonzero(away > distance)
         if not record.figure.singular or not len(beyond):
@@ -311,8 +309,7 @@ class EdgeTracer:
         )
 
     def _free(self, point: EvaluatedPoint, active: frozenset[int]) -> int:
-        fixed = null_space(point.matrix([]), RANK_TOLERANCE)
-        return int(fixed.shape[1]) - len(point.basis(active))
+        return int(point.frame.shape[1]) - len(point.basis(active))
 
     def _on_curve(self, point: EvaluatedPoint, active: frozenset[int]) -> bool:
         """Whether dependent functions vanish together on a curve, not at a point."""

@@ -17,18 +17,18 @@ from itertools import combinations, islice
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
-from polycorner.polyhedra.strata import RANK_TOLERANCE
 from polycorner.skeletons.dependence import curvature, held_at
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, Sample, projected
-from polycorner.skeletons.sectors import FLAT, Sector, active_along, sectors_between
+from polycorner.skeletons.sectors import Sector, active_along, sectors_between
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
-SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+# Distances in scale units at which edges are looked for, as far as ten tolerances; then there.
+SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 MAX_CANDIDATES = 20_000
 MAX_BASES = 64
-# Distances from zero that functions have which vanish along a curve, in scale units: at the least,
-# and over the size of the coordinates.
-ROUNDING, RELATIVE_ROUNDING = 1e-12, 64 * float(np.finfo(np.float64).eps)
+# Distance from zero of functions that vanish along a curve, over the size of the coordinates.
+RELATIVE_ROUNDING = 64 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -83,24 +83,23 @@ class VertexFigure:
         """Whether the point is isolated by second-order terms only."""
         return self.rank < self.full
 
-    @property
-    def is_thin(self) -> bool:
+    def is_thin(self, tolerances: Tolerances) -> bool:
         """Whether first derivatives do not tell the faces: edges touch, or surfaces do."""
-        pairs = combinations(self.rays, 2)
-        touching = any(one.direction @ other.direction > 1 - FLAT for one, other in pairs)
+        pairs, parallel = combinations(self.rays, 2), 1 - tolerances.dependent
+        touching = any(one.direction @ other.direction > parallel for one, other in pairs)
         return touching or any(len(s.held) > self.full - 2 for s in self.sectors)
 
 
 def corner_rank(point: EvaluatedPoint, active: frozenset[int]) -> tuple[int, int]:
     """Return the rank of the active gradients in the quotient, and the quotient's dimension."""
-    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    frame = point.frame
     slopes = unit_rows(point.gradients[sorted(active)]) @ frame
-    return rank(slopes, RANK_TOLERANCE), int(frame.shape[1])
+    return rank(slopes, point.quotient.tolerances.rank), int(frame.shape[1])
 
 
 def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
     """Return the rays and sectors at a regular corner with the given active functions."""
-    frame = null_space(point.matrix([]), RANK_TOLERANCE)
+    tolerances, frame = point.quotient.tolerances, point.frame
     rows = sorted(active)
     slopes = unit_rows(point.gradients[rows]) @ frame
     full = frame.shape[1]
@@ -108,8 +107,8 @@ def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure
     rays: list[Ray] = []
     for y, tight in _regular(point, rows, slopes):
         known, way = len(rays), frame @ y
-        for base in _bases(rows, slopes, tight):
-            covered = [x for x in rays if x.direction @ way > 1 - FLAT]
+        for base in _bases(point, rows, slopes, tight):
+            covered = [x for x in rays if x.direction @ way > 1 - tolerances.dependent]
             if not any(x.active >= base for x in covered):
                 ray = _tested(point, active, way, base)
                 if ray is not None and all(x.active != ray.active for x in covered):
@@ -117,7 +116,7 @@ def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure
         if len(rows) == full and len(rays) == known:
             notes.append(
                 f"an edge out of the corner {_names(point, rows)} is shorter than "
-                f"{SAMPLES[-1]:g} scale units: not followed"
+                f"{10 * tolerances.zero:g} scale units: not followed"
             )
     sectors = sectors_between(point, rows, slopes, [x.direction @ frame for x in rays])
     return VertexFigure(full, full, tuple(rays), sectors, tuple(notes))
@@ -132,14 +131,15 @@ def faces_beside(point: EvaluatedPoint, active: frozenset[int]) -> list[Ray]:
     Modulo the direction of the edge they are what edges are at a corner.
     """
     rows = sorted(active)
-    along = null_space(point.matrix(rows), RANK_TOLERANCE)
-    across = null_space(np.vstack([point.matrix([]), along.T]), RANK_TOLERANCE)
+    limit = point.quotient.tolerances.rank
+    along = null_space(point.matrix(rows), limit)
+    across = null_space(np.vstack([point.matrix([]), along.T]), limit)
     slopes = unit_rows(point.gradients[rows]) @ across
     if across.shape[1] == 0 or along.shape[1] != 1:
         return []
     found: list[Ray] = []
     for y, tight in _regular(point, rows, slopes):
-        for base in _bases(rows, slopes, tight):
+        for base in _bases(point, rows, slopes, tight):
             ray = _tested(point, active, across @ y, base)
             if ray is not None and all(ray.active != other.active for other in found):
                 found.append(ray)
@@ -148,25 +148,26 @@ def faces_beside(point: EvaluatedPoint, active: frozenset[int]) -> list[Ray]:
 
 def _regular(point: EvaluatedPoint, rows: list[int], slopes: Array) -> Iterator[Candidate]:
     """Yield directions in the quotient and the functions that vanish along them."""
-    quotient = point.quotient
+    quotient, tolerances = point.quotient, point.quotient.tolerances
     if not quotient.polyhedron.is_union:
-        for d, tight in extreme_rays(slopes, FLAT):
+        for d, tight in extreme_rays(slopes, tolerances.dependent):
             yield d, frozenset(rows[k] for k in tight)
         return
     n = slopes.shape[1]
     for chosen in islice(combinations(range(len(rows)), n - 1), MAX_CANDIDATES):
-        lines = Rows(slopes[list(chosen)], RANK_TOLERANCE) if chosen else None
+        lines = Rows(slopes[list(chosen)], tolerances.rank) if chosen else None
         if lines is not None and lines.rank < n - 1:
             continue
         line = np.ones((1, 1)) if lines is None else lines.null_space
         for d in (line[:, 0], -line[:, 0]):
             along = active_along(point, rows, slopes @ d)
-            if along is not None and _rank_of(rows, slopes, along) == n - 1:
+            if along is not None and _rank_of(point, rows, slopes, along) == n - 1:
                 yield d, along
 
 
-def _rank_of(rows: list[int], slopes: Array, some: frozenset[int]) -> int:
-    return rank(slopes[[rows.index(i) for i in sorted(some)]], RANK_TOLERANCE)
+def _rank_of(point: EvaluatedPoint, rows: list[int], slopes: Array, some: frozenset[int]) -> int:
+    chosen = slopes[[rows.index(i) for i in sorted(some)]]
+    return rank(chosen, point.quotient.tolerances.rank)
 
 
 def singular_rays(
@@ -178,14 +179,14 @@ def singular_rays(
     zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
     """
     rows = sorted(active)
-    slopes = unit_rows(point.gradients[rows]) @ null_space(point.matrix([]), RANK_TOLERANCE)
+    slopes = unit_rows(point.gradients[rows]) @ point.frame
     if not _isolated(point, rows, slopes):
         notes.append(
             f"{_names(point, rows)}: rank too low, and second order does not show an isolated point"
         )
     for k in range(len(rows)):
         rest = [i for i in range(len(rows)) if i != k]
-        held = Rows(slopes[rest], RANK_TOLERANCE)
+        held = Rows(slopes[rest], point.quotient.tolerances.rank)
         plane = held.null_space if rest else np.eye(slopes.shape[1])
         tight = frozenset(rows[i] for i in rest)
         if plane.shape[1] == 1:
@@ -214,10 +215,11 @@ def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
     It suffices that one relation is definite on the null directions: tried for those of an
     orthonormal basis.  False: not shown.
     """
-    held = Rows(slopes, RANK_TOLERANCE)
+    limit = point.quotient.tolerances.rank
+    held = Rows(slopes, limit)
     for weights in held.relations.T:
         values = np.linalg.eigvalsh(curvature(point, rows, weights, held.null_space))
-        if values[0] > RANK_TOLERANCE or values[-1] < -RANK_TOLERANCE:
+        if values[0] > limit or values[-1] < -limit:
             return True
     return False
 
@@ -234,14 +236,16 @@ def _null_lines(
     return [plane @ (line / np.linalg.norm(line)) for line in lines]
 
 
-def _bases(rows: list[int], slopes: Array, tight: frozenset[int]) -> Iterator[frozenset[int]]:
+def _bases(
+    point: EvaluatedPoint, rows: list[int], slopes: Array, tight: frozenset[int]
+) -> Iterator[frozenset[int]]:
     """Yield the independent subsets that may define the curve: just one where all are needed."""
     n = slopes.shape[1]
     if len(tight) <= n - 1:
         yield tight
         return
     for some in islice(combinations(sorted(tight), n - 1), MAX_BASES):
-        if _rank_of(rows, slopes, frozenset(some)) == n - 1:
+        if _rank_of(point, rows, slopes, frozenset(some)) == n - 1:
             yield frozenset(some)
 
 
@@ -251,7 +255,7 @@ def rounding(point: EvaluatedPoint) -> float:
     Far from the origin rounding errors of the coordinates count.
     """
     size = abs(point.q / point.quotient.polyhedron.manifold.scale_array).max()
-    return max(ROUNDING, RELATIVE_ROUNDING * float(size))
+    return max(10 * point.quotient.tolerances.rounding, RELATIVE_ROUNDING * float(size))
 
 
 def _tested(
@@ -265,9 +269,9 @@ def _tested(
     quotient, union = point.quotient, point.quotient.polyhedron.is_union
     scales = quotient.polyhedron.manifold.scale_array
     kept, rows = sorted(base), np.array(sorted(active.difference(base)), dtype=np.int64)
-    far = 10 * quotient.tolerance
+    least = 10 * quotient.tolerances.zero
     opened = np.zeros(len(rows))  # signs of the functions farther out
-    for h in [h for h in SAMPLES if h >= far] or [10 * far]:
+    for h in [*([h for h in SAMPLES if h > least] or [10 * least]), least]:
         sample = projected(quotient, point.q + h * scales * direction, kept, 0.5 * h)
         if sample is None:
             continue

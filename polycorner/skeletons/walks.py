@@ -31,16 +31,12 @@ SHORTEST_STEP = 1e-7
 # relative to the step.
 TURN = 0.25
 STRAY = 0.01
-# Step below which a change of orientation ends a walk: it did not jump to another curve.
-FLIP = 1e-3
 # Ratio of the volumes of the held gradients at two points that lets one look for a singular point.
 COLLAPSE = 0.5
 # Part of a step within which the slope of a function bounds how far it may fall.
 NARROW = 1e-3
 # Distance in scale units of a tip from where a walk stops.
 TIP = 1e-2
-# Distance in scale units from zero at which a passive function shows that the curve is lost.
-DRIFT = 1e-6
 
 
 class End(Enum):
@@ -150,7 +146,8 @@ class _Follower:
                 self._move(*back)
                 return self._walk(End.CLOSED)
             self._move(point, t)
-            if any(abs(point.distances[self.passive]) > DRIFT):
+            # A passive function off zero shows that the curve is lost.
+            if any(abs(point.distances[self.passive]) > self.quotient.tolerances.same):
                 return self._walk(End.SINGULAR)
             if self.length > self.extent:
                 return self._walk(End.INFINITY)
@@ -194,7 +191,8 @@ class _Follower:
                 flipped = point.orientation(t) * self.side < 0
                 if flipped and self._dependent(point) is not None:
                     return point, t, h
-                if flipped and h < FLIP:
+                # After a short step the walk did not jump to another curve.
+                if flipped and h < self.quotient.tolerances.beside:
                     return End.SINGULAR
                 if turn < TURN and not strayed and not flipped:
                     return point, t, h
@@ -288,7 +286,7 @@ class _Follower:
         A function that ends positive is followed to where its slope vanishes; there it touches
         (within the tolerance), has crossed before, or was only near.
         """
-        end, far = point, 1.0
+        end, far, zero = point, 1.0, self.quotient.tolerances.zero
         if sign * point.values[j] >= 0:
 
             def slope(s: float) -> tuple[float, HeldPoint]:
@@ -297,14 +295,14 @@ class _Follower:
 
             def is_clear(at: HeldPoint, rate: float, part: float) -> bool:
                 fall = 2 * abs(rate) * part * self._chord(point)
-                size = self.quotient.tolerance * at.sizes[j]
+                size = zero * at.sizes[j]
                 return part < NARROW and bool(sign * at.values[j] - fall > size)
 
             far, end = sign_change(slope, enough=is_clear if self.point.is_curve else None)
             distance = sign * end.distances[j]
-            if distance > self.quotient.tolerance:
+            if distance > zero:
                 return None
-            if distance >= -self.quotient.tolerance:
+            if distance >= -zero:
                 return end, False
 
         def value(s: float) -> tuple[float, HeldPoint]:
@@ -329,10 +327,11 @@ class _Follower:
     def _return(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
         """Return where this step passes the start of the walk again, and the tangent there."""
         symmetry, manifold = self.quotient.symmetry, self.quotient.polyhedron.manifold
+        tolerances = self.quotient.tolerances
         near = 2 * symmetry.separation(manifold, point.q, self.point.q)
         if self.length < 2 * self._chord(point) or abs(self._from_home(point.q)).max() > near:
             return None
-        ahead = self._from_home(self.start.q + 1e-6 * self.scales * self.out)
+        ahead = self._from_home(self.start.q + tolerances.difference * self.scales * self.out)
 
         def passed(s: float) -> tuple[float, HeldPoint]:
             at = self._between(point, s)
@@ -341,7 +340,7 @@ class _Follower:
         if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
             return None
         _, nearest = sign_change(passed)
-        same = abs(self._from_home(nearest.q)).max() < 100 * self.quotient.tolerance
+        same = abs(self._from_home(nearest.q)).max() < 100 * tolerances.zero
         return (nearest, nearest.tangent(self.t)) if same else None
 
     def _from_home(self, q: Array) -> Array:

@@ -15,6 +15,7 @@ from polycorner.files.skeletons import KIND
 from polycorner.models import SphereCluster
 from polycorner.skeletons import Completeness
 from polycorner.skeletons.search import resume
+from polycorner.tolerances import Tolerances
 
 M = Manifold.euclidean("x y")
 X, Y = M.symbols
@@ -30,6 +31,14 @@ def test_a_loaded_atlas_goes_on_as_the_saved_one(tmp_path, budget):
     same(load_skeleton(path, RING), skeleton(RING, starts, budget=budget))
     same(resume(load_skeleton(path, RING)), skeleton(RING, starts))
     assert [entry.name for entry in path.parent.iterdir()] == ["ring.json"]
+
+
+def test_tolerances_are_kept_and_those_of_older_files_are_the_defaults(tmp_path):
+    chosen = {"tolerance": 3e-7, "rank_tolerance": 2e-5}
+    path = save_skeleton(skeleton(RING, [[0.0, 1.5]], **chosen), tmp_path / "ring.json")
+    assert load_skeleton(path).state.quotient.tolerances == Tolerances.of(**chosen)
+    rewritten(KIND, path, lambda entries: entries.pop("rank tolerance"))
+    assert load_skeleton(path).state.quotient.tolerances == Tolerances.of(3e-7)
 
 
 def test_relabellings_survive(tmp_path):
@@ -180,6 +189,7 @@ def at(*path):
 FAR = [1e30, 1e30]
 FORGED = [
     *[(at("tolerance"), x) for x in (-1, 0, 1e12, "nan", 10**400)],
+    *[(at("rank tolerance"), x) for x in (-1, 0, 1, "nan")],
     *[(at("extent"), x) for x in (-1, 0, "nan", 0.1)],
     *[(at("corners", 0, "point"), x) for x in (FAR, [1e300, 0.0], [1.0], 10**400)],
     *[(at("corners", 0, "active"), x) for x in ([], ["in"], ["nobody"], 7)],

@@ -18,6 +18,7 @@ from polycorner.skeletons.quadrics import common_zeros
 from polycorner.skeletons.sectors import Ranks
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.vertex_figures import corner_rank
+from polycorner.tolerances import DEFAULT
 
 few = settings(max_examples=settings.default.max_examples // 8)
 FOUR = Manifold.euclidean("t a b c")
@@ -27,7 +28,7 @@ weight = st.floats(0.3, 2.0)
 
 def corner(D, at=None):
     q = np.zeros(D.manifold.size) if at is None else np.array(at, dtype=float)
-    quotient = Quotient.near(D, Symmetry(), 1e-8, 100.0, [q])
+    quotient = Quotient.near(D, Symmetry(), DEFAULT, 100.0, [q])
     active = quotient.at(q).active()
     return SingularPoint(quotient, q, sorted(active)), active
 
@@ -51,7 +52,7 @@ def test_two_conics_meet_in_the_points_they_are_made_to_go_through(seed, through
     for form, entries in zip(forms, rng.standard_normal((2, len(basis))) @ basis, strict=True):
         form[i, j] += entries / 2
         form[j, i] += entries / 2
-    found = common_zeros(forms)
+    found = common_zeros(forms, DEFAULT.rank)
     if found is None:
         return  # they nearly touch
     assert len(found) in {0, 2, 4}
@@ -64,7 +65,7 @@ def test_two_conics_meet_in_the_points_they_are_made_to_go_through(seed, through
 
 @pytest.mark.parametrize("form", [[[1, 0], [0, 0]], [[0, 0], [0, 0]]])
 def test_a_double_zero_is_none_that_is_told(form):
-    assert common_zeros(np.array([form], dtype=float)) is None
+    assert common_zeros(np.array([form], dtype=float), DEFAULT.rank) is None
 
 
 @given(st.integers(0, 10**6))
@@ -75,7 +76,7 @@ def test_ranks_of_sets_from_the_relations_of_all(seed):
     slopes = unit_rows(slopes[slopes.any(axis=1)])
     some = frozenset(np.flatnonzero(rng.random(len(slopes)) < 0.6).tolist())
     if some:
-        assert Ranks(slopes).of(some) == rank(slopes[sorted(some)], 1e-6)
+        assert Ranks(slopes, DEFAULT).of(some) == rank(slopes[sorted(some)], DEFAULT.rank)
 
 
 # ------------------------------------------------------------------------------------------ corners
@@ -129,7 +130,7 @@ def test_dependent_edges_that_are_short(length):
 def test_a_corner_that_a_walk_misses_by_the_root_of_the_tolerance():
     """Where ``a`` and ``b`` vanish and ``t`` is small, the others are of its square."""
     D = Polyhedron(FOUR, [a, b, t**2 - a, t**2 - b, c])
-    quotient = Quotient.near(D, Symmetry(), 1e-8, 100.0, [np.zeros(4)])
+    quotient = Quotient.near(D, Symmetry(), DEFAULT, 100.0, [np.zeros(4)])
     registry = Explorer(quotient, [], np.random.default_rng(0)).registry
     missed = quotient.at(np.array([2e-4, 0, 0, 0]))
     assert missed.active() == {0, 1, 4}

@@ -14,6 +14,7 @@ from skeleton_shapes import ball, boxes_union, half_spaces, polytope, space
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.points import Quotient
+from polycorner.tolerances import DEFAULT
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols
@@ -24,7 +25,7 @@ fewest = settings(max_examples=settings.default.max_examples // 8)
 def figure(D, q, symmetry=None):
     """Return what leaves a point, with all functions that matter there."""
     point = np.asarray(q, dtype=float)
-    point = Quotient.near(D, symmetry or Symmetry(), 1e-8, 100.0, [point]).at(point)
+    point = Quotient.near(D, symmetry or Symmetry(), DEFAULT, 100.0, [point]).at(point)
     explorer = Explorer(point.quotient, [], np.random.default_rng(0))
     return explorer.registry.figure(point, point.active())
 

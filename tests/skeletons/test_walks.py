@@ -16,6 +16,7 @@ from polycorner.formulas.families import Family
 from polycorner.skeletons import End
 from polycorner.skeletons.points import HeldPoint, Quotient, projected
 from polycorner.skeletons.walks import follow
+from polycorner.tolerances import DEFAULT
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols
@@ -24,7 +25,7 @@ TAU = math.tau
 
 def quotient(D, *, symmetry=None, extent=100.0):
     equations = range(len(D.functions), len(D.functions) + len(D.equations))
-    return Quotient(D, symmetry or Symmetry(), 1e-8, extent, tuple(equations))
+    return Quotient(D, symmetry or Symmetry(), DEFAULT, extent, tuple(equations))
 
 
 ELLIPSE = Family.of(
