@@ -97,12 +97,12 @@ class Tolerances:
     @property
     def corner(self) -> float:
         """Distance up to which two corners are one: between ``same`` and ``near``."""
-        return 1e-5 * self._factor**0.625
+        return float(1e-5 * self._factor**0.625)
 
     @property
     def beside(self) -> float:
         """Distance of points that a singular point is compared with."""
-        return 1e-3 * self._factor**0.375
+        return float(1e-3 * self._factor**0.375)
 
     @property
     def multiplier(self) -> float:

@@ -4,10 +4,9 @@ import numpy as np
 
 from polycorner.formulas.bundles import Bundle
 from polycorner.motion.mechanics import OVERLAP
+from polycorner.polyhedra.faces import Face
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array
-
-STEPS = 4  # onto equations that nearly hold
 
 
 def check_contacts(polyhedron: Polyhedron, q: Array) -> None:
@@ -80,11 +79,9 @@ def bends(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array] | None:
 
 def onto_equations(polyhedron: Polyhedron, q: Array) -> Array:
     """Return the place ``(n,)`` on the equations to which Gauss and Newton's steps lead."""
-    scales = polyhedron.manifold.scale_array
-    for _ in range(STEPS if polyhedron.equations else 0):
-        step = np.linalg.lstsq(_slopes(polyhedron, q), polyhedron.equation_values(q), rcond=None)[0]
-        q = q - scales * step
-    return q
+    m = len(polyhedron.functions)
+    equations = range(m, m + len(polyhedron.equations))
+    return Face.of(polyhedron, equations).project(q).point if equations else q
 
 
 def _slopes(polyhedron: Polyhedron, q: Array) -> Array:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from polycorner.checks import instance, reals, refuse, whole
 from polycorner.kinds import checked
 from polycorner.models.spheres import SphereCluster
+from polycorner.polyhedra.faces import Face
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -27,7 +28,6 @@ RINGS = (24, 12)  # circles that shade a ball, if there are few pictures and if 
 LIGHT = np.array([-0.3, 0.35])  # the brightest point of a ball, in radii from its middle
 FOG, HAZE = 0.45, 1.5  # largest fading of a ball, and the depth at which it is reached
 TILTS = np.radians(np.arange(-40, 41, 5))  # rotations tried after the principal axes
-NEWTON = 6  # steps, enough for chords of any length to converge to rounding
 CELL = (1.9, 1.5)  # width of a picture in inches, for few and for many
 FEW = 12
 
@@ -183,18 +183,10 @@ def _sampled(
     lengths = np.concatenate([[0.0], np.cumsum(steps)])
     moments = np.linspace(0, lengths[-1], frames)
     places = np.stack([np.interp(moments, lengths, column) for column in line.T], axis=-1)
-    rows = [model.pairs.index(pair) for pair in sorted(held)]
+    face = Face.of(model.polyhedron, [model.pairs.index(pair) for pair in sorted(held)])
     for k in range(1, frames - 1):
-        places[k] = _closed(model, places[k], rows)
+        places[k] = face.project(places[k]).point
     return places, moments
-
-
-def _closed(model: SphereCluster, q: Array, rows: list[int]) -> Array:
-    """Return a point near ``q`` at which the gaps of some contacts vanish."""
-    for _ in range(NEWTON if rows else 0):
-        gaps, slopes = model.polyhedron.values(q)[rows], model.polyhedron.gradients(q)[rows]
-        q = q - np.linalg.lstsq(slopes, gaps, rcond=DEFAULT.rank)[0]
-    return q
 
 
 # ----------------------------------------------------------------------------------------- drawing

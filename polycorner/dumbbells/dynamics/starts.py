@@ -8,13 +8,13 @@ import numpy as np
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.minimisation import minimise
+from polycorner.polyhedra.faces import Face
 from polycorner.spaces.manifold import Array
 
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
 ROOM = 3.0  # area of that strip in areas of the dumbbells
 GAP = 0.05  # mm, between dumbbells of a bunch
 TRIES = 2000  # rejected draws in a row after which the strip grows
-NEWTON_STEPS = 30
 
 
 def isolated(
@@ -95,20 +95,10 @@ def _turned(pair: DumbbellPair, q: Array, angle: float) -> Array:
 
 def _cornered(pair: DumbbellPair, q: Array) -> Array:
     """Return the nearby pair with the same mean placement whose three nearest contacts touch."""
-    bundle, unit = pair.polyhedron.bundle, np.array([pair.centre_radius, 1.0, pair.length / 2])
-    nearest = np.argsort(bundle.evaluate(q, 0)[0])[:3]
-    change = np.concatenate([-np.eye(3), np.eye(3)]) / unit  # of both, in opposite directions
-    for _ in range(NEWTON_STEPS):
-        gaps, slopes = bundle.evaluate(q, 1)
-        try:
-            move = np.linalg.solve(slopes[nearest] @ change, -gaps[nearest])
-        except np.linalg.LinAlgError:
-            break
-        size = float(np.abs(move).max())
-        q = q + change @ move * min(1.0, pair.ball_radius / max(size, 1e-300))
-        if size < 1e-13 * pair.length:
-            break
-    gaps = bundle.evaluate(q, 0)[0]
+    nearest = np.argsort(pair.polyhedron.values(q))[:3]
+    opposite = np.concatenate([-np.eye(3), np.eye(3)])
+    q = Face.of(pair.polyhedron, nearest.tolist()).project(q, along=opposite, stride=1.0).point
+    gaps = pair.polyhedron.values(q)
     if not (gaps.min() > -1e-9 and np.abs(gaps[nearest]).max() < 1e-9):
         msg = (
             "heading: expected one at which such dumbbells touch at three contacts; "

@@ -1,6 +1,7 @@
 """Steepest descent inside a polyhedron, contact by contact."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, minimise
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.problem import Problem, pose
+from polycorner.polyhedra.faces import Face
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked
@@ -24,7 +26,6 @@ LEAST = 1e-4  # shortest step, below which the minimiser takes over
 TOUCHING = 1e-4  # scaled distance within which a contact closes if the energy presses on it
 MOST = 600  # points of a path
 GROWTH = 1.5
-CORRECTIONS = 3
 
 Indices = NDArray[np.int64]
 
@@ -119,7 +120,8 @@ def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Arra
         size = float(np.linalg.norm(way))
         if size <= LEAST:
             break
-        ahead = _held(problem, q + step / size * way * problem.scales, pressed)
+        closed = Face(partial(problem.evaluate, order=1), problem.scales, pressed.tolist())
+        ahead = closed.project(q + step / size * way * problem.scales).point
         reached, trial = problem.restore(everything, ahead)
         lower, onward, held = _downhill(problem, trial)
         # A reversed direction means that the step overshot; contacts only deflect.
@@ -150,15 +152,3 @@ def _downhill(problem: Problem, q: Array) -> tuple[float, Array, Indices]:
     rows = gradients[closed]
     weights, _ = nnls(rows.T, pull)
     return float(values[-1]), rows.T @ weights - pull, closed[weights > 0]
-
-
-def _held(problem: Problem, q: Array, pressed: Indices) -> Array:
-    """Return the point near ``q`` where some contacts are closed.
-
-    Newton's method with the shortest corrections: a tangent leaves a curved face.
-    """
-    for _ in range(CORRECTIONS if len(pressed) else 0):
-        values, gradients = problem.evaluate(q, 1)
-        move = np.linalg.lstsq(gradients[pressed], -values[pressed], rcond=1e-6)[0]
-        q = q + move * problem.scales
-    return q
