@@ -1,6 +1,5 @@
 from .groups import AllOf, AnyOf
-from .nerves import Nerve, nerve
-from .persistence import Bar
+from .nerves import Bar, Nerve, nerve
 from .polyhedron import Polyhedron
 from .strata import LocalType, Stratum, stratum_at
 from .symmetry import Element, Symmetry

@@ -7,10 +7,15 @@ type of the polyhedron: the pairs of a point and of a place in the cell of all p
 project to both, with contractible fibres (the nerve theorem, [Hatcher] sec. 4.G).  So does the part
 of the polyhedron above a height; a cell appears at the largest height on the common part of its
 pieces, which is a linear programme.
+
+Persistent homology of a cell complex that grows, with coefficients modulo 2 ([ELZ]).
+
+Cells are numbered in the order in which they appear, each after its faces.  Columns of boundaries
+are whole numbers whose bits are faces; adding two columns modulo 2 is their exclusive or.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -19,7 +24,6 @@ import numpy as np
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.polyhedra.affine import Programmes
-from polycorner.polyhedra.persistence import Bar, bars
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
@@ -30,8 +34,69 @@ if TYPE_CHECKING:
 
 # Heights that differ by less, relative to the largest, are one height, of cells in any order.
 MERGED = 1e-7
-
 Cell = tuple[frozenset[int], ...]  # of every union, which of its pieces
+
+
+@dataclass(frozen=True)
+class Bar(Checked):
+    """A class of homology: its dimension, and the heights from which to which it lives.
+
+    Attributes
+    ----------
+    dimension : int
+        0 for components, 1 for loops, and so on.
+    birth, death : float
+        It lives in the set above every height ``s`` with ``birth >= s > death``; ``death`` is
+        ``-inf`` for what never ends.
+    """
+
+    dimension: int
+    birth: float
+    death: float
+
+
+def bars(
+    cells: Mapping[int, Sequence[Sequence[int]]], heights: Mapping[int, Sequence[float]]
+) -> list[Bar]:
+    """Return the classes of homology of a complex above decreasing heights, the highest first.
+
+    Parameters
+    ----------
+    cells : mapping from int to sequence of sequence of int
+        For every dimension its cells, in the order in which they appear, as the positions of their
+        faces among the cells of one dimension less.
+    heights : mapping from int to sequence of float
+        At which each cell appears: decreasing, and at most those of its faces.
+    """
+    found: list[Bar] = []
+    killing: dict[int, int] = {}  # the cells that end a class of one dimension less, by what began
+    for dimension in sorted(cells, reverse=True):
+        ended, killing = killing, _paired(cells[dimension], set(killing))
+        killers = set(killing.values())
+        for k, birth in enumerate(heights[dimension]):
+            if k not in killers:
+                death = heights[dimension + 1][ended[k]] if k in ended else float("-inf")
+                if death < birth:
+                    found.append(Bar(dimension, birth, death))
+    return sorted(found, key=lambda bar: (-bar.birth, bar.dimension, -bar.death))
+
+
+def _paired(cells: Sequence[Sequence[int]], creators: set[int]) -> dict[int, int]:
+    """Return which cell ends the class that began with a cell of one dimension less.
+
+    Columns of ``creators``, whose own classes end, would be reduced to zero (clearing, [CK]).
+    """
+    pivots: dict[int, int] = {}
+    killing: dict[int, int] = {}
+    for k, faces in enumerate(cells):
+        column = 0 if k in creators else sum(1 << face for face in faces)
+        while column:
+            last = column.bit_length() - 1
+            if last not in pivots:
+                pivots[last], killing[last] = column, k
+                break
+            column ^= pivots[last]
+    return killing
 
 
 @dataclass(frozen=True, eq=False)

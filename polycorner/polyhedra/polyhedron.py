@@ -1,7 +1,14 @@
-"""And/or trees of smooth inequalities and the closed sets that they define on a manifold."""
+"""And/or trees of smooth inequalities and the closed sets that they define on a manifold.
+
+Equations of the spheres and rotations of a manifold: their vectors have the length one.
+
+With them a point of ``S^k`` is one of ``R^(k+1)`` with an equation, which polyhedra, conditions,
+walks and proofs treat as they treat any other.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from itertools import islice
 from typing import Any, Union
 
@@ -10,21 +17,93 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.polyhedra.description import description
 from polycorner.polyhedra.groups import AnyOf, Part, collect
-from polycorner.polyhedra.normalisation import normalisations
-from polycorner.printing import Printed, Sheet
+from polycorner.printing import MOST, Printed, Sheet, Table
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
 
+LONGEST = 72  # characters of a formula beyond which only its coordinates are listed
 # A model's remark on a point.
 Annotation = Callable[[Array], str | None]
 # A piece of the set: the positions of the functions that must all be at least zero.
 Piece = frozenset[int]
-
 MAX_SELECTIONS = 256
+Tree = Union[int, "_Node"]
+
+
+def normalisations(manifold: Manifold) -> tuple[SmoothFunction, ...]:
+    """Return ``(|u|^2 - 1) / 2`` for the vector ``u`` of every sphere and rotation."""
+    return tuple(
+        SmoothFunction.member(
+            _family(len(f.names)), "norm", manifold, reads=f.names, label=f"|{f.name}|"
+        )
+        for f in manifold.factors
+    )
+
+
+@cache
+def _family(k: int) -> Family:
+    import sympy
+
+    u = sympy.symbols([f"u{i}" for i in range(k)], real=True)
+    return Family.of({"norm": (sum(x**2 for x in u) - 1) / 2}, [x.name for x in u])
+
+
+def description(
+    manifold: Manifold,
+    functions: Sequence[SmoothFunction],
+    equations: Sequence[SmoothFunction],
+    joined: str,
+) -> Sheet:
+    """Return the sheet of a polyhedron.
+
+    Parameters
+    ----------
+    manifold : Manifold
+        The space of its points.
+    functions, equations : sequence of SmoothFunction
+        The inequalities ``f >= 0`` and the equations ``h = 0``.
+    joined : str
+        The and/or tree in words; empty where all inequalities hold together.
+    """
+    return Sheet(
+        f"Polyhedron in {', '.join(_coordinates(manifold))}",
+        (
+            _table(("inequality", "f >= 0"), functions),
+            _table(("equation", "h = 0"), equations),
+            f"Joined as {joined}." if joined else "",
+        ),
+    )
+
+
+def _coordinates(manifold: Manifold) -> Iterator[str]:
+    """Yield the names of the coordinates, those of a sphere or rotation together."""
+    for name in manifold.names:
+        factor = next((f for f in manifold.factors if name in f.names), None)
+        if factor is None:
+            yield name
+        elif name == factor.names[0]:
+            yield f"the unit {factor.kind} ({', '.join(factor.names)})"
+
+
+def _table(head: tuple[str, str], functions: Sequence[SmoothFunction]) -> Table:
+    rows = tuple((f.name, _formula(f)) for f in functions[:MOST])
+    hidden = len(functions) - len(rows)
+    return Table(head, rows, caption=f"The first {MOST} of {len(functions)}" if hidden else "")
+
+
+def _formula(f: SmoothFunction) -> str:
+    """Return a formula with the values of its parameters, or what it depends on if it is long."""
+    definitions, expressions = f.family.formulas()
+    reads = ", ".join(f.manifold.names[i] for i in f.reads)
+    if definitions or len(str(expressions[f.member_name])) > LONGEST:
+        return f"a function of {reads}"
+    values = zip(f.family.parameters, f.parameters, strict=True)
+    given = ", ".join(f"{name} = {value:g}" for name, value in values)
+    return f"{f.expression}{given and f' with {given}'}"
 
 
 class Polyhedron(Printed, Value):
@@ -208,9 +287,6 @@ class Polyhedron(Printed, Value):
         """
         limited = islice(_select(self.tree, values, tolerance), MAX_SELECTIONS)
         return list(dict.fromkeys(limited))
-
-
-Tree = Union[int, "_Node"]
 
 
 class _Node:

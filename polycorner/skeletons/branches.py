@@ -19,6 +19,13 @@ below ``1e-11`` at ``1e-3`` (by default) count as zero along a whole surface.
 Where the form of a set with one relation is semidefinite and has one null direction, that is the
 direction of an edge along which the relation persists, or of a cusp; ``N + 1 - k`` functions with
 one relation leave ``k`` dimensions.
+
+Common zeros of ``k - 1`` quadratic forms of ``k`` variables, ``k`` at most 3.
+
+On the projective line a form has two zeros, none, or a double one where it is semidefinite.  Two
+conics that do not touch meet in up to four points.  Three conics of their pencil are degenerate;
+where real points are common to all of it, one of these three consists of two real lines, and the
+points are the zeros of another conic on them.
 """
 
 import math
@@ -32,12 +39,13 @@ import numpy as np
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.skeletons.dependence import unit_hessians
 from polycorner.skeletons.points import EvaluatedPoint, projected
-from polycorner.skeletons.quadrics import common_zeros
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.spheres_about import Link
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
+# Members of the pencil of two conics, of which the least degenerate one is taken.
+ANGLES = (0.3, 1.1, 1.9, 2.7)
 # Least eigenvalue of a semidefinite form relative to the largest that counts as positive.
 CLEAR = 1e-3
 # Largest number of functions with slopes that open along an edge on which a relation persists.
@@ -47,9 +55,79 @@ MAX_SETS = 20_000
 # Radius in scale units of a circle on which sums of higher order change sign, its points, and the
 # part of the largest sum that may be a zero.
 ROUND, AROUND, NEARLY = 3e-3, 72, 1e-2
-
 # A unit direction in the quotient, and functions that stay zero along it.
 Branch = tuple[Array, frozenset[int]]
+
+
+def common_zeros(forms: Array, limit: float) -> list[Array] | None:
+    """Return the common zeros of quadratic forms, up to their signs.
+
+    Parameters
+    ----------
+    forms : (k - 1, k, k) array
+        Symmetric matrices, of the order of 1.
+    limit : float
+        Size of a form or of its eigenvalues, and distance of roots, that count as zero.
+
+    Returns
+    -------
+    list of (k,) arrays, or None
+        Unit vectors; None if a zero is not isolated or not simple, or ``k`` above 3.
+    """
+    k = forms.shape[-1]
+    if k > 3:
+        return None
+    if k == 1:
+        return [np.ones(1)]
+    return _on_line(forms[0], limit) if k == 2 else _of_conics(forms[0], forms[1], limit)
+
+
+def _on_line(form: Array, limit: float) -> list[Array] | None:
+    values, axes = np.linalg.eigh(form)
+    if abs(values).min() <= limit:
+        return None
+    if values[0] * values[1] > 0:
+        return []
+    low, high = math.sqrt(-values[0]), math.sqrt(values[1])
+    lines = [high * axes[:, 0] + sign * low * axes[:, 1] for sign in (1, -1)]
+    return [line / np.linalg.norm(line) for line in lines]
+
+
+def _of_conics(first: Array, second: Array, limit: float) -> list[Array] | None:
+    pencil = [
+        (math.cos(a) * first + math.sin(a) * second, math.cos(a) * second - math.sin(a) * first)
+        for a in ANGLES
+    ]
+    regular, other = max(pencil, key=lambda both: abs(np.linalg.det(both[0])))
+    if abs(np.linalg.det(regular)) <= limit:
+        return None
+    roots = np.linalg.eigvals(-np.linalg.solve(regular, other))
+    apart = abs(roots[:, None] - roots[None]) + np.eye(3)
+    if apart.min() <= limit * max(1.0, abs(roots).max()):
+        return None
+    found = []
+    real = [x.real for x in roots if abs(x.imag) <= limit]
+    for line in _lines([other + x * regular for x in real], limit):
+        zeros = _on_line(line.T @ regular @ line, limit)
+        if zeros is None:
+            return None
+        found += [line @ zero for zero in zeros]
+    return found
+
+
+def _lines(conics: list[Array], limit: float) -> list[Array]:
+    """Return the lines, as planes ``(3, 2)``, of the clearest of the conics that has real ones."""
+    clearest, found = limit, []
+    for conic in conics:
+        values, axes = np.linalg.eigh(conic)
+        if min(-values[0], values[2]) > clearest:
+            clearest = min(-values[0], values[2])
+            normals = (
+                math.sqrt(values[2]) * axes[:, 2] + sign * math.sqrt(-values[0]) * axes[:, 0]
+                for sign in (1, -1)
+            )
+            found = [null_space(normal[None], limit) for normal in normals]
+    return found
 
 
 class Branches:

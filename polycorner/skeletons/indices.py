@@ -7,20 +7,37 @@ For a height without degenerate critical points on a compact face and on its edg
 a critical point inside counts ``(-1)^index``; a minimum of the height along an edge counts 1 and a
 maximum -1 if the height rises into the face there, otherwise 0; a corner counts 1 if the height
 rises everywhere, -1 if it falls on two sides of a rise, otherwise 0 [GoreskyMacPherson, part I].
-Tips count as in :mod:`~polycorner.skeletons.tip_indices`.  Several heights in general position have
-to agree.
+Tips count as below.  Several heights in general position have to agree.
+
+What tips count in the Euler characteristic of a face.
+
+At a tip, where tangents do not tell the face, its link is followed: the arc or the closed curve in
+which the face meets a small sphere, and over which it is a cone ([Mil] sec. 2).  A height that
+vanishes on no limit of tangent planes has there the index ``1 - chi`` of the part of the link that
+lies lower ([GoreskyMacPherson], part I): chi is the number of arcs of this part, and 0 where it is
+all of a closed curve.
 """
+
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from polycorner.skeletons.alignment import aligned
-from polycorner.skeletons.borders import Border
+from polycorner.polyhedra.symmetry import Element
+from polycorner.skeletons.borders import Border, Tip, seeds_of
 from polycorner.skeletons.heights import Height
 from polycorner.skeletons.nets import LEVELS, Net
+from polycorner.skeletons.points import HeldPoint
+from polycorner.skeletons.spheres_about import link_about
 from polycorner.skeletons.surfaces import Surface
-from polycorner.skeletons.tip_indices import links_at, tips_index
+from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
 
+# Step, in scale units, of the differences that carry a direction.
+STEP = 1e-4
+# Deviation from 1 of the cosine between directions that are parallel.
+PARALLEL = 1e-6
+Links = list[tuple[Tip, Array]]
 # Heights that have to agree, and that are tried.
 AGREEING = 3
 HEIGHTS = 8
@@ -31,6 +48,100 @@ NEWTON = 10
 WAY = np.linspace(0.1, 1.0, 10)
 FAR = 1e9
 HALVINGS = 12
+
+
+def aligned(border: Border) -> Border | None:
+    """Return a border with all its edges carried to one image of the face.
+
+    None if a symmetry carries the face to itself, so that it is not its own quotient, or if it is
+    not clear which image of an edge bounds it.
+    """
+    group = border.quotient.symmetry.group
+    if len(group) == 1:
+        return border
+    surface = Surface(border.quotient, border.active, border.seeds[0])
+    net = Net(surface, border.seeds[:1])
+    if any(_covered(net, _carried(g, net.points)) for g in group[1:]):
+        return None
+    edges = []
+    for active, points, closed in border.edges:
+        images = [_carried(g, points) for g in group]
+        here = [image for image in images if _covered(net, image)]
+        if len(here) != 1:
+            return None
+        edges.append((active, here[0], closed))
+    if not edges:
+        return border
+    around = surface.embedded(np.concatenate([points for _, points, _ in edges]))
+
+    def moved(ray: tuple[frozenset[int], Array]) -> tuple[frozenset[int], Array]:
+        active, (q, direction) = ray
+        ahead = q + STEP * surface.scales * direction
+        images = [_carried(g, np.array([q, ahead])) for g in group]
+        away = [
+            np.linalg.norm(surface.apart(surface.embedded(image[:1]), around), axis=1).min()
+            for image in images
+        ]
+        start, end = images[int(np.argmin(away))]
+        return active, np.array([start, (end - start) / surface.scales / STEP])
+
+    corners = tuple((moved(first), moved(last)) for first, last in border.corners)
+    seeds = seeds_of([points for _, points, _ in edges])
+    return replace(border, edges=tuple(edges), corners=corners, seeds=seeds)
+
+
+def _carried(element: Element, points: Array) -> Array:
+    return np.array([element.apply(q) for q in points])
+
+
+def _covered(net: Net, points: Array) -> bool:
+    """Whether a net covers any of the points."""
+    q, _ = net.surface.projected(points)
+    _, gradients = net.surface.evaluated(q)
+    return bool(net.covers(net.surface.embedded(q), net.surface.across(gradients)).any())
+
+
+def links_at(surface: Surface, tips: Iterable[Tip]) -> Links | None:
+    """Return tips with their links, as :func:`tips_index` takes them; None if one is unknown."""
+    found = [(tip, _link(surface, tip)) for tip in tips]
+    known = [(tip, link) for tip, link in found if link is not None]
+    return known if len(known) == len(found) else None
+
+
+def tips_index(height: Height, links: Links) -> int:
+    """Return what tips count for a height."""
+    return sum(_index(height, tip, link) for tip, link in links)
+
+
+def _link(surface: Surface, tip: Tip) -> Array | None:
+    """Return the scaled ways from a tip to points of its link in order, ``(n, k)``.
+
+    None where the link is not known.
+    """
+    if not tip.sampled:
+        opposite = len(tip.ways) == 2 and abs(tip.ways[0] @ tip.ways[1]) > 1 - PARALLEL
+        return np.array(tip.ways).T if opposite else None
+    radius = float(np.linalg.norm((tip.near - tip.point) / surface.scales))
+    link = link_about(surface.quotient.at(tip.point), radius)
+    start = HeldPoint(link, tip.near, link.at(tip.near).basis(surface.active))
+    ahead = start.tangent(np.random.default_rng(0).standard_normal(len(tip.near)))
+    sides: list[Array] = []
+    for way in (ahead, -ahead):
+        walk = follow(start, way, passive=surface.active, home=True)
+        sides.append(walk.points[:: 1 - 2 * len(sides)])
+        if walk.end is End.CLOSED and not tip.ways:
+            break
+        if walk.end is not End.CORNER or not tip.ways:
+            return None
+    points = np.concatenate(sides[::-1])
+    return np.asarray(((points - tip.point) / surface.scales).T)
+
+
+def _index(height: Height, tip: Tip, link: Array) -> int:
+    """Return what a tip counts; of its link the scaled ways are given."""
+    low = height.slopes(tip.point[None], link[None])[0] < 0
+    before = np.append(bool(not tip.ways and low[-1]), low[:-1])
+    return 1 - int((low & ~before).sum())
 
 
 def face_euler_characteristic(border: Border) -> int | None:

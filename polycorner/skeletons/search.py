@@ -160,7 +160,7 @@ def examine_faces(
     """Look for corners inside the two-dimensional faces of a finished skeleton.
 
     Where another function touches zero inside a face, no edge need lead to the corner: see
-    :mod:`polycorner.skeletons.touching`.  One straight walk crosses every face from one of its
+    :mod:`polycorner.skeletons.insides`.  One straight walk crosses every face from one of its
     corners, and Newton's method looks for minima that are zero beside it; faces along which
     gradients are dependent are left out.  From corners that are found the search goes on.  It does
     not prove that there are no others.

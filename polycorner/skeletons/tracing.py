@@ -1,10 +1,15 @@
 """Edges while a skeleton grows: traced from corners, or found through one of their points.
 
 Other processes walk along edges and compute vertex figures ahead of when they are needed.
+
+Walks along edges in workers: what comes back.
+
+Points travel as coordinates with the functions that are held there; values, gradients and frames
+are computed again at the other end.
 """
 
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 
 import numpy as np
@@ -12,7 +17,7 @@ import numpy as np
 from polycorner.lookahead import Lookahead
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.curves import Curve, EdgeEnd, lies_on
-from polycorner.skeletons.dependence import follow_edge, is_dependent
+from polycorner.skeletons.dependence import follow_edge, held_at, is_dependent
 from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.registry import (
     BareCorner,
@@ -22,7 +27,6 @@ from polycorner.skeletons.registry import (
     figured,
     written_point,
 )
-from polycorner.skeletons.remote_walks import Report, walked
 from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
@@ -30,12 +34,42 @@ from polycorner.workers import Shared
 
 # Most steps along an edge to a point near its end.
 INWARD = 60
-
 # In place of a ray: the vertex figure of the corner is to be computed.
 FIGURE = -1
-
 # A walk, the relabellings to the corner where it ended, and the position of the edge.
 Arrival = tuple[Walk, list[Relabelling], int]
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A walk without the values at its end; see :class:`~polycorner.skeletons.walks.Walk`."""
+
+    points: Array
+    kept: list[int]
+    kind: type[HeldPoint] | None
+    tangent: Array
+    end: End
+    length: float
+
+    @classmethod
+    def of(cls, walk: Walk) -> "Report":
+        """Return that of a walk."""
+        kind = None if is_dependent(walk.last) else type(walk.last)
+        return cls(walk.points, walk.last.kept, kind, walk.tangent, walk.end, walk.length)
+
+    def walk(self, quotient: Quotient, active: frozenset[int]) -> Walk:
+        """Return the walk along an edge with given active functions."""
+        if self.kind is None:
+            last = held_at(quotient, self.points[-1], active, self.kept)
+        else:
+            last = self.kind(quotient, self.points[-1], self.kept)
+        return Walk(self.points, last, self.tangent, self.end, self.length)
+
+
+def walked(quotient: Shared, ray: Ray) -> Report:
+    """Walk along an edge to its end."""
+    start = ray.start(quotient.value)
+    return Report.of(follow_edge(start, ray.direction, ray.active))
 
 
 class EdgeTracer:

@@ -8,7 +8,7 @@ import pytest
 from kept_files import motion
 
 from polycorner.files import load_trajectory, save_trajectory
-from polycorner.files.hdf5 import check_structure
+from polycorner.files.motions import check_structure
 from polycorner.files.trajectories import KIND
 from polycorner.models import textbook
 

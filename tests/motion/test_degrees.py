@@ -7,7 +7,7 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.motion.degrees import degree
+from polycorner.motion.formulation import degree
 
 X, Y, V, W = sympy.symbols("x y v w", real=True)
 leaves = st.sampled_from([X, Y, V, W, sympy.Integer(2), sympy.sin(X)])

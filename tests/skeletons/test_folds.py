@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry
 from polycorner.skeletons import End, links
-from polycorner.skeletons.arcs import arc_length
 from polycorner.skeletons.dependence import follow_edge
 from polycorner.skeletons.explorer import Explorer
+from polycorner.skeletons.parts import arc_length
 from polycorner.skeletons.points import Quotient
 from polycorner.tolerances import DEFAULT
 

@@ -11,8 +11,8 @@ from polycorner import Manifold, Polyhedron, Symmetry, skeleton
 from polycorner.models import SphereCluster
 from polycorner.polyhedra.symmetry import Element
 from polycorner.skeletons import Completeness, examine_faces
+from polycorner.skeletons.insides import Start, touching_points
 from polycorner.skeletons.points import Quotient, projected
-from polycorner.skeletons.touching import Start, touching_points
 from polycorner.tolerances import DEFAULT
 
 SPACE = Manifold.euclidean("x y z")

@@ -9,7 +9,7 @@ import pytest
 import sweep_functions
 import xarray as xr
 
-from polycorner.sweeps import SweepError, scheduling, sweep
+from polycorner.sweeps import SweepError, execution, sweep
 from polycorner.workers import AHEAD, Inline, Workers
 
 GRID = {"a": ([0, 1, 2], "mm"), "b": [1, 2, 3, 4]}
@@ -50,7 +50,7 @@ def test_few_batches_are_in_flight_however_large_the_grid():
 
 
 def test_points_a_worker_has_no_time_for_are_handed_out_again(monkeypatch):
-    monkeypatch.setattr(scheduling, "BUDGET", 0.0)
+    monkeypatch.setattr(execution, "BUDGET", 0.0)
     grid = {"a": range(20), "b": range(30)}
     with ThreadPoolExecutor(2) as pool:
         found = sweep(sweep_functions.drawn, grid, executor=pool, rng=5)

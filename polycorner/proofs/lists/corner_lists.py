@@ -1,24 +1,93 @@
 """Lists of all corners of a polyhedron in a box, and what is proved."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
-from polycorner.proofs.lists.atlases import proved_skeleton
 from polycorner.proofs.lists.corner_records import CornerRecord, save
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.search import Tally
 from polycorner.skeletons.elements import Skeleton
+from polycorner.skeletons.parts import Completeness
+from polycorner.skeletons.search import skeleton
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import TOLERANCE, Tolerances
 from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import os
     from pathlib import Path
+
+
+def proved_skeleton(
+    polyhedron: Polyhedron,
+    points: Sequence[Array],
+    symmetry: Symmetry,
+    *,
+    complete: bool,
+    starts: Sequence[Any] = (),
+    tolerance: float = TOLERANCE,
+    **options: Any,
+) -> Skeleton:
+    """Return the skeleton found from corners, and whether its corners are proved to be all.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+    points : sequence of (n,) arrays
+        The corners of a list.
+    symmetry : Symmetry
+        Symmetry to divide by.
+    complete : bool
+        Whether the list is complete.
+    starts : sequence of (n,) arrays, optional
+        Points of the set from which the search sets out as well.
+    tolerance : float, optional
+        Distance, in scale units, up to which a function counts as zero; corners of either side are
+        compared with what belongs to it.
+    options
+        Of :func:`polycorner.skeleton`.
+    """
+    rows = [*points, *(np.asarray(q, dtype=float) for q in starts)]
+    around = np.reshape(rows, (-1, polyhedron.manifold.size))
+    found = skeleton(polyhedron, around, symmetry=symmetry, tolerance=tolerance, **options)
+    notes = _mismatches(found, points, symmetry, Tolerances.of(tolerance).corner)
+    if not complete:
+        notes.append("the list of corners is not complete")
+    proved = not notes and found.complete is Completeness.EXHAUSTED
+    return replace(
+        found,
+        complete=Completeness.CORNERS_PROVED if proved else found.complete,
+        notes=(*found.notes, *notes),
+    )
+
+
+def _mismatches(
+    found: Skeleton, points: Sequence[Array], symmetry: Symmetry, reach: float
+) -> list[str]:
+    """Return sentences on the corners of one side that are not those of the other."""
+    manifold = found.polyhedron.manifold
+    pairs = [
+        [bool(symmetry.relabellings(manifold, q, corner.point, reach)) for corner in found.corners]
+        for q in points
+    ]
+    table = np.reshape(np.array(pairs, dtype=bool), (len(points), len(found.corners)))
+    notes = [
+        f"corner {k} of the list is {count} corners of the skeleton"
+        for k, count in enumerate(table.sum(axis=1).tolist())
+        if count != 1
+    ]
+    single = not (symmetry.elements or symmetry.fields)
+    for k, count in enumerate(table.sum(axis=0).tolist()):
+        if count == 0 or (single and count > 1):
+            notes.append(f"corner {k} of the skeleton is {count} corners of the list")
+    return notes
 
 
 @dataclass(frozen=True, eq=False)

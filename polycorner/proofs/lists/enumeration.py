@@ -1,5 +1,23 @@
-"""The search for all stationary points: its arguments, its symmetries, its run."""
+"""The search for all stationary points: its arguments, its symmetries, its run.
 
+Coordinates that may be fixed because continuous symmetries carry every point to their values.
+
+Let the fields ``xi`` be symmetries whose components have bounded derivatives on the whole manifold,
+so that their flows exist for all times.  After the coordinates ``F``, a coordinate ``j`` may be
+fixed if a combination of the fields with constant coefficients has, wherever ``q_F`` has its
+values, components 0 along ``F`` and a constant other than 0 along ``j``: its flow keeps ``q_F`` and
+carries ``q_j`` to any value.
+
+At a point of the section the fields leave it, and the energy and all functions are constant along
+them: the point is stationary in the section if and only if it is in the whole space.
+
+Parameters of formulas as coordinates of a search that nothing moves along.
+
+The functions become functions of the coordinates and the chosen parameters.  Directions, faces and
+loci are those of the coordinates, at each value of the parameters.
+"""
+
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,34 +27,170 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from polycorner import checks
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.ranges import LARGEST
 from polycorner.interrupts import first_interrupt
+from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.enclosures import Formulas, SmoothForms
+from polycorner.intervals.tapes import Box, needed
 from polycorner.kinds import checked
+from polycorner.minimisation.parametric import lifted_family
 from polycorner.minimisation.problem import Problem, pose
+from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.proofs.arguments import check_parameters
+from polycorner.proofs.invariance import Generator, annihilated, generators, translations
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
 from polycorner.proofs.lists.listing import listed
 from polycorner.proofs.lists.multiples import pieces, without_multiples
-from polycorner.proofs.lists.parameters import with_parameters
-from polycorner.proofs.lists.quotients import unreached
+from polycorner.proofs.lists.operators import BITS
 from polycorner.proofs.lists.search import Search
 from polycorner.proofs.lists.stationary import StationaryList
 from polycorner.proofs.lists.stores import Store
 from polycorner.proofs.lists.unions import united
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     import os
 
     from polycorner.minimisation.problem import Energy
-    from polycorner.proofs.parameter_boxes import Interval
 
+Interval = tuple[float, float]
 S = TypeVar("S", bound=Search)
 RESOLUTION = 1e-6
 MOST_BOXES = 10_000_000
+
+
+def with_parameters(
+    problem: Problem,
+    found: Domain,
+    symmetry: Symmetry | None,
+    sides: Mapping[str, Interval],
+) -> tuple[Problem, Domain, Symmetry | None]:
+    """Return problem, domain and symmetry with some parameters as additional coordinates.
+
+    Raises
+    ------
+    ValueError
+        If a parameter has the name of a coordinate.
+    """
+    d, names = problem.polyhedron, tuple(sides)
+    taken = [name for name in names if name in d.manifold.names]
+    if taken:
+        checks.refuse("parameters", "names that no coordinate has", ", ".join(taken))
+    extended = d.manifold * Manifold(names, (math.inf,) * len(names))
+    functions = [_lifted(f, extended, frozenset(names)) for f in problem.functions]
+    m = problem.inequalities
+    everything = pose(
+        Polyhedron(extended, _tree(d.tree, functions[:m]), functions[m:-1]), functions[-1]
+    )
+    n, ends = d.manifold.size, np.array(list(sides.values()))
+    lower, upper = (np.r_[side, ends[:, k]] for k, side in enumerate((found.lower, found.upper)))
+    places = tuple(range(n, n + len(names)))
+    return everything, Domain(extended, lower, upper, places), _extended(symmetry, n, len(names))
+
+
+def _lifted(f: SmoothFunction, manifold: Manifold, chosen: frozenset[str]) -> SmoothFunction:
+    family = lifted_family(f.family, frozenset({f.member_name}), chosen)
+    own = tuple(p for p in f.family.parameters if p in chosen)
+    values = dict(zip(f.family.parameters, f.parameters, strict=True))
+    return SmoothFunction.member(
+        family,
+        f.member_name,
+        manifold,
+        parameters=[values[p] for p in family.parameters],
+        reads=[*(manifold.names[i] for i in f.reads), *own],
+        label=f.name,
+    )
+
+
+def _tree(tree: Any, functions: "list[SmoothFunction]") -> Any:
+    if isinstance(tree, int):
+        return functions[tree]
+    kind = AnyOf if tree.union else AllOf
+    return kind(*[_tree(child, functions) for child in tree.children])
+
+
+def _extended(symmetry: Symmetry | None, n: int, count: int) -> Symmetry | None:
+    if symmetry is None:
+        return None
+
+    def carried(apply: Any) -> Any:
+        def moved(q: Array) -> Array:
+            return np.concatenate([np.asarray(apply(q[..., :n])), q[..., n:]], axis=-1)
+
+        return moved
+
+    elements = tuple(Element(carried(e.apply), e.names) for e in symmetry.elements)
+    fields = [f if isinstance(f, Mapping) else [*f, *[0] * count] for f in symmetry.fields]
+    return Symmetry(fields=fields, elements=elements)
+
+
+def unreached(formulas: Formulas, domain: Domain, fields: Sequence[object]) -> list[int]:
+    """Return the fixed coordinates whose values not every orbit is shown to reach.
+
+    Parameters
+    ----------
+    formulas : Formulas
+        All functions of the problem.
+    domain : Domain
+    fields : sequence of vector fields
+        Declared symmetries; translations are found without being declared.
+    """
+    left = list(domain.fixed)
+    if not left:
+        return left
+    everything = SmoothForms(formulas.graph, formulas.outputs, formulas.dimension, formulas.inputs)
+    with precision(BITS):
+        known = [f for f in generators(domain.manifold, fields) if all(annihilated(everything, f))]
+        known += generators(domain.manifold, translations(everything))
+        complete = [f for f in known if _is_complete(f)]
+        done: list[int] = []
+        while left:
+            rows = [_constants(f, domain, done) for f in complete]
+            new = next((j for j in left if _moves(rows, done, j)), None)
+            if new is None:
+                break
+            done.append(new)
+            left.remove(new)
+    return left
+
+
+def _constants(field: Generator, domain: Domain, done: Sequence[int]) -> Array:
+    """Return the components that are constant where some coordinates are fixed, NaN for others."""
+    hull = [ball(0, math.inf)] * domain.manifold.dimension
+    for i in done:
+        hull[i] = ball(float(domain.lower[i]))
+    found = field.bounds(hull)
+    return np.array([float(x) if x.is_finite() and x.rad() == 0 else math.nan for x in found])
+
+
+def _moves(rows: Sequence[Array], done: Sequence[int], new: int) -> bool:
+    """Whether a combination of rows is 0 along ``done`` and not along ``new``."""
+    usable = [row[[*done, new]] for row in rows if np.isfinite(row[[*done, new]]).all()]
+    if not usable:
+        return False
+    matrix = np.array(usable)
+    return _rank(matrix) > _rank(matrix[:, :-1])
+
+
+def _rank(matrix: Array) -> int:
+    return int(np.linalg.matrix_rank(matrix, rtol=DEFAULT.alike)) if matrix.size else 0
+
+
+def _is_complete(field: Generator) -> bool:
+    """Whether the derivatives of the components are bounded, without branches."""
+    formulas = field.formulas
+    nodes = needed(formulas.graph, formulas.outputs)
+    if any(formulas.graph.nodes[a][0] == "select" for a in nodes):
+        return False
+    forms = SmoothForms(formulas.graph, formulas.outputs, formulas.dimension, formulas.inputs)
+    _, slopes = forms.evaluate(Box([ball(0, math.inf)] * formulas.dimension), 1)
+    return all(x.is_finite() for row in slopes for x in row)
 
 
 @checked

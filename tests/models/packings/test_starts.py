@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from polycorner.models import PeriodicPacking
-from polycorner.models.packings.starts import decompressed, excess
+from polycorner.models.packings.periodic import decompressed, excess
 
 
 def contacts(centres, radii, box):

@@ -9,9 +9,9 @@ import sympy
 
 from polycorner import Manifold, Polyhedron
 from polycorner.proofs import stationary_points
+from polycorner.proofs.lists.attempts import Screen
 from polycorner.proofs.lists.candidates import newton
 from polycorner.proofs.lists.enumeration import begun
-from polycorner.proofs.lists.screening import Screen
 from polycorner.proofs.lists.search import CHUNKS, LEAST, Search
 
 PLANE = Manifold.euclidean("x y")
