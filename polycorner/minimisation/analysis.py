@@ -34,8 +34,10 @@ from polycorner.polyhedra.cones import (
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
-# Distances, in scale units, at which lower points are sought where a gradient vanishes.
+# Distances, in scale units, at which lower points are sought where a gradient vanishes: those that
+# are not lost in how far the point may be off.
 DISTANCES = 10.0 ** np.arange(-5, 0)
 UNRESOLVED = "at the corner of the active functions beside it, their gradients may be dependent"
 BLIND = "a function whose gradient vanishes may forbid these directions"
@@ -54,8 +56,7 @@ DECISIVE = (
 def analyse(
     problem: Problem,
     q: Array,
-    tolerance: float,
-    rank_tolerance: float,
+    tolerances: Tolerances,
     *,
     higher: Higher = "series",
 ) -> Analysis:
@@ -67,14 +68,15 @@ def analyse(
     is no evidence: it may change very slowly.
     """
     values, gradients, hessians = problem.evaluate(q, 2)
-    local = Local(problem, q, values, gradients, hessians, tolerance, rank_tolerance, higher)
-    pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerance)
+    local = Local(problem, q, values, gradients, hessians, tolerances, higher)
+    pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerances.zero)
     if not pieces:
         return _without_conditions(local, Verdict.OUTSIDE, "")
     if not np.isfinite(values[-1]):
         reason = f"{problem.energy.name} has no finite value there"
         return _without_conditions(local, Verdict.DOMAIN_EDGE, reason)
-    reason = obstacle(problem, q, gradients, hessians, frozenset().union(*pieces))
+    active = frozenset[int]().union(*pieces)
+    reason = obstacle(problem, q, gradients, hessians, active, tolerances)
     if reason:
         return _without_conditions(local, Verdict.NOT_SMOOTH, reason)
     analyses = [_analyse_piece(local, piece) for piece in pieces]
@@ -102,7 +104,7 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     blind = _blind(local, active)
     seen = [i for i in range(len(gradients)) if i not in blind]
     kept = sum(1 for i in seen if i < k)
-    rows = Rows(gradients[seen] if blind else gradients, local.rank_tolerance)
+    rows = Rows(gradients[seen] if blind else gradients, local.tolerances.rank)
     level = unresolved(local, [numbers[i] for i in seen], rows)
     if level:
         exact = None if settled else corner(local, active)
@@ -110,20 +112,21 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
             return _analyse_piece(exact, piece, settled=True)
         sizes = np.linalg.norm(gradients[seen], axis=1)
         gradients[seen] = rows.truncated(level) * sizes[:, None]
-        rows = Rows(gradients[seen], local.rank_tolerance)
+        rows = Rows(gradients[seen], local.tolerances.rank)
     slope = local.gradients[-1]
-    most = 0.1 * float(np.linalg.norm(slope)) / local.rank_tolerance + small
-    multipliers = find_multipliers(rows, kept, slope, small, most)
+    most = 0.1 * float(np.linalg.norm(slope)) / local.tolerances.rank + small
+    multipliers = find_multipliers(rows, kept, slope, small, most, local.tolerances.dependent)
     left = slope - multipliers.values @ rows.units
     multipliers = multipliers.spread(seen, len(gradients)) if blind else multipliers
     values = multipliers.values[:k]
     strong = [i for i in seen if i >= k or abs(values[i]) > small]
     weak = tuple(active[i] for i in seen if i < k and abs(values[i]) <= small)
-    face = rows if len(strong) == len(seen) else Rows(gradients[strong], local.rank_tolerance)
+    face = rows if len(strong) == len(seen) else Rows(gradients[strong], local.tolerances.rank)
     hessian = _lagrangian_hessian(local, active, gradients, multipliers)
-    small_curvature = local.tolerance * max(local.reference, float(abs(hessian).max()))
+    small_curvature = local.tolerances.curvature * max(local.reference, float(abs(hessian).max()))
     weak_rows = local.gradients[list(weak)]
-    curvature = find_curvature(hessian, face.null_space, weak_rows, small_curvature, left)
+    reach = local.tolerances.zero / 10
+    curvature = find_curvature(hessian, face.null_space, weak_rows, small_curvature, left, reach)
     if not weak and np.isfinite(hessian).all():
         curvature = steady(
             local, active, gradients, multipliers, curvature, NEARLY_FLAT * small_curvature
@@ -178,7 +181,7 @@ def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:
     numbers = [*active, *local.sections]
     sizes = abs(local.gradients[numbers]).max(axis=1, initial=0.0)
     bends = abs(local.hessians[numbers]).max(axis=(1, 2), initial=0.0)
-    return tuple(np.flatnonzero(sizes <= OPEN * local.tolerance * bends).tolist())
+    return tuple(np.flatnonzero(sizes <= OPEN * local.tolerances.zero * bends).tolist())
 
 
 def _with_blind(a: Analysis) -> Analysis:
@@ -204,7 +207,8 @@ def _leads_down(a: Analysis, way: Array) -> bool:
     local, k = a.local, len(a.active)
     if any(i >= k for i in a.blind) or len(a.gradients) > k:
         return False
-    points = local.point + DISTANCES[:, None] * way * local.problem.scales
+    seen = DISTANCES[DISTANCES >= local.tolerances.near / 10]
+    points = local.point + seen[:, None] * way * local.problem.scales
     values, gradients = local.problem.evaluate(points, 1)
     kept = [row for i, row in enumerate(a.active) if i not in a.blind]
     vanishing = [a.active[i] for i in a.blind]
@@ -224,10 +228,10 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
         if not without(flat, still).shape[1]:
             return symmetric(flat)
     held, values, exact = strong, a.multipliers.values, not a.blind
-    if rank(a.gradients[strong], local.rank_tolerance) < len(strong):
+    if rank(a.gradients[strong], local.tolerances.rank) < len(strong):
         held, values = _basic_multipliers(a, strong)
         hessian, exact = _hessian_with(local, numbers, a.gradients, values), False
-        tangent = Rows(a.gradients[held], local.rank_tolerance).null_space
+        tangent = Rows(a.gradients[held], local.tolerances.rank).null_space
         curvature = find_curvature(hessian, tangent, local.gradients[[]], a.small_curvature)
         left = abs(local.gradients[-1] - values @ unit_rows(a.gradients)).max()
         if curvature.least < -a.small_curvature or a.weak or left > local.small:
@@ -239,6 +243,7 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
     return decide(
         Situation(
             problem=local.problem,
+            tolerances=local.tolerances,
             point=local.point,
             piece=piece,
             rows=tuple(numbers[i] for i in held),
@@ -277,10 +282,10 @@ def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array
 
     k, units, slope = len(a.active), unit_rows(a.gradients), a.local.gradients[-1]
     equations = [i for i in strong if i >= k]
-    chosen = independent_rows(units[equations], a.local.rank_tolerance)
-    along = null_space(units[equations], a.local.rank_tolerance)
+    chosen = independent_rows(units[equations], a.local.tolerances.rank)
+    along = null_space(units[equations], a.local.tolerances.rank)
     rates = units @ along
-    others = [i for i in strong if i < k and np.linalg.norm(rates[i]) > a.local.rank_tolerance]
+    others = [i for i in strong if i < k and np.linalg.norm(rates[i]) > a.local.tolerances.rank]
     shares = (
         nnls(rates[others].T, slope @ along)[0] if others and along.size else [0.0] * len(others)
     )
@@ -320,7 +325,7 @@ def _verdict(
         regular = rows.independent
         if not regular and k:
             _, rate = inward_direction(rows.units[:k], rows.units[k:])
-            regular = rate > local.rank_tolerance
+            regular = rate > local.tolerances.rank
         return Verdict.NOT_STATIONARY if regular else Verdict.NO_MULTIPLIER
     if curvature.decided and curvature.least < -small_curvature:
         # Other multipliers may prove a minimum where they are not unique.
@@ -336,9 +341,9 @@ def _independent_positions(
     """Return positions of strongly active functions with independent gradients, greedily."""
     sections = [i for i in seen if i >= k]
     chosen: list[int] = []
-    reached = rank(gradients[sections], local.rank_tolerance)
+    reached = rank(gradients[sections], local.tolerances.rank)
     for i in positive.tolist():
-        if rank(gradients[[*chosen, i, *sections]], local.rank_tolerance) > reached:
+        if rank(gradients[[*chosen, i, *sections]], local.tolerances.rank) > reached:
             chosen.append(i)
             reached += 1
     return tuple(chosen)

@@ -24,13 +24,7 @@ from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.sparse_analysis import SparseAnalysis, analyse_sparse
 from polycorner.minimisation.sparse_explanation import sparse_explanation, sparse_sheet
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
-from polycorner.polyhedra.strata import (
-    RANK_TOLERANCE,
-    TOLERANCE,
-    Stratum,
-    check_tolerance,
-    stratum_at,
-)
+from polycorner.polyhedra.strata import Stratum, stratum_at
 from polycorner.printing import (
     Printed,
     Sheet,
@@ -44,6 +38,7 @@ from polycorner.printing import (
     units,
 )
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
@@ -100,10 +95,15 @@ class Certificate(Checked, Printed):
         object.__setattr__(self, "point", point)
 
     @cached_property
+    def tolerances(self) -> Tolerances:
+        """All numbers that belong to the two tolerances."""
+        return Tolerances.of(self.tolerance, self.rank_tolerance)
+
+    @cached_property
     def found(self) -> Analysis | SparseAnalysis:
         """First and second order at the point, with sparse matrices for a large polyhedron."""
         if self.problem.is_sparse:
-            return analyse_sparse(self.problem, self.point, self.tolerance, self.rank_tolerance)
+            return analyse_sparse(self.problem, self.point, self.tolerances)
         return self.analysis
 
     @cached_property
@@ -112,7 +112,7 @@ class Certificate(Checked, Printed):
         if self.problem.is_sparse:
             msg = "analysis: expected a small polyhedron; full matrices of this one are too large"
             raise ValueError(msg)
-        return analyse(self.problem, self.point, self.tolerance, self.rank_tolerance)
+        return analyse(self.problem, self.point, self.tolerances)
 
     @property
     def energy(self) -> float:
@@ -342,8 +342,7 @@ def certify(
     >>> c.verdict.name, c.multipliers, c.signature
     ('STRICT_MINIMUM', {'floor': 1.0}, (1, 1, 0))
     """
-    check_tolerance("tolerance", tolerance)
-    check_tolerance("rank_tolerance", rank_tolerance)
+    Tolerances.of(tolerance, rank_tolerance)  # whatever else is wrong, these are refused first
     problem = pose(polyhedron, energy)
     point = polyhedron.manifold.point(q)
     problem.check_energy(point, "q")

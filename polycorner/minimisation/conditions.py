@@ -8,7 +8,7 @@ coordinates, the conditions are those of [NW] ch. 12:
   ``{a_i d = 0 where lam_i > 0, a_i d >= 0 where lam_i = 0, e_j d = 0}``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,10 +17,6 @@ from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.polyhedra.cones import Rows, linear_programme, unit_rows
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
-
-# No curvature is trusted at which Newton's step, what is left of the gradient over the curvature,
-# is longer than this, in scale units: at a degenerate point nearby, both vanish.
-REACHED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +33,8 @@ class Multipliers(Value):
         Whether the conditions of first order hold with these values.
     residual : float
         Largest component of ``g - sum lam_i a_i``.
+    unique : bool
+        Whether there are no others.
     """
 
     values: Array
@@ -44,17 +42,13 @@ class Multipliers(Value):
     upper: Array
     exist: bool
     residual: float
-
-    @property
-    def unique(self) -> bool:
-        """Whether the multipliers are unique."""
-        return bool((self.upper - self.lower <= 1e-7 * (1 + abs(self.values).max(initial=0))).all())
+    unique: bool
 
     def spread(self, positions: list[int], count: int) -> "Multipliers":
         """Return these as multipliers of ``count`` functions, zero for all others."""
         whole = np.zeros((3, count))
         whole[:, positions] = self.values, self.lower, self.upper
-        return Multipliers(whole[0], whole[1], whole[2], self.exist, self.residual)
+        return replace(self, values=whole[0], lower=whole[1], upper=whole[2])
 
     def complementary(self, away: Array, small: float) -> bool:
         """Whether every product of a multiplier and its scaled gap is small."""
@@ -63,7 +57,9 @@ class Multipliers(Value):
         return bool((abs(self.values[: len(away)] * away) <= small).all())
 
 
-def find_multipliers(rows: Rows, k: int, gradient: Array, small: float, most: float) -> Multipliers:
+def find_multipliers(
+    rows: Rows, k: int, gradient: Array, small: float, most: float, dependent: float
+) -> Multipliers:
     """Return multipliers of unit gradients; central ones where they are not unique.
 
     Parameters
@@ -79,17 +75,25 @@ def find_multipliers(rows: Rows, k: int, gradient: Array, small: float, most: fl
     most : float
         Largest size accepted for multipliers of dependent gradients: next to a cusp, huge
         multipliers exist only because the gradients are not exactly dependent.
+    dependent : float
+        Relative range of multipliers up to which they are unique.
     """
     values = rows.weights(gradient) if len(rows.units) else np.empty(0)
     if rows.independent:
         residual = float(abs(gradient - values @ rows.units).max(initial=0))
         exist = residual <= small and bool((values[:k] >= -small).all())
-        return Multipliers(values, values, values, exist, residual)
-    return _central_multipliers(rows, k, gradient, values, small, most)
+        return Multipliers(values, values, values, exist, residual, unique=True)
+    return _central_multipliers(rows, k, gradient, values, small, most, dependent)
 
 
 def _central_multipliers(
-    rows: Rows, k: int, gradient: Array, least: Array, small: float, most: float
+    rows: Rows,
+    k: int,
+    gradient: Array,
+    least: Array,
+    small: float,
+    most: float,
+    dependent: float,
 ) -> Multipliers:
     """Decide existence for dependent gradients by non-negative least squares; find the ranges."""
     from scipy.optimize import nnls
@@ -100,11 +104,12 @@ def _central_multipliers(
     values[k:] -= split[len(units) :]
     residual = float(abs(gradient - values @ units).max())
     if distance > small or abs(values).max() > most:
-        return Multipliers(least, least, least, exist=False, residual=residual)
+        return Multipliers(least, least, least, exist=False, residual=residual, unique=True)
     lower, upper, centre = _ranges(rows.relations, k, values)
     if abs(gradient - centre @ units).max() > max(small, residual):
         centre = values  # over so long a way, nearly dependent rows are not dependent
-    return Multipliers(centre, lower, upper, exist=True, residual=residual)
+    unique = bool((upper - lower <= dependent * (1 + abs(centre).max())).all())
+    return Multipliers(centre, lower, upper, exist=True, residual=residual, unique=unique)
 
 
 def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
@@ -158,20 +163,28 @@ class Curvature(Value):
 
 
 def find_curvature(
-    hessian: Array, basis: Array, weak: Array, small: float, left: Array | None = None
+    hessian: Array,
+    basis: Array,
+    weak: Array,
+    small: float,
+    left: Array | None = None,
+    reach: float = 0.0,
 ) -> Curvature:
     """Minimise the form of ``hessian`` on ``{d in span(basis), weak d >= 0, |d| = 1}``.
 
     Without weak rows the least value is the least eigenvalue on the null space.  With them the
     sign of the least value is that of the form's copositivity on the cone's extreme rays; see
     :mod:`~polycorner.minimisation.copositivity`.
+
+    Where it is given what is left of the gradient, no curvature is trusted at which Newton's step,
+    the one over the other, is longer than ``reach``: at a degenerate point nearby, both vanish.
     """
     values, inner = np.linalg.eigh(basis.T @ hessian @ basis)
     vectors = basis @ inner
     if not len(weak):
         level = (values >= -small) & (values <= NEARLY_FLAT * small)
         if left is not None and len(values):
-            level |= (values > 0) & (abs(left @ vectors) > REACHED * values)
+            level |= (values > 0) & (abs(left @ vectors) > reach * values)
         least = float(values[0]) if len(values) else np.inf
         return Curvature(values, vectors, least, vectors[:, level], decided=True)
     if len(values) and values[0] > NEARLY_FLAT * small:

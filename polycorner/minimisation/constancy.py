@@ -12,19 +12,18 @@ from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
 RADII = (0.1, 1.0, 10.0, 100.0)  # of random points, in scale units
 POINTS = 16  # at each radius
 FEWEST = 8  # finite gradients of a function from which a symmetry is read
 VANISHING = 1e-150  # relative size of a derivative that is underflow
 SYMMETRIC = 1e-13  # relative size of a derivative that is rounding
-FIRST, LAST = 1e-3, 128.0  # distances followed, in scale units, each twice the one before
+LAST = 128.0  # distance followed, in scale units
 BENT = 0.05  # error of linear prediction, relative to the step, beyond which none is followed
 CONSTANT = 2e-14  # relative change of the energy that counts as rounding
 STEPS = 8  # of Newton's method
-SMALLER = 16  # steps in place of one that may have been a jump, and the distance of equal points
-SAME = 1e-6
-INSIDE = 1e-9  # scaled violation allowed along a locus
+SMALLER = 16  # steps in place of one that may have been a jump
 
 
 @lru_cache(maxsize=256)
@@ -140,6 +139,7 @@ def constancy(
     piece: Piece,
     q: Array,
     face: Face,
+    tolerances: Tolerances,
     *,
     one_sided: bool,
     reference: float,
@@ -157,6 +157,7 @@ def constancy(
     q : (n,) array
     face : Face
         Its ``moving`` directions are followed, and generic mixtures of them.
+    tolerances : Tolerances
     one_sided : bool
         Whether only the positive sides are followed.
     reference : float
@@ -174,7 +175,7 @@ def constancy(
     for w in weights:
         far = 0.0
         for side in [w] if one_sided else [w, -w]:
-            distance, moved = _followed(problem, piece, q, face, side, reference)
+            distance, moved = _followed(problem, piece, q, face, side, tolerances, reference)
             far, change = max(far, distance), max(change, moved)
             if distance < least or (least and change > CONSTANT):
                 return Constancy(distance, change, followed=False)
@@ -184,7 +185,13 @@ def constancy(
 
 
 def _followed(
-    problem: Problem, piece: Piece, q: Array, face: Face, w: Array, reference: float
+    problem: Problem,
+    piece: Piece,
+    q: Array,
+    face: Face,
+    w: Array,
+    tolerances: Tolerances,
+    reference: float,
 ) -> tuple[float, float]:
     """Return the distance followed in one direction, and the largest relative change."""
     start = q / problem.scales
@@ -195,7 +202,7 @@ def _followed(
         return 0.0, 0.0
     level = float(problem.energy.value(state[: len(q)] * problem.scales))
     size = abs(level) + reference
-    reach, change, t = 0.0, 0.0, FIRST
+    reach, change, t = 0.0, 0.0, tolerances.beside
     while t <= LAST:
         step = t - reach
         guess = state + step * tangent
@@ -203,23 +210,23 @@ def _followed(
         if found is None or abs((found - guess)[: len(q)]).max() > BENT * step:
             break
         values, gradients = problem.evaluate(found[: len(q)] * problem.scales, 1)
-        if not _is_inside(piece, problem.inequalities, values, gradients):
+        if not _is_inside(piece, problem.inequalities, values, gradients, tolerances.zero / 10):
             break
         pull = gradients[-1] - found[len(q) :] @ gradients[list(face.rows)]
         slope = abs(face.moving.T @ pull).max()
         moved = max(abs(values[-1] - level) / (1 + t) ** 2, slope / (1 + t))
-        if moved > CONSTANT * size and not _leads_to(
-            found, problem, face, start, w, state, reach, t
-        ):
-            break
+        if moved > CONSTANT * size:
+            there = _in_small_steps(problem, face, start, w, state, reach, t)
+            same = tolerances.same * (1 + abs(found).max())
+            if there is None or not abs(there - found).max() <= same:
+                break  # the long step was a jump elsewhere
         change = max(change, float(moved) / size)
         tangent = (found - state) / step
         state, reach, t = found, t, 2 * t
     return reach, change
 
 
-def _leads_to(
-    found: Array,
+def _in_small_steps(
     problem: Problem,
     face: Face,
     start: Array,
@@ -227,8 +234,8 @@ def _leads_to(
     state: Array,
     begin: float,
     end: float,
-) -> bool:
-    """Whether small steps arrive at the same point, so that a long one was no jump elsewhere."""
+) -> Array | None:
+    """Return where small steps arrive; None where they jump, too."""
     before = here = state
     for t in np.linspace(begin, end, SMALLER + 1)[1:]:
         guess = 2 * here - before
@@ -236,14 +243,16 @@ def _leads_to(
         if there is None or (
             here is not before and abs(there - guess).max() > BENT * abs(there - here).max()
         ):
-            return False
+            return None
         before, here = here, there
-    return bool(abs(here - found).max() <= SAME * (1 + abs(found).max()))
+    return here
 
 
-def _is_inside(piece: Piece, inequalities: int, values: Array, gradients: Array) -> bool:
+def _is_inside(
+    piece: Piece, inequalities: int, values: Array, gradients: Array, miss: float
+) -> bool:
     away = distances(values[:-1], gradients[:-1])
-    held = (away[sorted(piece)] >= -INSIDE).all() and (abs(away[inequalities:]) <= INSIDE).all()
+    held = (away[sorted(piece)] >= -miss).all() and (abs(away[inequalities:]) <= miss).all()
     return bool(np.isfinite(values).all() and held)
 
 

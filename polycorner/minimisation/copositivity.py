@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from polycorner.polyhedra.cones import Rows, extreme_rays
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 MAX_RAYS = 14  # of a cone on which a form is decided, at the cost of 2^14 small eigenproblems
-DEFINITE = 1e-12  # relative size of an eigenvalue that counts as positive
 
 
 def simplex_minimisers(form: Array, nearly: float = 0.0) -> tuple[Array, Array]:
@@ -31,7 +31,8 @@ def simplex_minimisers(form: Array, nearly: float = 0.0) -> tuple[Array, Array]:
     """
     k = len(form)
     points, values = [np.eye(k)], [np.diag(form)]
-    firm = max(DEFINITE * abs(form).max(initial=0.0), k * nearly)  # |sum x_i r_i|^2 <= k |x|^2
+    definite = 10 * DEFAULT.rounding * abs(form).max(initial=0.0)
+    firm = max(definite, k * nearly)  # |sum x_i r_i|^2 <= k |x|^2
     if k > 1 and np.linalg.eigvalsh(form)[0] > firm:
         return points[0], values[0]  # definite: positive on all of the orthant
     for size in range(2, k + 1):
@@ -55,7 +56,7 @@ def _inner_minimisers(forms: Array) -> tuple[Array, Array]:
     m = forms.shape[1]
     across = np.linalg.svd(np.ones((1, m)))[2][1:].T  # orthonormal, of sum zero
     values, vectors = np.linalg.eigh(across.T @ forms @ across)
-    regular = values[:, 0] > DEFINITE * abs(forms).max(axis=(1, 2))
+    regular = values[:, 0] > 10 * DEFAULT.rounding * abs(forms).max(axis=(1, 2))
     pull = (forms.sum(axis=2) / m) @ across
     weights = np.einsum("nij,ni->nj", vectors, pull) / np.where(regular[:, None], values, 1.0)
     x = 1.0 / m - np.einsum("nij,nj->ni", vectors, weights) @ across.T

@@ -36,8 +36,6 @@ from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.spaces.manifold import Array
 
-CLIMBS = 1e-6  # relative rate at which a form grows into the cone from an isolated zero
-
 
 def decide(s: Situation) -> Decision:
     """Decide a point whose second order vanishes; undecided where mathematics here cannot."""
@@ -71,7 +69,13 @@ def _stays(s: Situation, found: Decision) -> bool:
         if (gradients @ way >= -1e-9).all():
             face = s.face((), way[:, None])
             if constancy(
-                s.problem, s.piece, s.point, face, one_sided=True, reference=s.reference
+                s.problem,
+                s.piece,
+                s.point,
+                face,
+                s.tolerances,
+                one_sided=True,
+                reference=s.reference,
             ).holds:
                 return True
     return False
@@ -80,11 +84,11 @@ def _stays(s: Situation, found: Decision) -> bool:
 def _decide_rays(s: Situation, basis: Array) -> Decision | None:
     """Decide along zeros that are isolated rays; None where they are not."""
     gradients = unit_rows(s.problem.evaluate(s.point, 1)[1][list(s.weak)])
-    lines, rays, simplicial = cone_rays(gradients @ basis, 1e-6)
+    lines, rays, simplicial = cone_rays(gradients @ basis, s.tolerances.rank)
     if not simplicial or not s.flat.shape[1]:
         return None
     rays = basis @ rays
-    size = max(1e-300, float(abs(s.hessian).max()))
+    least = 100 * s.tolerances.curvature * max(1e-300, float(abs(s.hessian).max()))
     parts = []
     for way in s.flat.T:
         shut = gradients @ way <= 1e-7
@@ -94,7 +98,7 @@ def _decide_rays(s: Situation, basis: Array) -> Decision | None:
         closed = tuple(row for row, tight in zip(s.weak, shut, strict=True) if tight)
         inner = s.tangent(s.rows + closed)
         levels = np.linalg.eigvalsh(inner.T @ s.hessian @ inner)
-        if (climbs <= CLIMBS * size).any() or (levels <= s.nearly).sum() != 1:
+        if (climbs <= least).any() or (levels <= s.nearly).sum() != 1:
             return None
         if lines.shape[1] and abs(way @ basis @ lines).max() > 1 - 1e-9:
             return None
@@ -147,7 +151,7 @@ def _decide_opened(s: Situation) -> Decision:
     """Decide with the weak functions as variables that are not negative."""
     rows = s.rows + s.weak
     gradients = s.problem.evaluate(s.point, 1)[1][list(rows)]
-    if np.linalg.matrix_rank(unit_rows(gradients), tol=1e-6) < len(rows):
+    if np.linalg.matrix_rank(unit_rows(gradients), tol=s.tolerances.rank) < len(rows):
         return no_decision(s, "weakly active functions depend on each other")
     inner = s.tangent(rows)
     values, vectors = np.linalg.eigh(inner.T @ s.hessian @ inner)
@@ -159,7 +163,7 @@ def _decide_opened(s: Situation) -> Decision:
     germ = reduce_energy(s.problem, s.point, s.hessian, face, order_for(face.variables))
     if germ is None:
         return no_decision(s, "the conditions across these directions are singular")
-    found = classify(germ, len(s.weak), s.small, s.near(face))
+    found = classify(germ, len(s.weak), s.small, s.near(face), s.tolerances.same)
     if found.sign is Sign.ZERO and not len(found.zeros):
         unit = np.linalg.lstsq(germ.points[:, 1 : 1 + face.variables], s.flat, rcond=1e-9)[0].T
         unit = np.where(abs(unit) <= 1e-7 * abs(unit).max(axis=1)[:, None], 0.0, unit)

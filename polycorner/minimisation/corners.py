@@ -24,11 +24,11 @@ def corner(local: Local, active: tuple[int, ...]) -> Local | None:
     q, steps = local.point, []
     for _ in range(NEWTON):
         values, gradients = local.problem.evaluate(q, 1)
-        step = np.linalg.lstsq(gradients[numbers], values[numbers], rcond=local.rank_tolerance)[0]
+        step = np.linalg.lstsq(gradients[numbers], values[numbers], rcond=local.tolerances.rank)[0]
         q = q - step * scales
         steps.append(float(abs(step).max()))
     size = ROUNDING * (1.0 + float(abs(q / scales).max()))
-    if not (size < steps[0] <= OPEN * local.tolerance and steps[-1] <= size):
+    if not (size < steps[0] <= OPEN * local.tolerances.zero and steps[-1] <= size):
         return None
     values, gradients, hessians = local.problem.evaluate(q, 2)
     return replace(local, point=q, values=values, gradients=gradients, hessians=hessians)

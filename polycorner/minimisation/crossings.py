@@ -13,7 +13,6 @@ from polycorner.spaces.manifold import Array
 from polycorner.values import Checked
 
 NEWTON = 40  # steps, at most
-CLOSE = 1e-8  # relative size of a step after which one more is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,7 @@ def crossing(
         if last:
             named = dict(zip(lifted.names, lam.tolist(), strict=True))
             return Crossing(s, wrap(q), certificate.analysis.stated(named))
-        last = max(abs(du).max(), abs(ds / (s or 1.0))) < CLOSE
+        last = max(abs(du).max(), abs(ds / (s or 1.0))) < certificate.tolerances.settled
     return None
 
 

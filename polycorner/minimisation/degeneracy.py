@@ -35,14 +35,12 @@ from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 from polycorner.values import Value
 
 ORDERS = {1: 16, 2: 10, 3: 8, 4: 6}  # degree of the series by its number of variables
 ORDER, MOST = 4, 12  # the degree beyond, and the most variables
-REGULAR = 1e-6  # distance in scale units by which a point may be missed that is not degenerate
 FAR = 0.5  # distance in scale units over which constancy suffices in brief
-FALLS = 1e-12  # relative fall of the energy that is seen
-FEASIBLE = 1e-9  # scaled violation that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +49,8 @@ class Situation(Value):
 
     Attributes
     ----------
-    problem, point, piece
-        The problem, the point, and the inequalities that hold near it.
+    problem, tolerances, point, piece
+        The problem, the tolerances, the point, and the inequalities that hold near it.
     rows : tuple of int
         Strongly active functions with independent gradients, and equations.
     multipliers : (p,) array
@@ -73,6 +71,7 @@ class Situation(Value):
     """
 
     problem: Problem
+    tolerances: Tolerances
     point: Array
     piece: Piece
     rows: tuple[int, ...]
@@ -90,7 +89,9 @@ class Situation(Value):
     def tangent(self, rows: tuple[int, ...]) -> Array:
         """Return an orthonormal basis of the directions tangent to functions."""
         gradients = self.problem.evaluate(self.point, 1)[1]
-        return null_space(gradients[list(rows)], 1e-6) if rows else np.eye(len(self.point))
+        if not rows:
+            return np.eye(len(self.point))
+        return null_space(gradients[list(rows)], self.tolerances.rank)
 
     def near(self, face: Face) -> Array:
         """Return how much each variable of a face may differ within the tolerance of the point."""
@@ -169,6 +170,7 @@ def decide_free(s: Situation, flat: Array) -> Decision:
             s.piece.difference(s.weak),
             s.point,
             face,
+            s.tolerances,
             one_sided=False,
             reference=1e-300,  # where an energy decays, its own size tells that it changes
             least=FAR,
@@ -178,9 +180,8 @@ def decide_free(s: Situation, flat: Array) -> Decision:
     germ = reduce_energy(s.problem, s.point, s.hessian, face, order_for(moving.shape[1]))
     if germ is None:
         return no_decision(s, "the conditions across these directions are singular")
-    return concluded(
-        s, face, germ, classify(germ, 0, s.small, s.near(face)), locus=bool(still.shape[1])
-    )
+    found = classify(germ, 0, s.small, s.near(face), s.tolerances.same)
+    return concluded(s, face, germ, found, locus=bool(still.shape[1]))
 
 
 def symmetric(flat: Array) -> Decision:
@@ -216,7 +217,9 @@ def follow_zeros(face: Face, s: Situation, germ: Germ, found: Signed) -> Decisio
     whole = found.degree == 0 and not half
     ways = [(face, False)] if whole else [(_arc(face, s, germ, z), True) for z in found.zeros]
     seen = [
-        constancy(s.problem, s.piece, s.point, arc, one_sided=side, reference=s.reference)
+        constancy(
+            s.problem, s.piece, s.point, arc, s.tolerances, one_sided=side, reference=s.reference
+        )
         for arc, side in ways
     ]
     together = Constancy(
@@ -235,7 +238,9 @@ def follow_zeros(face: Face, s: Situation, germ: Germ, found: Signed) -> Decisio
 def follow_only(s: Situation, reason: str) -> Decision:
     """Decide without a series, by whether the energy is constant as far as it is followed."""
     face = s.face((), without(s.flat, symmetric_directions(s.problem, s.rows)))
-    seen = constancy(s.problem, s.piece, s.point, face, one_sided=False, reference=s.reference)
+    seen = constancy(
+        s.problem, s.piece, s.point, face, s.tolerances, one_sided=False, reference=s.reference
+    )
     if not seen.holds:
         return no_decision(s, reason)
     reason = f"{reason}; constant to rounding as far as it was followed"
@@ -263,13 +268,14 @@ def falls(s: Situation, germ: Germ, found: Signed) -> bool:
     level = float(
         s.problem.energy.value(germ.point(np.zeros(len(found.direction))) * s.problem.scales)
     )
+    miss, fall = s.tolerances.zero / 10, 10 * s.tolerances.rounding * (abs(level) + s.reference)
     for t in 0.5 ** np.arange(1, 20):
         u = germ.point(t ** np.array(found.weights) * found.direction)
         values, gradients = s.problem.evaluate(u * s.problem.scales, 1)
         away = distances(values[:-1], gradients[:-1])
         m = s.problem.inequalities
-        inside = (away[sorted(s.piece)] >= -FEASIBLE).all() and (abs(away[m:]) <= FEASIBLE).all()
-        if inside and values[-1] < level - FALLS * (abs(level) + s.reference):
+        inside = (away[sorted(s.piece)] >= -miss).all() and (abs(away[m:]) <= miss).all()
+        if inside and values[-1] < level - fall:
             return True
     return False
 
@@ -277,14 +283,14 @@ def falls(s: Situation, germ: Germ, found: Signed) -> bool:
 # --------------------------------------------------------------- zero or not
 
 
-def classify(germ: Germ, half: int, small: float, near: Array) -> Signed:
+def classify(germ: Germ, half: int, small: float, near: Array, same: float) -> Signed:
     """Return the sign of a reduced energy near 0, its first ``half`` variables not negative.
 
     A coefficient counts as zero within the rounding errors propagated to it, and as different
-    from zero only clearly beyond.  The degenerate point may have been missed a little: where all
-    variables are free, the series is moved to the point at which the terms below those that
-    decide vanish.  Otherwise terms decide nothing that would vanish a little further on, at a
-    distance ``near`` in every variable.
+    from zero only clearly beyond.  The degenerate point may have been missed a little, another one
+    by ``same``: where all variables are free, the series is moved to the point at which the terms
+    below those that decide vanish.  Otherwise terms decide nothing that would vanish a little
+    further on, at a distance ``near`` in every variable.
     """
     domain, m = germ.domain, germ.domain.variables
     coefficients, noise = germ.coefficients.copy(), germ.noise
@@ -296,7 +302,7 @@ def classify(germ: Germ, half: int, small: float, near: Array) -> Signed:
         here = domain.degrees == degree
         if not (abs(coefficients[here]) > CLEAR * noise[here]).any():
             continue
-        moved = (coefficients, noise) if half else _centred(germ, degree)
+        moved = (coefficients, noise) if half else _centred(germ, degree, same)
         if moved is None:
             continue
         below = (domain.degrees < degree) & (domain.degrees > 0)
@@ -327,7 +333,7 @@ def _sign(germ: Germ, coefficients: Array, noise: Array, half: int, near: Array)
     return found
 
 
-def _centred(germ: Germ, degree: int) -> tuple[Array, Array] | None:
+def _centred(germ: Germ, degree: int, same: float) -> tuple[Array, Array] | None:
     """Move a series to where the terms of one degree less vanish; None where that is far."""
     domain, m = germ.domain, germ.domain.variables
     coefficients, noise = germ.coefficients, germ.noise
@@ -340,7 +346,7 @@ def _centred(germ: Germ, degree: int) -> tuple[Array, Array] | None:
         slopes = np.array([domain.derivative(form, i)[lower] for i in range(m)]).T
         move = np.linalg.lstsq(slopes, -coefficients[lower], rcond=1e-8)[0]
         total += move
-        if abs(total).max() > (REGULAR if degree == 2 else MOVE):
+        if abs(total).max() > (same if degree == 2 else MOVE):
             return None
         inverse = np.linalg.pinv(slopes, rcond=1e-8)
         unsure = abs(inverse) @ noise[lower]

@@ -20,15 +20,13 @@ from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.printing import names, number
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
-NEAR = 1e-5  # distance up to which an edge ahead is that at which a search has ended, scale units
 SHORTEST = 1e-18  # length at which looking ahead starts, relative to the point's size
-BESIDE = 1e-9  # distance, in scale units, at which a formula is not defined beside an edge
 HALVINGS = 12
 # Ratios of successive differences of the energy: below the first they have a sum, beyond the second
 # they do not shrink.
 SHRINKING, LASTING = 0.95, 1 - 1e-6
-ALLOWED = 1e-8  # scaled violation up to which a point ahead still counts as one of the set
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +38,9 @@ class DomainEdge:
 
 
 @np.errstate(all="ignore")
-def domain_edge(problem: Problem, piece: Piece, q: Array) -> DomainEdge | None:
+def domain_edge(
+    problem: Problem, piece: Piece, q: Array, tolerances: Tolerances
+) -> DomainEdge | None:
     """Return the edge of a domain at which a search has ended, or None where there is none."""
     rows = [*sorted(piece), *range(problem.inequalities, problem.rows)]
     values, gradients, hessians = problem.evaluate(q, 2)
@@ -52,9 +52,10 @@ def domain_edge(problem: Problem, piece: Piece, q: Array) -> DomainEdge | None:
     for derivative, which in ((gradients, "first"), (hessians, "second")):
         rough = [row for row in rows if not np.isfinite(derivative[row]).all()]
         if rough:
-            return _at_edge(problem, q, rough, which) if _is_beside(problem, rows, q) else None
-    for way in _ways_down(problem, rows, values, gradients):
-        found = _ahead(problem, rows, q, way)
+            edge = _is_beside(problem, rows, q, tolerances.zero / 10)
+            return _at_edge(problem, q, rough, which) if edge else None
+    for way in _ways_down(problem, rows, values, gradients, tolerances.zero):
+        found = _ahead(problem, rows, q, way, tolerances)
         if found is not None:
             return found
     return None
@@ -68,19 +69,19 @@ def _at_edge(problem: Problem, q: Array, rows: list[int], which: str) -> DomainE
     return DomainEdge(q, note)
 
 
-def _is_beside(problem: Problem, rows: list[int], q: Array) -> bool:
+def _is_beside(problem: Problem, rows: list[int], q: Array, distance: float) -> bool:
     """Whether a function is not defined at a point beside ``q``."""
-    steps = BESIDE * np.maximum(abs(q), problem.scales) * np.eye(len(q))
+    steps = distance * np.maximum(abs(q), problem.scales) * np.eye(len(q))
     around = problem.evaluate(q + np.concatenate([steps, -steps]), 0)[0]
     return not bool(np.isfinite(around[:, rows]).all())
 
 
 def _ways_down(
-    problem: Problem, rows: list[int], values: Array, gradients: Array
+    problem: Problem, rows: list[int], values: Array, gradients: Array, closed: float
 ) -> Iterator[Array]:
     """Yield directions in which the energy decreases: freely, and along the contacts."""
     away = distances(values[:-1], gradients[:-1])
-    contacts = [row for row in rows[:-1] if abs(away[row]) <= ALLOWED]
+    contacts = [row for row in rows[:-1] if abs(away[row]) <= closed]
     for held in ([], contacts) if contacts else ([],):
         basis = null_space(gradients[held], 1e-8) if held else np.eye(problem.dimension)
         slope = basis @ (basis.T @ gradients[-1])
@@ -89,15 +90,17 @@ def _ways_down(
             yield -slope / size
 
 
-def _ahead(problem: Problem, rows: list[int], q: Array, way: Array) -> DomainEdge | None:
+def _ahead(
+    problem: Problem, rows: list[int], q: Array, way: Array, tolerances: Tolerances
+) -> DomainEdge | None:
     """Return the edge that lies shortly ahead, if the energy decreases all the way."""
     step = way * problem.scales
     size = max(1.0, float(abs(q / problem.scales).max()))
-    ahead = size * SHORTEST * 2.0 ** np.arange(np.log2(NEAR / SHORTEST))
+    ahead = size * SHORTEST * 2.0 ** np.arange(np.log2(tolerances.corner / SHORTEST))
     level = float(problem.energy.value(q))
     beyond = _is_beyond(problem, rows, q + ahead[:, None] * step, level)
     if not beyond.any():
-        return _pole(problem, rows, q, way)
+        return _pole(problem, rows, q, way, tolerances)
     first = int(beyond.argmax())
     inside, outside = (0.0 if first == 0 else float(ahead[first - 1])), float(ahead[first])
     for _ in range(80):
@@ -107,10 +110,10 @@ def _ahead(problem: Problem, rows: list[int], q: Array, way: Array) -> DomainEdg
     there = problem.evaluate(q + outside * step, 0)[0]
     between = np.linspace(0.0, inside, 17)
     path, slopes = problem.evaluate(q + between[:, None] * step, 1)[:2]
-    if not _stays(problem, rows, path, slopes):
-        return _pole(problem, rows, q, way)
+    if not _stays(problem, rows, path, slopes, tolerances.zero):
+        return _pole(problem, rows, q, way, tolerances)
     edge = q + inside * step
-    text, attained = _approach(problem, edge, step)
+    text, attained = _approach(problem, edge, step, tolerances.corner)
     missing = [row for row in rows if not np.isfinite(there[row])]
     if not missing and attained:
         return None  # a jump, or rounding
@@ -119,7 +122,9 @@ def _ahead(problem: Problem, rows: list[int], q: Array, way: Array) -> DomainEdg
     return DomainEdge(edge if attained else q, note)
 
 
-def _pole(problem: Problem, rows: list[int], q: Array, way: Array) -> DomainEdge | None:
+def _pole(
+    problem: Problem, rows: list[int], q: Array, way: Array, tolerances: Tolerances
+) -> DomainEdge | None:
     """Return a pole of the energy ahead, on both sides of which it falls without bound.
 
     Of ``E = C t^-p`` at the distance ``t``, ``E'/E`` is ``p / t`` and ``E''/E'`` is
@@ -130,13 +135,14 @@ def _pole(problem: Problem, rows: list[int], q: Array, way: Array) -> DomainEdge
     if not (slope < 0 and bend < 0 and values[-1] < 0):
         return None
     inverse = bend / slope - slope / values[-1]
-    if not inverse > 1 / NEAR:
+    if not inverse > 1 / tolerances.corner:
         return None
     step = way * problem.scales
     between = np.linspace(0.0, 0.9 / inverse, 17)
-    if not _stays(problem, rows, *problem.evaluate(q + between[:, None] * step, 1)[:2]):
+    path, slopes = problem.evaluate(q + between[:, None] * step, 1)[:2]
+    if not _stays(problem, rows, path, slopes, tolerances.zero):
         return None
-    text, attained = _approach(problem, q + step / inverse, step)
+    text, attained = _approach(problem, q + step / inverse, step, tolerances.corner)
     if attained:
         return None
     note = f"The search ran to the edge of the domain of {_named(problem, rows[-1:])}; {text}."
@@ -153,21 +159,21 @@ def _named(problem: Problem, rows: list[int]) -> str:
     return names(problem.functions[row].name for row in rows)
 
 
-def _stays(problem: Problem, rows: list[int], values: Array, gradients: Array) -> bool:
+def _stays(problem: Problem, rows: list[int], values: Array, gradients: Array, miss: float) -> bool:
     """Whether points on the way to an edge lie in the set, ever lower."""
     m = problem.inequalities
     energies = values[:, -1]
     noise = 1e-14 * abs(energies[0])
     for point, slopes in zip(values, gradients, strict=True):
         away = distances(point[:-1], slopes[:-1])
-        if any((away[i] < -ALLOWED) if i < m else (abs(away[i]) > ALLOWED) for i in rows[:-1]):
+        if any((away[i] < -miss) if i < m else (abs(away[i]) > miss) for i in rows[:-1]):
             return False
     return bool((np.diff(energies) <= noise).all())
 
 
-def _approach(problem: Problem, edge: Array, step: Array) -> tuple[str, bool]:
+def _approach(problem: Problem, edge: Array, step: Array, far: float) -> tuple[str, bool]:
     """Say how the energy behaves towards an edge; return whether its value there is finite."""
-    near = NEAR * 2.0 ** -np.arange(HALVINGS + 1)
+    near = far * 2.0 ** -np.arange(HALVINGS + 1)
     energies = problem.evaluate(edge - near[:, None] * step, 0)[0][:, -1]
     falls = -np.diff(energies)
     here = f"the energy decreases towards it, to {number(problem.energy.value(edge), 4)}"

@@ -27,15 +27,14 @@ from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.printing import number
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
 STAGES, STEPS = 240, 2  # descents in growing scales, and their steps
 BEYOND = 1e30  # distance, in scale units, up to which an energy without bound is followed
-SHOWN = 1e8  # distance up to which a point of an endless descent is resolved well enough to show
 DEEP = 1e60  # a fall by so many times the energy's size at the start is taken to be without bound
 SPACED = 1.4  # ratio of successive distances of a trace
 STRAIGHT, DOUBLINGS = 2.5, 5.0  # doublings of the distance needed, with a ray to go on and without
 ACROSS = 1e-6  # Newton's step across a valley, relative to that along it
-CLOSED = 1e-8  # gap of a contact, in scale units
 FARTHER = 1e6  # times the distance to which the energy has to fall on along a ray
 POWER = 0.15  # exponent of d with which energies fall towards a bound
 STEADY = 1.5  # ratio up to which successive exponents are those of one power
@@ -96,7 +95,7 @@ class Trace:
 
 
 @np.errstate(all="ignore")
-def escape(problem: Problem, piece: Piece, start: Array) -> Escape:
+def escape(problem: Problem, piece: Piece, start: Array, tolerances: Tolerances) -> Escape:
     """Follow the energy downhill in scales that grow with the distance, and say where it goes."""
     reached, origin = problem.restore(piece, start)
     if not reached or not np.isfinite(problem.energy.value(origin)):
@@ -108,18 +107,19 @@ def escape(problem: Problem, piece: Piece, start: Array) -> Escape:
     if trace.converged:
         return Escape(None, trace.last, f"The descent ended {far} scale units from its start.")
     went = f"The energy fell to {low} over {far} scale units"
-    if _is_attained_nowhere(problem, piece, trace):
+    if _is_attained_nowhere(problem, piece, trace, tolerances):
         return Escape(
             Verdict.NOT_ATTAINED,
             trace.last,
             f"{went}, by less and less each time that the distance was doubled: its decreases have "
             "a finite sum.",
         )
-    far_on = _far_along(problem, piece, trace) if len(trace.gone) > 1 else trace
+    far_on = _far_along(problem, piece, trace, tolerances) if len(trace.gone) > 1 else trace
     if _is_without_bound(trace) or _is_without_bound(far_on):
+        shown = int((trace.gone <= tolerances.unbounded).sum())  # resolved well enough
         return Escape(
             Verdict.UNBOUNDED,
-            trace.points[max(0, int((trace.gone <= SHOWN).sum()) - 1)],
+            trace.points[max(0, shown - 1)],
             f"{went}, and its decreases do not shrink as the distance is multiplied.",
         )
     return Escape(
@@ -177,7 +177,9 @@ def _is_without_bound(trace: Trace) -> bool:
     return bool(trace.lowest < -DEEP * trace.size or _slowing(trace) <= DIVERGENT)
 
 
-def _is_attained_nowhere(problem: Problem, piece: Piece, trace: Trace) -> bool:
+def _is_attained_nowhere(
+    problem: Problem, piece: Piece, trace: Trace, tolerances: Tolerances
+) -> bool:
     """Whether the energy falls towards a bound, as a power of the distance or of its logarithm.
 
     Near a minimum in the distance the exponents would grow: a short trace is believed if they are
@@ -193,12 +195,13 @@ def _is_attained_nowhere(problem: Problem, piece: Piece, trace: Trace) -> bool:
     if not (powers >= POWER).all():
         return False
     steady = doublings >= DOUBLINGS and powers.max() <= STEADY * powers.min()
-    if steady and not _nears_wall(problem, piece, trace):
+    if steady and not _nears_wall(problem, piece, trace, tolerances.zero):
         return True
-    return bool(_far_along(problem, piece, trace).gone[-1] > FARTHER * trace.gone[-1])
+    far_on = _far_along(problem, piece, trace, tolerances)
+    return bool(far_on.gone[-1] > FARTHER * trace.gone[-1])
 
 
-def _nears_wall(problem: Problem, piece: Piece, trace: Trace) -> bool:
+def _nears_wall(problem: Problem, piece: Piece, trace: Trace, closed: float) -> bool:
     """Whether a gap closes by no less each time that the distance is multiplied."""
     values, gradients = problem.evaluate(trace.points[-3:], 1)
     kept = sorted(piece)
@@ -206,17 +209,17 @@ def _nears_wall(problem: Problem, piece: Piece, trace: Trace) -> bool:
         [distances(f[:-1], df[:-1])[kept] for f, df in zip(values, gradients, strict=True)]
     )
     closing = -np.diff(away, axis=0) / np.diff(np.log(trace.gone[-3:]))[:, None]
-    gaps = away[1] > CLOSED
+    gaps = away[1] > closed
     return bool((gaps & (closing[1] > ACROSS * away[1]) & (closing[1] > closing[0])).any())
 
 
-def _far_along(problem: Problem, piece: Piece, trace: Trace) -> Trace:
+def _far_along(problem: Problem, piece: Piece, trace: Trace, tolerances: Tolerances) -> Trace:
     """Return a trace with points of the ray that goes on from it, inside the set and not upward.
 
     Rounding of the points moves them across the ray, where the energy is curved.
     """
-    last, m = trace.points[-1], problem.inequalities
-    step = _straight_on(problem, piece, last, last - trace.points[-2])
+    last, m, miss = trace.points[-1], problem.inequalities, tolerances.feasible
+    step = _straight_on(problem, piece, last, last - trace.points[-2], tolerances.zero)
     length = float(abs(step / problem.scales).max())
     if not length > 0:
         return trace
@@ -229,7 +232,7 @@ def _far_along(problem: Problem, piece: Piece, trace: Trace) -> Trace:
     for size, point, slopes in zip(sizes, values, gradients, strict=True):
         away = distances(point[:-1], slopes[:-1])
         noise = 1e-15 * abs(energy) + size
-        if (away[sorted(piece)] < -1e-10).any() or not (abs(away[m:]) <= 1e-10).all():
+        if (away[sorted(piece)] < -miss).any() or not (abs(away[m:]) <= miss).all():
             break
         if not -np.inf < point[-1] <= energy + noise:
             break
@@ -244,7 +247,7 @@ def _far_along(problem: Problem, piece: Piece, trace: Trace) -> Trace:
     )
 
 
-def _straight_on(problem: Problem, piece: Piece, q: Array, step: Array) -> Array:
+def _straight_on(problem: Problem, piece: Piece, q: Array, step: Array, closed: float) -> Array:
     """Return a step without its parts across the contacts, and across a valley of the energy.
 
     Across a valley, Newton's step is far shorter than the step along it.
@@ -252,7 +255,7 @@ def _straight_on(problem: Problem, piece: Piece, q: Array, step: Array) -> Array
     values, gradients, hessians = problem.evaluate(q, 2)
     m, u = problem.inequalities, step / problem.scales
     away = distances(values[:-1], gradients[:-1])
-    held = [*(i for i in sorted(piece) if away[i] <= CLOSED), *range(m, len(values) - 1)]
+    held = [*(i for i in sorted(piece) if away[i] <= closed), *range(m, len(values) - 1)]
     curvatures, vectors = np.linalg.eigh(hessians[-1])
     short = abs(gradients[-1] @ vectors) <= ACROSS * np.linalg.norm(u) * curvatures
     basis = null_space(np.vstack([gradients[held], vectors.T[short]]), 1e-8)

@@ -8,7 +8,6 @@ from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.spaces.manifold import Array
 
 PASSES = 60  # of Dinkelbach's method, which converges faster than linearly
-IMPLIED = 1e-9  # distance up to which a unit gradient counts as lying in the cone of others
 
 
 def steepest_descent(a: Analysis) -> tuple[float, Array]:
@@ -19,10 +18,10 @@ def steepest_descent(a: Analysis) -> tuple[float, Array]:
     """
     from scipy.optimize import nnls
 
-    slope, whole = a.local.gradients[-1], Rows(a.gradients, a.local.rank_tolerance)
+    slope, whole = a.local.gradients[-1], Rows(a.gradients, a.local.tolerances.rank)
     dependent = len(whole.units) > 0 and not whole.independent
     units = (
-        whole.truncated(a.local.rank_tolerance * whole.singular[0]) if dependent else whole.units
+        whole.truncated(a.local.tolerances.rank * whole.singular[0]) if dependent else whole.units
     )
     units[list(a.blind)] = 0.0
     rows = np.vstack([units, -units[len(a.active) :]])
@@ -36,10 +35,11 @@ def implied_functions(a: Analysis) -> list[int]:
     from scipy.optimize import nnls
 
     units, k = unit_rows(a.gradients), len(a.active)
+    implied = 1e-3 * a.local.tolerances.rank
     found = []
     for i in (i for i in range(k) if i not in a.blind):
         rows = np.vstack([np.delete(units, i, axis=0), -units[k:]])
-        if len(rows) and nnls(rows.T, units[i])[1] <= IMPLIED:
+        if len(rows) and nnls(rows.T, units[i])[1] <= implied:
             found.append(i)
     return found
 

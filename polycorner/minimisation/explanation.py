@@ -112,15 +112,15 @@ def _missed(a: Analysis, unit: str | None) -> str:
         "and its gradient vanishes there: no small step changes it to first order"
         if vanishing
         else f"to first order {number(abs(away[worst]), DIGITS)} scale units from zero (tolerance "
-        f"{local.tolerance:g})"
+        f"{local.tolerances.zero:g})"
     )
     text = (
         f"The largest violation is that of {violated}: its function is "
         f"{_with(local.values[worst], unit)}, {size}."
     )
-    failing = [d.names[i] for i in np.flatnonzero(away[:m] < -local.tolerance) if i != worst]
+    failing = [d.names[i] for i in np.flatnonzero(away[:m] < -local.tolerances.zero) if i != worst]
     failing += [
-        d.equation_names[j] for j in np.flatnonzero(off > local.tolerance) if m + j != worst
+        d.equation_names[j] for j in np.flatnonzero(off > local.tolerances.zero) if m + j != worst
     ]
     return f"{text} Also violated: {_names(failing)}." if failing and not d.is_union else text
 
@@ -202,7 +202,7 @@ def _slopes(a: Analysis, unit: str | None) -> Iterator[str]:
 def _slope_along(a: Analysis) -> str:
     if a.multipliers.residual <= a.local.small or not len(a.gradients):
         return ""
-    basis = null_space(a.gradients, a.local.rank_tolerance)
+    basis = null_space(a.gradients, a.local.tolerances.rank)
     slope = basis @ (basis.T @ a.local.gradients[-1])
     rate = float(np.linalg.norm(slope))
     return (
@@ -221,7 +221,7 @@ def _dependence(a: Analysis) -> Iterator[str]:
     if a.independent or len(a.blind) == len(a.gradients):
         return
     names = tuple(a.stated(dict.fromkeys(a.held_names)))
-    size = rank(a.gradients, a.local.rank_tolerance) + len(names) - len(a.held_names)
+    size = rank(a.gradients, a.local.tolerances.rank) + len(names) - len(a.held_names)
     text = f"The {len(names)} gradients of {_names(names)} are dependent, of rank {size}"
     if not a.multipliers.exist:
         yield f"{text}."

@@ -21,9 +21,9 @@ import numpy as np
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT, Tolerances
 
 EVALUATIONS = 400  # limit of each least-squares minimisation
-STATIONARY = 1e-6  # slope of the violation, relative to its size, that counts as zero
 REFINEMENTS = 30  # steps of Newton's method at the end
 MOVES = (1e-2, 1.0, 10.0, 10.0, 100.0, 100.0)  # random steps off a stationary point, in scale units
 
@@ -47,7 +47,9 @@ class Approach:
     stationary: bool
 
 
-def approach(problem: Problem, piece: Piece, q: Array) -> Approach:
+def approach(
+    problem: Problem, piece: Piece, q: Array, tolerances: Tolerances = DEFAULT
+) -> Approach:
     """Search a feasible point of a piece at which the energy is finite, from outside."""
     rows = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     violation = _Violation(problem, rows, q)
@@ -58,7 +60,8 @@ def approach(problem: Problem, piece: Piece, q: Array) -> Approach:
         reached, point = problem.restore(piece, u * problem.scales)
         if reached and np.isfinite(problem.energy.value(point)):
             return Approach(point, feasible=True, stationary=False)
-    return Approach(u * problem.scales, feasible=False, stationary=violation.is_stationary(u))
+    stationary = violation.is_stationary(u, 100 * tolerances.stationary)
+    return Approach(u * problem.scales, feasible=False, stationary=stationary)
 
 
 class _Violation:
@@ -144,6 +147,6 @@ class _Violation:
         """Return the gradient of ``|v|^2 / 2``."""
         return np.asarray(self.residuals(u) @ self.jacobian(u))
 
-    def is_stationary(self, u: Array) -> bool:
+    def is_stationary(self, u: Array, small: float) -> bool:
         slope, size = abs(self.slope(u)).max(initial=0.0), np.linalg.norm(self.residuals(u))
-        return bool(slope <= STATIONARY * size)
+        return bool(slope <= small * size)

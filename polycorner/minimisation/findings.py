@@ -13,6 +13,7 @@ from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 from polycorner.values import Value, cached_property
 
 T = TypeVar("T")
@@ -29,8 +30,7 @@ class Local(Value):
     values: Array
     gradients: Array
     hessians: Array
-    tolerance: float
-    rank_tolerance: float
+    tolerances: Tolerances
     higher: Higher = "series"
 
     @cached_property
@@ -41,7 +41,7 @@ class Local(Value):
     @property
     def small(self) -> float:
         """The size up to which a first derivative counts as zero."""
-        return self.tolerance * self.reference
+        return self.tolerances.stationary * self.reference
 
     @property
     def sections(self) -> range:
@@ -189,10 +189,12 @@ def _entrapment(a: Analysis) -> Iterator[tuple[str, Entrapment]]:
     held: list[int] = []
     for row in a.weak:
         slopes = local.gradients[[*held, row]] @ curved
-        if rank(slopes, 1e-6) > len(held):
+        if rank(slopes, local.tolerances.rank) > len(held):
             held.append(row)
             yield names[row], Entrapment.HALF_U
-    inner = curved @ null_space(local.gradients[held] @ curved, 1e-6) if held else curved
+    inner = curved
+    if held:
+        inner = curved @ null_space(local.gradients[held] @ curved, local.tolerances.rank)
     others = (
         (inner, Entrapment.U),
         (curvature.vectors[:, abs(curvature.values) <= small], Entrapment.FREE),

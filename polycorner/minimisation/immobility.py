@@ -33,13 +33,12 @@ from polycorner.kinds import checked
 from polycorner.minimisation.convex import ONE_AT_A_TIME, solve
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, stratum_at
+from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import TOLERANCE, Tolerances
 from polycorner.values import Checked
 
-NEARBY = 1e-5  # displacement, in scale units, across which second derivatives may jump
 LINE = (1e-3, 1e-2, 1e-1)  # where points of a line are compared, in scale units
-ROUNDING = 1e-12  # by which functions may fall along it
 JUMP = 1e-2  # change of a scaled second derivative that counts as one
 
 
@@ -119,11 +118,12 @@ def immobility(
     Immobility(immobile to second order, by a stress (Rimon and Burdick))
     """
     instance("polyhedron", polyhedron, Polyhedron)
+    tolerances = Tolerances.of(tolerance)
     point = polyhedron.manifold.point(q)
     pieces = stratum_at(polyhedron, point, tolerance=tolerance).pieces
     if not pieces:
         refuse("q", "a point of the polyhedron", point.tolist())
-    found = list(_of_pieces(polyhedron, point, pieces))
+    found = list(_of_pieces(polyhedron, point, pieces, tolerances))
     kinds = [some.mobility for some in found]
     for kind in (Mobility.MOBILE, Mobility.UNDECIDED, Mobility.SECOND_ORDER):
         if kind in kinds:
@@ -132,11 +132,11 @@ def immobility(
 
 
 def _of_pieces(
-    polyhedron: Polyhedron, q: Array, pieces: tuple[tuple[str, ...], ...]
+    polyhedron: Polyhedron, q: Array, pieces: tuple[tuple[str, ...], ...], tolerances: Tolerances
 ) -> Iterator[Immobility]:
     """Yield the answer for each piece, in scaled coordinates with unit gradients."""
     scales = polyhedron.manifold.scale_array
-    _, gradients, hessians = polyhedron.bundle.evaluate(q, 2)
+    values, gradients, hessians = polyhedron.bundle.evaluate(q, 2)
     names = (*polyhedron.names, *polyhedron.equation_names)
     finite = np.asarray(np.isfinite(gradients).all(axis=1))
     gradients = np.where(finite[:, None], gradients, 0.0) * scales
@@ -146,16 +146,30 @@ def _of_pieces(
     hessians = hessians * np.outer(scales, scales) / lengths[..., None]
     count = len(polyhedron.names)
     held = list(range(count, len(names)))
-    jumps = _jumps(polyhedron, q) * np.outer(scales, scales) / lengths[..., None]
+    beside = 10 * tolerances.difference * scales  # across which second derivatives may jump
+    jumps = _jumps(polyhedron, q, beside) * np.outer(scales, scales) / lengths[..., None]
+    # What active functions and equations miss zero by, as far as that violates them.
+    missed = np.where(abs(values) <= tolerances.zero * lengths[:, 0], values, 0.0)
+    missed[:count] = np.minimum(missed[:count], 0.0)
+
+    def slides(v: Array) -> bool:
+        """Whether no function falls along a line, up to rounding."""
+        along = np.array(LINE)[:, None] * v * scales
+        points = polyhedron.manifold.placed(polyhedron.manifold.moved(q, along))
+        away = (polyhedron.bundle.evaluate(points, 0)[0] - missed) / lengths[:, 0]
+        inside, off = away[:, :count], abs(away[:, count : count + len(polyhedron.stated)])
+        rounding = tolerances.zero / 1e4
+        return bool((polyhedron.implicit_of(inside) >= -rounding).all() and (off <= rounding).all())
+
     for piece in pieces:
         rows = [names.index(name) for name in piece]
         if not finite[rows + held].all():
             yield Immobility(Mobility.UNDECIDED, {})
             continue
-        local = _Local(units[rows], units[held], hessians[rows + held])
+        local = _Local(units[rows], units[held], hessians[rows + held], tolerances.rank)
         sizes, changes = np.maximum(1, abs(hessians[rows + held])), jumps[rows + held]
         smooth = bool((np.isfinite(sizes + changes) & (changes <= JUMP * sizes)).all())
-        answer = local.answer(lambda v: _slides(polyhedron, q, v), smooth=smooth)
+        answer = local.answer(slides, smooth=smooth)
         forces = answer.weights / lengths[rows + held, 0] if len(answer.weights) else answer.weights
         total = forces[: len(rows)].sum() or 1.0
         stress = dict(zip([*piece, *names[count:]], (forces / total).tolist(), strict=False))
@@ -163,20 +177,12 @@ def _of_pieces(
         yield Immobility(answer.mobility, stress, motion)
 
 
-def _jumps(polyhedron: Polyhedron, q: Array) -> Array:
+def _jumps(polyhedron: Polyhedron, q: Array, beside: Array) -> Array:
     """Return by how much second derivatives differ among points nearby."""
     rng = np.random.default_rng(0)
-    steps = NEARBY * polyhedron.manifold.scale_array * rng.uniform(-1, 1, (16, len(q)))
-    hessians = polyhedron.bundle.evaluate(q + steps, 2)[2]
+    hessians = polyhedron.bundle.evaluate(q + beside * rng.uniform(-1, 1, (16, len(q))), 2)[2]
     with np.errstate(invalid="ignore"):  # of infinite ones
         return np.asarray(np.ptp(hessians, axis=0))
-
-
-def _slides(polyhedron: Polyhedron, q: Array, v: Array) -> bool:
-    """Whether points along a line, in scaled coordinates, are in the polyhedron up to rounding."""
-    manifold = polyhedron.manifold
-    ways = np.array(LINE)[:, None] * v * manifold.scale_array
-    return bool(np.all(polyhedron.contains(manifold.moved(q, ways), tolerance=ROUNDING)))
 
 
 @dataclass(frozen=True)
@@ -188,11 +194,15 @@ class _Answer:
 
 @dataclass(frozen=True)
 class _Local:
-    """Unit gradients of active functions and equations, and their scaled second derivatives."""
+    """Unit gradients of active functions and equations, and their scaled second derivatives.
+
+    Slopes and singular values up to ``rank`` count as zero.
+    """
 
     functions: Array
     equations: Array
     bends: Array
+    rank: float
 
     def answer(self, slides: Callable[[Array], bool], *, smooth: bool) -> _Answer:
         """Return the verdict; to first order only if second derivatives jump.
@@ -203,13 +213,13 @@ class _Local:
         tight, inner = self._tight()
         if not tight and inner.any():
             return _Answer(Mobility.MOBILE, nothing, inner)
-        span = null_space(np.vstack([self.functions[tight], self.equations]), RANK_TOLERANCE)
+        span = null_space(np.vstack([self.functions[tight], self.equations]), self.rank)
         if not span.shape[1]:
             return _Answer(Mobility.FIRST_ORDER, nothing)
         if not smooth:
             return _Answer(Mobility.UNDECIDED, nothing)
         weights, largest = self._stress(span)
-        if largest < -RANK_TOLERANCE:
+        if largest < -self.rank:
             return _Answer(Mobility.SECOND_ORDER, weights)
         for v in self._candidates(span, inner, weights):
             if self._moves(v) or slides(v):
@@ -226,12 +236,12 @@ class _Local:
             found = linear_programme(
                 -row, -self.functions, limits, bound=1.0, equations=self.equations
             )
-            if row @ found > RANK_TOLERANCE:
+            if row @ found > self.rank:
                 inner = inner + found
             else:
                 tight.append(i)
         if not len(self.functions):
-            free = null_space(self.equations, RANK_TOLERANCE)
+            free = null_space(self.equations, self.rank)
             inner = free[:, 0] if free.shape[1] else inner
         return tight, inner
 
@@ -245,7 +255,7 @@ class _Local:
         k, count = len(self.functions), len(self.bends)
         rows = np.vstack([self.functions, self.equations])
         # All stresses: the relations of the gradients.
-        relations = Rows(rows, RANK_TOLERANCE).relations if k else np.empty((0, 0))
+        relations = Rows(rows, self.rank).relations if k else np.empty((0, 0))
         if not relations.shape[1]:
             return np.zeros(count), np.inf
         forms = np.array([span.T @ bend @ span for bend in self.bends])
@@ -271,13 +281,13 @@ class _Local:
         for axis in axes.T[::-1]:
             for side in (1, -1):
                 v = side * span @ axis
-                if (self.functions @ v >= -RANK_TOLERANCE).all():
+                if (self.functions @ v >= -self.rank).all():
                     yield v
 
     def _moves(self, v: Array) -> bool:
         """Whether a velocity and an acceleration have all tight functions grow."""
         slopes = self.functions @ v
-        tight = [i for i, slope in enumerate(slopes) if slope <= RANK_TOLERANCE]
+        tight = [i for i, slope in enumerate(slopes) if slope <= self.rank]
         k, n = len(self.functions), len(v)
         bent = np.array([v @ bend @ v for bend in self.bends])
         # Accelerations up to a thousand times the largest curvature are tried.
@@ -286,7 +296,7 @@ class _Local:
         start = np.zeros(n)
         if len(equations):
             start = np.linalg.lstsq(equations, -bent[k:], rcond=None)[0]
-            if not Rows(equations, RANK_TOLERANCE).independent:
+            if not Rows(equations, self.rank).independent:
                 return False
         rest = bent[:k] + self.functions @ start
         found = linear_programme(
@@ -296,4 +306,4 @@ class _Local:
             bound=reach,
             equations=np.hstack([equations, np.zeros((len(equations), 1))]),
         )
-        return bool(found[n] > RANK_TOLERANCE)
+        return bool(found[n] > self.rank)

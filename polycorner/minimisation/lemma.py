@@ -8,8 +8,9 @@ import numpy as np
 from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.sparse_analysis import SparseAnalysis, SparseLocal
-from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
+from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
 
@@ -81,7 +82,7 @@ def residuals_at(problem: Problem, q: Array, multipliers: Mapping[str, float]) -
 
 def _sparse_residuals(problem: Problem, q: Array, multipliers: Mapping[str, float]) -> Residuals:
     d, m = problem.polyhedron, problem.inequalities
-    local = SparseLocal.at(problem, q, TOLERANCE, RANK_TOLERANCE)
+    local = SparseLocal.at(problem, q, DEFAULT)
     weights = np.array([multipliers.get(name, 0.0) for name in (*d.names, *d.equation_names)])
     pull = local.gradient - local.rows.T @ weights
     return Residuals(

@@ -21,18 +21,15 @@ from numpy.typing import NDArray
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.methods import minimise
-from polycorner.minimisation.polishing import SETTLED
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, distances
+from polycorner.polyhedra.strata import distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 from polycorner.values import cached_property
 
-SAME = 1e-6  # distance of invariants, in scale units, up to which two points are one
-LEVEL = 1e-9  # relative difference up to which energies are equal
-MISS = 1e-8  # scaled violation allowed along a straight segment
 FINE = 0.05  # distance between samples of a segment, in scale units
 LONGEST = 50_000  # samples of the longest segment tried
 STRIDE = 0.5  # longest step of a walk, in scale units
@@ -41,7 +38,6 @@ PARTS = (1.0, 0.5, 0.25, 0.1, 0.02)  # fractions of a step, tried in turn
 GAIN = 0.1  # fraction of its length by which a step must approach its goal
 LEAST = 1e-3  # fraction of the distance from its goal by which a step should reduce it
 BESIDE = 0.1  # distance of the second point at which a symmetry is checked, in scale units
-INVARIANT = 1e-8  # relative change of the energy allowed under a symmetry
 NET = 0.5  # distance between the points kept of a locus, in scale units
 PAIRS = 3  # nearest pairs of points tried to connect two loci
 
@@ -52,6 +48,7 @@ class Quotient:
 
     problem: Problem
     symmetry: Symmetry
+    tolerances: Tolerances
 
     @cached_property
     def _circles(self) -> tuple[NDArray[np.bool_], Array]:
@@ -83,7 +80,7 @@ class Quotient:
         """Whether a group too large to list carries ``p`` to the orbit of ``q``."""
         manifold = self.problem.polyhedron.manifold
         return self.symmetry.relabel is not None and bool(
-            self.symmetry.relabellings(manifold, p, q, SAME)
+            self.symmetry.relabellings(manifold, p, q, self.tolerances.same)
         )
 
     def flat_beyond(self, found: Certificate) -> bool:
@@ -113,8 +110,8 @@ class Quotient:
 
     def _holds(self, away: Array) -> bool:
         inside, off = np.split(away, [self.problem.inequalities], axis=1)
-        enters = self.problem.polyhedron.implicit_of(inside) >= -MISS
-        return bool(enters.all() and (abs(off) <= MISS).all())
+        enters = self.problem.polyhedron.implicit_of(inside) >= -self.tolerances.zero
+        return bool(enters.all() and (abs(off) <= self.tolerances.zero).all())
 
     def _along(self, points: Array) -> tuple[Array, Array]:
         """Return the scaled distances to all functions at points, and the energies there."""
@@ -128,16 +125,18 @@ class Quotient:
         along = np.linspace(0, 1, parts + 1)[:, None]
         manifold = self.problem.polyhedron.manifold
         away, _ = self._along(manifold.moved(p, along * step * self.problem.scales))
-        bent = np.where(abs(away[0]) <= SAME, (along * abs(step).max()) ** 2, 0.0)
+        closed = abs(away[0]) <= self.tolerances.same
+        bent = np.where(closed, (along * abs(step).max()) ** 2, 0.0)
         inside = (away + bent)[:, : self.problem.inequalities]
-        return bool((self.problem.polyhedron.implicit_of(inside) >= -MISS).all())
+        enters = self.problem.polyhedron.implicit_of(inside) >= -self.tolerances.zero
+        return bool(enters.all())
 
     def is_walkable(self, p: Array, q: Array, energy: float, slack: float) -> bool:
         """Whether a walk on a level of the energy connects ``p`` to the orbit of ``q``."""
         goal = self.place(q)
         for _ in range(STEPS):
             miss = goal - self.place(p)
-            if abs(miss).max() <= SAME:
+            if abs(miss).max() <= self.tolerances.same:
                 return True
             way = self._towards(p, miss, slack)
             reached = None if way is None else self._stepped(p, *way, goal, energy, slack)
@@ -151,7 +150,7 @@ class Quotient:
 
         Near a crossing of loci all curvatures are small: up to ``slack`` they are flat.
         """
-        analysis = analyse(self.problem, p, TOLERANCE, RANK_TOLERANCE, higher="none")
+        analysis = analyse(self.problem, p, self.tolerances, higher="none")
         curvature = analysis.curvature
         level = max(analysis.small_curvature, slack)
         flat = curvature.vectors[:, abs(curvature.values) <= level]
@@ -188,9 +187,16 @@ class Quotient:
     ) -> Array | None:
         """Return a point near ``q`` on a level, by Newton's method or else by a longer descent."""
         point, last = self.problem.on_face(active, q)
-        settled = last < SETTLED and self._holds(self._along(point[None])[0])
+        settled = last < self.tolerances.settled and self._holds(self._along(point[None])[0])
         if not settled or self._apart(point, q) > near:
-            found = minimise(self.problem.polyhedron, self.problem.energy, q)
+            posed, both = self.problem, self.tolerances
+            found = minimise(
+                posed.polyhedron,
+                posed.energy,
+                q,
+                tolerance=both.zero,
+                rank_tolerance=both.rank,
+            )
             point, settled = found.point, found.search is None
         same = abs(self.problem.energy.value(point) - level[0]) <= level[1]
         return point if settled and same and self._apart(point, q) <= near else None
@@ -269,7 +275,7 @@ class Loci:
                     self._merge(first, other)
 
     def _new(self, found: Certificate, energy: float) -> Locus:
-        slack = LEVEL * (abs(energy) + found.analysis.reference)
+        slack = self.quotient.tolerances.level * (abs(energy) + found.analysis.reference)
         wide = self.quotient.flat_beyond(found)
         images = self.quotient.images(found.point)
         places = np.array([self.quotient.place(q) for q in images])
@@ -278,7 +284,8 @@ class Loci:
     def _known(self, near: list[Near], point: Array) -> Locus | None:
         """Return the locus that contains a point, if one does."""
         for apart, _, locus in near:
-            if apart <= SAME or self.quotient.are_relabelled(locus.points[0], point):
+            same = apart <= self.quotient.tolerances.same
+            if same or self.quotient.are_relabelled(locus.points[0], point):
                 return locus
         return None
 
@@ -325,12 +332,13 @@ class Loci:
         return False
 
 
-def check_symmetry(problem: Problem, symmetry: Symmetry, points: Array) -> None:
+def check_symmetry(quotient: Quotient, points: Array) -> None:
     """Raise ValueError for a symmetry that changes the energy at points, or at others nearby.
 
     At a point alone, the energy may happen to be stationary along a motion.
     """
-    manifold = problem.polyhedron.manifold
+    problem, symmetry = quotient.problem, quotient.symmetry
+    manifold, changing = problem.polyhedron.manifold, 10 * quotient.tolerances.level
     beside = BESIDE * np.cos(np.arange(1, problem.dimension + 1)) * problem.scales
     for q in [*points, *(points + beside)]:
         values, gradients, hessians = problem.evaluate(q, 2)
@@ -339,8 +347,8 @@ def check_symmetry(problem: Problem, symmetry: Symmetry, points: Array) -> None:
         images = [float(problem.energy.value(g.apply(q))) for g in symmetry.elements]
         changes = abs(np.array(images) - values[-1])
         for part, wrong in (
-            ("tangent", abs(slopes) > INVARIANT * size),
-            ("element", changes > INVARIANT * (abs(values[-1]) + size)),
+            ("tangent", abs(slopes) > changing * size),
+            ("element", changes > changing * (abs(values[-1]) + size)),
         ):
             if wrong.any():
                 msg = (

@@ -15,15 +15,16 @@ from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.domain_edges import domain_edge
 from polycorner.minimisation.escapes import escape
 from polycorner.minimisation.feasibility import approach
-from polycorner.minimisation.polishing import SETTLED, Endpoint
+from polycorner.minimisation.polishing import Endpoint
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.rescaling import PATIENCE, advice, rescaled
 from polycorner.minimisation.slsqp import slsqp
 from polycorner.minimisation.sparse_methods import sparse_descent, sparse_on_face
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import MAX_SELECTIONS, Piece, Polyhedron
-from polycorner.polyhedra.strata import RANK_TOLERANCE, TOLERANCE, check_tolerance, distances
+from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -102,8 +103,7 @@ def minimise(
     """
     checks.choice("method", method, _DESCENTS)
     checks.whole("max_iterations", max_iterations, least=1, most=checks.MOST)
-    check_tolerance("tolerance", tolerance)
-    check_tolerance("rank_tolerance", rank_tolerance)
+    tolerances = Tolerances.of(tolerance, rank_tolerance)
     problem = pose(polyhedron, energy)
     problem.check_size()
     q = polyhedron.manifold.point(start, "start")
@@ -111,9 +111,10 @@ def minimise(
         problem.check_energy(q, "start")
     if method == "newton" and problem.is_sparse:
         problem.check_energy(q, "start")
-        end = sparse_descent(problem, q, int(max_iterations), tolerance)
+        end = sparse_descent(problem, q, int(max_iterations), tolerances)
     else:
-        end = _descend_union(problem, q, _diagnosing(method), int(max_iterations))
+        descent = _diagnosing(method, tolerances)
+        end = _descend_union(problem, q, descent, int(max_iterations), tolerances)
     if end.failure is Verdict.INFEASIBLE:
         problem.check_energy(q, "start")
     ways = (tolerance, rank_tolerance, method, end.iterations)
@@ -161,8 +162,7 @@ def stationary_on(
         For arguments of the wrong kind, unknown names, or an energy that is not finite at the
         start.
     """
-    check_tolerance("tolerance", tolerance)
-    check_tolerance("rank_tolerance", rank_tolerance)
+    tolerances = Tolerances.of(tolerance, rank_tolerance)
     problem = pose(polyhedron, energy)
     problem.check_size()
     names = polyhedron.names
@@ -172,15 +172,19 @@ def stationary_on(
     q = polyhedron.manifold.point(start, "start")
     problem.check_energy(q, "start")
     face = frozenset(polyhedron.names.index(name) for name in active)
-    newton = sparse_on_face if problem.is_sparse else Problem.on_face
-    point, last = newton(problem, face, q)
-    failure = None if last < SETTLED else Verdict.NOT_CONVERGED
+    if problem.is_sparse:
+        point, last = sparse_on_face(problem, face, q, tolerances)
+    else:
+        point, last = problem.on_face(face, q)
+    failure = None if last < tolerances.zero else Verdict.NOT_CONVERGED
     return Certificate(
         problem, point if failure is None else q, tolerance, rank_tolerance, "face", 1, failure
     )
 
 
-def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> Endpoint:
+def _descend_union(
+    problem: Problem, q: Array, descent: Descent, limit: int, tolerances: Tolerances
+) -> Endpoint:
     """Descend in one branch of the and/or tree after another until none leads lower."""
     d = problem.polyhedron
     everything = frozenset(range(problem.inequalities))
@@ -193,14 +197,14 @@ def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> 
         if end.failure is not Verdict.INFEASIBLE:
             break
     else:
-        end = _descend_from_outside(problem, pieces, q, descent, limit)
+        end = _descend_from_outside(problem, pieces, q, descent, limit, tolerances)
     if not d.is_union:
         return end
     spent = end.iterations
     for _ in range(MAX_SWITCHES):
         if end.failure is not None:
             break
-        lower = _lower_branch(problem, end, descent, limit)
+        lower = _lower_branch(problem, end, descent, limit, tolerances.zero)
         if lower is None:
             break
         end, spent = lower, spent + lower.iterations
@@ -208,12 +212,17 @@ def _descend_union(problem: Problem, q: Array, descent: Descent, limit: int) -> 
 
 
 def _descend_from_outside(
-    problem: Problem, pieces: list[Piece], q: Array, descent: Descent, limit: int
+    problem: Problem,
+    pieces: list[Piece],
+    q: Array,
+    descent: Descent,
+    limit: int,
+    tolerances: Tolerances,
 ) -> Endpoint:
     """Descend from a point of least violation; INFEASIBLE is said where that is stationary."""
     ends = []
     for piece in pieces:
-        found = approach(problem, piece, q)
+        found = approach(problem, piece, q, tolerances)
         if found.feasible:
             return descent(problem, piece, found.point, limit)
         ends.append(found)
@@ -222,13 +231,15 @@ def _descend_from_outside(
     return Endpoint(ends[0].point, 0, failure)
 
 
-def _lower_branch(problem: Problem, end: Endpoint, descent: Descent, limit: int) -> Endpoint | None:
+def _lower_branch(
+    problem: Problem, end: Endpoint, descent: Descent, limit: int, touching: float
+) -> Endpoint | None:
     """Return the end of a descent in another branch at this point that leads lower, or None."""
     d = problem.polyhedron
     values, gradients, hessians = problem.evaluate(end.point, 2)
     m = problem.inequalities
     noise = 1e-10 * (abs(values[-1]) + abs(gradients[-1]).max() + abs(hessians[-1]).max())
-    for piece in d.selections(distances(values[:m], gradients[:m]).tolist(), 1e-8):
+    for piece in d.selections(distances(values[:m], gradients[:m]).tolist(), touching):
         other = descent(problem, piece, end.point, limit)
         if other.failure is Verdict.INFEASIBLE:
             continue
@@ -238,7 +249,7 @@ def _lower_branch(problem: Problem, end: Endpoint, descent: Descent, limit: int)
     return None
 
 
-def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+def _newton(problem: Problem, piece: Piece, q: Array, limit: int, _: Tolerances) -> Endpoint:
     status, iterations, point, multipliers = problem.descend(piece, q, limit)
     if status in {statuses.STALLED, statuses.UNEVEN}:
         status, iterations, point = rescaled(
@@ -254,47 +265,59 @@ def _newton(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
     )
 
 
-def _scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+def _scp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
     from polycorner.minimisation.scp import scp
 
-    return scp(problem, piece, q, limit)
+    return scp(problem, piece, q, limit, tolerances)
 
 
-_DESCENTS: dict[str, Descent] = {"newton": _newton, "slsqp": slsqp, "scp": _scp}
+_DESCENTS: dict[str, Callable[[Problem, Piece, Array, int, Tolerances], Endpoint]] = {
+    "newton": _newton,
+    "slsqp": slsqp,
+    "scp": _scp,
+}
 
 
-def _diagnosing(method: Method) -> Descent:
+def _diagnosing(method: Method, tolerances: Tolerances) -> Descent:
     """Return a method's descent whose failures say where they end, as far as that is seen."""
-    plain = _DESCENTS[method]
+
+    def plain(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+        return _DESCENTS[method](problem, piece, q, limit, tolerances)
 
     def descent(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
         end = plain(problem, piece, q, limit)
         if end.failure is not None and problem.rows - problem.inequalities > 2:
-            end = _without_dependent(problem, piece, q, plain, limit, end)
-        end = go_on(problem, piece, end, plain, limit)
+            end = _without_dependent(problem, piece, q, plain, limit, end, tolerances)
+        end = go_on(problem, piece, end, plain, limit, tolerances)
         if end.failure is None and not end.flat:
             return end
         if end.failure is Verdict.INFEASIBLE:
             return end
-        if _is_doubtful(problem, q, end):
-            return _diagnosed(problem, piece, q, limit, end)
+        if _is_doubtful(problem, q, end, tolerances):
+            return _diagnosed(problem, piece, q, limit, end, tolerances)
         return replace(end, failure=None)
 
     return descent
 
 
 def _without_dependent(
-    problem: Problem, piece: Piece, q: Array, plain: Descent, limit: int, end: Endpoint
+    problem: Problem,
+    piece: Piece,
+    q: Array,
+    plain: Descent,
+    limit: int,
+    end: Endpoint,
+    tolerances: Tolerances,
 ) -> Endpoint:
     """Repeat a failed descent with independent equations that imply the others nearby."""
-    smaller = problem.with_independent_equations(piece, [end.point, q])
+    smaller = problem.with_independent_equations(piece, [end.point, q], tolerances)
     if len(smaller.polyhedron.equations) == len(problem.polyhedron.equations):
         return end
     found = plain(smaller, frozenset(range(len(piece))), q, limit)
-    return found if problem.equations_hold(found.point, TOLERANCE) else end
+    return found if problem.equations_hold(found.point, tolerances.zero) else end
 
 
-def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
+def _is_doubtful(problem: Problem, start: Array, end: Endpoint, tolerances: Tolerances) -> bool:
     """Whether a descent ended at no minimum, or far away where nothing is decided.
 
     One that stalls at a minimum, as where gradients are dependent, has not failed.
@@ -305,7 +328,7 @@ def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
     if end.failure is None and not far:
         return False
     with np.errstate(all="ignore"):
-        found = analyse(problem, end.point, TOLERANCE, RANK_TOLERANCE, higher="followed")
+        found = analyse(problem, end.point, tolerances, higher="followed")
     if end.failure is None:
         return found.verdict is Verdict.UNDECIDED
     if not found.verdict.is_minimum:
@@ -314,20 +337,22 @@ def _is_doubtful(problem: Problem, start: Array, end: Endpoint) -> bool:
     return far and found.reference < FADED * Certificate(problem, start).analysis.reference
 
 
-def _diagnosed(problem: Problem, piece: Piece, q: Array, limit: int, end: Endpoint) -> Endpoint:
+def _diagnosed(
+    problem: Problem, piece: Piece, q: Array, limit: int, end: Endpoint, tolerances: Tolerances
+) -> Endpoint:
     """Return the end of a failed descent with what is seen of where it leads."""
-    edge = domain_edge(problem, piece, end.point)
+    edge = domain_edge(problem, piece, end.point, tolerances)
     if edge is not None:
         return Endpoint(edge.point, end.iterations, Verdict.DOMAIN_EDGE, edge.note)
     if end.failure is Verdict.NOT_CONVERGED and limit < PATIENCE:
         return replace(end, note=f"It was stopped after {end.iterations} steps.")
-    found = escape(problem, piece, q)
+    found = escape(problem, piece, q, tolerances)
     if found.verdict is Verdict.NOT_CONVERGED or (found.verdict is None and end.failure is None):
         note = f"{found.note} {advice(problem, end.point)}".lstrip()
         return end if end.failure is None else replace(end, failure=found.verdict, note=note)
     point = end.point if end.failure is found.verdict else found.point
     if not np.isfinite(problem.energy.value(point)):
-        edge = domain_edge(problem, piece, point)
+        edge = domain_edge(problem, piece, point, tolerances)
         if edge is not None:
             return Endpoint(edge.point, end.iterations, Verdict.DOMAIN_EDGE, edge.note)
     return Endpoint(point, end.iterations, found.verdict, found.note)

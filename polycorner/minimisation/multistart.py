@@ -15,9 +15,9 @@ from polycorner.minimisation.problem import pose
 from polycorner.minimisation.sampling import Box, start_points
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import TOLERANCE, check_tolerance
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
+from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 CHECKED = 3  # starts at which a symmetry is checked
 
 
-def minima(
+def minima(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron,
     energy: "Energy",
     *,
@@ -35,6 +35,7 @@ def minima(
     symmetry: Symmetry | None = None,
     progress: Progress = silent,
     tolerance: float = TOLERANCE,
+    rank_tolerance: float = RANK_TOLERANCE,
 ) -> Minima:
     """Find the local minima of an energy on a polyhedron by descent from many starts.
 
@@ -64,8 +65,9 @@ def minima(
     progress : callable, optional
         Called after every start with the number of starts done, their total, and the number of
         minima in words; see :class:`~polycorner.progress.Progress`.
-    tolerance : float, optional
-        See :class:`~polycorner.minimisation.certificate.Certificate`.
+    tolerance, rank_tolerance : float, optional
+        See :class:`~polycorner.minimisation.certificate.Certificate`.  Two points are one up to the
+        distance ``1e-6 (tolerance / 1e-8)^(3/4)``, in scale units.
 
     Returns
     -------
@@ -88,20 +90,26 @@ def minima(
     >>> [c.point.round(3).tolist() for c in found], sum(found.counts)
     ([[-1.03, 0.0], [0.967, 0.0]], 100)
     """
-    check_tolerance("tolerance", tolerance)
+    tolerances = Tolerances.of(tolerance, rank_tolerance)
     problem = pose(polyhedron, energy)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
     points = start_points(problem, starts, box, rng)
-    quotient = Quotient(problem, symmetry or Symmetry())
-    check_symmetry(problem, quotient.symmetry, points[:CHECKED])
+    quotient = Quotient(problem, symmetry or Symmetry(), tolerances)
+    check_symmetry(quotient, points[:CHECKED])
     loci, failures = Loci(quotient), Counter[Verdict]()
     interrupted = False
     try:
         for done, q in enumerate(points, 1):
-            found = minimise(polyhedron, problem.energy, q, tolerance=tolerance)
+            found = minimise(
+                polyhedron,
+                problem.energy,
+                q,
+                tolerance=tolerance,
+                rank_tolerance=rank_tolerance,
+            )
             if found.search is not None and found.verdict is found.search:
                 failures[found.search] += 1
             else:

@@ -10,10 +10,7 @@ from polycorner.polyhedra.cones import Rows, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
-
-FAR = 1e8  # distance from the origin, in scale units, beyond which a descent is unbounded
-NEAR = 1e-3  # scaled gap up to which a function may be active at an unpolished minimum
-SETTLED = 1e-8  # last step of Newton's method, in scale units, up to which it has converged
+from polycorner.tolerances import Tolerances
 
 
 @dataclass(frozen=True)
@@ -31,7 +28,14 @@ class Endpoint:
 
 
 def polished(
-    problem: Problem, piece: Piece, start: Array, q: Array, iterations: int, *, stopped: bool
+    problem: Problem,
+    piece: Piece,
+    start: Array,
+    q: Array,
+    iterations: int,
+    tolerances: Tolerances,
+    *,
+    stopped: bool,
 ) -> Endpoint:
     """Solve the KKT equations of the face that carries an approximate minimum ``q``.
 
@@ -44,6 +48,7 @@ def polished(
         Where the method started, and where it ended.
     iterations : int
         Number of its steps.
+    tolerances : Tolerances
     stopped : bool
         Whether it ended by its own stopping test.
     """
@@ -51,11 +56,12 @@ def polished(
         q = start
     values, gradients = problem.evaluate(q, 1)
     lower = values[-1] < problem.energy.value(start)
-    far = abs(q / problem.scales).max() > FAR
+    far = abs(q / problem.scales).max() > tolerances.unbounded
     if far and lower and _violated(problem, piece, q, 1e-6) == frozenset():
         return Endpoint(start, iterations, Verdict.UNBOUNDED)
     if np.isfinite(values).all() and np.isfinite(gradients).all():
-        point = _on_face(problem, piece, q, _carrying(problem, piece, values, gradients))
+        face = _carrying(problem, piece, values, gradients, tolerances.beside)
+        point = _on_face(problem, piece, q, face, tolerances)
         if point is not None:
             return Endpoint(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
     for origin in (q, start):
@@ -65,7 +71,9 @@ def polished(
     return Endpoint(q, iterations, Verdict.INFEASIBLE)
 
 
-def _on_face(problem: Problem, piece: Piece, q: Array, face: Piece) -> Array | None:
+def _on_face(
+    problem: Problem, piece: Piece, q: Array, face: Piece, tolerances: Tolerances
+) -> Array | None:
     """Return the stationary point near ``q`` of a face that is corrected on the way.
 
     Violated functions join the face; functions with negative multipliers leave it.
@@ -74,37 +82,40 @@ def _on_face(problem: Problem, piece: Piece, q: Array, face: Piece) -> Array | N
     while face not in seen:
         seen.add(face)
         point, last = problem.on_face(face, q)
-        if not last < SETTLED or abs((point - q) / problem.scales).max() > 0.1:
+        if not last < tolerances.settled or abs((point - q) / problem.scales).max() > 0.1:
             return None
-        violated = _violated(problem, piece, point)
+        violated = _violated(problem, piece, point, tolerances.feasible)
         if violated is None or not np.isfinite(problem.energy.value(point)):
             return None
-        negative = _negative(problem, face, point)
+        negative = _negative(problem, face, point, tolerances)
         if not violated and not negative:
             return point
         face = (face | violated) if violated else face - negative
     return None
 
 
-def _negative(problem: Problem, face: Piece, point: Array) -> Piece:
+def _negative(problem: Problem, face: Piece, point: Array, tolerances: Tolerances) -> Piece:
     """Return the functions with negative multipliers, for a face with independent gradients."""
     _, gradients = problem.evaluate(point, 1)
     chosen = sorted(face)
-    rows = Rows(gradients[[*chosen, *range(problem.inequalities, problem.rows - 1)]], 1e-8)
+    held = [*chosen, *range(problem.inequalities, problem.rows - 1)]
+    rows = Rows(gradients[held], tolerances.rank / 100)
     if not chosen or not rows.independent:
         return frozenset()
     weights = rows.weights(gradients[-1])[: len(chosen)]
-    small = 1e-9 * float(abs(gradients[-1]).max())
+    small = tolerances.multiplier * float(abs(gradients[-1]).max())
     return frozenset(i for i, weight in zip(chosen, weights, strict=True) if weight < -small)
 
 
-def _carrying(problem: Problem, piece: Piece, values: Array, gradients: Array) -> Piece:
+def _carrying(
+    problem: Problem, piece: Piece, values: Array, gradients: Array, reach: float
+) -> Piece:
     """Return the nearly active functions with a share in the energy's gradient."""
     from scipy.optimize import nnls
 
     m = problem.inequalities
     away = distances(values[:-1], gradients[:-1])
-    near = [i for i in sorted(piece) if away[i] <= NEAR]
+    near = [i for i in sorted(piece) if away[i] <= reach]
     if not near:
         return frozenset()
     sections = unit_rows(gradients[m:-1])
@@ -114,7 +125,7 @@ def _carrying(problem: Problem, piece: Piece, values: Array, gradients: Array) -
     return frozenset(i for i, share in zip(near, shares, strict=False) if share > 1e-6 * size)
 
 
-def _violated(problem: Problem, piece: Piece, q: Array, tolerance: float = 1e-10) -> Piece | None:
+def _violated(problem: Problem, piece: Piece, q: Array, tolerance: float) -> Piece | None:
     """Return the inequalities of a piece that are violated at ``q``; None if an equation is."""
     values, gradients = problem.evaluate(q, 1)
     away = distances(values[:-1], gradients[:-1])

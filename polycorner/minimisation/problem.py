@@ -16,6 +16,7 @@ from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import Tolerances
 from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
@@ -233,13 +234,15 @@ class Problem(Checked):
         masks = self.mask(strong), self.mask(piece)
         return descent.probe(self._laid, masks, q / self.scales, directions, held, steps)
 
-    def with_independent_equations(self, piece: Piece, points: Iterable[Array]) -> "Problem":
+    def with_independent_equations(
+        self, piece: Piece, points: Iterable[Array], tolerances: Tolerances
+    ) -> "Problem":
         """Return the problem in one piece, of the equations there that imply the others.
 
         These are independent near given points.
         """
         d, m = self.polyhedron, self.inequalities
-        chosen = independent_equations(d, points)
+        chosen = independent_equations(d, points, tolerances)
         parts = [d.functions[i] for i in sorted(piece)]
         stated = [d.equations[i - m] for i in chosen if i - m < len(d.stated)]
         return pose(Polyhedron(d.manifold, parts, stated), self.energy)

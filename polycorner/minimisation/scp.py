@@ -17,6 +17,7 @@ from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
 FIRST_RADIUS, LEAST_RADIUS = 0.25, 1e-9  # of the trust region, in scale units
 PENALTY = 10.0  # initial weight of the constraint violation in the merit function
@@ -77,10 +78,10 @@ class Model:
         return np.asarray(self.step.value), duals
 
 
-def scp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+def scp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
     """Run sequential convex programming and polish its result."""
     point, iterations, settled = sequential_convex(problem, piece, q, limit)
-    return polished(problem, piece, q, point, iterations, stopped=settled)
+    return polished(problem, piece, q, point, iterations, tolerances, stopped=settled)
 
 
 def sequential_convex(

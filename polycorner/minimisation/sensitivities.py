@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 
     Quantity: TypeAlias = SmoothFunction | sympy.Expr | str
 
-DRIFT = 1e-8  # relative slope along a free direction up to which it counts as zero
-
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity(Checked, Printed):
@@ -102,7 +100,8 @@ class Sensitivity(Checked, Printed):
         point, scales = self.certificate.point, self.certificate.problem.scales
         slope = np.asarray(function.gradient(point))
         loose = abs((slope * scales) @ self.free)
-        if (loose > DRIFT * np.linalg.norm(slope * scales)).any():
+        still = self.certificate.tolerances.stationary * np.linalg.norm(slope * scales)
+        if (loose > still).any():
             msg = (
                 "quantity: expected one that is constant along the free directions; got "
                 f"{function.name}, which changes along them: its derivative is not determined"
@@ -207,7 +206,7 @@ def sensitivity(
     if solved is None:
         raise ValueError(_refusal("the second order vanishes in a direction that is not free"))
     moved, changed, slopes = solved
-    loose = (slopes > DRIFT).any(axis=0)
+    loose = (slopes > certificate.tolerances.stationary).any(axis=0)
     if loose.any():
         name = list(rates)[int(np.flatnonzero(loose)[0])]
         msg = (

@@ -8,11 +8,12 @@ from polycorner.minimisation.polishing import Endpoint, polished
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
 STOPPED = (0, 8)  # SLSQP's exit codes for convergence, and for a line search without progress
 
 
-def slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
+def slsqp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
     """Run SLSQP in scaled coordinates, the energy divided by its own size, and polish."""
     from scipy.optimize import minimize
 
@@ -45,5 +46,5 @@ def slsqp(problem: Problem, piece: Piece, q: Array, limit: int) -> Endpoint:
         constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
         options=options,
     )
-    stopped = found.status in STOPPED
-    return polished(problem, piece, q, found.x * scales, int(found.nit), stopped=stopped)
+    point, stopped = found.x * scales, found.status in STOPPED
+    return polished(problem, piece, q, point, int(found.nit), tolerances, stopped=stopped)

@@ -19,6 +19,7 @@ from polycorner.minimisation.sparse.optimality import (
 )
 from polycorner.minimisation.verdicts import Entrapment, Verdict
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 from polycorner.values import Value, cached_property
 
 
@@ -42,13 +43,10 @@ class SparseLocal(Value):
     rows: csr_array
     gradient: Array
     hessian: csr_array
-    tolerance: float
-    rank_tolerance: float
+    tolerances: Tolerances
 
     @classmethod
-    def at(
-        cls, problem: Problem, q: Array, tolerance: float, rank_tolerance: float
-    ) -> "SparseLocal":
+    def at(cls, problem: Problem, q: Array, tolerances: Tolerances) -> "SparseLocal":
         """Evaluate the functions of a problem at a point."""
         scaling = diags_array(problem.scales)
         values, rows = problem.sparse_rows.evaluate(q)
@@ -61,8 +59,7 @@ class SparseLocal(Value):
             csr_array(rows @ scaling),
             np.asarray(slopes.sum(axis=0) * problem.scales),
             csr_array(scaling @ bent @ scaling),
-            tolerance,
-            rank_tolerance,
+            tolerances,
         )
 
     @cached_property
@@ -74,7 +71,7 @@ class SparseLocal(Value):
     @property
     def small(self) -> float:
         """The size up to which a first derivative counts as zero."""
-        return self.tolerance * self.reference
+        return self.tolerances.stationary * self.reference
 
     @cached_property
     def away(self) -> Array:
@@ -147,7 +144,8 @@ class SparseAnalysis(Value):
         values, found = self.first.values, self.first
         unknown = np.full((2, len(values)), np.nan)
         lower, upper = (values, values) if found.independent else unknown
-        return Multipliers(values, lower, upper, found.exist, found.residual)
+        unique = found.independent
+        return Multipliers(values, lower, upper, found.exist, found.residual, unique)
 
     @property
     def named_multipliers(self) -> dict[str, float]:
@@ -162,9 +160,10 @@ class SparseAnalysis(Value):
             return {name: (value, value) for name, value in self.named_multipliers.items()}
         held = (*self.names, *self.local.problem.polyhedron.equation_names)
         local, k = self.local, len(self.active)
+        dependent = local.tolerances.dependent
         numbers = [*self.active, *range(local.problem.inequalities, len(local.away))]
         rows = unit(csr_array(local.rows[numbers]))
-        ends = multiplier_ranges(rows, k, local.gradient, self.first.values) / self.sizes
+        ends = multiplier_ranges(rows, k, local.gradient, self.first.values, dependent) / self.sizes
         return dict(zip(held, map(tuple, ends.T.tolist()), strict=True))
 
     @property
@@ -212,27 +211,26 @@ class SparseAnalysis(Value):
         raise ValueError(msg)
 
 
-def analyse_sparse(
-    problem: Problem, q: Array, tolerance: float, rank_tolerance: float
-) -> SparseAnalysis:
+def analyse_sparse(problem: Problem, q: Array, tolerances: Tolerances) -> SparseAnalysis:
     """Analyse a point of a polyhedron without unions, with sparse matrices throughout."""
-    local = SparseLocal.at(problem, q, tolerance, rank_tolerance)
-    m = problem.inequalities
-    active = np.flatnonzero(local.away[:m] <= tolerance)
+    local = SparseLocal.at(problem, q, tolerances)
+    m, zero = problem.inequalities, tolerances.zero
+    active = np.flatnonzero(local.away[:m] <= zero)
     held = np.concatenate([active, np.arange(m, len(local.away))])
     matrix = csr_array(local.rows[held])
-    outside = bool((local.away[:m] < -tolerance).any() or (abs(local.away[m:]) > tolerance).any())
+    outside = bool((local.away[:m] < -zero).any() or (abs(local.away[m:]) > zero).any())
     sizes = lengths(matrix)
     sizes = np.where(sizes > 0, sizes, 1.0)
     unit_rows = unit(matrix)
     small, k = local.small, len(active)
-    first = first_order(unit_rows, k, local.gradient, small, rank_tolerance)
-    strong = np.flatnonzero(first.values[:k] > tolerance * abs(first.values).max(initial=0.0))
+    first = first_order(unit_rows, k, local.gradient, small, tolerances)
+    least = tolerances.stationary * abs(first.values).max(initial=0.0)
+    strong = np.flatnonzero(first.values[:k] > least)
     carrying = unit_rows[np.concatenate([strong, np.arange(k, len(held))])]
     moved = _moved(local, carrying)
     carrying = csr_array(carrying[:, moved])
     whole = first.rank is not None and len(strong) == k
-    own = first.rank if whole else rank(carrying, rank_tolerance)
+    own = first.rank if whole else rank(carrying, tolerances.rank)
     weights = np.zeros(len(local.away))
     weights[held] = first.values / sizes
     face = _Face(moved, carrying, weights, None if own is None else len(moved) - own)

@@ -21,8 +21,6 @@ from polycorner.minimisation.sparse_analysis import SparseAnalysis
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.spaces.manifold import Array
 
-LEFT = 1e-8  # part of the right-hand side that is left where the system has no solution
-
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
@@ -119,7 +117,8 @@ def sparse_derivatives(certificate: Certificate, rates: Rates) -> Derivatives | 
     system = Saddle(hessian, units)
     found = system.solve(right, np.zeros_like(right))
     left = abs(right - system.matrix @ found).max(axis=0, initial=0.0)
-    sloping = left > LEFT * np.maximum(abs(right).max(axis=0, initial=0.0), np.finfo(float).tiny)
+    size = np.maximum(abs(right).max(axis=0, initial=0.0), np.finfo(float).tiny)
+    sloping = left > certificate.tolerances.stationary * size  # there is no solution
     if sloping.any():
         name = list(rates)[int(np.flatnonzero(sloping)[0])]
         return f"the energy does not stay constant along the free coordinates as {name} changes"

@@ -10,10 +10,7 @@ from polycorner.minimisation.constancy import without
 from polycorner.minimisation.findings import Local
 from polycorner.spaces.manifold import Array
 
-# Steps, relative to the coordinates, over which curvatures must be steady, and how small one must
-# be, relative to the largest, to be looked at.
-BESIDE = 1e-6
-FAINT = 1e-3
+FAINT = 1e-3  # curvature, relative to the largest, up to which one is looked at
 FARTHEST = 0.01  # scale units up to which Newton's step says how far a degenerate point may be
 
 
@@ -79,7 +76,7 @@ def _changes(
         sizes = np.maximum(np.sqrt((gradients * gradients).sum(axis=1)), 1e-300)
         left = local.gradients[-1] - (multipliers.values / sizes) @ gradients
         newton = np.nan_to_num(abs(ways @ left) / abs(values))
-        reach = BESIDE * (1 + abs(local.point / local.problem.scales).max())
+        reach = local.tolerances.difference * (1 + abs(local.point / local.problem.scales).max())
         ahead = ways * np.clip(2 * newton, reach, max(reach, FARTHEST))[:, None]
         points = local.point + np.vstack([ahead, -ahead]) * local.problem.scales
         hessians = local.problem.evaluate(points, 2)[2]

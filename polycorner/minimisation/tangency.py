@@ -9,7 +9,6 @@ beside it: at the distance ``d`` of a simple contact, ``s ~ d`` and ``m ~ d^2 / 
 
 import numpy as np
 
-from polycorner.minimisation.degeneracy import FEASIBLE
 from polycorner.minimisation.evidence import steepest_descent
 from polycorner.minimisation.findings import Analysis, Local
 from polycorner.polyhedra.cones import Rows
@@ -48,14 +47,16 @@ def falls_on_set(a: Analysis) -> bool:
         return False
     numbers = [n for i, n in enumerate([*a.active, *local.sections]) if i not in a.blind]
     unit = 1.0 / max(1.0, bend(local, numbers))
-    smaller = problem.with_independent_equations(frozenset(a.active), [local.point])
-    everything = frozenset(range(smaller.inequalities))
+    smaller = problem.with_independent_equations(
+        frozenset(a.active), [local.point], local.tolerances
+    )
+    everything, miss = frozenset(range(smaller.inequalities)), local.tolerances.zero / 10
     for step in unit * np.array(STEPS):
         ahead = local.point + step * way * problem.scales
         reached, point = smaller.restore(everything, ahead)
         moved = float(np.linalg.norm((point - ahead) / problem.scales))
         fall = float(local.values[-1] - problem.energy.value(point))
-        if not (reached and moved <= step / 4 and problem.equations_hold(point, FEASIBLE)):
+        if not (reached and moved <= step / 4 and problem.equations_hold(point, miss)):
             return False
         if step < STEPS[0] * unit and not fall >= rate * step / 2:
             return False

@@ -11,9 +11,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
-
-# Rows of functions differ by less, relative to their size, after a symmetry.
-SAME = 1e-9
+from polycorner.tolerances import DEFAULT
 
 
 class Programmes:
@@ -96,7 +94,7 @@ class Programmes:
         affine = np.linalg.lstsq(after, before)[0]
         off = abs(after @ affine - before).max()
         same = frozenset(image[i] for i in self.always) == self.always
-        return bool(off <= SAME * abs(before).max()) and same
+        return bool(off <= DEFAULT.alike * abs(before).max()) and same
 
 
 def _on(polyhedron: Polyhedron, height: Any) -> SmoothFunction:

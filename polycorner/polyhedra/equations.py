@@ -7,16 +7,18 @@ import numpy as np
 
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import RANK_TOLERANCE, evaluated
+from polycorner.polyhedra.strata import evaluated
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT, Tolerances
 
 RANKED = 4  # points that are looked at
 AROUND = (1e-3, 0.1, 1.0)  # distances, in scale units, of points beside them
 STEPS = 50  # to the equations
-LAST = 1e-8  # size of a step, in scale units, whose square is rounding
 
 
-def independent_equations(polyhedron: Polyhedron, points: Iterable[Array]) -> tuple[int, ...]:
+def independent_equations(
+    polyhedron: Polyhedron, points: Iterable[Array], tolerances: Tolerances = DEFAULT
+) -> tuple[int, ...]:
     """Return positions of equations with independent gradients that span those of all equations.
 
     The rank of equations on the set is the largest near given points: near, because it may fall
@@ -31,11 +33,12 @@ def independent_equations(polyhedron: Polyhedron, points: Iterable[Array]) -> tu
         The set.
     points : iterable of (n,) arrays
         Points on the set or beside it.
+    tolerances : Tolerances, optional
     """
     first, count = len(polyhedron.functions), len(polyhedron.equation_names)
     rng, scales = np.random.default_rng(0), polyhedron.manifold.scale_array
     found = (
-        _on_equations(polyhedron, q + radius * scales * rng.standard_normal(len(q)))
+        _on_equations(polyhedron, q + radius * scales * rng.standard_normal(len(q)), tolerances)
         for q in islice(points, RANKED if count > 1 else 0)
         for radius in AROUND
     )
@@ -46,28 +49,28 @@ def independent_equations(polyhedron: Polyhedron, points: Iterable[Array]) -> tu
     steady = sizes.min(axis=0) / np.maximum(sizes.max(axis=0), 1e-300)
     normalising = np.arange(count) >= count - polyhedron.normalised
     order = np.lexsort((-steady, ~normalising)).tolist()
-    most = max((_first_independent(gradients, order) for gradients in samples), key=len)
+    most = max((_first_independent(some, order, tolerances.rank) for some in samples), key=len)
     return tuple(first + i for i in sorted(most))
 
 
-def _first_independent(gradients: Array, order: list[int]) -> list[int]:
+def _first_independent(gradients: Array, order: list[int], tolerance: float) -> list[int]:
     """Return the positions, taken in order, of rows that are independent of those before."""
     chosen: list[int] = []
     for i in order:
-        if rank(gradients[[*chosen, i]], RANK_TOLERANCE) > len(chosen):
+        if rank(gradients[[*chosen, i]], tolerance) > len(chosen):
             chosen.append(i)
     return chosen
 
 
-def _on_equations(polyhedron: Polyhedron, q: Array) -> Array | None:
+def _on_equations(polyhedron: Polyhedron, q: Array, tolerances: Tolerances) -> Array | None:
     """Return the gradients of all equations where Gauss and Newton's steps to them end, if so."""
     first, scales = len(polyhedron.functions), polyhedron.manifold.scale_array
     for _ in range(STEPS):
         values, gradients = (part[first:] for part in evaluated(polyhedron, q))
         if not (np.isfinite(values).all() and np.isfinite(gradients).all()):
             return None
-        step = -np.asarray(np.linalg.lstsq(gradients, values, rcond=RANK_TOLERANCE)[0])
-        if np.linalg.norm(step) <= LAST:
+        step = -np.asarray(np.linalg.lstsq(gradients, values, rcond=tolerances.rank)[0])
+        if np.linalg.norm(step) <= tolerances.settled:
             return gradients
         q = q + scales * step
     return None

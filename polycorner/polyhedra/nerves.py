@@ -27,13 +27,12 @@ from polycorner.polyhedra.affine import Programmes
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
 
-# Heights that differ by less, relative to the largest, are one height, of cells in any order.
-MERGED = 1e-7
 Cell = tuple[frozenset[int], ...]  # of every union, which of its pieces
 
 
@@ -253,7 +252,9 @@ def _merged(decreasing: list[float]) -> list[float]:
     """Return decreasing heights with those that are equal up to rounding made equal."""
     found: list[float] = []
     size = max((abs(h) for h in decreasing if np.isfinite(h)), default=0.0)
+    # Cells of heights as near, the accuracy of the programmes, come in any order.
+    merged = DEFAULT.same / 10 * size
     for h in decreasing:
-        near = bool(found) and found[-1] - h <= MERGED * size
+        near = bool(found) and found[-1] - h <= merged
         found.append(found[-1] if near else h)
     return found

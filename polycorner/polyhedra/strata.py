@@ -13,10 +13,8 @@ from polycorner.polyhedra.cones import inward_direction, rank
 from polycorner.polyhedra.polyhedron import Piece, Polyhedron
 from polycorner.printing import Printed, Sheet, facts, names
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked
-
-TOLERANCE = 1e-8
-RANK_TOLERANCE = 1e-6
 
 
 class LocalType(Enum):
@@ -114,11 +112,10 @@ def stratum_at(
     0
     """
     checks.instance("polyhedron", polyhedron, Polyhedron)
-    check_tolerance("tolerance", tolerance)
-    check_tolerance("rank_tolerance", rank_tolerance)
+    tolerances = Tolerances.of(tolerance, rank_tolerance)
     point = polyhedron.manifold.point(q)
     values, gradients = evaluated(polyhedron, point)
-    return stratum_of(polyhedron, point, values, gradients, tolerance, rank_tolerance)
+    return stratum_of(polyhedron, point, values, gradients, tolerances.zero, tolerances.rank)
 
 
 def stratum_of(

@@ -16,12 +16,11 @@ from polycorner.formulas.rows import Indices, Mask, SparseRows
 from polycorner.minimisation.sparse.faces import FacePoint, on_corner
 from polycorner.minimisation.sparse.programmes import Linearised, step
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
-STRONG = 1e-9  # multiplier, relative to the largest, above which a function counts as held
 CLOSE = 0.05  # largest displacement, in scale units, from which on the corner is solved for
 WIDER = 3.0  # next box, in units of the largest displacement of this step
 LEAST = 1e-9  # box, in scale units, below which the chain has stalled
-ROUNDING = 1e-13  # violation, in scale units, of a point that lies in the polyhedron
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def descend(
         found = step(at, np.full(len(q), reach))
         if found is None or reach < LEAST:
             return ChainEnd(q, held, lam, count, None)
-        strong = found.multipliers > STRONG * found.multipliers.max(initial=0.0)
+        strong = found.multipliers > DEFAULT.multiplier * found.multipliers.max(initial=0.0)
         held, lam = rows.chosen(np.flatnonzero(strong)), found.multipliers[strong]
         used = held.used
         displacement = land.level(found.displacement, used)
@@ -141,4 +140,4 @@ def _settled(land: Landscape, corner: FacePoint) -> bool:
     if not (corner.multipliers > 0).all():
         return False
     values = land.near(corner.point, 0.0).values(corner.point)
-    return bool(values.min(initial=0.0) >= -ROUNDING)
+    return bool(values.min(initial=0.0) >= -DEFAULT.rounding)

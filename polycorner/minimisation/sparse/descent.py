@@ -31,8 +31,6 @@ from polycorner.minimisation.sparse.optimality import (
 )
 from polycorner.minimisation.sparse.quadratic_programmes import quadratic_step
 from polycorner.minimisation.sparse.restoration import (
-    FEASIBLE,
-    ON_THE_WAY,
     inside,
     linearised,
     near,
@@ -43,6 +41,7 @@ from polycorner.minimisation.sparse.restoration import (
 )
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
 FIRST, LEAST = 0.25, 1e-10  # box of the first step, and of the last, in scale units
 WIDER, FINEST = 4.0, 1e-8  # next box, in units of the displacement; the least one after a success
@@ -51,11 +50,7 @@ SAMPLES = 64  # of a step, at most
 FACTORS = (1.0, 0.5, 0.25, 0.125)  # parts of a step that are tried before the box shrinks
 PROMISED = 1e-4  # part of the decrease that the model promises, with which a step is accepted
 CLOSE = 0.5  # step from which on Newton's method on the face is tried
-SETTLED = 1e-8  # last step of Newton's method, in scale units, up to which it has converged
-RANK = 1e-6  # singular value of unit gradients up to which they are dependent
-NEGATIVE = 1e-9  # multiplier, relative to the largest derivative, that counts as negative
 CORRECTIONS = 20  # of the face on which Newton's method is tried
-FAR = 1e8  # distance from the start, in scale units, beyond which a descent is unbounded
 IDLE = 5  # steps without any promise after which a descent has stalled
 PUSHES = (0.1, 0.01, 0.001)  # lengths of steps off a saddle, in scale units
 
@@ -69,7 +64,7 @@ class DescentEnd:
     failure: Verdict | None
 
 
-def descend(problem: Nonlinear, start: Array, limit: int, tolerance: float) -> DescentEnd:
+def descend(problem: Nonlinear, start: Array, limit: int) -> DescentEnd:
     """Descend from ``start``, never through a wall, until a face carries a minimum.
 
     Parameters
@@ -79,8 +74,6 @@ def descend(problem: Nonlinear, start: Array, limit: int, tolerance: float) -> D
         In scaled coordinates; if it is not feasible, the violation is lowered first.
     limit : int
         Number of quadratic programmes.
-    tolerance : float
-        Curvature, relative to the energy's derivatives, that counts as zero.
     """
     at = problem.at(start)
     found = projected(problem, at, 30) if at.is_finite else None
@@ -90,15 +83,14 @@ def descend(problem: Nonlinear, start: Array, limit: int, tolerance: float) -> D
             failure = Verdict.INFEASIBLE if search.stationary else Verdict.NOT_CONVERGED
             return DescentEnd(search.at.place, 0, failure)
         found = search.at
-    return _Descent(problem, found, tolerance).run(limit)
+    return _Descent(problem, found).run(limit)
 
 
 class _Descent:
     """The state of a descent: a feasible point, the box of the next step, the last multipliers."""
 
-    def __init__(self, problem: Nonlinear, at: Point, tolerance: float) -> None:
-        self.problem, self.at, self.origin = problem, at, at.place
-        self.tolerance, self.reach = tolerance, FIRST
+    def __init__(self, problem: Nonlinear, at: Point) -> None:
+        self.problem, self.at, self.origin, self.reach = problem, at, at.place, FIRST
         self.multipliers = np.zeros(len(at.distances))
         self.tried: tuple[Indices, float] | None = None
         self.idle = 0
@@ -109,7 +101,7 @@ class _Descent:
             ended = self.advanced()
             if ended is not None:
                 return DescentEnd(ended[0], count, ended[1])
-            if abs(self.at.place - self.origin).max() > FAR:
+            if abs(self.at.place - self.origin).max() > self.problem.tolerances.unbounded:
                 return DescentEnd(self.at.place, count, Verdict.UNBOUNDED)
         return DescentEnd(self.at.place, limit, Verdict.NOT_CONVERGED)
 
@@ -195,21 +187,23 @@ class _Descent:
         of basic functions, where others vanish with multipliers that may be zero, the nearest point
         of the set is taken instead.  From a saddle the descent goes on.
         """
-        problem = self.problem
+        problem, tolerances = self.problem, self.problem.tolerances
         for _ in range(CORRECTIONS):
             everything = np.concatenate([held, problem.equations])
             near = self.multipliers[everything]
             found = on_face(problem, everything, self.at.place, near=near)
-            if found is None or not found.last_step < SETTLED:
+            if found is None or not found.last_step < tolerances.settled:
                 return None
             at = problem.at(found.point)
             at = inside(problem, at, everything) if basic else at
-            violated = np.flatnonzero(at.distances[: problem.inequalities] < -FEASIBLE)
+            missed = at.distances[: problem.inequalities] < -tolerances.feasible
+            violated = np.flatnonzero(missed)
             if len(violated):
                 held = np.union1d(held, violated)
                 continue
-            lam = signed_multipliers(at, everything, len(held), found.multipliers)
-            negative = lam[: len(held)] < -NEGATIVE * float(abs(at.gradient).max())
+            lam = signed_multipliers(at, everything, len(held), found.multipliers, tolerances)
+            small = tolerances.multiplier * float(abs(at.gradient).max())
+            negative = lam[: len(held)] < -small
             if not negative.any():
                 return self.judged(at, everything, lam)
             held = held[~negative]
@@ -223,7 +217,8 @@ class _Descent:
         at, k = self.at, len(held)
         rows = csr_array(at.rows[np.concatenate([held, self.problem.equations])])
         found = basic_multipliers(rows, k, at.gradient)
-        return held if found is None else held[found[:k] > NEGATIVE * abs(found).max(initial=0.0)]
+        least = self.problem.tolerances.multiplier
+        return held if found is None else held[found[:k] > least * abs(found).max(initial=0.0)]
 
     def judged(
         self, at: Point, held: Indices, multipliers: Array
@@ -232,15 +227,16 @@ class _Descent:
         problem = self.problem
         missed = violation(problem, self.at)[held] @ abs(multipliers)
         noise = 1e-12 * (abs(self.at.energy) + float(abs(at.gradient).max())) + missed
-        if worst(problem, at) > FEASIBLE or not at.energy <= self.at.energy + noise:
+        tolerances = problem.tolerances
+        if worst(problem, at) > tolerances.feasible or not at.energy <= self.at.energy + noise:
             return None
         lam = np.zeros(len(at.distances))
         lam[held] = multipliers
-        closed = np.flatnonzero(at.distances[: problem.inequalities] <= ON_THE_WAY)
+        closed = np.flatnonzero(at.distances[: problem.inequalities] <= tolerances.zero)
         held = np.union1d(held, closed)  # weakly active ones, too
         rows, hessian = csr_array(at.rows[held]), problem.hessian(at, lam)
         size = max(float(abs(at.gradient).max()), float(abs(hessian).max())) or 1.0
-        if second_order(hessian, rows, self.tolerance * size) is Verdict.SADDLE:
+        if second_order(hessian, rows, tolerances.flat * size) is Verdict.SADDLE:
             lower = self.beyond(at, held, downward(hessian, rows))
             if lower is not None:
                 self.at, self.reach, self.tried = lower, FIRST, None
@@ -263,15 +259,17 @@ class _Descent:
         return None
 
 
-def signed_multipliers(at: Point, held: Indices, inequalities: int, lam: Array) -> Array:
+def signed_multipliers(
+    at: Point, held: Indices, inequalities: int, lam: Array, tolerances: Tolerances
+) -> Array:
     """Return multipliers none of which is negative, if gradients are dependent and there are such.
 
     Where gradients are independent, there are no others than those given.
     """
     if not lam[:inequalities].min(initial=0.0) < 0:
         return lam
-    small = NEGATIVE * float(abs(at.gradient).max())
-    found = first_order(csr_array(at.rows[held]), inequalities, at.gradient, small, RANK)
+    small = tolerances.multiplier * float(abs(at.gradient).max())
+    found = first_order(csr_array(at.rows[held]), inequalities, at.gradient, small, tolerances)
     return lam if found.independent or not found.exist else found.values
 
 

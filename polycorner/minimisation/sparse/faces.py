@@ -17,7 +17,6 @@ from polycorner.minimisation.sparse.nonlinear import Nonlinear, Point
 from polycorner.spaces.manifold import Array
 
 MOST_STEPS = 20
-STATIONARY = 1e-8  # derivative, relative to the largest, that counts as zero
 FAR = 0.3  # in scale units: a step this long has left the neighbourhood of the face's point
 
 Evaluate = Callable[[Array], tuple[Array, csr_array]]
@@ -94,7 +93,8 @@ def is_stationary(problem: Nonlinear, at: Point, held: Indices, lam: Array) -> b
     A step in the null space of a singular system is zero without being Newton's.
     """
     left = abs(at.gradient - at.rows[held].T @ lam).max(initial=0.0)
-    return bool(left <= STATIONARY * _size(at, _lagrangian(problem, at, held, lam)))
+    small = problem.tolerances.stationary
+    return bool(left <= small * _size(at, _lagrangian(problem, at, held, lam)))
 
 
 def _lagrangian(problem: Nonlinear, at: Point, held: Indices, lam: Array) -> csr_array:

@@ -7,8 +7,8 @@ from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_arr
 from scipy.sparse.linalg import splu
 
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
-BACKWARD = 1e-10  # backward error of a factorisation whose pivots' signs are believed
 REFINEMENTS = 3  # steps of iterative refinement
 REGULAR = 1e-10  # regularisation of a symmetric system, relative to its largest entry
 MOST_REFINEMENTS = 20  # of a regularised system
@@ -59,8 +59,9 @@ def negative_eigenvalues(matrix: Any) -> int | None:
     ones = np.ones(square.shape[0])
     x = lu.solve(ones)
     error = abs(square @ x - ones).max(initial=0.0)
+    # The backward error of a factorisation whose pivots' signs are believed.
     size = 1.0 + float(abs(square).sum(axis=1).max()) * float(abs(x).max(initial=0.0))
-    return int((pivots < 0).sum()) if error < BACKWARD * size else None
+    return int((pivots < 0).sum()) if error < 1000 * DEFAULT.rounding * size else None
 
 
 def unit(matrix: csr_array) -> csr_array:

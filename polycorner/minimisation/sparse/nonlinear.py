@@ -8,6 +8,7 @@ from scipy.sparse import csr_array, diags_array
 from polycorner.formulas.rows import Indices, SparseRows
 from polycorner.minimisation.sparse.factorisation import lengths
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 from polycorner.values import Value, cached_property
 
 
@@ -57,12 +58,15 @@ class Nonlinear(Value):
     inequalities : int
         The number ``m`` of the ``f_i``.
     scales : (n,) array
+    tolerances : Tolerances
+        Those in force.
     """
 
     terms: SparseRows
     constraints: SparseRows
     inequalities: int
     scales: Array
+    tolerances: Tolerances
 
     @property
     def equations(self) -> Indices:

@@ -16,10 +16,9 @@ from polycorner.minimisation.sparse.factorisation import (
 from polycorner.minimisation.sparse.programmes import Linearised, step
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import Tolerances
 
 INWARD = 1e-3  # rate, per step of a scale unit, at which a direction leads inward
-SIGN = 1e-8  # negative multiplier, relative to the largest, that counts as zero
-DETERMINED = 1e-7  # entry of a random state of self-stress that counts as zero
 PENALTY = 1e4  # of directions that leave the face, in units of the largest curvature
 
 
@@ -51,13 +50,13 @@ class FirstOrder:
 
 
 def first_order(
-    rows: csr_array, inequalities: int, gradient: Array, small: float, rank_tolerance: float
+    rows: csr_array, inequalities: int, gradient: Array, small: float, tolerances: Tolerances
 ) -> FirstOrder:
     """Return the multipliers of unit gradients.
 
     Where they are not unique, those whose least is the largest.
     """
-    found = rank(rows, rank_tolerance)
+    found = rank(rows, tolerances.rank)
     k = rows.shape[0]
     if found == k:
         lam = least_squares(rows, gradient) if k else np.empty(0)
@@ -67,9 +66,8 @@ def first_order(
         return FirstOrder(np.zeros(k), np.inf, found, exist=False)
     residual = float(abs(gradient - rows.T @ lam).max(initial=0.0))
     least = float(lam[:inequalities].min(initial=0.0))
-    return FirstOrder(
-        lam, residual, found, exist=residual <= small and least >= -SIGN * abs(lam).max(initial=0.0)
-    )
+    negative = -tolerances.stationary * abs(lam).max(initial=0.0)
+    return FirstOrder(lam, residual, found, exist=residual <= small and least >= negative)
 
 
 def _central(rows: csr_array, inequalities: int, gradient: Array) -> Array | None:
@@ -108,11 +106,14 @@ def basic_multipliers(rows: csr_array, inequalities: int, gradient: Array) -> Ar
     return found.x[:k] * scale if found.status == 0 else None
 
 
-def multiplier_ranges(rows: csr_array, inequalities: int, gradient: Array, values: Array) -> Array:
+def multiplier_ranges(
+    rows: csr_array, inequalities: int, gradient: Array, values: Array, dependent: float
+) -> Array:
     """Return the least and the largest value ``(2, k)`` of each multiplier of unit gradients.
 
     A multiplier is determined if no state of self-stress, ``A^T z = 0``, contains it.  Random ones
-    contain all that are in any; for these HiGHS solves two linear programmes each.
+    contain all that are in any, with entries beyond ``dependent``; for these HiGHS solves two
+    linear programmes each.
     """
     ends = np.array([values, values])
     k, scale = len(values), float(abs(gradient).max(initial=0.0)) or 1.0
@@ -122,7 +123,7 @@ def multiplier_ranges(rows: csr_array, inequalities: int, gradient: Array, value
     stress = stresses.solve(right, np.zeros_like(right))[:k]
     signs = [(0, None)] * inequalities + [(None, None)] * (k - inequalities)
     solve: Any = linprog
-    for i in np.flatnonzero(abs(stress).max(axis=1) > DETERMINED):
+    for i in np.flatnonzero(abs(stress).max(axis=1) > dependent):
         for row, sign in enumerate((1.0, -1.0)):
             cost = np.zeros(k)
             cost[i] = sign

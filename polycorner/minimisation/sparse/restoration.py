@@ -12,9 +12,6 @@ from polycorner.minimisation.sparse.programmes import Linearised
 from polycorner.minimisation.sparse.quadratic_programmes import elastic_step, quadratic_step
 from polycorner.spaces.manifold import Array
 
-FEASIBLE = 1e-10  # distance, in scale units, by which a constraint may be missed at the end
-ON_THE_WAY = 1e-8  # the same during a descent, as the solver of the programmes is no more accurate
-STATIONARY = 1e-6  # decrease of the violation, relative to it, that counts as none
 FIRST, LEAST = 0.5, 1e-9  # box of a step, in scale units
 AROUND = 100.0  # box of a step on a flat face, in units of the violation
 FARTHEST = 10.0  # violation, in scale units, beyond which a projection is given up
@@ -50,7 +47,7 @@ def near(problem: Nonlinear, at: Point, reach: float) -> Indices:
     """Return the inequalities that a step in a box of the size ``reach`` can close."""
     m = problem.inequalities
     sums = abs(at.rows[:m]).sum(axis=1)
-    return np.flatnonzero(at.distances[:m] <= 1.2 * reach * sums + ON_THE_WAY)
+    return np.flatnonzero(at.distances[:m] <= 1.2 * reach * sums + problem.tolerances.zero)
 
 
 def linearised(problem: Nonlinear, at: Point, kept: Indices, size: float) -> Linearised:
@@ -58,7 +55,7 @@ def linearised(problem: Nonlinear, at: Point, kept: Indices, size: float) -> Lin
 
     What is missed by rounding counts as zero.
     """
-    values = np.where(abs(at.distances) < ON_THE_WAY, 0.0, at.distances)
+    values = np.where(abs(at.distances) < problem.tolerances.zero, 0.0, at.distances)
     own, rows = problem.equations, at.rows
     return Linearised(
         values[kept],
@@ -74,19 +71,16 @@ def projected(
 ) -> Point | None:
     """Return the point after Gauss-Newton steps onto the held functions and those that are missed.
 
-    The steps end in the set; with ``onto``, also where all held functions vanish.  None if they
-    do not.
+    The steps end in the set, up to what counts as zero, as the solver of the programmes is no more
+    accurate; with ``onto``, also where all held functions vanish.  None if they do not.
     """
-    face = held if onto else NONE
+    face, miss = held if onto else NONE, problem.tolerances.zero
     missed = np.zeros(len(at.distances), dtype=np.bool_)
     missed[problem.equations] = missed[held] = True
     for _ in range(limit):
-        if (
-            worst(problem, at) <= ON_THE_WAY
-            and abs(at.distances[face]).max(initial=0.0) <= ON_THE_WAY
-        ):
+        if worst(problem, at) <= miss and abs(at.distances[face]).max(initial=0.0) <= miss:
             return at
-        missed |= violation(problem, at) > ON_THE_WAY
+        missed |= violation(problem, at) > miss
         chosen, n = np.flatnonzero(missed), len(at.place)
         right = np.concatenate([np.zeros(n), -at.distances[chosen]])
         try:
@@ -99,19 +93,19 @@ def projected(
         at = problem.at(at.place + change[:n])
         if not worst(problem, at) < FARTHEST:
             return None
-    return at if worst(problem, at) <= ON_THE_WAY else None
+    return at if worst(problem, at) <= miss else None
 
 
 def restored(problem: Nonlinear, at: Point, limit: int) -> Restored:
     """Lower the sum of violations by elastic programmes in a trust region until it vanishes."""
-    reach = FIRST
+    reach, miss = FIRST, problem.tolerances.zero
     total = float(violation(problem, at).sum())
     for _ in range(limit):
         if worst(problem, at) < 1e-3:
             ended = projected(problem, at, 10)
             if ended is not None:
                 return Restored(ended, feasible=True)
-        kept = np.flatnonzero(at.distances[: problem.inequalities] <= 2.4 * reach + ON_THE_WAY)
+        kept = np.flatnonzero(at.distances[: problem.inequalities] <= 2.4 * reach + miss)
         kept = np.union1d(kept, near(problem, at, reach))
         model = linearised(problem, at, kept, 1.0)
         step = elastic_step(model, reach)
@@ -119,7 +113,7 @@ def restored(problem: Nonlinear, at: Point, limit: int) -> Restored:
             return Restored(at, feasible=False)
         left = np.maximum(-(model.values + model.rows @ step), 0.0).sum()
         left += abs(model.sections + model.section_rows @ step).sum()
-        if total - left <= STATIONARY * total:
+        if total - left <= 100 * problem.tolerances.stationary * total:
             return Restored(at, feasible=False, stationary=True)
         trial = problem.at(at.place + step)
         after = float(violation(problem, trial).sum()) if trial.is_finite else np.inf
@@ -131,7 +125,7 @@ def restored(problem: Nonlinear, at: Point, limit: int) -> Restored:
             reach = 0.25 * min(reach, size)
         if reach < LEAST:
             break
-    return Restored(at, feasible=worst(problem, at) <= ON_THE_WAY)
+    return Restored(at, feasible=worst(problem, at) <= miss)
 
 
 def inside(problem: Nonlinear, at: Point, held: Indices) -> Point:
@@ -142,7 +136,7 @@ def inside(problem: Nonlinear, at: Point, held: Indices) -> Point:
     others = np.setdiff1d(np.arange(problem.inequalities), held)
     for _ in range(5):
         short = worst(problem, at)
-        if short <= FEASIBLE:
+        if short <= problem.tolerances.feasible:
             break
         reach = AROUND * short
         kept = others[at.distances[others] <= 10 * reach]

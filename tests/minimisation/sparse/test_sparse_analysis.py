@@ -11,6 +11,7 @@ from polycorner import Manifold, Polyhedron, Verdict, certify, minimise
 from polycorner.minimisation.problem import pose
 from polycorner.minimisation.sparse.factorisation import negative_eigenvalues, rank
 from polycorner.minimisation.sparse_analysis import analyse_sparse
+from polycorner.tolerances import DEFAULT
 
 # Largest least distance of N points in a unit square, as published: packomania.com.
 DISTANCES = {
@@ -57,7 +58,7 @@ def test_densest_packings_in_a_square_are_certified(count):
     assert -best.energy == pytest.approx(DISTANCES[count], abs=1e-10)
     # A free point that happens to lie on a wall is beyond the analysis with full matrices.
     assert best.is_minimum or (count in {7, 11} and best.verdict is Verdict.UNDECIDED)
-    found = analyse_sparse(best.problem, best.point, 1e-8, 1e-6)
+    found = analyse_sparse(best.problem, best.point, DEFAULT)
     assert found.verdict.is_minimum
     assert found.names == best.active
 
@@ -89,7 +90,7 @@ def test_twelve_spheres_around_one():
     D = Polyhedron(M, {f"{i}-{j}": squared(i, j) - t for i, j in near}, spheres | held)
     q = np.append(points.ravel(), edge)
     problem = pose(D, -t)
-    found = analyse_sparse(problem, q, 1e-8, 1e-6)
+    found = analyse_sparse(problem, q, DEFAULT)
     assert len(found.active) == 30
     assert found.verdict is certify(D, -t, q).verdict is Verdict.STRICT_MINIMUM
     assert found.first.rank == 37  # a corner
@@ -127,7 +128,7 @@ def chain_of_springs(count, sign=1.0):
 def test_second_order_by_inertia(sign, verdict):
     D, E = chain_of_springs(12, sign)
     q = np.zeros(12)
-    found = analyse_sparse(pose(D, E), q, 1e-8, 1e-6)
+    found = analyse_sparse(pose(D, E), q, DEFAULT)
     assert found.verdict is certify(D, E, q).verdict is Verdict[verdict]
     assert found.face_dimension == 6
 
@@ -137,7 +138,7 @@ def test_first_order_verdicts():
     x, y = M.symbols
     D = Polyhedron(M, {"floor": y, "wall": x})
     for energy, q in [(2 * y - 3 * x, (0, 0)), (x + y, (0, 0)), (x + y, (0, 1)), (x + y, (-1, 0))]:
-        found = analyse_sparse(pose(D, energy), np.array(q, dtype=float), 1e-8, 1e-6)
+        found = analyse_sparse(pose(D, energy), np.array(q, dtype=float), DEFAULT)
         assert found.verdict is certify(D, energy, q).verdict
 
 

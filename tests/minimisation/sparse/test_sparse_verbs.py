@@ -23,6 +23,7 @@ from polycorner.formulas.families import Family
 from polycorner.minimisation import problem as problems
 from polycorner.minimisation.problem import pose
 from polycorner.minimisation.sparse_analysis import analyse_sparse
+from polycorner.tolerances import DEFAULT
 
 SIDES = (("floor", "low", "y"), ("left", "low", "x"), ("right", "high", "x"))
 
@@ -259,6 +260,17 @@ def test_failures_are_verdicts():
     assert cut.verdict in {Verdict.NOT_CONVERGED, Verdict.STRICT_MINIMUM}
 
 
+@pytest.mark.parametrize(("tolerance", "is_empty"), [(1e-8, True), (1e-5, False)])
+@pytest.mark.usefixtures("everything_sparse")
+def test_a_set_that_is_empty_by_less_than_the_tolerance_has_a_minimum(tolerance, is_empty):
+    M = Manifold.euclidean("x y")
+    x, y = M.symbols
+    D = Polyhedron(M, {"right": x - 1e-7, "left": -x})
+    c = minimise(D, x + y**2, [0.5, 1.0], tolerance=tolerance)
+    assert (c.verdict is Verdict.INFEASIBLE) == is_empty
+    assert c.is_minimum != is_empty
+
+
 @pytest.mark.usefixtures("everything_sparse")
 def test_saddles_are_left():
     M = Manifold.euclidean("x y z")
@@ -291,7 +303,7 @@ def test_multiplier_ranges_of_a_redundant_pile():
     M = Manifold.euclidean("y t")
     y, t = M.symbols
     D = Polyhedron(M, {"left": y - t, "middle": y, "right": y + t, "stop": 1 - t})
-    dense, sparse = certify(D, y, [0.0, 0.0]), analyse_sparse(pose(D, y), np.zeros(2), 1e-8, 1e-6)
+    dense, sparse = certify(D, y, [0.0, 0.0]), analyse_sparse(pose(D, y), np.zeros(2), DEFAULT)
     assert not sparse.independent
     # left + middle + right = 1 and left = right.
     exact = {"left": (0, 0.5), "middle": (0, 1), "right": (0, 0.5)}

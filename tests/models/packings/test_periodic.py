@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from polycorner.minimisation import Verdict
 from polycorner.minimisation.sparse_analysis import analyse_sparse
 from polycorner.models import PeriodicPacking
+from polycorner.tolerances import DEFAULT
 
 
 @pytest.fixture(
@@ -79,7 +80,7 @@ def test_every_body_is_held_by_enough_contacts_or_is_a_rattler(jammed):
 def test_certify_finds_the_same_forces(jammed):
     certificate = jammed.certificate
     assert certificate.problem.is_sparse == (jammed.point.size > 250)
-    found = analyse_sparse(certificate.problem, certificate.point, 1e-8, 1e-6)
+    found = analyse_sparse(certificate.problem, certificate.point, DEFAULT)
     assert found.verdict is jammed.verdict
     multipliers = found.named_multipliers
     forces = [multipliers[f"{i + 1}-{j + 1}"] for i, j in jammed.pairs]
@@ -100,7 +101,7 @@ def test_small_packings_agree_with_full_matrices():
     jammed = PeriodicPacking.bidisperse(24).jam(5)
     dense = jammed.certificate
     assert not dense.problem.is_sparse
-    sparse = analyse_sparse(dense.problem, dense.point, 1e-8, 1e-6)
+    sparse = analyse_sparse(dense.problem, dense.point, DEFAULT)
     assert sparse.verdict is dense.verdict
     assert sparse.names == dense.active
     assert sparse.independent == dense.licq
