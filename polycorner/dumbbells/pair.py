@@ -18,9 +18,9 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import TOLERANCE
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import TOLERANCE
 from polycorner.values import Checked, cached_property
 
 Chirality = Literal["L", "R"]

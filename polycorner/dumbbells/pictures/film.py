@@ -19,9 +19,10 @@ from polycorner.dumbbells.pictures.symbols import energy_unit
 from polycorner.kinds import checked
 from polycorner.motion.trajectory import Trajectory
 from polycorner.polyhedra.cones import rank
-from polycorner.polyhedra.strata import RANK_TOLERANCE, Stratum, stratum_at
+from polycorner.polyhedra.strata import Stratum, stratum_at
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
 if TYPE_CHECKING:
@@ -302,7 +303,7 @@ class _Shot:
             return f"dimension {free}, rank 0, interior"
         rows = [self.pair.polyhedron.names.index(name) for name in names]
         _, gradients = self.pair.polyhedron.bundle.evaluate(self.q[:, :3].reshape(6), 1)
-        r = rank(gradients[rows] * self.pair.manifold.scale_array, RANK_TOLERANCE)
+        r = rank(gradients[rows] * self.pair.manifold.scale_array, DEFAULT.rank)
         return f"dimension {free - r}, rank {r}, {'quadrant' if r == len(rows) else 'dependent'}"
 
     @property
