@@ -13,14 +13,13 @@ from polycorner.minimisation.conditions import (
 )
 from polycorner.minimisation.constancy import symmetric_tangents, without
 from polycorner.minimisation.corner_degeneracy import decide
-from polycorner.minimisation.corners import beside_inflection, corner, seen_from
 from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.evidence import steepest_descent
 from polycorner.minimisation.findings import OPEN, Analysis, Higher, Local
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.smoothness import obstacle
-from polycorner.minimisation.steadiness import steady
+from polycorner.minimisation.steadiness import is_steady, steady
 from polycorner.minimisation.tangency import falls_on_set, unresolved
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import (
@@ -36,6 +35,8 @@ from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
+NEWTON = 4  # steps to a corner
+ROUNDING = 1e-14  # relative length of a step that is rounding
 # Distances, in scale units, at which lower points are sought where a gradient vanishes: those that
 # are not lost in how far the point may be off.
 DISTANCES = 10.0 ** np.arange(-5, 0)
@@ -51,6 +52,47 @@ DECISIVE = (
     Verdict.WEAK_MINIMUM,
     Verdict.STRICT_MINIMUM,
 )
+
+
+def corner(local: Local, active: tuple[int, ...]) -> Local | None:
+    """Return the derivatives where the active functions vanish exactly, by Newton's method.
+
+    A point is within its tolerance of them, which is more than rounding: higher orders would tell
+    it from the corner.  None where it is the corner, or where none is found as near.
+    """
+    numbers, scales = [*active, *local.sections], local.problem.scales
+    q, steps = local.point, []
+    for _ in range(NEWTON):
+        values, gradients = local.problem.evaluate(q, 1)
+        step = np.linalg.lstsq(gradients[numbers], values[numbers], rcond=local.tolerances.rank)[0]
+        q = q - step * scales
+        steps.append(float(abs(step).max()))
+    size = ROUNDING * (1.0 + float(abs(q / scales).max()))
+    if not (size < steps[0] <= OPEN * local.tolerances.zero and steps[-1] <= size):
+        return None
+    values, gradients, hessians = local.problem.evaluate(q, 2)
+    return replace(local, point=q, values=values, gradients=gradients, hessians=hessians)
+
+
+def seen_from(a: Analysis, exact: Analysis) -> Analysis:
+    """Return the analysis of a point as that of the exact corner beside it."""
+    if exact.verdict in {Verdict.NOT_STATIONARY, Verdict.NO_MULTIPLIER}:
+        reason = "the exact corner of the active functions beside it is not stationary"
+        return replace(a, decision=undecided(len(a.local.point), reason))
+    return replace(a, verdict=exact.verdict, decision=exact.decision, curvature=exact.curvature)
+
+
+def beside_inflection(a: Analysis) -> Analysis:
+    """Return an analysis to second order with weak functions, where the curvature is steady.
+
+    Beside an inflection the wall may lie on either side of it.
+    """
+    strict = a.verdict is Verdict.STRICT_MINIMUM
+    point = a.local, a.active, a.gradients, a.multipliers, a.curvature
+    if not is_steady(*point, least=NEARLY_FLAT * a.small_curvature if strict else np.inf):
+        reason = "the second order changes as much as it is over a tiny distance"
+        return replace(a, verdict=Verdict.UNDECIDED, decision=undecided(len(a.local.point), reason))
+    return replace(a, verdict=Verdict.WEAK_MINIMUM) if strict else a
 
 
 def analyse(

@@ -1,8 +1,19 @@
-"""Local minimisation of an energy on a polyhedron by three methods that must agree."""
+"""Local minimisation of an energy on a polyhedron by three methods that must agree.
 
-from collections.abc import Callable, Mapping
+Scales of badly scaled problems, estimated from the data where a descent has stalled.
+
+A descent measures steps in the manifold's scales.  Where these are far from the sizes over which
+the functions vary, steps are short and curvatures drown in rounding errors.  A stalled descent goes
+on from where it is, in scales that are estimated there, until one converges:
+
+* ``sqrt(max_j |L_jj| / |L_ii|)`` with ``L`` the Hessian of the Lagrangian, which makes the diagonal
+  of the scaled Hessian constant ([NW] sec. 2.2); where ``L`` is flat, the magnitude below;
+* ``|q_i|``, the magnitude of the coordinate, where it is larger than the manifold's scale.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,27 +26,142 @@ from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.domain_edges import domain_edge
 from polycorner.minimisation.escapes import escape
 from polycorner.minimisation.feasibility import approach
-from polycorner.minimisation.polishing import Endpoint
+from polycorner.minimisation.polishing import Endpoint, polished
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.rescaling import PATIENCE, advice, rescaled
-from polycorner.minimisation.slsqp import slsqp
-from polycorner.minimisation.sparse_methods import sparse_descent, sparse_on_face
+from polycorner.minimisation.sparse.descent import descend
+from polycorner.minimisation.sparse.faces import on_face
+from polycorner.minimisation.sparse.nonlinear import Nonlinear
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.polyhedron import MAX_SELECTIONS, Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
+from polycorner.printing import number
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
+STOPPED = (0, 8)  # SLSQP's exit codes for convergence, and for a line search without progress
+FARTHEST = 1e3  # longest step of Newton's method towards a chosen face, in scale units
+End = tuple[int, int, Array, Array]  # status, iterations, point, multipliers
+FLAT = 1e-14  # diagonal entry, relative to the largest, below which a coordinate is flat
+UNEVEN = 1e3  # ratio of estimated scales, in the manifold's, for which a flat end is doubted
+PATIENCE = 100  # a lower limit on the steps is meant to cut the descent short
 Method = Literal["newton", "slsqp", "scp"]
 Descent = Callable[[Problem, Piece, Array, int], Endpoint]  # from a point, inside one piece
-
 MAX_SWITCHES = 50  # of branches in a union
 FIRM = {Verdict.STRICT_MINIMUM, Verdict.WEAK_MINIMUM}  # not decided by rounding far away
 DISTANT = 8.0  # scale units beyond which a flat end is doubted
 FADED = 1e-2  # size of derivatives, relative to those at the start, below which it is doubted
+
+
+def slsqp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
+    """Run SLSQP in scaled coordinates, the energy divided by its own size, and polish."""
+    from scipy.optimize import minimize
+
+    scales, m = problem.scales, problem.inequalities
+    values, gradients, hessians = problem.evaluate(q, 2)
+    size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
+    rows = sorted(piece)
+    sections = list(range(m, problem.rows - 1))
+    floor = float(values[-1])
+    options: Any = {"ftol": 1e-15, "maxiter": limit}
+
+    def constraint(kind: str, kept: list[int]) -> Any:
+        return {
+            "type": kind,
+            "fun": lambda u: problem.evaluate(u * scales, 0)[0][kept],
+            "jac": lambda u: problem.evaluate(u * scales, 1)[1][kept],
+        }
+
+    def energy(u: Array) -> float:
+        return float(problem.evaluate(u * scales, 0)[0][-1] - floor) / size
+
+    def slope(u: Array) -> Array:
+        return np.asarray(problem.evaluate(u * scales, 1)[1][-1] / size)
+
+    found = minimize(
+        energy,
+        q / scales,
+        jac=slope,
+        method="SLSQP",
+        constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
+        options=options,
+    )
+    point, stopped = found.x * scales, found.status in STOPPED
+    return polished(problem, piece, q, point, int(found.nit), tolerances, stopped=stopped)
+
+
+def nonlinear(problem: Problem, tolerances: Tolerances) -> Nonlinear:
+    """Return a problem as a sparse nonlinear programme."""
+    terms, constraints = problem.sparse_energy, problem.sparse_rows
+    return Nonlinear(terms, constraints, problem.inequalities, problem.scales, tolerances)
+
+
+def sparse_descent(problem: Problem, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
+    """Descend from ``q`` in a sparse polyhedron; see :mod:`.sparse.descent`."""
+    end = descend(nonlinear(problem, tolerances), q / problem.scales, limit)
+    return Endpoint(end.point * problem.scales, end.iterations, end.failure)
+
+
+def sparse_on_face(
+    problem: Problem, active: Piece, q: Array, tolerances: Tolerances
+) -> tuple[Array, float]:
+    """Apply Newton's method on a face; return the point and the length of the last step."""
+    programme = nonlinear(problem, tolerances)
+    held = np.concatenate([np.array(sorted(active), dtype=np.int64), programme.equations])
+    found = on_face(programme, held, q / problem.scales, far=FARTHEST)
+    if found is None:
+        return q, np.inf
+    return found.point * problem.scales, found.last_step
+
+
+def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int, int, Array]:
+    """Let a descent go on in estimated scales that stalled, or where it is flat and uneven.
+
+    Returns
+    -------
+    status, iterations, point
+        Of the first descent that converges to a point as low, otherwise those given; iterations
+        are those of all.
+    """
+    status, spent, q, multipliers = end
+    if status == statuses.STALLED and spent >= limit and limit < PATIENCE:
+        return status, spent, q
+    for scales in estimated_scales(problem, q, multipliers):
+        even = np.ptp(np.log(scales / problem.scales)) < np.log(UNEVEN)
+        if even and status == statuses.UNEVEN:
+            break
+        ended, more, point, _ = problem.descend(piece, q, limit, scales)
+        spent += more
+        lower = problem.energy.value(point) <= problem.energy.value(q)
+        if lower and ended in (statuses.CONVERGED, statuses.LEVEL, statuses.UNEVEN):
+            return ended, spent, point
+    return status, spent, q
+
+
+def estimated_scales(problem: Problem, q: Array, multipliers: Array) -> Iterator[Array]:
+    """Yield scales ``(n,)`` at ``q``, where the energy's multipliers by row are given."""
+    magnitudes = np.maximum(abs(q), problem.scales)
+    bends = problem.evaluate(q, 2)[2].diagonal(axis1=1, axis2=2)
+    with np.errstate(all="ignore"):
+        sizes = abs(bends[-1] - multipliers @ bends[:-1]) / problem.scales**2
+    if np.isfinite(sizes).all() and sizes.max() > 0:
+        flat = sizes <= FLAT * sizes.max()
+        yield np.where(flat, magnitudes, np.sqrt(sizes.max() / np.where(flat, 1.0, sizes)))
+    yield magnitudes
+
+
+def advice(problem: Problem, q: Array) -> str:
+    """Return in words which scales of the manifold the curvatures at a point suggest, if others."""
+    scales = next(estimated_scales(problem, q, np.zeros(problem.rows - 1)))
+    if not np.isfinite(scales).all() or np.ptp(np.log(scales / problem.scales)) < np.log(UNEVEN):
+        return (
+            "No other scales of single coordinates suggest themselves; more steps may help "
+            "(max_iterations)."
+        )
+    shown = ", ".join(number(scale, 2) for scale in scales / scales.min() * problem.scales.min())
+    return f"A manifold with scales=({shown}) would suit the curvatures there."
 
 
 def minimise(

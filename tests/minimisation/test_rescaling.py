@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, Verdict, minimise
 from polycorner.formulas import Family
+from polycorner.minimisation.methods import advice
 from polycorner.minimisation.problem import pose
-from polycorner.minimisation.rescaling import advice
 
 PLANE = Manifold.euclidean("x y")
 x, y = PLANE.symbols
