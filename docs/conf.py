@@ -32,6 +32,7 @@ extensions = [
     "docs.extensions.homes",
     "docs.extensions.links",
     "docs.extensions.mathml",
+    "docs.extensions.rooms",
     "docs.extensions.tidy",
 ]
 exclude_patterns = [

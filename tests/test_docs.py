@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import polycorner
-from docs.extensions import api, homes, links, mathml
+from docs.extensions import api, homes, links, mathml, rooms
 from polycorner import minimise
 from polycorner.dumbbells import DumbbellPair
 
@@ -128,3 +128,14 @@ def test_formulas_are_typeset_and_keep_their_tex():
 )
 def test_public_names(target, name):
     assert homes.public_name(target) == name
+
+
+def test_the_figure_of_the_architecture_has_every_room_with_its_lines(tmp_path):
+    shown = [room for layer in rooms.layers() for room in layer]
+    package = ROOT / "polycorner"
+    there = {p.stem for p in package.glob("[!_]*") if p.suffix == ".py" or p.is_dir()}
+    assert sorted(shown) == sorted(there | {"__main__"})
+    source = [p for p in package.rglob("*.py") if p.parent != package or p.stem in shown]
+    count = sum(len(p.read_text().splitlines()) for p in source)
+    assert sum(rooms.lines(room) for room in shown) == count
+    rooms.draw().savefig(tmp_path / "rooms.svg")
