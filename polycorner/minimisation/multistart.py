@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # Bounds for each coordinate; None for a whole circle or sphere.
 Box = Sequence[tuple[float, float] | None]
 TRIES = 10_000  # samples a start before they are moved into the polyhedron instead
-RESTORED = 100  # samples a start that are moved before a box is reported to miss the polyhedron
+RESTORED = 20  # samples a start that are moved before a box is reported to miss the polyhedron
 CHECKED = 3  # starts at which a symmetry is checked
 
 
@@ -84,15 +84,17 @@ def _moved(
     d, (low, high) = problem.polyhedron, box
     pieces = d.signs_to_pieces([0] * len(d.functions))
     found: list[Array] = []
-    for _ in range(RESTORED * count):
+    moved = 0
+    while len(found) < count and moved < RESTORED * (len(found) + 1):
+        moved += 1
         q = rng.uniform(low, high)
         q = d.manifold.factors.scattered(q, rng) if d.manifold.factors else q
         reached, point = problem.restore(pieces[rng.integers(len(pieces))], q)
         aside = d.manifold.difference(point, np.clip(point, low, high))
         if reached and not aside.any() and np.isfinite(problem.energy.value(point)):
             found.append(point)
-        if len(found) == count:
-            return np.array(found)
+    if len(found) == count:
+        return np.array(found)
     msg = f"box: expected one that meets the polyhedron; {len(found)} of {tries} points do"
     raise ValueError(msg)
 
