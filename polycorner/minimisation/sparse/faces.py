@@ -15,6 +15,7 @@ from polycorner.minimisation.sparse.factorisation import (
 )
 from polycorner.minimisation.sparse.nonlinear import Nonlinear, Point
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 MOST_STEPS = 20
 FAR = 0.3  # in scale units: a step this long has left the neighbourhood of the face's point
@@ -36,9 +37,9 @@ def on_corner(held: Evaluate, gradient: Array, q: Array) -> FacePoint | None:
     """Solve ``f(q) = 0`` for as many functions as coordinates, then ``A^T lam = g``.
 
     Newton's method converges quadratically at a corner with independent gradients; None where it
-    leaves the neighbourhood, or meets a singular matrix.
+    leaves the neighbourhood, meets a singular matrix, or has not settled, as at a multiple root.
     """
-    last = np.inf
+    last, short = np.inf, DEFAULT.settled / 10
     values, rows = held(q)
     for _ in range(MOST_STEPS):
         lu = factorised(rows)
@@ -46,10 +47,12 @@ def on_corner(held: Evaluate, gradient: Array, q: Array) -> FacePoint | None:
         if lu is None or change is None or abs(change).max(initial=0.0) > FAR:
             return None
         size = float(abs(change).max(initial=0.0))
-        if size >= last and size < 1e-9:
+        if size >= last and size < short:
             break  # rounding: the point before is as good
         q, last = q + change, size
         values, rows = held(q)
+    if last > short:
+        return None
     lam = least_squares(rows, gradient)
     return None if lam is None else FacePoint(q, lam, last, float(abs(values).max(initial=0.0)))
 
