@@ -20,7 +20,7 @@ from polycorner import minimise, skeleton
 from polycorner.dumbbells import DumbbellPair, dyad_minima, pair_atlas, pair_map
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch, follow_bunch
-from polycorner.dumbbells.dynamics.pairs import Sizes
+from polycorner.dumbbells.dynamics.pairs import DumbbellLengths
 from polycorner.dumbbells.pictures import (
     draw_atlas,
     draw_heading,
@@ -155,7 +155,11 @@ def draw_bunches(runs: dict[BunchRun, tuple[float, ...]]) -> Figure:
 
 
 def _draw_instant(axes: Axes, run: BunchRun, index: int) -> None:
-    sizes, q, here = Sizes.of_drum(run.drum), run.q[index], np.flatnonzero(run.present[index])
+    sizes, q, here = (
+        DumbbellLengths.of_drum(run.drum),
+        run.q[index],
+        np.flatnonzero(run.present[index]),
+    )
     sums = dict.fromkeys(here.tolist(), 0)
     for i, j, hand in run.dyads(index):
         sums[i] += hand

@@ -9,7 +9,8 @@ an entry or a comment, or ignore::
 
 The digest is that of all bytes before it, kind and version included, and is checked before the
 content is read.  It protects against damage, not against forgery: whoever changes a file can give
-it a digest that fits.  So a reader checks every number, and does it within :meth:`Kind.reading`.
+it a digest that fits.  So a reader checks every number, within
+:meth:`FileKind.reading`.
 """
 
 import hashlib
@@ -62,7 +63,7 @@ def _shortened(why: object) -> str:
 
 
 @dataclass(frozen=True)
-class Kind:
+class FileKind:
     """A kind of file.
 
     Attributes

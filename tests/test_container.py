@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polycorner import __version__
-from polycorner.container import BINARY, JSON, XML, Kind, number, read_number
+from polycorner.container import BINARY, JSON, XML, FileKind, number, read_number
 
-KIND = Kind("thing", "save_thing", JSON)
+KIND = FileKind("thing", "save_thing", JSON)
 CONTENT = {"name": "x", "values": [1.5, -0.0, 1e-300], "nested": {"deep": None}}
 REFUSAL = r"^path: expected a thing that save_thing wrote; .*thing\.json "
 

@@ -25,7 +25,7 @@ from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
-from polycorner.bodies.pairs import Member, Tree, apart, distances, members
+from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances, members
 from polycorner.bodies.poses import Placement, frame_of
 from polycorner.bodies.shapes import Body, Turn, turning
 from polycorner.bodies.walls import Wall, within
@@ -299,7 +299,7 @@ class Arrangement(Checked):
         return pairs(self.lattice, self.placements, dict(self.fixed))
 
     @cached_property
-    def at_walls(self) -> list[tuple[Wall, SmoothFunction, Member, Array]]:
+    def at_walls(self) -> list[tuple[Wall, SmoothFunction, PlacedPart, Array]]:
         """The gaps at walls with parts and their points."""
         return [
             (wall, function, member, point)

@@ -15,7 +15,7 @@ from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.neighbours import pairs
-from polycorner.bodies.pairs import Member, Touch, distances
+from polycorner.bodies.pairs import PlacedPart, Touch, distances
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import carried, turned
 from polycorner.bodies.slips import ROLLING, SLIDING, AtWall, slips_at_wall, slips_of
@@ -210,7 +210,7 @@ def friction_of(
 ) -> tuple[Friction, ...]:
     """Return dry friction and rolling resistance where a coefficient is positive."""
     space = motions(manifold)
-    rubbing: dict[str, list[Member]] = {t.gap.name: [t.one, t.two] for t in touches}
+    rubbing: dict[str, list[PlacedPart]] = {t.gap.name: [t.one, t.two] for t in touches}
     rubbing |= {label: [member] for label, _, member, _ in walls}
     slips: dict[str, Callable[[str], tuple[SmoothFunction, ...]]] = {
         t.gap.name: partial(slips_of, space, t) for t in touches
@@ -257,7 +257,7 @@ def _set(mu: float, dimension: int) -> ConvexSet:
     return Interval(mu) if dimension == 2 else Disc(mu)
 
 
-def _check_turning(argument: str, rubbing: list[Member], given: Any) -> None:
+def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None:
     for member in rubbing:
         if member.frame in {Frame.SHIFTED, Frame.AXIAL}:
             missing = "coordinates of all rotations (orientations='all')"

@@ -8,7 +8,7 @@ import numpy as np
 
 from polycorner.bodies.images import Image
 from polycorner.bodies.lattices import CLEAR, Lattice, radius, reaches
-from polycorner.bodies.pairs import Member, apart, members
+from polycorner.bodies.pairs import PlacedPart, apart, members
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import sympy
 
 
-Pair = tuple[Member, Member]
+Pair = tuple[PlacedPart, PlacedPart]
 
 
 def pairs(

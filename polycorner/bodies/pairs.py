@@ -33,7 +33,7 @@ Tree = AllOf | AnyOf | SmoothFunction
 
 
 @dataclass(frozen=True, eq=False)
-class Member(Value):
+class PlacedPart(Value):
     """A part of a body in an arrangement.
 
     Attributes
@@ -61,7 +61,7 @@ class Member(Value):
     middle: Array
     image: Image | None = None
 
-    def at(self, mark: str, image: Image) -> "Member":
+    def at(self, mark: str, image: Image) -> "PlacedPart":
         """Return an image of it, with a mark on the name of the body."""
         name = self.body + mark + self.name[len(self.body) :]
         return replace(self, name=name, image=image)
@@ -75,12 +75,12 @@ class Member(Value):
         return f"{self.name}.v{i + 1}" if len(self.part.points) > 1 else self.name
 
 
-def members(name: str, body: Body, placement: Placement | None) -> list[Member]:
+def members(name: str, body: Body, placement: Placement | None) -> list[PlacedPart]:
     """Return the parts of a body, fixed if it has no coordinates."""
     frame = Frame.FIXED if placement is None else placement.frame
     coordinates = () if placement is None else placement.manifold.names
     return [
-        Member(
+        PlacedPart(
             name,
             f"{name}.{part}" if part else name,
             shape,
@@ -96,8 +96,8 @@ def members(name: str, body: Body, placement: Placement | None) -> list[Member]:
 def function_of(
     manifold: Manifold,
     family: Family,
-    one: Member,
-    two: Member | None,
+    one: PlacedPart,
+    two: PlacedPart | None,
     parameters: list[float],
     label: str,
     member: str = "gap",
@@ -117,7 +117,7 @@ def function_of(
     )
 
 
-def _imaged(family: Family, one: Member, two: Member) -> tuple[Family, list[float]]:
+def _imaged(family: Family, one: PlacedPart, two: PlacedPart) -> tuple[Family, list[float]]:
     """Return the family of functions of images, and its further parameters."""
     d = one.part.dimension
     image, sign = (one.image, 1.0) if one.image else (two.image, -1.0)
@@ -132,7 +132,7 @@ def _imaged(family: Family, one: Member, two: Member) -> tuple[Family, list[floa
     return made, [*middles, *shift, *lengths]
 
 
-def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True) -> Tree:
+def apart(manifold: Manifold, one: PlacedPart, two: PlacedPart, *, excluded: bool = True) -> Tree:
     """Return the gaps of two parts.
 
     ``excluded`` says whether a union excludes rounded hulls that cross; motions, which start
@@ -149,14 +149,14 @@ def apart(manifold: Manifold, one: Member, two: Member, *, excluded: bool = True
     return parts[0] if len(parts) == 1 else AllOf(*parts)
 
 
-def _can_cross(one: Member, two: Member) -> bool:
+def _can_cross(one: PlacedPart, two: PlacedPart) -> bool:
     """Whether the distances are also large for hulls that cross; not of two rods in space."""
     if min(len(one.part.points), len(two.part.points)) == 1 or _are_parallel(one, two):
         return False
     return one.part.dimension == 2 or bool(one.part.facets or two.part.facets)
 
 
-def _are_parallel(one: Member, two: Member) -> bool:
+def _are_parallel(one: PlacedPart, two: PlacedPart) -> bool:
     """Whether they are a rod and its own image."""
     return one.part is two.part and one.body == two.body and len(one.part.points) == 2
 
@@ -168,13 +168,13 @@ class Touch(NamedTuple):
     """
 
     gap: SmoothFunction
-    one: Member
+    one: PlacedPart
     first: Array
-    two: Member
+    two: PlacedPart
     second: Array
 
 
-def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
+def distances(manifold: Manifold, one: PlacedPart, two: PlacedPart) -> Iterator[Touch]:
     """Yield the gaps of two parts of which one is rounded."""
     radius = one.part.radius + two.part.radius
     a, b, d = one.part.points, two.part.points, one.part.dimension
@@ -195,7 +195,9 @@ def distances(manifold: Manifold, one: Member, two: Member) -> Iterator[Touch]:
     yield from _from_hull(manifold, two, one, radius)
 
 
-def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
+def _from_segment(
+    manifold: Manifold, one: PlacedPart, two: PlacedPart, radius: float
+) -> Iterator[Touch]:
     """Distances of the points of one part from the other, which is a segment."""
     if len(two.part.points) != 2:
         return
@@ -206,7 +208,9 @@ def _from_segment(manifold: Manifold, one: Member, two: Member, radius: float) -
         yield Touch(function, one, p[None], two, two.part.points)
 
 
-def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
+def _from_hull(
+    manifold: Manifold, one: PlacedPart, two: PlacedPart, radius: float
+) -> Iterator[Touch]:
     """Distances of the points of one part from the other, which has faces."""
     facets = two.part.facets
     if facets is None:
@@ -221,7 +225,7 @@ def _from_hull(manifold: Manifold, one: Member, two: Member, radius: float) -> I
         yield Touch(function, one, p[None], two, two.part.points)
 
 
-def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterator[Touch]:
+def _rods(manifold: Manifold, one: PlacedPart, two: PlacedPart, radius: float) -> Iterator[Touch]:
     """Distances of all edges in space."""
     family = gaps.segments(one.frame, two.frame)
     for (i, first), (j, second) in product(_edges(one), _edges(two)):
@@ -230,7 +234,7 @@ def _rods(manifold: Manifold, one: Member, two: Member, radius: float) -> Iterat
         yield Touch(function, one, first, two, second)
 
 
-def _edges(member: Member) -> list[tuple[str, Array]]:
+def _edges(member: PlacedPart) -> list[tuple[str, Array]]:
     """Return the ends of all edges with the ends of their names; a segment is its own edge."""
     points, facets = member.part.points, member.part.facets
     if facets is None:
@@ -238,7 +242,7 @@ def _edges(member: Member) -> list[tuple[str, Array]]:
     return [(f".e{k + 1}", points[[i, j]]) for k, (i, j, _, _) in enumerate(facets.edges)]
 
 
-def separated(manifold: Manifold, one: Member, two: Member) -> Tree:
+def separated(manifold: Manifold, one: PlacedPart, two: PlacedPart) -> Tree:
     """Return the union over all planes that may separate two hulls, segments included."""
     first, second = _faces(one.part), _faces(two.part)
     if not (one.frame.turns or two.frame.turns):
@@ -273,7 +277,7 @@ def _faces(part: Part) -> list[_Face]:
     return [_Face(f"{letter}{f + 1}", *some) for f, some in enumerate(found)]
 
 
-def _outside(manifold: Manifold, one: Member, two: Member, face: _Face) -> Tree:
+def _outside(manifold: Manifold, one: PlacedPart, two: PlacedPart, face: _Face) -> Tree:
     """All points of the first are outside of a face of the second."""
     family = gaps.side(one.frame, two.frame, two.part.dimension)
     numbers = [*two.numbers(face.point, face.normal), 0.0]
@@ -286,7 +290,7 @@ def _outside(manifold: Manifold, one: Member, two: Member, face: _Face) -> Tree:
     return some[0] if len(some) == 1 else AllOf(*some)
 
 
-def nearest(member: Member, normal: Array, *, turning: bool) -> list[tuple[int, Array]]:
+def nearest(member: PlacedPart, normal: Array, *, turning: bool) -> list[tuple[int, Array]]:
     """Return the points of a part, with their numbers, that may be nearest to a plane.
 
     If neither the plane nor the body turns it is always the same one.
@@ -298,7 +302,7 @@ def nearest(member: Member, normal: Array, *, turning: bool) -> list[tuple[int, 
     return [(i, points[i])]
 
 
-def _by_edges(manifold: Manifold, one: Member, two: Member) -> Iterator[Tree]:
+def _by_edges(manifold: Manifold, one: PlacedPart, two: PlacedPart) -> Iterator[Tree]:
     """Pairs of edges, on either side, whose common perpendicular separates."""
     family = gaps.crossing(one.frame, two.frame)
     # A segment lies on both sides of each of its planes.

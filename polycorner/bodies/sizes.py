@@ -14,7 +14,7 @@ from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.gaps import points_of
 from polycorner.bodies.kernels import together
-from polycorner.bodies.pairs import Member, Tree, apart
+from polycorner.bodies.pairs import PlacedPart, Tree, apart
 from polycorner.bodies.walls import HalfSpace
 from polycorner.checks import about, instance, refuse
 from polycorner.formulas import cache
@@ -165,11 +165,11 @@ def scaled(
     return Polyhedron(manifold, AllOf(*together(gaps), *limits))
 
 
-def _moving(one: Member, two: Member) -> int:
+def _moving(one: PlacedPart, two: PlacedPart) -> int:
     return sum(m.frame is not Frame.FIXED for m in (one, two))
 
 
-def _moving_radius(one: Member, two: Member) -> float:
+def _moving_radius(one: PlacedPart, two: PlacedPart) -> float:
     return sum(m.part.radius for m in (one, two) if m.frame is not Frame.FIXED)
 
 

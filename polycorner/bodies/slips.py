@@ -19,7 +19,7 @@ from polycorner.bodies import frames, gaps, normals, waves
 from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.gaps import FIRST, SECOND, given, numbers
 from polycorner.bodies.normals import Definitions, Features, inward, nearest, off_hull
-from polycorner.bodies.pairs import Member, Touch, function_of
+from polycorner.bodies.pairs import PlacedPart, Touch, function_of
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
 from polycorner.formulas import cache
 from polycorner.formulas.families import Family
@@ -39,10 +39,10 @@ SLIDING, ROLLING = "sliding", "rolling"
 COMPONENTS = ("s0", "s1")
 SPIN = ("spin0", "spin1", "spin2")  # angular velocity of a wall
 
-AtWall = tuple[str, Wall, Member, Array]  # name of the contact, wall, part, point
+AtWall = tuple[str, Wall, PlacedPart, Array]  # name of the contact, wall, part, point
 
 
-class Motion(NamedTuple):
+class RigidVelocity(NamedTuple):
     """Velocity of the origin of a body, its angular velocity, and the origin."""
 
     velocity: "Point"
@@ -107,8 +107,8 @@ def slips_at_wall(space: Manifold, touch: AtWall, kind: str) -> tuple[SmoothFunc
 def _functions(
     space: Manifold,
     family: Family,
-    one: Member,
-    two: Member | None,
+    one: PlacedPart,
+    two: PlacedPart | None,
     values: list[float],
     label: str,
 ) -> tuple[SmoothFunction, ...]:
@@ -178,7 +178,7 @@ def _along_wall(kind: str, frame: Frame, d: int, flat: bool, waviness: int) -> "
     p = w.point("P", frame.point(FIRST, symbols(numbers("p", frame, d)), d))
     centre = given("v" if flat else "c", d)
     x, y, z = symbols(SPIN)
-    wall = Motion(zero(), (x, y, z), centre)
+    wall = RigidVelocity(zero(), (x, y, z), centre)
     normal = given("n", d) if flat else inward(w, minus(p, centre), d, waviness)
     return _across(w, kind, d, p, normal, _motion(FIRST, frame, d), wall)
 
@@ -188,10 +188,10 @@ def _placed(w: Definitions, name: str, role: str, frame: Frame, d: int) -> "Poin
     return w.point(name, frame.point(role, symbols(numbers(f"{name}_", frame, d)), d))
 
 
-def _motion(role: str, frame: Frame, d: int) -> Motion:
+def _motion(role: str, frame: Frame, d: int) -> RigidVelocity:
     """Return the motion of a body."""
     if frame is Frame.FIXED:
-        return Motion(zero(), zero(), zero())
+        return RigidVelocity(zero(), zero(), zero())
     manifold, spin = frame.manifold(role, d, 1.0, 1.0, ""), zero()
     rates = velocities(manifold)
     if frame is Frame.TURNED:
@@ -200,7 +200,7 @@ def _motion(role: str, frame: Frame, d: int) -> Motion:
         x, y, z = rotations.angular_velocity(manifold, frame="space")
         spin = (x, y, z)
     velocity, origin = ((*some[:d], *zero())[:3] for some in (rates, manifold.symbols))
-    return Motion(velocity, spin, origin)
+    return RigidVelocity(velocity, spin, origin)
 
 
 def _across(
@@ -209,8 +209,8 @@ def _across(
     d: int,
     p: "Point",
     normal: "Point",
-    one: Motion,
-    two: Motion,
+    one: RigidVelocity,
+    two: RigidVelocity,
 ) -> "Formulas":
     """Return the components across the normal of the difference of two motions."""
     (r,), n = symbols(["r"]), w.point("n", normal)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.bodies import gaps
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.pairs import Member, function_of, nearest
+from polycorner.bodies.pairs import PlacedPart, function_of, nearest
 from polycorner.bodies.waves import checked_waves, depth
 from polycorner.checks import refuse
 from polycorner.formulas.families import Family
@@ -192,7 +192,7 @@ def box(low: ArrayLike, high: ArrayLike) -> dict[str, HalfSpace]:
 
 
 def within(
-    manifold: Manifold, name: str, wall: Wall, member: Member
+    manifold: Manifold, name: str, wall: Wall, member: PlacedPart
 ) -> list[tuple[SmoothFunction, Array]]:
     """Return the gaps of a part and a wall, and the points of the part that they are of."""
     radius = member.part.radius

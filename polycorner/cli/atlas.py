@@ -14,7 +14,7 @@ from polycorner.cli.options import (
     seed_option,
 )
 from polycorner.cli.report import critical_sheet, label
-from polycorner.cli.search import DiskSearch, Search
+from polycorner.cli.search import DiskSearch, SkeletonSearch
 
 if TYPE_CHECKING:
     from polycorner.models.pinball import Pinball
@@ -89,7 +89,7 @@ def spheres(
     from polycorner.models.spheres import SphereCluster
 
     model = SphereCluster(count)
-    search = Search("spheres", {"count": count}, out, seed, budget, workers)
+    search = SkeletonSearch("spheres", {"count": count}, out, seed, budget, workers)
     found = search.run(model.polyhedron, lambda _: model.starts(), model.symmetry, resume=resume)
     special = [k for k, corner in enumerate(found.corners) if corner.singular]
     extra = {
@@ -189,7 +189,7 @@ def _planar(
     workers: int | None,
     resume: bool,
 ) -> None:
-    search = Search(name, {}, out, seed, budget, workers)
+    search = SkeletonSearch(name, {}, out, seed, budget, workers)
     found = search.run(model.polyhedron, lambda rng: model.starts(rng, STARTS), None, resume=resume)
 
     def draw(folder: Path) -> list[Path]:

@@ -25,7 +25,7 @@ from polycorner.cli.output import (
 from polycorner.cli.report import atlas_sheet, keys, label
 
 if TYPE_CHECKING:
-    from polycorner.container import Kind
+    from polycorner.container import FileKind
     from polycorner.models import CriticalConfiguration, CriticalSearch, TorusDisks
     from polycorner.polyhedra.polyhedron import Polyhedron
     from polycorner.polyhedra.symmetry import Symmetry
@@ -127,7 +127,7 @@ class Kept:
             raise click.exceptions.Exit(130)
 
 
-class Search(Kept):
+class SkeletonSearch(Kept):
     """A search for corners, edges and faces.
 
     Parameters
@@ -273,9 +273,9 @@ class DiskSearch(Kept):
 
     def run(self, model: "TorusDisks", *, resume: bool) -> "tuple[CriticalConfiguration, ...]":
         """Search, or resume; an interruption loses the round under way only."""
-        from polycorner.container import JSON, Kind
+        from polycorner.container import JSON, FileKind
 
-        kind = Kind("search of disks", "polycorner atlas disks", JSON)
+        kind = FileKind("search of disks", "polycorner atlas disks", JSON)
         resume = self.has_kept(resume=resume)
         with working(f"searching {self.model}", "rounds") as progress:
             search = self._load(model, kind) if resume else model.critical_search(self.seed)
@@ -291,7 +291,7 @@ class DiskSearch(Kept):
         self.end(finished=search.complete, interrupted=not search.complete)
         return search.configurations
 
-    def _load(self, model: "TorusDisks", kind: "Kind") -> "CriticalSearch":
+    def _load(self, model: "TorusDisks", kind: "FileKind") -> "CriticalSearch":
         from polycorner.models import CriticalSearch
 
         try:

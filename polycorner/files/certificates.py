@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import checks
-from polycorner.container import JSON, Kind, number, read_number
+from polycorner.container import JSON, FileKind, number, read_number
 from polycorner.files.polyhedra import (
     Entries,
     manifold_entry,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
     from polycorner.polyhedra.polyhedron import Polyhedron
 
-KIND = Kind("certificate", "save_certificate", JSON)
+KIND = FileKind("certificate", "save_certificate", JSON)
 HEADER = entries(
     {
         "coordinates": many(entries({"value": real()})),

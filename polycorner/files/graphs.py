@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import instance, refuse
-from polycorner.container import XML, Kind, versions
+from polycorner.container import XML, FileKind, versions
 from polycorner.forms import Form, count, entries, flag, many, mapped, number, position, text, word
 from polycorner.kinds import checked
 from polycorner.polyhedra.strata import LocalType
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from polycorner.spaces.manifold import Array
 
-KIND = Kind("graph", "save_graph", XML)
+KIND = FileKind("graph", "save_graph", XML)
 HEADER = '<?xml version="1.0" encoding="utf-8"?>'
 TAKEN = ("kind", "active", "rank", "dimension", "local_type", "singular", "chirality", "length")
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from polycorner import checks, forms
 from polycorner.checks import refuse
-from polycorner.container import Kind, versions
+from polycorner.container import FileKind, versions
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import EventKind
 from polycorner.motion.mechanics import MechanicalSystem
@@ -290,7 +290,7 @@ def _noise(at: Mapping[Any, Any]) -> Noise:
 # -------------------------------------------------------------------------------------------- files
 
 
-def save_dataset(kind: Kind, path: str | os.PathLike[str], content: "xr.Dataset") -> Path:
+def save_dataset(kind: FileKind, path: str | os.PathLike[str], content: "xr.Dataset") -> Path:
     """Write a dataset as NetCDF, atomically."""
     packed = {"zlib": True, "complevel": 4}
     encoding = {name: packed for name in content.data_vars if content[name].size > 1}
@@ -299,7 +299,7 @@ def save_dataset(kind: Kind, path: str | os.PathLike[str], content: "xr.Dataset"
 
 
 def load_dataset(
-    kind: Kind, path: str | os.PathLike[str], read: "Callable[[xr.Dataset], T]"
+    kind: FileKind, path: str | os.PathLike[str], read: "Callable[[xr.Dataset], T]"
 ) -> "T":
     """Return what ``read`` makes of the dataset in a file, after checks of digest and structure."""
     import xarray as xr

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from polycorner.checks import refuse
-from polycorner.container import JSON, Kind, number, read_number
+from polycorner.container import JSON, FileKind, number, read_number
 from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
 from polycorner.files.skeleton_forms import HEADER, check_active, check_rays, check_sizes, unlike
 from polycorner.forms import generator_entry, read_generator
@@ -19,7 +19,7 @@ from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.curves import Curve
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import Crossing, Flag
+from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
@@ -28,7 +28,7 @@ from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.walks import End
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, Tolerances
 
-KIND = Kind("skeleton", "save_skeleton", JSON)
+KIND = FileKind("skeleton", "save_skeleton", JSON)
 
 
 @checked
@@ -167,7 +167,7 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> "
         record.edges.update(dict(corner["edges"]))
     explorer.curves += [_read_curve(entry, n) for entry in content["edges"]]
     explorer.crossings += [
-        Crossing(_read_flag(start), _read_flag(stop)) for start, stop in content["crossings"]
+        FaceCrossing(_read_flag(start), _read_flag(stop)) for start, stop in content["crossings"]
     ]
     explorer.starts.extend((count, _points(start, n, 1)) for count, start in content["starts"])
     explorer.pending.extend((corner, ray) for corner, ray in content["pending"])

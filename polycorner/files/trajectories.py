@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.checks import instance, names
-from polycorner.container import BINARY, Kind
+from polycorner.container import BINARY, FileKind
 from polycorner.files.formulas import formula_text
 from polycorner.files.motions import (
     MotionUnits,
@@ -31,7 +31,7 @@ from polycorner.motion.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-KIND = Kind("trajectory", "save_trajectory", BINARY)
+KIND = FileKind("trajectory", "save_trajectory", BINARY)
 OTHERS = ("time", "energy", "force", "impulse", "gap")
 GAP = ("time", "body", "gap")
 NOT_STATED = "not stated"

@@ -7,12 +7,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from polycorner.formulas.families import Family
-from polycorner.formulas.shapes import Shape
+from polycorner.formulas.shapes import FormulaShape
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
 
 
-class Member(Protocol):
+class BoundFunction(Protocol):
     """A function of a family, bound to coordinates and parameters."""
 
     @property
@@ -36,14 +36,16 @@ class Member(Protocol):
 class Call(Value):
     """One call of a kernel: which coordinates go in, which rows come out."""
 
-    family: Family | Shape
+    family: Family | FormulaShape
     reads: tuple[int, ...]
     parameters: Array
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
 
-def resolve(f: Member) -> tuple[Family | Shape, tuple[int, ...], tuple[float, ...], int]:
+def resolve(
+    f: BoundFunction,
+) -> tuple[Family | FormulaShape, tuple[int, ...], tuple[float, ...], int]:
     """Return what evaluates a function: kernel, coordinates, parameters and column."""
     binding = f.family.bindings.get(f.member_name)
     if binding is None:
@@ -103,10 +105,10 @@ class Bundle(Value):
         One call for each family, choice of coordinates and choice of parameters.
     """
 
-    def __init__(self, manifold: Manifold, functions: Sequence[Member]) -> None:
+    def __init__(self, manifold: Manifold, functions: Sequence[BoundFunction]) -> None:
         self.manifold, self.functions = manifold, tuple(functions)
         grouped: dict[Any, list[tuple[int, int]]] = {}
-        resolved: dict[Any, tuple[Family | Shape, tuple[int, ...], Array]] = {}
+        resolved: dict[Any, tuple[Family | FormulaShape, tuple[int, ...], Array]] = {}
         for row, f in enumerate(self.functions):
             family, reads, numbers, column = resolve(f)
             key = (family.key or id(family), reads, numbers)

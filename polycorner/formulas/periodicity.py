@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from polycorner.formulas.bundles import Member
+from polycorner.formulas.bundles import BoundFunction
 from polycorner.formulas.expressions import SAMPLES, SPREAD, announce, check_periodic
 from polycorner.spaces.manifold import Manifold
 from polycorner.tolerances import DEFAULT
@@ -61,7 +61,7 @@ def _differ(one: Any, other: Any, manifold: Manifold, parameters: Mapping[str, f
     return False
 
 
-class Stated(Member, Protocol):
+class Stated(BoundFunction, Protocol):
     """A function of a family with a name, on a manifold."""
 
     name: str

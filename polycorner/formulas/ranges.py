@@ -127,14 +127,14 @@ def _elementary(op: str, x: Fact) -> Fact:
 
 
 @dataclass(frozen=True)
-class Pattern:
+class Selection:
     """A selection that is continuous: ``min``, ``max``, ``abs`` or ``clamp`` of nodes."""
 
     kind: str
     nodes: tuple[int, ...]
 
 
-def pattern(graph: Graph, node: int) -> Pattern | None:
+def pattern(graph: Graph, node: int) -> Selection | None:
     """Return what a selection amounts to, or None if it is not known to be continuous.
 
     ``a if a <= b else b`` is the smaller of both, ``-u if u < 0 else u`` is ``|u|``, and so on.  A
@@ -152,7 +152,7 @@ def pattern(graph: Graph, node: int) -> Pattern | None:
         return None
     a, b = (int(c) for c in compared)
     if {yes, no} == {a, b}:
-        return Pattern("min" if yes == a else "max", (a, b))
+        return Selection("min" if yes == a else "max", (a, b))
     if _opposite(graph, yes, no):
         return _absolute(graph, a, b, yes, no)
     return _clamp(graph, a, b, yes, no)
@@ -162,16 +162,16 @@ def _opposite(graph: Graph, x: int, y: int) -> bool:
     return graph.nodes[x] == ("neg", (y,)) or graph.nodes[y] == ("neg", (x,))
 
 
-def _absolute(graph: Graph, a: int, b: int, yes: int, no: int) -> Pattern | None:
+def _absolute(graph: Graph, a: int, b: int, yes: int, no: int) -> Selection | None:
     """Recognise ``|u|`` and ``-|u|``: selections between ``u`` and ``-u`` by the sign of ``u``."""
     if is_zero(graph, b) and a in (yes, no):
-        return Pattern("abs" if no == a else "-abs", (a,))
+        return Selection("abs" if no == a else "-abs", (a,))
     if is_zero(graph, a) and b in (yes, no):
-        return Pattern("abs" if yes == b else "-abs", (b,))
+        return Selection("abs" if yes == b else "-abs", (b,))
     return None
 
 
-def _clamp(graph: Graph, a: int, b: int, yes: int, no: int) -> Pattern | None:
+def _clamp(graph: Graph, a: int, b: int, yes: int, no: int) -> Selection | None:
     """Recognise ``max(c, y)`` and ``min(c, y)`` where ``y`` is an extreme of the number compared.
 
     ``c if t <= c else min(d, t)`` is ``max(c, min(d, t))`` for constants ``c <= d``.
@@ -184,7 +184,7 @@ def _clamp(graph: Graph, a: int, b: int, yes: int, no: int) -> Pattern | None:
             continue
         other = inner.nodes[1 - inner.nodes.index(t)]
         if graph.nodes[other][0] == "const" and _ordered(graph, bound, other, lower=lower):
-            return Pattern("max" if lower else "min", (bound, no))
+            return Selection("max" if lower else "min", (bound, no))
     return None
 
 

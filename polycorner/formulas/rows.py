@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from polycorner.formulas.bundles import Member, resolve
+from polycorner.formulas.bundles import BoundFunction, resolve
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -93,7 +93,7 @@ class SparseRows(Value):
     dimension: int
 
     @classmethod
-    def of(cls, functions: Sequence[Member], dimension: int) -> "SparseRows":
+    def of(cls, functions: Sequence[BoundFunction], dimension: int) -> "SparseRows":
         """Return the rows of functions, one after the other."""
         found: dict[Any, tuple[Any, list[Any]]] = {}
         for row, f in enumerate(functions):

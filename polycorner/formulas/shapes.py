@@ -32,7 +32,7 @@ _SHARING = Lock()
 
 
 @dataclass(frozen=True, eq=False)
-class Shape(Value):
+class FormulaShape(Value):
     """A formula up to the names of its coordinates and its numbers.
 
     Attributes
@@ -88,7 +88,7 @@ class Binding(Value):
 
     Attributes
     ----------
-    shape : Shape
+    shape : FormulaShape
     reads : tuple of int
         Which of the formula's variables the shape reads, in order.
     numbers : tuple of float
@@ -97,7 +97,7 @@ class Binding(Value):
         The numbers to the last digit.
     """
 
-    shape: Shape
+    shape: FormulaShape
     reads: tuple[int, ...]
     numbers: tuple[float, ...]
     exact: str = field(repr=False)
@@ -142,7 +142,7 @@ def _general(
     reads = tuple(translator.reads) or (0,)
     count = len(parameters) + len(translator.numbers)
     program = Program(translator.graph, (output,), len(reads), count)
-    shape = Shape(program.digest(), program)
+    shape = FormulaShape(program.digest(), program)
     numbers = tuple([float(number) for number in translator.numbers])
     return Binding(shape, reads, numbers, repr((shape.key, reads, translator.numbers)))
 
@@ -203,7 +203,7 @@ def _polynomial(expression: "sympy.Expr", position: Mapping[str, int]) -> Bindin
             curvature[j, i] += value
     bent = curvature.ravel().tolist() if degree == 2 else []
     numbers = (terms.get((), 0.0), *slopes.tolist(), *bent)
-    shape = Shape(f"polynomial {n} {degree}", Polynomial(n, degree))
+    shape = FormulaShape(f"polynomial {n} {degree}", Polynomial(n, degree))
     return Binding(shape, reads, numbers, repr(sorted(exact, key=lambda known: known[0])))
 
 

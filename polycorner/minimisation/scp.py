@@ -24,7 +24,7 @@ PENALTY = 10.0  # initial weight of the constraint violation in the merit functi
 
 
 @dataclass(frozen=True)
-class Model:
+class ConvexStep:
     """The convex programme of one step, with cvxpy parameters for its data.
 
     ``minimise g.d + |R d|^2 / 2 + penalty * (slack)`` subject to ``A d + b + slack >= 0``,
@@ -42,7 +42,7 @@ class Model:
     contacts: cp.Constraint | None
 
     @classmethod
-    def stated(cls, n: int, inequalities: int, equations: int) -> "Model":
+    def stated(cls, n: int, inequalities: int, equations: int) -> "ConvexStep":
         """State the programme for ``n`` coordinates."""
         step = cp.Variable(n)
         gradient, root, radius = cp.Parameter(n), cp.Parameter((n, n)), cp.Parameter(nonneg=True)
@@ -96,7 +96,7 @@ def sequential_convex(
     kept = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     count, scales = len(piece), problem.scales
     with ONE_AT_A_TIME:
-        model = Model.stated(problem.dimension, count, len(kept) - count)
+        model = ConvexStep.stated(problem.dimension, count, len(kept) - count)
     values, gradients, hessians = problem.evaluate(q, 2)
     size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
     duals = np.zeros(count)
@@ -163,7 +163,7 @@ def _weights(rows: Array, slope: Array, duals: Array) -> Array:
 
 
 def _load(
-    model: Model,
+    model: ConvexStep,
     values: Array,
     gradients: Array,
     kept: list[int],

@@ -19,14 +19,14 @@ import numpy as np
 from polycorner import forms
 from polycorner.atomic import PART
 from polycorner.checks import instance, real, refuse
-from polycorner.container import BINARY, Kind
+from polycorner.container import BINARY, FileKind
 from polycorner.kinds import check_fields
 from polycorner.motion.events import joined
 from polycorner.motion.recorder import Recorder
 from polycorner.motion.tables import event_arrays, touch_table
 from polycorner.values import Checked
 
-KIND = Kind("checkpoint", "a simulation", BINARY)
+KIND = FileKind("checkpoint", "a simulation", BINARY)
 STATE = "state.npz"
 LOCK = ".lock"
 ENGINE = "engine."

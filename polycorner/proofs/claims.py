@@ -19,7 +19,7 @@ from polycorner.proofs.invariance import (
     slope_bounds,
     translations,
 )
-from polycorner.proofs.kkt import FIRST_BITS, System
+from polycorner.proofs.kkt import FIRST_BITS, KKTSystem
 from polycorner.proofs.statements import Claim, ConditionResult, Status
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def pose_claim(
         for basis in translations(forms):
             kept += generators(problem.polyhedron.manifold, [basis])
         fields, gauges = _independent(kept, box, problem.scales, certificate.rank_tolerance)
-        system = System(formulas, rows, gauges, point, _units(certificate, rows, gauges))
+        system = KKTSystem(formulas, rows, gauges, point, _units(certificate, rows, gauges))
         multipliers = _multipliers(certificate, rows)
         start = [ball(x) for x in (*point, *multipliers, *[0.0] * len(gauges))]
     return Posed(Claim(problem, system, fields), start, refused)
@@ -130,7 +130,7 @@ def pose_claim(
 def _units(
     certificate: Certificate, rows: Sequence[int], gauges: Sequence[Sequence[float]]
 ) -> tuple[float, ...]:
-    """Return the units of coordinates and multipliers; see :class:`System`."""
+    """Return the units of coordinates and multipliers; see :class:`KKTSystem`."""
     problem = certificate.problem
     _, gradients = problem.evaluate(certificate.point, 1)
     normals = [*gradients[list(rows)], *(np.array(gauge) * problem.scales for gauge in gauges)]

@@ -35,7 +35,7 @@ SUBJECT = "the KKT equations"
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class Linearisation:
     """Enclosures of the equations and their derivatives on a box.
 
     Attributes
@@ -64,7 +64,7 @@ class Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class KKTSystem:
     """The KKT equations of one face; see the module.
 
     Attributes
@@ -103,11 +103,11 @@ class System:
         """The number of unknowns ``N``."""
         return self.dimension + len(self.held) + len(self.gauges)
 
-    def at(self, z: "Sequence[Ball]", p: "Sequence[Ball]" = ()) -> Linear | Undecided:
+    def at(self, z: "Sequence[Ball]", p: "Sequence[Ball]" = ()) -> Linearisation | Undecided:
         """Return the equations and their derivatives on boxes of unknowns and parameters."""
         return self.linear(z, Box([*z[: self.dimension], *p]))
 
-    def linear(self, z: "Sequence[Ball]", box: Box) -> Linear | Undecided:
+    def linear(self, z: "Sequence[Ball]", box: Box) -> Linearisation | Undecided:
         """Return the same for a point and parameters that are enclosed jointly by ``box``."""
         n, k = self.dimension, len(self.held)
         forms = self._smooth(box)
@@ -123,7 +123,7 @@ class System:
         away = [q - a for q, a in zip(z[:n], self.anchor, strict=True)]
         rows = [*(g[:n] for g in gradients[:k]), *normals]
         no_rows, no_drift = [ball(0)] * len(rows), [ball(0)] * (self.formulas.inputs - n)
-        return Linear(
+        return Linearisation(
             residual=[*slope, *values[:k], *(dot(normal, away) for normal in normals)],
             jacobian=[
                 *([*bent[i][:n], *(-row[i] for row in rows)] for i in range(n)),
@@ -182,7 +182,7 @@ def _pairs(reach: "Sequence[Ball]") -> "Iterator[tuple[int, int, Ball]]":
 
 
 def newton(
-    system: System,
+    system: KKTSystem,
     z: "Sequence[Ball]",
     p: "Sequence[Ball]" = (),
     *,
@@ -205,7 +205,7 @@ def newton(
 
 
 def _settled(
-    system: System, z: "Sequence[Ball]", p: "Sequence[Ball]", small: "Ball", steps: int
+    system: KKTSystem, z: "Sequence[Ball]", p: "Sequence[Ball]", small: "Ball", steps: int
 ) -> "list[Ball] | Undecided":
     """Take Newton steps until one is relatively small, then one more."""
     last = False

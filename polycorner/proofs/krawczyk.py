@@ -33,7 +33,7 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.kkt import SUBJECT, Linear, System
+from polycorner.proofs.kkt import SUBJECT, KKTSystem, Linearisation
 from polycorner.values import cached_property
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Predictor:
 
     Attributes
     ----------
-    system : System
+    system : KKTSystem
         The equations.
     cell : Cell
         The parameters.
@@ -69,7 +69,7 @@ class Predictor:
         ``Z1``, ``[N][p]``; empty without parameters.
     """
 
-    system: System
+    system: KKTSystem
     cell: Cell
     centre: "list[Ball]"
     tangents: "list[list[Ball]]"
@@ -119,7 +119,7 @@ class Enclosure:
         ``K``, which contains it, in the interior of ``W``.
     preconditioner : Matrix
         ``Y``.
-    start, linear : Linear
+    start, linear : Linearisation
         The equations and their derivatives at the centre, and over the whole box.
     """
 
@@ -127,8 +127,8 @@ class Enclosure:
     candidate: "list[Ball]"
     remainder: "list[Ball]"
     preconditioner: "Matrix"
-    start: Linear
-    linear: Linear
+    start: Linearisation
+    linear: Linearisation
 
     @cached_property
     def solution(self) -> "list[Ball]":
@@ -141,7 +141,7 @@ class Enclosure:
 
 
 def enclose(
-    system: System, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
+    system: KKTSystem, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
 ) -> Enclosure | Undecided:
     """Prove that the equations have exactly one solution in a box about ``centre``.
 
@@ -180,12 +180,14 @@ def enclose(
     )
 
 
-def _defect(linear: Linear, preconditioner: "Matrix") -> "Matrix":
+def _defect(linear: Linearisation, preconditioner: "Matrix") -> "Matrix":
     """Return ``I - Y J``."""
     return identity(preconditioner.nrows()) - preconditioner * matrix(linear.jacobian)
 
 
-def _base(predictor: Predictor, start: Linear, preconditioner: "Matrix") -> "Matrix | Undecided":
+def _base(
+    predictor: Predictor, start: Linearisation, preconditioner: "Matrix"
+) -> "Matrix | Undecided":
     """Return ``-Y F`` along the predictor."""
     system, tangents = predictor.system, predictor.tangents
     value = column(start.residual)

@@ -9,7 +9,7 @@ from polycorner.intervals.balls import bounds, decimals
 from polycorner.minimisation import Problem
 from polycorner.proofs.exact import ExactPoint, implied, recognised
 from polycorner.proofs.invariance import Generator
-from polycorner.proofs.kkt import System
+from polycorner.proofs.kkt import KKTSystem
 from polycorner.proofs.krawczyk import Enclosure
 from polycorner.values import cached_property
 
@@ -62,14 +62,14 @@ class Claim:
     ----------
     problem : Problem
         The polyhedron and the energy.
-    system : System
+    system : KKTSystem
         The KKT equations of the face.
     fields : tuple of Generator
         One for every gauge of the system.
     """
 
     problem: Problem
-    system: System
+    system: KKTSystem
     fields: tuple[Generator, ...]
 
     @property

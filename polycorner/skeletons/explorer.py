@@ -12,7 +12,7 @@ import numpy as np
 from polycorner.lookahead import Lookahead
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.curves import Curve
-from polycorner.skeletons.flags import Crossing, Flag
+from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.links import singular_figure
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
@@ -45,7 +45,7 @@ class Explorer(Prober):
         probes = not isinstance(quotient.polyhedron, Link)
         super().__init__(quotient, partial(singular_figure, _searched), rng, probes=probes)
         self.starts: deque[tuple[int, Array]] = deque(enumerate(starts))
-        self.crossings: list[Crossing] = []
+        self.crossings: list[FaceCrossing] = []
         self.tried: set[Flag] = set()
         self._beside: dict[int, Mapping[frozenset[int], Ray]] = {}
         self._tries: Counter[frozenset[int]] = Counter()  # singular points, by face
@@ -334,7 +334,7 @@ class Explorer(Prober):
         edge = self._edge_at(walk.last, active)
         if edge is not None:
             names = self.registry.names(face)
-            self.crossings.append(Crossing(start, (*edge, names)))
+            self.crossings.append(FaceCrossing(start, (*edge, names)))
 
     def flag(self, k: int, face: frozenset[int]) -> Flag:
         """Return the flag of an edge and a face beside it."""

@@ -9,7 +9,7 @@ Flag = tuple[str, Any, frozenset[str]]
 
 
 @dataclass(frozen=True)
-class Crossing:
+class FaceCrossing:
     """A straight way across a face, from one of its edges to another."""
 
     start: Flag

@@ -8,7 +8,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.skeletons.curves import Curve, EdgeEnd
-from polycorner.skeletons.flags import Crossing, Flag
+from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import CornerRecord
@@ -54,7 +54,7 @@ class SearchState(Value):
         Corners.
     curves : tuple of Curve
         Edges.
-    crossings : tuple of Crossing
+    crossings : tuple of FaceCrossing
         Straight ways across faces.
     starts : tuple of (int, (n,) array)
         Numbered starts that no descent was made from yet.
@@ -83,7 +83,7 @@ class SearchState(Value):
     quotient: Quotient
     records: tuple[CornerRecord, ...]
     curves: tuple[Curve, ...]
-    crossings: tuple[Crossing, ...]
+    crossings: tuple[FaceCrossing, ...]
     starts: tuple[tuple[int, Array], ...]
     pending: tuple[EdgeEnd, ...]
     tried: frozenset[Flag]

@@ -14,7 +14,7 @@ from polycorner import Manifold, Polyhedron, SmoothFunction
 from polycorner.intervals.balls import ball, between, bounds, exact, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.proofs.definite import pivots, tangent_form
-from polycorner.proofs.kkt import System, newton
+from polycorner.proofs.kkt import KKTSystem, newton
 from polycorner.proofs.krawczyk import Cell, Enclosure, enclose, widened
 
 M1, M2 = Manifold.euclidean("x"), Manifold.euclidean("x y")
@@ -30,7 +30,7 @@ def system(manifold, functions, energy, held, anchor, gauges=(), free=(), parame
     f = SmoothFunction("energy", energy, manifold, parameters=parameters)
     formulas = Formulas([*d.functions, f], manifold, free)
     units = (*manifold.scales, *[1.0] * (len(held) + len(gauges)))
-    return System(formulas, tuple(held), tuple(gauges), tuple(anchor), units)
+    return KKTSystem(formulas, tuple(held), tuple(gauges), tuple(anchor), units)
 
 
 def solved(s, start, bits=120, cell=None, p=()):

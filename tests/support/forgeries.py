@@ -22,7 +22,7 @@ import google_crc32c
 import numpy as np
 import xarray as xr
 
-from polycorner.container import Kind
+from polycorner.container import FileKind
 from polycorner.errors import PolycornerError
 
 NUMBERS = [-1, 0, 1, 2, 7, -(2**63), 2**63, 10**12, 10**400, 0.5, -0.5, 1e12, 1e30, 1e300, -1e300]
@@ -136,12 +136,12 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
     return bytes(found)
 
 
-def resealed(kind: Kind, path: Path, content: bytes) -> None:
+def resealed(kind: FileKind, path: Path, content: bytes) -> None:
     """Write a content with a digest that fits."""
     kind.save(path, content)
 
 
-def forge_bytes(kind: Kind) -> Callable[[Path, random.Random], None]:
+def forge_bytes(kind: FileKind) -> Callable[[Path, random.Random], None]:
     """Return what damages the content of a file, with a digest that fits or without."""
 
     def forge(path: Path, rng: random.Random) -> None:
@@ -153,7 +153,7 @@ def forge_bytes(kind: Kind) -> Callable[[Path, random.Random], None]:
     return forge
 
 
-def forge_json(kind: Kind) -> Callable[[Path, random.Random], None]:
+def forge_json(kind: FileKind) -> Callable[[Path, random.Random], None]:
     """Return what changes entries of JSON."""
 
     def forge(path: Path, rng: random.Random) -> None:
@@ -165,7 +165,7 @@ def forge_json(kind: Kind) -> Callable[[Path, random.Random], None]:
     return forge
 
 
-def forge_graph(kind: Kind) -> Callable[[Path, random.Random], None]:
+def forge_graph(kind: FileKind) -> Callable[[Path, random.Random], None]:
     """Return what changes numbers, words and tags of GraphML."""
 
     def forge(path: Path, rng: random.Random) -> None:
@@ -218,11 +218,11 @@ def forged_array(array: Any, rng: random.Random) -> Any:
     return array
 
 
-def _rows(kind: Kind, path: Path) -> int:
+def _rows(kind: FileKind, path: Path) -> int:
     return len(kind.load_arrays(path)["left"])
 
 
-def forge_arrays(kind: Kind, *, shared: bool = True) -> Callable[[Path, random.Random], None]:
+def forge_arrays(kind: FileKind, *, shared: bool = True) -> Callable[[Path, random.Random], None]:
     """Return what changes an array in one of the archives of a folder.
 
     ``shared`` makes some forgeries agree: the last row that was recorded is that of the state.
@@ -252,7 +252,7 @@ def forge_arrays(kind: Kind, *, shared: bool = True) -> Callable[[Path, random.R
     return forge
 
 
-def forge_dataset(kind: Kind) -> Callable[[Path, random.Random], None]:
+def forge_dataset(kind: FileKind) -> Callable[[Path, random.Random], None]:
     """Return what changes a variable or an attribute of a NetCDF file."""
 
     def forge(path: Path, rng: random.Random) -> None:

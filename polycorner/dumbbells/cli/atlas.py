@@ -11,7 +11,7 @@ from polycorner.cli.atlas import RESUMING, search_options
 from polycorner.cli.options import GroupedCommand, examples, given, option
 from polycorner.cli.output import fail
 from polycorner.cli.report import keys
-from polycorner.cli.search import Search
+from polycorner.cli.search import SkeletonSearch
 from polycorner.dumbbells.cli.options import GROUP, chosen_pair, pair_options, parameters
 
 UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
@@ -47,7 +47,7 @@ def dyad(
     angle = math.radians(heading)
     polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
     chosen = parameters(pair) | {"heading_deg": heading}
-    search = Search("dyad", chosen, out, seed, budget, workers)
+    search = SkeletonSearch("dyad", chosen, out, seed, budget, workers)
     found = search.run(
         polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
     )

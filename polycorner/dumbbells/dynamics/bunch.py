@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from polycorner.checks import instance, real, refuse
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
-from polycorner.dumbbells.dynamics.pairs import LEFT_AS, Handed, Sizes, dyads_among, left_as
+from polycorner.dumbbells.dynamics.pairs import (
+    LEFT_AS,
+    DumbbellLengths,
+    Handed,
+    dyads_among,
+    left_as,
+)
 from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.dynamics.starts import scatter
 from polycorner.motion.checkpoints import Checkpoint
@@ -93,7 +99,7 @@ class BunchRun(Value):
 
         By :func:`polycorner.dumbbells.dynamics.pairs.is_dyad`; a dumbbell may be in several.
         """
-        return dyads_among(Sizes.of_drum(self.drum), self.q[index], self.present[index])
+        return dyads_among(DumbbellLengths.of_drum(self.drum), self.q[index], self.present[index])
 
     @cached_property
     def exit_kinds(self) -> tuple[str, ...]:

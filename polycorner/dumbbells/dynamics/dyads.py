@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
-from polycorner.dumbbells.dynamics.pairs import Sizes, chirality, gaps
+from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, chirality, gaps
 from polycorner.dumbbells.dynamics.singles import APART
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality
@@ -41,7 +41,7 @@ def handedness(drum: DumbbellDrum, q: Array) -> NDArray[np.int64]:
     q : (..., 2, k) array
         Placements of A and B, beginning with ``phi, eta, theta``.
     """
-    return chirality(Sizes.of_drum(drum).balls(q).reshape(*q.shape[:-2], 4, 2))
+    return chirality(DumbbellLengths.of_drum(drum).balls(q).reshape(*q.shape[:-2], 4, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ class DyadPaths(Value):
 
         Near means centres closer than ``l + 2 r`` in the developed plane.
         """
-        sizes = Sizes.of_drum(self.drum)
+        sizes = DumbbellLengths.of_drum(self.drum)
         apart = sizes.apart(self.q[..., 0, :], self.q[..., 1, :])
         lost = (apart >= sizes.reach) | (self.hand != self.hand[0])
         when = self.times[np.argmax(lost, axis=0)]

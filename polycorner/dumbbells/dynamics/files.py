@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.container import BINARY, Kind
+from polycorner.container import BINARY, FileKind
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.drum_motion import COORDINATES
 from polycorner.dumbbells.imperfections import KINDS
@@ -27,7 +27,7 @@ from polycorner.motion.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-KIND = Kind("run", "save_run", BINARY)
+KIND = FileKind("run", "save_run", BINARY)
 UNITS = {
     "length": "mm",
     "ball_radius": "mm",

@@ -32,7 +32,7 @@ LEFT_AS = {1: "right", -1: "left", 0: "single"}
 
 
 @dataclass(frozen=True)
-class Sizes:
+class DumbbellLengths:
     """Lengths in mm: ``l``, ``r``, ``rho = R - r`` and ``t``."""
 
     length: float
@@ -41,12 +41,12 @@ class Sizes:
     rod_radius: float
 
     @classmethod
-    def of(cls, trajectory: "Trajectory") -> "Sizes":
+    def of(cls, trajectory: "Trajectory") -> "DumbbellLengths":
         """Return the lengths of the dumbbells of a trajectory in the drum."""
         return cls.of_drum(drum_of(trajectory))
 
     @classmethod
-    def of_drum(cls, drum: DumbbellDrum) -> "Sizes":
+    def of_drum(cls, drum: DumbbellDrum) -> "DumbbellLengths":
         """Return the lengths of a drum's dumbbells."""
         return cls(drum.length, drum.ball_radius, drum.centre_radius, drum.rod_radius)
 
@@ -81,7 +81,7 @@ class Sizes:
 
 
 @lru_cache(maxsize=8)
-def _pair(sizes: Sizes) -> DumbbellPair:
+def _pair(sizes: DumbbellLengths) -> DumbbellPair:
     drum_radius = sizes.centre_radius + sizes.ball_radius
     return DumbbellPair(sizes.length, sizes.ball_radius, sizes.rod_radius, drum_radius)
 
@@ -144,7 +144,7 @@ def _from_line(points: Array, line: Array) -> Array:
     return np.asarray(np.abs(turn) / np.linalg.norm(axis, axis=-1)[..., None])
 
 
-def gaps(sizes: DumbbellDrum | Sizes, q: Array) -> Array:
+def gaps(sizes: DumbbellDrum | DumbbellLengths, q: Array) -> Array:
     """Return the nine gaps of pairs ``(..., 2, k)`` in a drum, ``(..., 9)``, in mm.
 
     In the order of :attr:`polycorner.dumbbells.formulas.CONTACTS`.
@@ -156,7 +156,7 @@ def gaps(sizes: DumbbellDrum | Sizes, q: Array) -> Array:
     return np.asarray(found).reshape(*q.shape[:-2], len(CONTACTS))
 
 
-def is_dyad(sizes: DumbbellDrum | Sizes, q: Array) -> NDArray[np.bool_]:
+def is_dyad(sizes: DumbbellDrum | DumbbellLengths, q: Array) -> NDArray[np.bool_]:
     """Return which pairs are dyads: those near the subset ``T`` of [GMBN] sec. 7.
 
     In ``T`` dumbbells are parallel and a ball of each touches the other's rod.  Here headings, as
@@ -167,7 +167,7 @@ def is_dyad(sizes: DumbbellDrum | Sizes, q: Array) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    sizes : DumbbellDrum or Sizes
+    sizes : DumbbellDrum or DumbbellLengths
     q : (..., 2, k) array
         Placements of A and B, beginning with ``phi, eta, theta``.
     """
@@ -186,16 +186,18 @@ def dyads(trajectory: "Trajectory", index: int) -> list[Dyad]:
     A dyad is a pair for which :func:`is_dyad` holds and that has a chirality; a dumbbell may be in
     several.
     """
-    found = dyads_among(Sizes.of(trajectory), trajectory.q[index], trajectory.present[index])
+    found = dyads_among(
+        DumbbellLengths.of(trajectory), trajectory.q[index], trajectory.present[index]
+    )
     return [(i, j, "R" if hand > 0 else "L") for i, j, hand in found]
 
 
-def dyads_among(sizes: Sizes, q: Array, present: NDArray[np.bool_]) -> list[Handed]:
+def dyads_among(sizes: DumbbellLengths, q: Array, present: NDArray[np.bool_]) -> list[Handed]:
     """Return the dyads among dumbbells: two numbers and the chirality, +1 right or -1 left.
 
     Parameters
     ----------
-    sizes : Sizes
+    sizes : DumbbellLengths
     q : (N, k) array
         Placements, beginning with ``phi, eta, theta``.
     present : (N,) array of bool
@@ -247,7 +249,7 @@ def left_as(
 
 def exits(trajectory: "Trajectory", *, memory: float = MEMORY) -> dict[str, int]:
     """Return how many dumbbells left in dyads of each chirality and single; see :func:`left_as`."""
-    sizes, q, present = Sizes.of(trajectory), trajectory.q, trajectory.present
+    sizes, q, present = DumbbellLengths.of(trajectory), trajectory.q, trajectory.present
     left = [(event.time, event.bodies[0]) for event in trajectory.of_kind(EventKind.EXIT)]
     kinds = left_as(
         trajectory.times, left, lambda at: dyads_among(sizes, q[at], present[at]), memory
@@ -261,7 +263,7 @@ def held(trajectory: "Trajectory") -> bool:
     At every recorded instant both are in the drum, their centres are closer than ``l + 2 r`` in the
     developed plane, and their chirality is that of the beginning.
     """
-    sizes, q = Sizes.of(trajectory), trajectory.q
+    sizes, q = DumbbellLengths.of(trajectory), trajectory.q
     if q.shape[1] != 2:
         msg = f"trajectory: expected one of two dumbbells; got one of {q.shape[1]}"
         raise ValueError(msg)
@@ -272,7 +274,7 @@ def held(trajectory: "Trajectory") -> bool:
 
 def handedness(trajectory: "Trajectory", index: int = 0) -> Chirality | None:
     """Return the chirality of the first two dumbbells at a recorded instant."""
-    balls = Sizes.of(trajectory).balls(trajectory.q[index, :2]).reshape(4, 2)
+    balls = DumbbellLengths.of(trajectory).balls(trajectory.q[index, :2]).reshape(4, 2)
     return cast("Chirality | None", {1: "R", -1: "L"}.get(int(chirality(balls))))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
-from polycorner.dumbbells.dynamics.pairs import Sizes, dyads, mean_heading
+from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, dyads, mean_heading
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.pictures.symbols import HANDS, WORDS, sizes_in_words
 from polycorner.kinds import checked
@@ -159,7 +159,7 @@ class DrumView:
     def __init__(self, run: Trajectory, *, width: float = 7.0) -> None:
         self.run = run
         real("width", width, above=0)
-        self.sizes = Sizes.of(run)
+        self.sizes = DumbbellLengths.of(run)
         (left, right), (low, high) = self._extent()
         height = (width - 1.6) * (high - low) / (right - left) + 1.6
         if height > TALL:

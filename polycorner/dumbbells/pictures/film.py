@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import reals, refuse
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
-from polycorner.dumbbells.dynamics.pairs import Handed, Sizes, dyads_among
+from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, Handed, dyads_among
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
@@ -264,7 +264,7 @@ class _Shot:
     def of(cls, run: Trajectory, index: int, centres: Array) -> "_Shot":
         path, drum = run, drum_of(run)
         q, present = path.q[index], path.present[index]
-        dyads = dyads_among(Sizes.of_drum(drum), q, present) if drum.count > 2 else []
+        dyads = dyads_among(DumbbellLengths.of_drum(drum), q, present) if drum.count > 2 else []
         return cls(drum.pair, q, present, centres, path.touching[index], dyads)
 
     @property

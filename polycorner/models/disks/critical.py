@@ -19,7 +19,7 @@ from polycorner.models.disks.configurations import (
     with_rattlers,
 )
 from polycorner.models.disks.critical_points import solved
-from polycorner.models.disks.smoothing import Candidate, candidates, smooth
+from polycorner.models.disks.smoothing import NearlyCritical, candidates, smooth
 from polycorner.models.disks.torus import OWN
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -196,7 +196,7 @@ def _moved(points: Array, rng: np.random.Generator) -> Array:
     return centres.reshape(points.shape)
 
 
-def _settled(model: Disks, c: Candidate) -> CriticalConfiguration | None:
+def _settled(model: Disks, c: NearlyCritical) -> CriticalConfiguration | None:
     """Solve for the corner near a candidate, away from the cut of the chart."""
     centres = placed(c.point)
     weights = smooth(model.pairs, centres[None], c.sharpness).weights[0]

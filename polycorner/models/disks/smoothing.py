@@ -31,7 +31,7 @@ FLAT, NEARLY = 1e-9, 0.15
 LOADED, NEARLY_LOADED = 1e-4, 3e-2
 
 
-class Local(Protocol):
+class GroupedFunctions(Protocol):
     """Functions in groups, each group reading few coordinates."""
 
     @property
@@ -62,7 +62,7 @@ class Smoothed:
         return np.asarray(np.linalg.norm(self.gradient, axis=-1))
 
 
-def smooth(functions: Local, points: Array, sharpness: float) -> Smoothed:
+def smooth(functions: GroupedFunctions, points: Array, sharpness: float) -> Smoothed:
     """Evaluate ``E_s`` at points ``(B, n)``."""
     values, gradients, hessians = functions.derivatives(points)
     (count, n), reads = points.shape, functions.reads
@@ -85,7 +85,7 @@ def smooth(functions: Local, points: Array, sharpness: float) -> Smoothed:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class NearlyCritical:
     """A critical point of a sharp energy, or nearly one.
 
     Attributes
@@ -117,9 +117,9 @@ class _Population:
     def where(self, chosen: NDArray[np.bool_]) -> "_Population":
         return _Population(self.points[chosen], self.slopes[chosen], self.hits[chosen])
 
-    def candidates(self, sharpness: float, loaded: float) -> list[Candidate]:
+    def candidates(self, sharpness: float, loaded: float) -> list[NearlyCritical]:
         return [
-            Candidate(point, sharpness, loaded, int(hits))
+            NearlyCritical(point, sharpness, loaded, int(hits))
             for point, hits in zip(self.points, self.hits, strict=True)
         ]
 
@@ -132,11 +132,11 @@ class _Population:
 
 
 def candidates(
-    functions: Local,
+    functions: GroupedFunctions,
     starts: Array,
     rng: np.random.Generator,
     moves: Callable[[Array, np.random.Generator], Array],
-) -> list[Candidate]:
+) -> list[NearlyCritical]:
     """Return guesses of critical points of ``tau``, some of them several times.
 
     At every sharpness what is known is followed, and disturbed copies of it look for branches
@@ -146,7 +146,7 @@ def candidates(
 
     Parameters
     ----------
-    functions : Local
+    functions : GroupedFunctions
         The ``d_k``.
     starts : (B, n) array
         Starts of the descents, spread over the softer energies.
@@ -159,7 +159,7 @@ def candidates(
     shares = np.array_split(starts, int((levels < RANDOM_BELOW).sum()))
     nothing = starts[:0]
     known = nearly = _Population(nothing, np.empty(0), np.empty(0, dtype=np.intp))
-    found: list[Candidate] = []
+    found: list[NearlyCritical] = []
     for level, sharpness in enumerate(levels):
         flat = FLAT * max(1.0, sharpness / 100)
         followed = _followed(functions, known, sharpness, flat)
@@ -191,7 +191,9 @@ def _near(points: Array, copies: int, sharpness: float, rng: np.random.Generator
     return repeated + reach * rng.normal(size=repeated.shape)
 
 
-def _followed(functions: Local, known: _Population, sharpness: float, flat: float) -> _Population:
+def _followed(
+    functions: GroupedFunctions, known: _Population, sharpness: float, flat: float
+) -> _Population:
     """Follow critical points from one sharpness to the next by Newton's method in short steps."""
     points = known.points.copy()
     if not len(points):
@@ -209,7 +211,11 @@ def _followed(functions: Local, known: _Population, sharpness: float, flat: floa
 
 
 def _aimed(
-    functions: Local, starts: Array, sharpness: float, flat: float, aims: NDArray[np.intp]
+    functions: GroupedFunctions,
+    starts: Array,
+    sharpness: float,
+    flat: float,
+    aims: NDArray[np.intp],
 ) -> _Population:
     """Follow eigenvectors to critical points of given index.
 
@@ -236,7 +242,9 @@ def _aimed(
     return _Population(points, slope, np.ones(len(points), dtype=np.intp))
 
 
-def _least_slope(functions: Local, starts: Array, sharpness: float, flat: float) -> _Population:
+def _least_slope(
+    functions: GroupedFunctions, starts: Array, sharpness: float, flat: float
+) -> _Population:
     """Minimise ``|grad E_s|^2`` from every start with damped Gauss-Newton steps."""
     points, n = starts.copy(), starts.shape[1]
     if not len(points):
@@ -269,7 +277,7 @@ def _capped(steps: Array, longest: float) -> Array:
     return np.asarray(steps * np.minimum(1, longest / np.maximum(sizes, 1e-300)))
 
 
-def _told_apart(functions: Local, some: _Population, sharpness: float) -> _Population:
+def _told_apart(functions: GroupedFunctions, some: _Population, sharpness: float) -> _Population:
     """Keep one of those critical points that agree in energy and index."""
     if not len(some.points):
         return some
@@ -282,7 +290,7 @@ def _told_apart(functions: Local, some: _Population, sharpness: float) -> _Popul
     return _Population(some.points[first], some.slopes[first], hits)
 
 
-def _flattest(functions: Local, some: _Population, sharpness: float) -> _Population:
+def _flattest(functions: GroupedFunctions, some: _Population, sharpness: float) -> _Population:
     """Keep the points of least slope, one for each energy, and not too many."""
     if not len(some.points):
         return some

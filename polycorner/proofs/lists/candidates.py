@@ -18,7 +18,7 @@ RELEVANT = 1e-6  # share of the largest force at which a function counts as acti
 
 
 @dataclass
-class Faces:
+class FacesOfPoints:
     """Rows of the functions that vanish on faces, one face for each point.
 
     Attributes
@@ -33,7 +33,7 @@ class Faces:
     filled: Mask
 
     @classmethod
-    def of(cls, problem: Problem, active: Mask) -> "Faces":
+    def of(cls, problem: Problem, active: Mask) -> "FacesOfPoints":
         """Return the faces with some active inequalities ``(B, m)``."""
         counts = active.sum(axis=1)
         most = int(counts.max(initial=0))
@@ -79,7 +79,7 @@ def newton(
     found : (B,) array of bool
         Where the method has settled, with positive multipliers of the inequalities.
     """
-    faces, free = Faces.of(problem, active), list(free)
+    faces, free = FacesOfPoints.of(problem, active), list(free)
     n, units, count = len(free), problem.scales[free], faces.rows.shape[1]
     start, reach = q, np.broadcast_to(reach, len(q))
     q, lam, found = q.copy(), np.zeros((len(q), count)), np.zeros(len(q), dtype=np.bool_)

@@ -15,7 +15,7 @@ from polycorner.proofs.lists.coincidences import OPEN, ZERO, Place, active_at, s
 from polycorner.proofs.lists.corner_search import CornerSearch
 from polycorner.proofs.lists.members import RegionPoint, full, image, placed, same
 from polycorner.proofs.lists.operators import BITS
-from polycorner.proofs.lists.tips import Tip
+from polycorner.proofs.lists.tips import TipRegion
 
 MOST_OPEN = 6  # functions of unknown sign at a point, all of whose signs are gone through
 
@@ -40,7 +40,7 @@ class Candidate(RegionPoint):
 
 def candidates(search: CornerSearch) -> list[Candidate]:
     """Return the points that are corners or may be, each once; regular ones first."""
-    order = sorted(enumerate(search.regions), key=lambda pair: isinstance(pair[1], Tip))
+    order = sorted(enumerate(search.regions), key=lambda pair: isinstance(pair[1], TipRegion))
     found: list[Candidate] = []
     for number, region in order:
         new = _candidate(search, number, region)
@@ -70,7 +70,7 @@ def _candidate(search: CornerSearch, number: int, region: Region) -> Candidate |
             active = active_at(search.conj, found)
             corner = active is not None and set(region.active) <= set(active)
             possible.add(active if corner else None)
-            if active is not None and not corner and isinstance(region, Tip):
+            if active is not None and not corner and isinstance(region, TipRegion):
                 sole |= not set(region.critical).isdisjoint(active)
         if possible == {None} and not sole:
             return None
@@ -80,7 +80,7 @@ def _candidate(search: CornerSearch, number: int, region: Region) -> Candidate |
 
 def _place(search: CornerSearch, region: Region) -> Place:
     """Return the point of a region, enclosed as well as its kind allows."""
-    if not isinstance(region, Tip):
+    if not isinstance(region, TipRegion):
         return placed(search, region)
     with precision(BITS):
         point, rows = [ball(x) for x in region.exact], search.vertices.rows(region.active)

@@ -18,7 +18,7 @@ from polycorner.proofs.lists.corner_points import Candidate
 from polycorner.proofs.lists.corner_search import CornerSearch
 from polycorner.proofs.lists.records import Record
 from polycorner.proofs.lists.relations import Relation
-from polycorner.proofs.lists.tips import Tip
+from polycorner.proofs.lists.tips import TipRegion
 from polycorner.values import Value
 
 FORMAT = ("polycorner-corner-list", 1)
@@ -74,12 +74,12 @@ def save(path: str | os.PathLike[str], proof: CornerRecord) -> Path:
         {"rows": list(r.rows), "weights": [str(w) for w in r.weights]} for r in proof.relations
     ]
     for region, entry in zip(proof.record.regions, data["regions"], strict=True):
-        if isinstance(region, Tip):
+        if isinstance(region, TipRegion):
             entry.update(_tip(region))
     return records.written(path, proof.record, data)
 
 
-def _tip(region: Tip) -> dict[str, Any]:
+def _tip(region: TipRegion) -> dict[str, Any]:
     return {
         "exact": [str(x) for x in region.exact],
         "combination": [str(x) for x in region.combination],

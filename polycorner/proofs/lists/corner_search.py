@@ -23,7 +23,7 @@ from polycorner.proofs.lists.levels import Levels, Rows, levels
 from polycorner.proofs.lists.pinning import STRAY
 from polycorner.proofs.lists.relations import Relation, relation
 from polycorner.proofs.lists.search import Search
-from polycorner.proofs.lists.tips import Tip, tips
+from polycorner.proofs.lists.tips import TipRegion, tips
 from polycorner.spaces.manifold import Array
 
 ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
@@ -214,7 +214,7 @@ class _Around:
             inside: Truths = np.all(within | ~free, axis=1)
             if inside.any():
                 self._add(self.zeros, tuple(sorted(region.active)), inside)
-                for i in region.critical if isinstance(region, Tip) else ():
+                for i in region.critical if isinstance(region, TipRegion) else ():
                     self._add(self.criticals, (i,), inside)
 
     @staticmethod

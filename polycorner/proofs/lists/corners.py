@@ -18,7 +18,7 @@ from polycorner.proofs.lists.enumeration import MOST_BOXES, RESOLUTION, begun
 from polycorner.proofs.lists.listing import undecided
 from polycorner.proofs.lists.members import full
 from polycorner.proofs.lists.search import Search
-from polycorner.proofs.lists.tips import Tip
+from polycorner.proofs.lists.tips import TipRegion
 
 
 def corners(
@@ -120,5 +120,5 @@ def _point(search: CornerSearch, one: Candidate, orbit: int) -> CornerPoint:
     lower, upper = full(search, one.region)
     names = search.problem.polyhedron.names
     rows = sorted(one.zeros) if one.active is None else one.active
-    singular = isinstance(search.regions[one.number], Tip)
+    singular = isinstance(search.regions[one.number], TipRegion)
     return CornerPoint(lower, upper, tuple(names[i] for i in rows), singular, orbit)

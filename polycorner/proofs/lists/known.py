@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.proofs.lists.acceptance import Region
-from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
@@ -15,7 +15,7 @@ FIRST = 64  # rows that a growing array has room for
 
 
 @dataclass
-class Rows:
+class GrowingRows:
     """An array that grows by rows, ``(R, width)``."""
 
     width: int
@@ -46,11 +46,11 @@ class Sides:
 
     def __init__(self, width: int) -> None:
         self.width = width
-        self._rows: dict[frozenset[int], Rows] = {}
+        self._rows: dict[frozenset[int], GrowingRows] = {}
 
     def add(self, active: frozenset[int], lower: Array, upper: Array) -> None:
         """Add a box."""
-        rows = self._rows.setdefault(active, Rows(2 * self.width))
+        rows = self._rows.setdefault(active, GrowingRows(2 * self.width))
         rows.add(np.concatenate([lower, upper]))
 
     def of(self, active: frozenset[int]) -> tuple[Array, Array]:
@@ -65,11 +65,11 @@ class Tried:
 
     def __init__(self, scales: Array) -> None:
         self.scales = scales
-        self._rows: dict[tuple[int, ...], Rows] = {}
+        self._rows: dict[tuple[int, ...], GrowingRows] = {}
 
     def add(self, active: tuple[int, ...], q: Array, widest: float) -> None:
         """Add a point."""
-        rows = self._rows.setdefault(active, Rows(len(q) + 1))
+        rows = self._rows.setdefault(active, GrowingRows(len(q) + 1))
         rows.add(np.append(q, widest))
 
     def has(self, active: tuple[int, ...], q: Array, widest: float) -> bool:
@@ -98,10 +98,10 @@ class Known:
 
     def __init__(self, dimension: int, inequalities: int, parameters: tuple[int, ...] = ()) -> None:
         self.regions: list[Region] = []
-        self.loci: list[Locus] = []
-        self.missed: list[Locus] = []  # loci without a point of the set
+        self.loci: list[LocusRegion] = []
+        self.missed: list[LocusRegion] = []  # loci without a point of the set
         self._sides = Sides(dimension)
-        self._all = Rows(2 * dimension + inequalities)
+        self._all = GrowingRows(2 * dimension + inequalities)
         self._dimension = dimension
         self._parameters = list(parameters)
 
@@ -121,7 +121,7 @@ class Known:
         lower, upper = self._sides.of(active)
         return bool(((q >= lower) & (q <= upper)).all(axis=1).any())
 
-    def has_locus(self, place: Locus) -> bool:
+    def has_locus(self, place: LocusRegion) -> bool:
         """Whether a locus lies in the box of a known one."""
         return any(
             (place.sharp_lower >= other.lower).all() and (place.sharp_upper <= other.upper).all()

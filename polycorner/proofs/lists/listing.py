@@ -6,7 +6,7 @@ from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
-from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.members import OPEN, Listed, Member, full, images, moved, settled
 from polycorner.proofs.lists.records import record
 from polycorner.proofs.lists.search import Search
@@ -60,10 +60,10 @@ def undecided(search: Search) -> Array:
     return np.stack([lower, upper], axis=1)
 
 
-def _loci(search: Search) -> list[Locus]:
+def _loci(search: Search) -> list[LocusRegion]:
     """Return the loci that were found and their images, each once."""
     domain, z = search.domain, search.reads
-    found: list[Locus] = []
+    found: list[LocusRegion] = []
     for place in search.loci:
         for g in (None, *search.motions):
             image = place if g is None else _locus_image(search, place, g)
@@ -75,14 +75,14 @@ def _loci(search: Search) -> list[Locus]:
     return found
 
 
-def _locus_image(search: Search, place: Locus, g: Motion) -> Locus:
+def _locus_image(search: Search, place: LocusRegion, g: Motion) -> LocusRegion:
     z, ends = list(place.z), []
     for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
         sides = search.domain.lower.copy(), search.domain.upper.copy()
         sides[0][z], sides[1][z] = lower, upper
         ends += [side[z] for side in moved(g, *sides, search.domain.manifold)]
     sample = None if place.sample is None else g(place.sample, search.domain.manifold)
-    return Locus(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
+    return LocusRegion(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
 
 
 def point_of(search: Search, member: Member, orbit: int) -> StationaryPoint:

@@ -44,7 +44,7 @@ MOST_PIECES = 4096  # boxes in which a point of the set is looked for, at a time
 
 
 @dataclass(frozen=True, eq=False)
-class Locus(Value):
+class LocusRegion(Value):
     """A point ``z*`` where the derivative of the energy vanishes, whatever ``y`` is.
 
     Attributes
@@ -84,7 +84,7 @@ def locus(
     q: Array,
     scales: Array,
     held: Mapping[int, tuple[float, float]] = MappingProxyType({}),
-) -> Locus | None:
+) -> LocusRegion | None:
     """Return the widest locus tried about ``q``, where the energy's derivative nearly vanishes.
 
     It is one for all values of the parameters, with their sides ``held``.
@@ -109,7 +109,7 @@ def _shown(
     q: Array,
     radii: Array,
     held: Mapping[int, tuple[float, float]],
-) -> Locus | None:
+) -> LocusRegion | None:
     places = list(z)
     lower, upper = q[places] - radii, q[places] + radii
     hull = [ball(x) for x in q.tolist()]
@@ -142,10 +142,12 @@ def _shown(
     if not all(x.contains_interior(y) for x, y in zip(unknowns, image, strict=True)):
         return None
     ends = np.array([outward(x) for x in image]).reshape(-1, 2)  # none where nothing moves
-    return Locus(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])
+    return LocusRegion(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])
 
 
-def met(place: Locus, functions: BoxFunctions, conj: Mask, domain: Domain) -> Locus | None:
+def met(
+    place: LocusRegion, functions: BoxFunctions, conj: Mask, domain: Domain
+) -> LocusRegion | None:
     """Return the locus with a sample, if one is found; None if it is shown to miss the set."""
     z = list(place.z)
     along = np.setdiff1d(domain.free, z)

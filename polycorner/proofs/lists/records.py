@@ -39,7 +39,7 @@ from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
-from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.members import IN, OPEN, Member
 from polycorner.proofs.lists.pinned import Pinned
 from polycorner.proofs.lists.search import Search
@@ -66,7 +66,7 @@ class Record(Value):
     motions : tuple of Motion
     weights : (n,) array
     regions : tuple of Region
-    loci : tuple of Locus
+    loci : tuple of LocusRegion
     listed, open_points : tuple of int
         Regions whose points are in the list, and those whose points may be.  Of points that are
         images of each other, those that the search met.
@@ -84,7 +84,7 @@ class Record(Value):
     motions: tuple[Motion, ...]
     weights: Array
     regions: tuple[Region, ...]
-    loci: tuple[Locus, ...]
+    loci: tuple[LocusRegion, ...]
     listed: tuple[int, ...]
     open_points: tuple[int, ...]
     codes: NDArray[np.int8]
@@ -236,7 +236,7 @@ def _hex(values: Array) -> list[str]:
     return [x.hex() for x in values.tolist()]
 
 
-def _sides(box: Region | Locus) -> dict[str, list[str]]:
+def _sides(box: Region | LocusRegion) -> dict[str, list[str]]:
     return {name: _hex(getattr(box, name)) for name in SIDES}
 
 
@@ -249,7 +249,7 @@ def region_data(region: Region) -> dict[str, Any]:
     return found
 
 
-def locus_data(place: Locus) -> dict[str, Any]:
+def locus_data(place: LocusRegion) -> dict[str, Any]:
     """Return a locus as plain data."""
     sample = None if place.sample is None else _hex(place.sample)
     return {"z": list(place.z), "index": place.index, "sample": sample, **_sides(place)}
@@ -265,11 +265,11 @@ def region_from(data: dict[str, Any]) -> Region:
     return Pinned(*region, tuple(data["corner"]), into, steps, weights.reshape(len(steps), -1))
 
 
-def locus_from(data: dict[str, Any]) -> Locus:
+def locus_from(data: dict[str, Any]) -> LocusRegion:
     """Return the locus that some data describe."""
     lower, upper, low, high = (_numbers(data[name]) for name in SIDES)
     sample = None if data["sample"] is None else _numbers(data["sample"])
-    return Locus(tuple(data["z"]), lower, upper, low, high, data["index"], sample)
+    return LocusRegion(tuple(data["z"]), lower, upper, low, high, data["index"], sample)
 
 
 def _numbers(texts: Sequence[str]) -> Array:

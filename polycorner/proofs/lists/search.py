@@ -30,7 +30,7 @@ from polycorner.proofs.lists.attempts import Attempts, Mapped, Starts
 from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.examination import Examined, examine, reconsider
 from polycorner.proofs.lists.known import Known
-from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.pinning import pin
 from polycorner.proofs.lists.redundancy import Closing, close_redundant
 from polycorner.proofs.lists.settings import Setting
@@ -96,7 +96,7 @@ class Search(Setting):
         return self.known.regions
 
     @property
-    def loci(self) -> list[Locus]:
+    def loci(self) -> list[LocusRegion]:
         """Loci that were found."""
         return self.known.loci
 

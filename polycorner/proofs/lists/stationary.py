@@ -9,7 +9,7 @@ from polycorner.minimisation import Certificate, certify
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
 from polycorner.proofs.lists.domains import Domain
-from polycorner.proofs.lists.loci import Locus
+from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.records import Record, save
 from polycorner.proofs.lists.search import Search, Tally
 from polycorner.proofs.parameter_boxes import Interval, shown_box
@@ -275,7 +275,7 @@ class StationaryList(Printed, Checked):
         return save(path, self.record)
 
 
-def locus_of(search: Search, place: Locus) -> StationaryLocus:
+def locus_of(search: Search, place: LocusRegion) -> StationaryLocus:
     """Return a locus by the names of its coordinates."""
     keys = [search.domain.manifold.names[i] for i in place.z]
     n = len(search.domain.lower) - len(search.domain.parameters)

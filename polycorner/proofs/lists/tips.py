@@ -46,7 +46,7 @@ Exact = tuple[Fraction, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Tip(Region):
+class TipRegion(Region):
     """A box in which some functions vanish together at one point only, where they are dependent.
 
     Attributes
@@ -67,7 +67,7 @@ class Tip(Region):
     critical: tuple[int, ...]
 
 
-def tips(vertices: Vertices, q: Array, open_: Sequence[int], reach: float) -> Iterator[Tip]:
+def tips(vertices: Vertices, q: Array, open_: Sequence[int], reach: float) -> Iterator[TipRegion]:
     """Yield boxes about a singular corner near ``q``, for each set of functions that isolates it.
 
     Parameters
@@ -90,7 +90,7 @@ def tips(vertices: Vertices, q: Array, open_: Sequence[int], reach: float) -> It
                 return
 
 
-def _tips_at(vertices: Vertices, point: Exact, open_: Sequence[int]) -> Iterator[Tip]:
+def _tips_at(vertices: Vertices, point: Exact, open_: Sequence[int]) -> Iterator[TipRegion]:
     active, slopes = _vanishing(vertices, point, open_)
     if active is None:
         return
@@ -170,7 +170,7 @@ def _vanishing(
 
 def _isolated(
     vertices: Vertices, point: Exact, active: list[int], slopes: list[list[Fraction]]
-) -> Tip | None:
+) -> TipRegion | None:
     """Return the widest box tried in which the point is the only common zero."""
     import sympy
 
@@ -205,7 +205,7 @@ def _isolated(
                         for i, g, h in zip(active, slopes, hessians, strict=False)
                         if not any(g) and not vertices.equations and _regular(h)
                     ]
-                    return Tip(
+                    return TipRegion(
                         lower, upper, tuple(active), ends[:, 0], ends[:, 1], None,
                         point, relation, weight, tuple(critical),
                     )  # fmt: skip

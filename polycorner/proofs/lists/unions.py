@@ -27,7 +27,7 @@ Names = frozenset[str]
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
+class _Searched:
     """A search that has ended, its list, and its members by the functions of their faces."""
 
     search: Search
@@ -75,7 +75,7 @@ def united(
     every = []
     for search in searches:
         members = tuple(member for _, member in settled(search)[0])
-        every.append(_Piece(search, listed(search, search.problem), members, alike))
+        every.append(_Searched(search, listed(search, search.problem), members, alike))
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
     loci: list[StationaryLocus] = []
@@ -110,7 +110,7 @@ def united(
 
 
 def _judged(
-    piece: _Piece, member: Member, others: tuple[Sequence[_Piece], Sequence[_Piece]]
+    piece: _Searched, member: Member, others: tuple[Sequence[_Searched], Sequence[_Searched]]
 ) -> tuple[str, bool]:
     """Return whether a point of a piece is stationary in the union, and whether its index counts.
 
@@ -136,7 +136,7 @@ def _judged(
     return place, len(several) == 1 or all(one.region.index == 0 for one in several)
 
 
-def _same(piece: _Piece, member: Member, other: _Piece) -> Member | None:
+def _same(piece: _Searched, member: Member, other: _Searched) -> Member | None:
     """Return the member of another piece whose point is that of a region."""
     face = piece.face(member)
     alike = (one for one in other.members if other.face(one) == face)

@@ -13,7 +13,7 @@ from oracles import gaps
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics import pairs as drum_pairs
 from polycorner.dumbbells.dynamics import starts as drum_starts
-from polycorner.dumbbells.dynamics.pairs import Sizes
+from polycorner.dumbbells.dynamics.pairs import DumbbellLengths
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.models.textbook import bouncing_ball
@@ -21,7 +21,7 @@ from polycorner.motion.events import Event, EventKind
 from polycorner.motion.simulation import simulate
 
 PAIR = DumbbellPair(16, 3, 1.5, 125)
-SIZES = Sizes(16.0, 3.0, 122.0, 1.5)
+SIZES = DumbbellLengths(16.0, 3.0, 122.0, 1.5)
 
 # -------------------------------------------------------------------------------------------- dyads
 
