@@ -306,12 +306,18 @@ def _check_mass(bodies: IdenticalBodies, q: Array, v: Array) -> None:
     for i in range(bodies.count):
         mass = moment(bodies.body.formulation, bodies.body.parameters, q[i], v[i]).mass
         least = np.linalg.eigvalsh(mass)[0] if np.isfinite(mass).all() else np.nan
-        if not least > 0:
+        if not (least > 0 and _is_regular(mass)):
             msg = (
                 "kinetic: expected a positive definite mass matrix; got one with the eigenvalue "
                 f"{least:.6g} at q = {q[i].tolist()}"
             )
             raise ValueError(msg)
+
+
+def _is_regular(mass: Array) -> bool:
+    """Whether a positive matrix is more than rounding from a singular one, in any units."""
+    sizes = np.sqrt(np.diagonal(mass))
+    return bool(np.linalg.eigvalsh(mass / np.outer(sizes, sizes))[0] > DEFAULT.rounding)
 
 
 @checked

@@ -197,11 +197,11 @@ class _Scaled:
 
     @classmethod
     def of(cls, problem: StepProblem) -> "_Scaled":
-        try:
-            root = np.asarray(np.linalg.cholesky(problem.mass), dtype=np.float64)
-        except np.linalg.LinAlgError as error:
+        sizes = np.linalg.eigvalsh(problem.mass)
+        if not sizes[0] > 1e-13 * sizes[-1]:
             msg = "the mass matrix of a step is not positive definite"
-            raise SolverError(msg) from error
+            raise SolverError(msg)
+        root = np.linalg.cholesky(problem.mass)
         free = problem.v_free
         sizes = np.array([1 / np.sqrt(compliance(problem, row[None])) for row in problem.normals])
         rows = sizes[:, None] * np.linalg.solve(root, problem.normals.T).T
