@@ -159,12 +159,14 @@ class Body(Checked):
     def axis(self) -> Array | None:
         """A unit vector along the line through the origin that contains all points, or None.
 
-        The body is a surface of revolution about this line.  All points at the origin: zero.
+        The body is a surface of revolution about this line.  All points at the origin: zero.  It
+        leads to the first of the farthest points, those of equal length but for rounding.
         """
         lengths = np.linalg.norm(self.markers, axis=1)
         if lengths.max() == 0:
             return np.zeros(self.dimension)
-        along: Array = self.markers[np.argmax(lengths)] / lengths.max()
+        far = int(np.argmax(lengths >= (1 - DEFAULT.alike) * lengths.max()))
+        along: Array = self.markers[far] / lengths[far]
         away = self.markers - np.outer(self.markers @ along, along)
         return along if np.linalg.norm(away, axis=1).max() <= DEFAULT.alike * self.size else None
 

@@ -159,3 +159,10 @@ def test_arrangements_can_be_pickled():
 def test_wrong_arguments_are_named(make, kind, said):
     with pytest.raises(kind, match=said):
         make()
+
+
+@pytest.mark.parametrize("length", [np.nextafter(1.5, 0), 1.5, np.nextafter(1.5, 2)])
+def test_the_axis_leads_to_the_first_of_points_as_far_but_for_rounding(length):
+    """Which of two ends is the farther by the last bit says nothing."""
+    rod = capsule([0, 0, -1.5], [0, 0, length], 0.2)
+    assert rod.axis.tolist() == [0, 0, -1]
