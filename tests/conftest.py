@@ -60,7 +60,7 @@ def pytest_configure(config):
         config.pluginmanager.register(costs.Recorder(costs.FILE))
     seed = config.getoption("--disturbed")
     if seed is not None:
-        Disturbed(seed).install()
+        Disturbed.install_once(seed)
         here = HERE / "support"  # for processes that tests start
         paths = [str(here / "disturbed"), str(here), os.environ.get("PYTHONPATH", "")]
         os.environ["POLYCORNER_DISTURBED"] = str(seed)

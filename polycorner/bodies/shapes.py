@@ -264,7 +264,7 @@ def polygon(vertices: ArrayLike, radius: float = 0.0) -> Body:
 
     Examples
     --------
-    >>> polygon([[0, 0], [1, 0], [1, 1], [0, 1]]).size == math.sqrt(2)
+    >>> math.isclose(polygon([[0, 0], [1, 0], [1, 1], [0, 1]]).size, math.sqrt(2))
     True
     """
     points = _points("vertices", vertices, 2)

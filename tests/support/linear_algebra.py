@@ -36,6 +36,12 @@ class Disturbed:
         self.table = np.clip(np.random.default_rng(seed).standard_normal(TABLE), -3, 3)
         self.orthonormal = np.linalg.qr
 
+    @classmethod
+    def install_once(cls, seed):
+        """Disturb the whole of a process, which its parent may have asked for already."""
+        if not hasattr(np.linalg, "disturbed"):
+            np.linalg.disturbed = cls(seed).install()
+
     def install(self, put=setattr):
         """Put the disturbed functions in place of those of NumPy and SciPy."""
         import scipy.linalg

@@ -12,7 +12,7 @@ class Late:
             sys.meta_path.remove(self)
             from linear_algebra import Disturbed
 
-            Disturbed(int(os.environ["POLYCORNER_DISTURBED"])).install()
+            Disturbed.install_once(int(os.environ["POLYCORNER_DISTURBED"]))
 
 
 sys.meta_path.insert(0, Late())
