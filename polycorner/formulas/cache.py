@@ -215,10 +215,10 @@ def _some_key(folder: Path) -> bytes:
     try:
         part.touch(mode=stat.S_IRUSR | stat.S_IWUSR, exist_ok=False)
         part.write_bytes(secrets.token_bytes(SIZE))
-        if path.exists():  # but is no key, or not a private one
-            part.replace(path)
-        else:
+        if not path.exists():
             os.link(part, path)
+        elif not _key(folder):  # what is there is no key, or not a private one
+            part.replace(path)
     except FileExistsError:
         pass  # another process was first
     except OSError:  # a file system without links
