@@ -165,4 +165,4 @@ def test_wrong_arguments_are_named(make, kind, said):
 def test_the_axis_leads_to_the_first_of_points_as_far_but_for_rounding(length):
     """Which of two ends is the farther by the last bit says nothing."""
     rod = capsule([0, 0, -1.5], [0, 0, length], 0.2)
-    assert rod.axis.tolist() == [0, 0, -1]
+    assert np.allclose(rod.axis, [0, 0, -1], rtol=0, atol=1e-14)
