@@ -11,8 +11,8 @@ are cut off.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,40 +25,11 @@ from polycorner.values import Value
 STEPS = 50
 
 
-class End(Enum):
-    """How a way to a face ended; the value is a sentence."""
-
-    SETTLED = "the last step was rounding, or its square is"
-    UNSETTLED = "the steps did not become short"
-    FAR = "the steps led farther away than was allowed"
-    NOT_FINITE = "a value or a derivative was not finite"
-
-
-@dataclass(frozen=True, eq=False)
-class Arrival(Value):
-    """Where the way to a face ended.
-
-    Attributes
-    ----------
-    point : (n,) array
-        The last point at which the functions were evaluated or to which a step led.
-    first, last : float
-        Lengths of the first and the last step, in scale units.
-    end : End
-    gradients : (k, n) array
-        Scaled gradients of the functions that are held, where the last step began.
-    """
+class Arrival(NamedTuple):
+    """Where the way to a face ended: a point, and whether the last step was rounding there."""
 
     point: Array
-    first: float
-    last: float
-    end: End
-    gradients: Array
-
-    @property
-    def settled(self) -> bool:
-        """Whether the functions vanish there."""
-        return self.end is End.SETTLED
+    settled: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +65,6 @@ class Face(Value):
         q: Array,
         *,
         along: Array | None = None,
-        cut: float | None = None,
-        reach: float = math.inf,
         stride: float = math.inf,
         steps: int = STEPS,
     ) -> Arrival:
@@ -107,36 +76,31 @@ class Face(Value):
             A point nearby.
         along : (n, r) array, optional
             Scaled directions that the steps are combined of; by default all.
-        cut : float, optional
-            Singular values of the derivative, relative to the largest, along which no step is
-            taken; by default ``tolerances.rank``.
-        reach : float, optional
-            Longest way, in scale units.
         stride : float, optional
-            Longest step; longer ones are shortened.
+            Longest step, in scale units; longer ones are shortened.
         steps : int, optional
             The most steps.
+
+        Returns
+        -------
+        Arrival
+            Not settled at the last point where a value or a derivative is not finite, and after
+            the last step.
         """
-        rows, cut = list(self.held), self.tolerances.rank if cut is None else cut
-        first, last, way = math.inf, math.inf, 0.0
-        gradients = np.zeros((len(rows), len(q)))
-        for k in range(steps):
-            values, every = self.evaluate(q)[:2]
-            missed, gradients = values[rows], every[rows]
-            if not (np.isfinite(missed).all() and np.isfinite(gradients).all()):
-                return Arrival(q, first, last, End.NOT_FINITE, gradients)
+        rows, last = list(self.held), math.inf
+        for _ in range(steps):
+            values, gradients = (part[rows] for part in self.evaluate(q)[:2])
+            if not (np.isfinite(values).all() and np.isfinite(gradients).all()):
+                break
             matrix = gradients if along is None else gradients @ along
-            d = np.linalg.lstsq(matrix, -missed, rcond=cut)[0]
+            d = np.linalg.lstsq(matrix, -values, rcond=self.tolerances.rank)[0]
             d = d if along is None else along @ d
-            size, before = math.sqrt(float(d @ d)), last
-            share = min(1.0, stride / size) if size else 1.0
-            q, last, way = q + self.scales * (share * d), size, way + share * size
-            first = size if k == 0 else first
-            if way > reach:
-                return Arrival(q, first, last, End.FAR, gradients)
-            if self._is_last(q, size, before):
-                return Arrival(q, first, last, End.SETTLED, gradients)
-        return Arrival(q, first, last, End.UNSETTLED, gradients)
+            size = math.sqrt(float(d @ d))
+            q = q + self.scales * (d * min(1.0, stride / size) if size else d)
+            if self._is_last(q, size, last):
+                return Arrival(q, settled=True)
+            last = size
+        return Arrival(q, settled=False)
 
     def _is_last(self, q: Array, size: float, before: float) -> bool:
         """Whether a step was rounding, or no longer half as long as the one before."""
