@@ -86,6 +86,13 @@ class Domain(Value):
         inside = (lower + turn - slack >= left) & (upper + turn + slack <= right)
         return np.asarray(inside.all(axis=-1))
 
+    def apart(self, low: Array, high: Array, left: Array, right: Array) -> bool:
+        """Whether two boxes in all coordinates are disjoint, on circles as well."""
+        middle = 0.5 * (left + right) - 0.5 * (low + high)
+        turn = middle - self.manifold.wrap(middle)
+        slack = ROUNDING * self.manifold.scale_array
+        return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
+
     def sides(self) -> dict[str, tuple[float, float]]:
         """Return the sides by name."""
         pairs = zip(self.lower.tolist(), self.upper.tolist(), strict=True)

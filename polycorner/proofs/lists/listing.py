@@ -34,22 +34,24 @@ def listed(search: Search, problem: Problem) -> StationaryList:
                 known.add(image)
                 (points if alike is False else open_points).append(point_of(search, image, orbits))
         orbits += 1
-    loci = tuple(locus_of(search, place) for place in _loci(search))
-    if search.minima_only:
-        loci = tuple(place for place in loci if place.is_minimum)
-    n, names = problem.dimension, search.domain.manifold.names
     return StationaryList(
         problem,
-        Domain(problem.polyhedron.manifold, search.domain.lower[:n], search.domain.upper[:n]),
-        {names[i]: side for i, side in search.domain.held.items()},
+        *box_of(search, problem),
         tuple(points),
-        loci,
-        undecided(search)[:, :, :n],
+        tuple(locus_of(search, place) for place in loci_of(search)),
+        undecided(search)[:, :, : problem.dimension],
         tuple(open_points),
         search.tally,
         record(search, members, ways),
         search.minima_only,
     )
+
+
+def box_of(search: Search, problem: Problem) -> tuple[Domain, dict[str, tuple[float, float]]]:
+    """Return the box in the coordinates of a problem, and the sides of parameters by name."""
+    n, names, domain = problem.dimension, search.domain.manifold.names, search.domain
+    box = Domain(problem.polyhedron.manifold, domain.lower[:n], domain.upper[:n])
+    return box, {names[i]: side for i, side in domain.held.items()}
 
 
 def undecided(search: Search) -> Array:
@@ -60,11 +62,13 @@ def undecided(search: Search) -> Array:
     return np.stack([lower, upper], axis=1)
 
 
-def _loci(search: Search) -> list[LocusRegion]:
-    """Return the loci that were found and their images, each once."""
+def loci_of(search: Search) -> list[LocusRegion]:
+    """Return the loci that were found, or those of minima, and their images, each once."""
     domain, z = search.domain, search.reads
     found: list[LocusRegion] = []
     for place in search.loci:
+        if search.minima_only and place.index != 0:
+            continue
         for g in (None, *search.motions):
             image = place if g is None else _locus_image(search, place, g)
             sharp = image.sharp_lower, image.sharp_upper

@@ -9,7 +9,6 @@ from polycorner.intervals.tapes import Box
 from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
-from polycorner.proofs.lists.domains import ROUNDING
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.known import Sides
 from polycorner.proofs.lists.operators import BITS
@@ -116,12 +115,7 @@ def inside(search: Search, region: Region, other: Region) -> bool:
 
 def apart(search: Search, region: Region, other: Region) -> bool:
     """Whether the enclosures of two points are disjoint."""
-    (low, high), (left, right) = full(search, region), full(search, other)
-    manifold = search.domain.manifold
-    middle = 0.5 * (left + right) - 0.5 * (low + high)
-    turn = middle - manifold.wrap(middle)
-    slack = ROUNDING * manifold.scale_array
-    return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
+    return search.domain.apart(*full(search, region), *full(search, other))
 
 
 def settled(search: Search) -> tuple[list[tuple[int, Member]], dict[int, Array]]:

@@ -43,8 +43,18 @@ class Pieces:
 
 def pieces(polyhedron: Polyhedron) -> Pieces:
     """Return a set as a union of polyhedra without multiples."""
-    m = len(polyhedron.functions)
+    return _pieces(polyhedron, _literals(polyhedron))
+
+
+def without_multiples(polyhedron: Polyhedron) -> Polyhedron:
+    """Return the same set as one polyhedron, in which equations of single branches remain."""
     literals = _literals(polyhedron)
+    found = _pieces(polyhedron, literals).parts
+    return found[0] if len(found) == 1 else _of_the_first(polyhedron, literals)
+
+
+def _pieces(polyhedron: Polyhedron, literals: list[Literal]) -> Pieces:
+    m = len(polyhedron.functions)
     names = (*polyhedron.names, *polyhedron.equation_names)
     alike = {name: names[i] for name, (i, _) in zip(names, literals, strict=True)}
     if not _has_equations(literals, m):
@@ -57,12 +67,6 @@ def pieces(polyhedron: Polyhedron) -> Pieces:
         branches.setdefault(held, []).append(rest)
     parts = [_part(polyhedron, literals, held, rests) for held, rests in branches.items()]
     return Pieces(tuple(parts), alike)
-
-
-def without_multiples(polyhedron: Polyhedron) -> Polyhedron:
-    """Return the same set as one polyhedron, in which equations of single branches remain."""
-    found = pieces(polyhedron).parts
-    return found[0] if len(found) == 1 else _of_the_first(polyhedron, _literals(polyhedron))
 
 
 def _has_equations(literals: list[Literal], m: int) -> bool:

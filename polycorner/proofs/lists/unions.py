@@ -16,11 +16,16 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from polycorner.minimisation.problem import Problem
-from polycorner.proofs.lists.domains import ROUNDING, Domain
-from polycorner.proofs.lists.listing import listed, point_of, undecided
+from polycorner.proofs.lists.listing import box_of, loci_of, point_of, undecided
+from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.members import IN, OPEN, OUT, Member, full, inside, settled
 from polycorner.proofs.lists.search import Search, Tally
-from polycorner.proofs.lists.stationary import StationaryList, StationaryLocus, StationaryPoint
+from polycorner.proofs.lists.stationary import (
+    StationaryList,
+    StationaryLocus,
+    StationaryPoint,
+    locus_of,
+)
 from polycorner.spaces.manifold import Array
 
 Names = frozenset[str]
@@ -28,11 +33,11 @@ Names = frozenset[str]
 
 @dataclass(frozen=True, eq=False)
 class _Searched:
-    """A search that has ended, its list, and its members by the functions of their faces."""
+    """A search that has ended, its members by the functions of their faces, and its loci."""
 
     search: Search
-    found: StationaryList
     members: tuple[Member, ...]
+    loci: tuple[LocusRegion, ...]
     alike: Mapping[str, str]
 
     def face(self, member: Member) -> Names:
@@ -64,8 +69,14 @@ class _Searched:
         domain = self.search.domain
         boxes = [full(self.search, member.region) for member in self.members]
         boxes += [(box[0], box[1]) for box in undecided(self.search)]
-        boxes += [_sides(domain, locus) for locus in self.found.loci]
-        return all(_apart(domain, lower, upper, *box) for box in boxes)
+        boxes += [self.sides(place) for place in self.loci]
+        return all(domain.apart(lower, upper, *box) for box in boxes)
+
+    def sides(self, place: LocusRegion) -> tuple[Array, Array]:
+        """Return the sides of a locus in all coordinates."""
+        lower, upper = self.search.domain.lower.copy(), self.search.domain.upper.copy()
+        lower[list(place.z)], upper[list(place.z)] = place.sharp_lower, place.sharp_upper
+        return lower, upper
 
 
 def united(
@@ -75,7 +86,7 @@ def united(
     every = []
     for search in searches:
         members = tuple(member for _, member in settled(search)[0])
-        every.append(_Searched(search, listed(search, search.problem), members, alike))
+        every.append(_Searched(search, members, tuple(loci_of(search)), alike))
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
     loci: list[StationaryLocus] = []
@@ -83,29 +94,27 @@ def united(
     for k, piece in enumerate(every):
         others = (every[:k], every[k + 1 :])
         for member in piece.members:
-            place, minimum = _judged(piece, member, others)
-            if place != OUT:
-                to = points if place == IN else open_points
+            where, minimum = _judged(piece, member, others)
+            if where != OUT:
+                to = points if where == IN else open_points
                 point = point_of(piece.search, member, len(to))
                 to.append(point if minimum else replace(point, index=None))
-        for locus in piece.found.loci:
-            sides = _sides(piece.search.domain, locus)
+        for place in piece.loci:
+            sides = piece.sides(place)
             if all(p.place(*sides, frozenset()) == OUT for p in every if p is not piece):
-                loci.append(locus)
+                loci.append(locus_of(piece.search, place))
             else:
                 rest.append(np.array([sides]))
-    first = every[0].found
     return StationaryList(
         problem,
-        first.domain,
-        first.parameters,
+        *box_of(searches[0], problem),
         tuple(points),
         tuple(loci),
         np.concatenate(rest)[:, :, : problem.dimension],
         tuple(open_points),
         _total([piece.search.tally for piece in every]),
         None,
-        first.minima_only,
+        searches[0].minima_only,
     )
 
 
@@ -141,23 +150,6 @@ def _same(piece: _Searched, member: Member, other: _Searched) -> Member | None:
     face = piece.face(member)
     alike = (one for one in other.members if other.face(one) == face)
     return next((o for o in alike if inside(other.search, member.region, o.region)), None)
-
-
-def _sides(domain: Domain, locus: StationaryLocus) -> tuple[Array, Array]:
-    """Return the sides of a locus in all coordinates."""
-    lower, upper = domain.lower.copy(), domain.upper.copy()
-    for name, low in locus.lower.items():
-        i = domain.manifold.names.index(name)
-        lower[i], upper[i] = low, locus.upper[name]
-    return lower, upper
-
-
-def _apart(domain: Domain, low: Array, high: Array, left: Array, right: Array) -> bool:
-    """Whether two boxes are disjoint, on circles as well."""
-    middle = 0.5 * (left + right) - 0.5 * (low + high)
-    turn = middle - domain.manifold.wrap(middle)
-    slack = ROUNDING * domain.manifold.scale_array
-    return bool(((low + turn > right + slack) | (high + turn < left - slack)).any())
 
 
 def _total(tallies: Sequence[Tally]) -> Tally:

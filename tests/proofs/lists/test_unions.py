@@ -4,10 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from polycorner import AllOf, AnyOf, Manifold, Polyhedron, minima
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction, minima
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import corners, stationary_points
 
@@ -125,3 +126,35 @@ def test_a_search_in_pieces_goes_on_where_it_stood(tmp_path):
     again = stationary_points(d, energy, box=BOX, store=tmp_path / "kept")
     assert again.complete
     assert [p.point.tolist() for p in again] == [p.point.tolist() for p in whole]
+
+
+def test_lists_hold_for_all_values_of_a_parameter():
+    """The minima on both axes are (p, 0) and (0, 2), for p from 0.9 to 1.1."""
+    p = sympy.Symbol("p")
+    energy = SmoothFunction("E", (X - p) ** 2 + (Y - 2) ** 2, PLANE, parameters={"p": 1.0})
+    d = Polyhedron(PLANE, [X, Y, AnyOf(-X, -Y)])
+    found = stationary_points(d, energy, box=[(-1, 3), (-1, 3)], parameters={"p": (0.9, 1.1)})
+    assert found.complete
+    assert str(found).count("2 isolated stationary points") == 1
+    one, other = sorted(found, key=lambda point: point.upper[0])
+    assert np.allclose([one.lower, one.upper], [[0, 2], [0, 2]], atol=1e-6)
+    assert other.lower[0] <= 0.9
+    assert other.upper[0] >= 1.1
+    assert np.allclose([other.lower[1], other.upper[1]], 0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("centre", "listed"), [(2.0, True), (0.0, False)])
+def test_a_locus_is_listed_where_it_misses_the_other_pieces(centre, listed):
+    """A line along w, in a half-space, and the plane u = 0, which it meets or does not."""
+    d = Polyhedron(SPACE, [AnyOf(U + 1 if centre == 0 else U - 1, AllOf(U, -U))])
+    energy = (U - centre) ** 2 + (V - 1) ** 2
+    found = stationary_points(d, energy, box=BOX, max_boxes=3000)
+    assert not found.complete  # the plane has a line of equilibria
+    lines = [(p.lower["u"], p.upper["u"]) for p in found.loci]
+    boxes = found.undecided[:, :, 0]
+    if listed:
+        ((low, high),) = lines
+        assert low <= centre <= high
+    else:
+        assert not lines
+        assert ((boxes[:, 0] <= centre) & (centre <= boxes[:, 1])).any()
