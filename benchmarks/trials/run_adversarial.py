@@ -4,8 +4,8 @@
 
 *proved true*: a theorem whose enclosure contains a strict minimum.  *proved false*: a theorem about
 anything else.  *failed, none*: a hypothesis is violated, and there is no minimum; *failed, one*:
-there is one all the same, of a kind that the theorem does not cover.  *open*: undecided.  A verdict
-is *false* if it says that a minimum is strict where none is.
+there is one all the same, beside the enclosed point or of a kind that the theorem does not cover.
+*open*: undecided.  A verdict is *false* if it says that a minimum is strict where none is.
 """
 
 import argparse

@@ -36,9 +36,9 @@ def draw() -> Figure:
     for y, layer in enumerate(rows):
         count = sum(lines(room) for room in layer)
         length = 0.17 * count / most
-        axes.barh(y, length, left=0.25, height=0.7, color="0.75")
-        axes.text(0.24, y, ", ".join(layer), ha="right", va="center", fontsize=9 - len(layer) / 3)
-        axes.text(0.255 + length, y, f"{count:,}", va="center", fontsize=7)
+        axes.barh(y, length, left=0.26, height=0.7, color="0.75")
+        axes.text(0.25, y, ", ".join(layer), ha="right", va="center", fontsize=9 - len(layer) / 2)
+        axes.text(0.265 + length, y, f"{count:,}", va="center", fontsize=7)
         if len(layer) == 1:
             said = import_module(f"polycorner.{layer[0]}").__doc__ or ""
             axes.text(0.475, y, said.split("\n")[0], va="center", fontsize=7)

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class Status(StrEnum):
     """Status of a condition in a proof.
 
-    It is proved, or failed (proved to be violated, which refutes the minimum), at the point or for
-    all parameters of a cell; or undecided.  Over a box of parameters a condition that is violated
-    on some cells, not on all, failed in part.
+    It is proved, or failed (proved to be violated, so that the enclosed point is no minimum), at
+    the point or for all parameters of a cell; or undecided.  Over a box of parameters a condition
+    that is violated on some cells, not on all, failed in part.
     """
 
     PROVED = "proved"
