@@ -287,8 +287,8 @@ def stationary_points(
     branches = pieces(question.problem.polyhedron)
     several = len(branches.parts) > 1
     if several and symmetry is not None:
-        expected = "None, as branches of the polyhedron have equations of their own"
-        checks.refuse("symmetry", expected, symmetry)
+        msg = "symmetry: expected None, as branches have equations of their own; got a Symmetry"
+        raise ValueError(msg)
     checks.whole("max_boxes", max_boxes, least=1)
     checks.whole("workers", workers, least=1)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
