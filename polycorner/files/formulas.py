@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.checks import refuse
 from polycorner.formulas.expressions import KINKED, as_expression
-from polycorner.formulas.translate import UNARY
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.polyhedra.groups import MOST_BRANCHES
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Symbols = Mapping[str, sympy.Symbol]
 
-FUNCTIONS = frozenset(UNARY) | {"Add", "Mul", "atan2", "Abs", "Min", "Max", "Piecewise"}
+FUNCTIONS = frozenset(OPERATIONS) | {"Add", "Mul", "atan2", "Abs", "Min", "Max", "Piecewise"}
 CONSTANTS = ("pi", "E")
 SYMBOL = "Symbol"  # the notation of symbols whose names are no identifiers, or taken
 LONG = 50  # terms beyond which a sum is written as Add(...), since parsers limit nesting
@@ -31,7 +31,7 @@ LONG = 50  # terms beyond which a sum is written as Add(...), since parsers limi
 BITS = 14_000  # of a number; Python reads no longer ones
 LARGEST = 1_000_000  # characters
 DEEPEST = 100  # operations that contain each other
-ARGUMENTS = dict.fromkeys(UNARY, 1) | {"Abs": 1, "atan2": 2}
+ARGUMENTS = dict.fromkeys(OPERATIONS, 1) | {"Abs": 1, "atan2": 2}
 
 
 def symbols(names: Iterable[str]) -> "dict[str, sympy.Symbol]":

@@ -15,9 +15,6 @@ from polycorner.formulas.programs import Graph
 
 LANES = 8
 F64, I64 = ir.DoubleType(), ir.IntType(64)
-LIBM_UNARY = (
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "erf"
-)  # fmt: skip
 LIBM_BINARY = ("atan2", "pow")
 
 # Argument reduction by pi/2 in three parts (Cody and Waite): each of the first two has 33 bits, so

@@ -11,6 +11,7 @@ import numpy as np
 
 from polycorner.checks import mapping, refuse
 from polycorner.errors import NonsmoothWarning
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.spaces.manifold import Manifold
 from polycorner.tolerances import DEFAULT
 
@@ -143,10 +144,11 @@ def _is_periodic(expression: "sympy.Basic", x: "sympy.Symbol", period: float) ->
         part = waiting.pop()
         if x not in part.free_symbols:
             continue
-        if type(part).__name__ in {"sin", "cos", "tan"}:
+        known = OPERATIONS.get(type(part).__name__)
+        if known is not None and known.turns:
             slope = part.args[0].diff(x)
             turns = float(slope) * period / math.tau if slope.is_number else math.nan
-            turns *= 2 if type(part).__name__ == "tan" else 1
+            turns *= known.turns
             if abs(turns - np.round(turns)) <= DEFAULT.same / 10:
                 continue
         if part == x:

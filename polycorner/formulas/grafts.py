@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload, Program
-from polycorner.formulas.translate import UNARY
 
 
 def grafted(graph: Graph, program: Program, inputs: Mapping[tuple[str, int], int]) -> list[int]:
@@ -29,4 +29,4 @@ def rebuilt(graph: Graph, op: str, args: Iterable[Payload], placed: Mapping[int,
     if op in {"add", "sub", "neg", "mul", "div", "select"}:
         result: int = getattr(graph, op)(*children)
         return result
-    return graph.unary(op, *children) if op in UNARY else graph.node(op, *children)
+    return graph.unary(op, *children) if op in OPERATIONS else graph.node(op, *children)

@@ -22,7 +22,6 @@ from polycorner.formulas.ranges import (
     SMALLEST_DIVISOR,
     Fact,
     arguments,
-    number,
     outward,
     pattern,
     static,
@@ -65,22 +64,16 @@ class IntervalEmitter:
         known = self.facts[node] = static(self.graph, node, self.facts)
         result = self._leaf(op, args) if op in {"const", "var"} else self._operate(op, node)
         if known.guarded:
-            result = functions.finite(self.r, result, 2.0**GUARD)
+            result = functions.inside(self.r, result, -(2.0**GUARD), 2.0**GUARD)
         self.facts[node] = known.kept
         return result
 
     def _leaf(self, op: str, args: tuple[Any, ...]) -> Sides:
         if op == "const":
-            low, high = (self.r.splat(end) for end in outward(args[0]))
-            return (
-                (low, low)
-                if number(self.graph, self.graph.const(args[0])) is not None
-                else (
-                    low,
-                    high,
-                )
-            )
-        box = functions.finite(self.r, self.boxes[int(args[0])], 2.0**INPUT)
+            ends = outward(args[0])
+            low, high = (self.r.splat(end) for end in ends)
+            return (low, low) if ends[0] == ends[1] else (low, high)
+        box = functions.inside(self.r, self.boxes[int(args[0])], -(2.0**INPUT), 2.0**INPUT)
         return bounded(self.r, self.b.fcmp_ordered("<=", *box), box)
 
     def _operate(self, op: str, node: int) -> Sides:

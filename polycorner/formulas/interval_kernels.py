@@ -18,6 +18,7 @@ from polycorner.formulas import (
     interval_emit,
     interval_forms,
     interval_library,
+    operations,
     programs,
     ranges,
     rounding,
@@ -246,7 +247,7 @@ def best_rounding() -> str:
 
 @lru_cache(maxsize=1)
 def _generator_key() -> str:
-    rooms = (programs, translate, adjoints, emit, batches)
+    rooms = (operations, programs, translate, adjoints, emit, batches)
     ours = (ranges, rounding, interval_library, interval_emit, interval_forms)
     return repr((source_key(*(m.__name__ for m in (*rooms, *ours)), __name__), machine_key()))
 

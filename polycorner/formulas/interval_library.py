@@ -20,13 +20,13 @@ the library of GNU documents for these functions are 1 or 2 units; the tests com
 with Arb ([Johansson]).
 """
 
-from collections.abc import Callable
-from typing import Any
+import math
 
 from llvmlite import ir
 
 from polycorner.formulas import emit
-from polycorner.formulas.ranges import LARGEST_EXPONENT, PI
+from polycorner.formulas.operations import OPERATIONS
+from polycorner.formulas.ranges import PI
 from polycorner.formulas.rounding import NAN, Stepped, greatest, least
 
 CIRCULAR = 2.0**-50
@@ -62,12 +62,17 @@ def circular(r: Stepped, x: Sides) -> tuple[Sides, Sides]:
     far = b.or_(
         *[b.fcmp_ordered(">", r.call("fabs", end), r.splat(emit.REDUCTION_LIMIT)) for end in x]
     )
-    turns = [
-        r.widen(b.fmul(end, r.splat(QUARTERS)), 8, up=up)
-        for end, up in zip(x, (False, True), strict=True)
-    ]
+    turns = _turns(r, x)
     sine, cosine = ([b.extract_value(end, k) for end in ends] for k in (0, 1))
     return _circular(r, sine, turns, far, 1), _circular(r, cosine, turns, far, 0)
+
+
+def _turns(r: Stepped, x: Sides) -> list[ir.Value]:
+    """Return bounds of an interval in quarter turns."""
+    return [
+        r.widen(r.b.fmul(end, r.splat(QUARTERS)), 8, up=up)
+        for end, up in zip(x, (False, True), strict=True)
+    ]
 
 
 def _circular(
@@ -97,13 +102,6 @@ def _passes(r: Stepped, turns: list[ir.Value], place: int) -> ir.Value:
     return b.fcmp_ordered(">=", r.call("floor", last), r.call("ceil", first))
 
 
-def _ends(r: Stepped, name: str, x: Sides) -> Sides:
-    """Return an increasing function of the C library at both ends."""
-    function = emit.library(r.b.module, name)
-    low, high = (emit.by_lane(r.b, function, [end], r.lanes) for end in x)
-    return r.widen(low, LIBRARY, up=False), r.widen(high, LIBRARY, up=True)
-
-
 def magnitude(r: Stepped, x: Sides) -> Sides:
     """Return the range of ``|x|``."""
     b = r.b
@@ -111,75 +109,24 @@ def magnitude(r: Stepped, x: Sides) -> Sides:
     return greatest(b, r.splat(0.0), below), greatest(b, b.fneg(x[0]), x[1])
 
 
-def _moderate(r: Stepped, x: Sides) -> Sides:
-    """Give up arguments at which exponential functions would be too large."""
-    b, limit = r.b, LARGEST_EXPONENT
-    low = b.fcmp_ordered(">=", x[0], r.splat(-limit))
-    high = b.fcmp_ordered("<=", x[1], r.splat(limit))
-    return bounded(r, b.and_(low, high), x)
-
-
-def _exp(r: Stepped, x: Sides) -> Sides:
-    """Below the limit an exponential is between zero and its value there."""
-    b, limit = r.b, r.splat(LARGEST_EXPONENT)
-    low, high = bounded(r, b.fcmp_ordered("<=", x[1], limit), x)
-    ends = [greatest(b, r.splat(-LARGEST_EXPONENT), end) for end in (low, high)]
-    lower, upper = within(r, _ends(r, "exp", (ends[0], ends[1])), 0.0, None)
-    tiny = b.fcmp_ordered("<", low, r.splat(-LARGEST_EXPONENT))
-    return b.select(tiny, r.splat(0.0), lower), upper
-
-
-def _log(r: Stepped, x: Sides) -> Sides:
-    return _ends(r, "log", bounded(r, r.b.fcmp_ordered(">", x[0], r.splat(0.0)), x))
-
-
-def _inside(r: Stepped, x: Sides) -> Sides:
-    b = r.b
-    low = b.fcmp_ordered(">=", x[0], r.splat(-1.0))
-    high = b.fcmp_ordered("<=", x[1], r.splat(1.0))
-    return bounded(r, b.and_(low, high), x)
-
-
-def _acos(r: Stepped, x: Sides) -> Sides:
-    low, high = _inside(r, x)
-    function = emit.library(r.b.module, "acos")
-    lower, upper = (emit.by_lane(r.b, function, [end], r.lanes) for end in (high, low))
-    result = r.widen(lower, LIBRARY, up=False), r.widen(upper, LIBRARY, up=True)
-    return within(r, result, 0.0, None)
-
-
-def _tan(r: Stepped, x: Sides) -> Sides:
-    """Return the range of a tangent; its poles, at odd quarter turns, must lie outside."""
-    b = r.b
-    turns = [
-        r.widen(b.fmul(end, r.splat(QUARTERS)), 8, up=up)
-        for end, up in zip(x, (False, True), strict=True)
-    ]
-    pole = b.or_(_passes(r, turns, 1), _passes(r, turns, 3))
-    limit = r.splat(emit.REDUCTION_LIMIT)
-    near = b.and_(*[b.fcmp_ordered("<=", r.call("fabs", end), limit) for end in x])
-    return _ends(r, "tan", bounded(r, b.and_(near, b.not_(pole)), x))
-
-
-def _cosh(r: Stepped, x: Sides) -> Sides:
-    return within(r, _ends(r, "cosh", magnitude(r, _moderate(r, x))), 1.0, None)
-
-
 def unary(r: Stepped, op: str, x: Sides) -> Sides:
     """Return the range of an elementary function; NaN where it is not defined and bounded."""
-    rules: dict[str, Callable[[], Sides]] = {
-        "exp": lambda: _exp(r, x),
-        "log": lambda: _log(r, x),
-        "asin": lambda: _ends(r, "asin", _inside(r, x)),
-        "acos": lambda: _acos(r, x),
-        "atan": lambda: _ends(r, "atan", x),
-        "tan": lambda: _tan(r, x),
-        "sinh": lambda: _ends(r, "sinh", _moderate(r, x)),
-        "cosh": lambda: _cosh(r, x),
-        "tanh": lambda: within(r, _ends(r, "tanh", x), -1.0, 1.0),
-        "erf": lambda: within(r, _ends(r, "erf", x), -1.0, 1.0),
-    }
-    return rules[op]()
+    known, function = OPERATIONS[op], emit.library(r.b.module, op)
+    x = inside(r, _between_poles(r, x) if known.turns else x, *known.limits)
+    if known.shape == "even":
+        x = magnitude(r, x)
+    ends = x[::-1] if known.shape == "decreasing" else x
+    low, high = (emit.by_lane(r.b, function, [end], r.lanes) for end in ends)
+    sides = r.widen(low, LIBRARY, up=False), r.widen(high, LIBRARY, up=True)
+    return within(r, sides, *known.values)
+
+
+def _between_poles(r: Stepped, x: Sides) -> Sides:
+    """Give up intervals that may contain a pole of a tangent, at odd quarter turns."""
+    turns = _turns(r, x)
+    pole = r.b.or_(_passes(r, turns, 1), _passes(r, turns, 3))
+    limit = emit.REDUCTION_LIMIT
+    return bounded(r, r.b.not_(pole), inside(r, x, -limit, limit))
 
 
 def _corners(r: Stepped, name: str, x: Sides, y: Sides) -> Sides:
@@ -219,8 +166,11 @@ def power(r: Stepped, x: Sides, y: Sides, *, positive: bool) -> Sides:
     return within(r, bounded(r, ok, (low, high)), 0.0, None)
 
 
-def finite(r: Stepped, x: Sides, limit: float) -> Sides:
-    """Give up intervals that reach beyond a limit."""
-    b: Any = r.b
-    low = b.fcmp_ordered(">=", x[0], r.splat(-limit))
-    return bounded(r, b.and_(low, b.fcmp_ordered("<=", x[1], r.splat(limit))), x)
+def inside(r: Stepped, x: Sides, least_end: float, greatest_end: float) -> Sides:
+    """Give up intervals that reach beyond limits, which may be infinite."""
+    b = r.b
+    if math.isfinite(greatest_end):
+        x = bounded(r, b.fcmp_ordered("<=", x[1], r.splat(greatest_end)), x)
+    if math.isfinite(least_end):
+        x = bounded(r, b.fcmp_ordered(">=", x[0], r.splat(least_end)), x)
+    return x

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from polycorner.formulas import adjoints, batches, emit, programs, translate
+from polycorner.formulas import adjoints, batches, emit, operations, programs, translate
 from polycorner.formulas.batches import emit_lanes, emit_points
 from polycorner.formulas.cache import read_code, source_key, write_code
 from polycorner.formulas.machine_code import load_code, machine_code, machine_key
@@ -178,7 +178,7 @@ def address(array: Array) -> int:
 
 @lru_cache(maxsize=1)
 def _generator_key() -> str:
-    rooms = (programs, translate, adjoints, emit, batches)
+    rooms = (operations, programs, translate, adjoints, emit, batches)
     code = source_key(*(room.__name__ for room in rooms), __name__)
     return repr((code, machine_key()))
 

@@ -15,6 +15,7 @@ from llvmlite.binding.ffi import ObjectRef
 from polycorner import __version__
 from polycorner.formulas import emit
 from polycorner.formulas.cache import source_key
+from polycorner.formulas.operations import OPERATIONS
 
 OPTIMISATION = 2
 
@@ -87,7 +88,7 @@ def _prepare() -> None:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     library = ctypes.CDLL(ctypes.util.find_library("m") if os.name == "posix" else "ucrtbase")
-    for name in (*emit.LIBM_UNARY, *emit.LIBM_BINARY, "sqrt", "floor", "ceil", "malloc", "free"):
+    for name in (*OPERATIONS, *emit.LIBM_BINARY, "floor", "ceil", "malloc", "free"):
         function = ctypes.cast(getattr(library, name), ctypes.c_void_p)
         llvm.add_symbol(name, function.value)
 

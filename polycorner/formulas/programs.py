@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
+from polycorner.formulas.operations import OPERATIONS
+
 Payload = int | str | Fraction
 Node = tuple[str, tuple[Payload, ...]]
 
@@ -167,11 +169,8 @@ class Graph:
     def unary(self, op: str, a: int) -> int:
         """Return an elementary function of ``a``."""
         u = self._value(a)
-        if u == 0 and op in {"sin", "tan", "asin", "atan", "sinh", "tanh", "sqrt", "erf"}:
-            return a
-        if op == "sqrt" and u == 1:
-            return a
-        return self.node(op, a)
+        fixed = u is not None and OPERATIONS[op].known.get(u) == u
+        return a if fixed else self.node(op, a)
 
     def power(self, a: int, exponent: Fraction) -> int:
         """Return ``a ** exponent`` by multiplications and square roots where that is possible."""
@@ -264,38 +263,7 @@ class Graph:
         raise AssertionError(msg)
 
     def _chain(self, op: str, a: int, u: int, du: int) -> int:
-        if op == "sqrt":
-            return self.mul(self.mul(self.const(Fraction(1, 2)), self.inv(a)), du)
-        if op in {"tan", "atan", "tanh", "log", "asin", "acos"}:
-            return self._chain_reciprocal(op, a, u, du)
-        slope = {
-            "neg": lambda: self.const(-1),
-            "sin": lambda: self.unary("cos", u),
-            "cos": lambda: self.neg(self.unary("sin", u)),
-            "sinh": lambda: self.unary("cosh", u),
-            "cosh": lambda: self.unary("sinh", u),
-            "exp": lambda: a,
-            "erf": lambda: self._bell(u),
-        }[op]()
-        return self.mul(slope, du)
-
-    def _bell(self, u: int) -> int:
-        """Return the derivative of the error function, ``2 exp(-u^2) / sqrt(pi)``."""
-        height = self.div(self.const(2), self.unary("sqrt", self.const("pi")))
-        return self.mul(height, self.unary("exp", self.neg(self.mul(u, u))))
-
-    def _chain_reciprocal(self, op: str, a: int, u: int, du: int) -> int:
-        one, square = self.const(1), self.mul(u, u)
-        if op == "tan":
-            return self.mul(self.add(one, self.mul(a, a)), du)
-        if op == "tanh":
-            return self.mul(self.sub(one, self.mul(a, a)), du)
-        if op == "atan":
-            return self.div(du, self.add(one, square))
-        if op == "log":
-            return self.div(du, u)
-        quotient = self.div(du, self.unary("sqrt", self.sub(one, square)))
-        return quotient if op == "asin" else self.neg(quotient)
+        return self.neg(du) if op == "neg" else int(OPERATIONS[op].slope(self, u, a, du))
 
 
 @dataclass(frozen=True)

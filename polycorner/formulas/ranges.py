@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph
 
 INPUT, GUARD, LARGEST = 40.0, 480.0, 1000.0
 BOUNDLESS = 2000.0  # the size of what has no bound of its own
 SMALLEST_DIVISOR = 200.0  # denominators that may be smaller than 2**-200 are given up
 SMALLEST = -1000.0  # no smaller size is claimed, since bounds are moved by subnormal numbers
-LARGEST_EXPONENT = 600.0  # arguments beyond this of exp, sinh and cosh are given up
 
 PI, E = (3.141592653589793, 3.1415926535897936), (2.718281828459045, 2.7182818284590455)
-UNIT = {"sin", "cos", "tanh", "erf"}
 LOGIC = {"lt", "le", "and", "or", "not"}
 
 
@@ -107,23 +106,15 @@ def fact(op: str, given: list[Fact], *, same: bool) -> Fact:
 
 
 def _elementary(op: str, x: Fact) -> Fact:
-    if op in UNIT:
-        odd = op in {"tanh", "erf"}
-        return Fact(odd and x.nonnegative, odd and x.nonpositive, 0.0)
-    if op == "sqrt":
-        return Fact(True, False, max(x.size, 0.0) / 2 + 1)
-    if op in {"exp", "cosh"}:
-        return Fact(True, False, 900.0)
-    if op == "sinh":
-        return Fact(x.nonnegative, x.nonpositive, 900.0)
-    if op in {"atan", "asin", "acos", "atan2"}:
-        positive = op == "acos" or (op != "atan2" and x.nonnegative)
-        return Fact(positive, op in {"atan", "asin"} and x.nonpositive, 2.0)
-    if op == "log":
-        return Fact(False, False, 11.0)
+    if op == "atan2":
+        return Fact(False, False, 2.0)
     if op == "pow":
         return Fact(True, False, BOUNDLESS)
-    return Fact(False, False, BOUNDLESS)  # tan
+    known = OPERATIONS[op]
+    size = max(x.size, 0.0) / 2 + 1 if op == "sqrt" else known.size
+    least, odd = known.values[0], known.keeps_signs
+    positive = least is not None and least >= 0
+    return Fact(positive or (odd and x.nonnegative), odd and x.nonpositive, size)
 
 
 @dataclass(frozen=True)

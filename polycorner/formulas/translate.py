@@ -6,6 +6,7 @@ from fractions import Fraction
 from functools import partial, reduce
 from typing import TYPE_CHECKING
 
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Program
 from polycorner.values import cached_property
 
@@ -13,9 +14,6 @@ if TYPE_CHECKING:
     import sympy
 
 LARGEST_POWER = 2**16  # up to which a power is a chain of multiplications
-UNARY = (
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "erf"
-)  # fmt: skip
 
 
 def compile_expressions(
@@ -140,7 +138,7 @@ class Translator:
             "And": lambda e: self._fold("and", e.args),
             "Or": lambda e: self._fold("or", e.args),
         }
-        return rules | {op: partial(self._unary, op) for op in UNARY}
+        return rules | {op: partial(self._unary, op) for op in OPERATIONS}
 
     def _unary(self, op: str, e: "sympy.Basic") -> int:
         return self.graph.unary(op, self.translate(e.args[0]))

@@ -16,8 +16,8 @@ from functools import lru_cache
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from polycorner.formulas.operations import OPERATIONS, Operation
 from polycorner.formulas.programs import Payload
-from polycorner.formulas.translate import UNARY
 
 if TYPE_CHECKING:
     from flint import arb, arb_mat
@@ -252,7 +252,7 @@ def operations() -> dict[str, Callable[..., Any]]:
     from flint import arb
 
     return {
-        **{name: getattr(arb, name) for name in UNARY},
+        **{name: getattr(arb, name) for name in OPERATIONS},
         "square": square,
         "neg": operator.neg,
         "add": operator.add,
@@ -277,11 +277,7 @@ def _whole(number: Ball) -> bool:
 # For each operation that is not analytic everywhere: the reason it may fail to be on a box, and the
 # condition on its arguments under which it is analytic on the whole box.
 ANALYTIC: dict[str, tuple[str, Callable[..., bool]]] = {
-    "sqrt": ("the argument of a square root may reach 0", lambda x: x > 0),
-    "log": ("the argument of a logarithm may reach 0", lambda x: x > 0),
-    "asin": ("the argument of an arcsine may reach 1 or -1", lambda x: -1 < x < 1),
-    "acos": ("the argument of an arccosine may reach 1 or -1", lambda x: -1 < x < 1),
-    "tan": ("a tangent may reach a pole", lambda x: x.cos() != 0),
+    **{name: known.analytic for name, known in OPERATIONS.items() if known.analytic},
     "div": ("a denominator may reach 0", lambda _, y: y != 0),
     "pow": (
         "the base of a power may reach 0",
@@ -289,6 +285,28 @@ ANALYTIC: dict[str, tuple[str, Callable[..., bool]]] = {
     ),
     "atan2": ("the arguments of atan2 may reach its cut", lambda y, x: x > 0 or y != 0),
 }
+
+
+class _Balls:
+    """Balls as an algebra, for the rules of elementary functions."""
+
+    const = staticmethod(lambda value: value if isinstance(value, int) else constant(value))
+    add, sub, div, neg = operator.add, operator.sub, operator.truediv, operator.neg
+
+    @staticmethod
+    def mul(a: Ball, b: Ball) -> Ball:
+        """Return a product, or a square."""
+        return square(a) if a is b else a * b
+
+    @staticmethod
+    def unary(op: str, a: Ball) -> Ball:
+        """Return an elementary function."""
+        return operations()[op](a)
+
+
+def _slope(known: Operation) -> Callable[..., Any]:
+    return lambda x, y: known.slope(_Balls, x[0], y, 1)
+
 
 # Partial derivatives of each operation with respect to its arguments, from the arguments and the
 # value.  They are not finite where the operation is not differentiable, except atan2 on its cut.
@@ -299,19 +317,7 @@ PARTIALS: dict[str, tuple[Callable[..., Any], ...]] = {
     "mul": (lambda x, _: x[1], lambda x, _: x[0]),
     "square": (lambda x, _: 2 * x[0],),
     "div": (lambda x, _: 1 / x[1], lambda x, y: -y / x[1]),
-    "sqrt": (lambda _, y: 1 / (2 * y),),
-    "sin": (lambda x, _: x[0].cos(),),
-    "cos": (lambda x, _: -x[0].sin(),),
-    "tan": (lambda _, y: 1 + y * y,),
-    "asin": (lambda x, _: 1 / (1 - x[0] * x[0]).sqrt(),),
-    "acos": (lambda x, _: -1 / (1 - x[0] * x[0]).sqrt(),),
-    "atan": (lambda x, _: 1 / (1 + square(x[0])),),
-    "sinh": (lambda x, _: x[0].cosh(),),
-    "cosh": (lambda x, _: x[0].sinh(),),
-    "tanh": (lambda _, y: 1 - y * y,),
-    "exp": (lambda _, y: y,),
-    "log": (lambda x, _: 1 / x[0],),
-    "erf": (lambda x, _: 2 * (-square(x[0])).exp() / constant("pi").sqrt(),),
+    **{name: (_slope(known),) for name, known in OPERATIONS.items()},
     "pow": (lambda x, _: x[1] * x[0] ** (x[1] - 1), lambda x, y: y * x[0].log()),
     "atan2": (
         lambda x, _: x[1] / (square(x[0]) + square(x[1])),

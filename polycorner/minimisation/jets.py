@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from polycorner.formulas.adjoints import LEAVES, derivatives
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import arguments
 from polycorner.minimisation.series import Ring, ring
@@ -158,68 +159,41 @@ def _quotient(domain: Ring, a: Array, b: Array) -> Array:
 def _general_power(domain: Ring, a: Array, exponent: Array) -> Array:
     if not exponent[0, 1:].any():
         return _power(domain, a, float(exponent[0, 0]))
-    return _exponential(domain, domain.mul(exponent, _logarithm(domain, a)))
+    return _RULES["exp"](domain, domain.mul(exponent, _RULES["log"](domain, a)))
 
 
-def _exponential(domain: Ring, a: Array) -> Array:
-    top = math.exp(a[0, 0])
-    orders = range(domain.order + 2)
-    return domain.compose(np.array([top / math.factorial(k) for k in orders]), a)
+class _Series:
+    """Power series as an algebra, for the rules of elementary functions."""
+
+    def __init__(self, domain: Ring) -> None:
+        self.const: Callable[[Any], Array] = lambda exact: _number(exact, domain)
+        self.add, self.sub, self.mul, self.div, self.neg = (
+            partial(_RULES[op], domain) for op in ("add", "sub", "mul", "div", "neg")
+        )
+        self.unary: Callable[[str, Array], Array] = lambda op, a: _RULES[op](domain, a)
 
 
-def _logarithm(domain: Ring, a: Array) -> Array:
-    base = float(a[0, 0])
-    rest = [-((-1 / base) ** k) / k for k in range(1, domain.order + 2)]
-    return domain.compose(np.array([math.log(base), *rest]), a)
-
-
-def _periodic(cycle: Callable[[float], tuple[float, ...]]) -> _Rule:
-    """Return the rule of a function whose derivatives repeat."""
+def _elementary(op: str) -> _Rule:
+    """Return the rule of an elementary function."""
+    known, value = OPERATIONS[op], getattr(math, op)
 
     def rule(domain: Ring, a: Array) -> Array:
-        values = cycle(float(a[0, 0]))
         orders = range(domain.order + 2)
-        taylor = [values[k % len(values)] / math.factorial(k) for k in orders]
-        return domain.compose(np.array(taylor), a)
-
-    return rule
-
-
-_sine = _periodic(lambda t: (math.sin(t), math.cos(t), -math.sin(t), -math.cos(t)))
-_cosine = _periodic(lambda t: (math.cos(t), -math.sin(t), -math.cos(t), math.sin(t)))
-_sinh = _periodic(lambda t: (math.sinh(t), math.cosh(t)))
-_cosh = _periodic(lambda t: (math.cosh(t), math.sinh(t)))
-
-
-def _integral(value: Callable[[float], float], sign: float, power: float) -> _Rule:
-    """Return the rule of the integral of ``(1 + sign t^2)^power``."""
-
-    def rule(domain: Ring, a: Array) -> Array:
+        if known.cycle:
+            values = [derivative(a[0, 0]) for derivative in known.cycle]
+            taylor = [values[k % len(values)] / math.factorial(k) for k in orders]
+            return domain.compose(np.array(taylor), a)
         line = ring(1, domain.order + 1)
-        t = line.constant(a[0, 0]) + line.variable(0)
-        slope = _power(line, line.constant(1.0) + sign * line.mul(t, t), power)[0]
-        rest = slope[:-1] / np.arange(1, domain.order + 2)
-        return domain.compose(np.array([value(a[0, 0]), *rest]), a)
+        t, y = line.constant(a[0, 0]) + line.variable(0), line.constant(value(a[0, 0]))
+        for _ in orders:  # a slope of y to one order more gives y to one order more
+            before = y.copy()
+            slope = known.slope(_Series(line), t, y, line.constant(1.0))[0]
+            y[0, 1:] = slope[:-1] / orders[1:]
+            if np.array_equal(y, before):
+                break
+        return domain.compose(y[0], a)
 
     return rule
-
-
-_arctangent = _integral(math.atan, 1.0, -1.0)
-_arcsine = _integral(math.asin, -1.0, -0.5)
-
-
-def _error_function(domain: Ring, a: Array) -> Array:
-    line = ring(1, domain.order + 1)
-    t = line.constant(a[0, 0]) + line.variable(0)
-    slope = 2 / math.sqrt(math.pi) * _exponential(line, _negative(line, line.mul(t, t)))[0]
-    rest = slope[:-1] / np.arange(1, domain.order + 2)
-    return domain.compose(np.array([math.erf(a[0, 0]), *rest]), a)
-
-
-def _arccosine(domain: Ring, a: Array) -> Array:
-    result = _negative(domain, _arcsine(domain, a))
-    result[0, 0] = math.acos(a[0, 0])
-    return result
 
 
 def _angle(domain: Ring, y: Array, x: Array) -> Array:
@@ -229,7 +203,7 @@ def _angle(domain: Ring, y: Array, x: Array) -> Array:
         raise ZeroDivisionError
     across, along = a * y - b * x, a * x + b * y
     across[1], along[1] = abs(a) * y[1] + abs(b) * x[1], abs(a) * x[1] + abs(b) * y[1]
-    result = _arctangent(domain, _quotient(domain, across, along))
+    result = _RULES["atan"](domain, _quotient(domain, across, along))
     result[0, 0] = math.atan2(b, a)
     return result
 
@@ -255,19 +229,8 @@ _RULES: dict[str, _Rule] = {
     "mul": Ring.mul,
     "div": _quotient,
     "pow": _general_power,
+    **{op: _elementary(op) for op in OPERATIONS},
     "sqrt": lambda domain, a: _power(domain, a, 0.5),
-    "exp": _exponential,
-    "log": _logarithm,
-    "sin": _sine,
-    "cos": _cosine,
-    "tan": lambda domain, a: _quotient(domain, _sine(domain, a), _cosine(domain, a)),
-    "sinh": _sinh,
-    "cosh": _cosh,
-    "tanh": lambda domain, a: _quotient(domain, _sinh(domain, a), _cosh(domain, a)),
-    "asin": _arcsine,
-    "acos": _arccosine,
-    "atan": _arctangent,
-    "erf": _error_function,
     "atan2": _angle,
     "lt": _comparison(lambda u, v: u < v),
     "le": _comparison(lambda u, v: u <= v),

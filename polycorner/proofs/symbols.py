@@ -10,6 +10,7 @@ from fractions import Fraction
 from math import isqrt
 from typing import TYPE_CHECKING, Any
 
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload
 from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import ball, constant, operations
@@ -23,12 +24,6 @@ if TYPE_CHECKING:
 
 ZERO = Fraction(0)
 ONE = Fraction(1)
-# Elementary functions at their rational arguments with rational values.
-KNOWN: dict[str, tuple[Fraction, Fraction]] = {
-    **dict.fromkeys(("sin", "tan", "asin", "atan", "sinh", "tanh", "erf"), (ZERO, ZERO)),
-    **dict.fromkeys(("cos", "cosh", "exp"), (ZERO, ONE)),
-    **dict.fromkeys(("log", "acos"), (ONE, ZERO)),
-}
 # Twice the sine where it is rational, by twelfths of a turn.
 TWICE_SINES = {0: 0, 1: 1, 3: 2, 5: 1, 6: 0, 7: -1, 9: -2, 11: -1}
 COMPARE = ("lt", "le")
@@ -171,8 +166,8 @@ def _number_of(op: str, given: list[Polynomial], symbols: Symbols) -> Any:
         return _power(given, last, symbols)
     if op == "sqrt" and first is not None:
         return _root(first, symbols)
-    if op in KNOWN and first == KNOWN[op][0]:
-        return algebra.number(KNOWN[op][1])
+    if op in OPERATIONS and (value := OPERATIONS[op].known.get(first)) is not None:
+        return algebra.number(value)
     if op in {"sin", "cos"} and (turn := _twelfths(given[0], symbols)) is not None:
         twice = TWICE_SINES.get((turn + 3 * (op == "cos")) % 12)
         if twice is not None:

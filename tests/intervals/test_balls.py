@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.intervals.balls import (
     ANALYTIC,
     PARTIALS,
@@ -28,19 +29,7 @@ from polycorner.intervals.balls import (
 DIGITS = 60
 ONE = {
     "neg": lambda x: -x,
-    "sin": mpmath.sin,
-    "cos": mpmath.cos,
-    "tan": mpmath.tan,
-    "asin": mpmath.asin,
-    "acos": mpmath.acos,
-    "atan": mpmath.atan,
-    "sinh": mpmath.sinh,
-    "cosh": mpmath.cosh,
-    "tanh": mpmath.tanh,
-    "erf": mpmath.erf,
-    "exp": mpmath.exp,
-    "log": mpmath.log,
-    "sqrt": mpmath.sqrt,
+    **{op: getattr(mpmath, op) for op in OPERATIONS},
     "square": lambda x: x * x,
 }
 TWO = {
