@@ -26,33 +26,16 @@ from polycorner.formulas.programs import Graph, Program
 FEW = 12  # variables up to which derivatives are pushed forward
 MANY = 2000  # operations up to which they are
 DEEP = 100  # the same for operations that follow one another
-LEAVES = frozenset({"const", "var", "par"})
 
 # The nonzero partial derivatives of a node, by variable.
 Row = dict[int, int]
-
-
-def children(graph: Graph, node: int) -> tuple[int, ...]:
-    """Return the nodes that an operation reads."""
-    op, args = graph.nodes[node]
-    return () if op in LEAVES else tuple([int(a) for a in args])
-
-
-def reach(graph: Graph, node: int, reached: set[int]) -> None:
-    """Add a node and all that it depends on to a set that contains what its own nodes do."""
-    waiting = [node]
-    while waiting:
-        a = waiting.pop()
-        if a not in reached:
-            reached.add(a)
-            waiting += children(graph, a)
 
 
 def depth(graph: Graph, outputs: Iterable[int]) -> int:
     """Return the length of the longest chain of operations under the outputs."""
     lengths: list[int] = []
     for node in range(max(outputs, default=-1) + 1):
-        lengths.append(1 + max((lengths[c] for c in children(graph, node)), default=0))
+        lengths.append(1 + max((lengths[c] for c in graph.children(node)), default=0))
     return max((lengths[f] for f in outputs), default=0)
 
 
@@ -77,10 +60,8 @@ class Reverse:
 
     def _enter(self, node: int) -> None:
         """Find the gradients of all branches below a node, from the innermost on."""
-        reached: set[int] = set()
-        reach(self.graph, node, reached)
-        for a in sorted(reached):
-            for branch in children(self.graph, a)[1:] if self.graph.nodes[a][0] == "select" else ():
+        for a in self.graph.needed([node]):
+            for branch in self.graph.children(a)[1:] if self.graph.nodes[a][0] == "select" else ():
                 if branch not in self._rows:
                     self._rows[branch] = self._accumulate(branch)
 
@@ -112,7 +93,7 @@ class Reverse:
 
     def _add_branches(self, found: Row, a: int, w: int) -> None:
         g = self.graph
-        condition, yes, no = children(g, a)
+        condition, yes, no = g.children(a)
         left, right, zero = self.row(yes), self.row(no), g.const(0)
         for i in sorted({*left, *right}):
             slope = g.select(condition, left.get(i, zero), right.get(i, zero))

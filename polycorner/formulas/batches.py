@@ -7,7 +7,7 @@ import numpy as np
 from llvmlite import ir
 
 from polycorner.formulas import emit
-from polycorner.formulas.adjoints import derivatives, reach
+from polycorner.formulas.adjoints import derivatives
 from polycorner.formulas.programs import Polynomial, Program
 
 LONG = 5000  # operations after which a function of machine code ends
@@ -101,7 +101,7 @@ def _parts(program: Program, levels: tuple[list[int], ...]) -> Iterator[list[tup
             for position in range(f * width, (f + 1) * width):
                 node = nodes[position]
                 if not (sparse[level] and node == zero):
-                    reach(program.graph, node, reached)
+                    reached.update(program.graph.needed([node], known=reached))
                     group.append((level, position, node))
     yield group
 
@@ -252,7 +252,7 @@ def _emit_body(
             continue
         for start in range(0, len(nodes), emit.LANES):
             values = [emitter.value(node) for node in nodes[start : start + emit.LANES]]
-            _store(b, values, pointer, start, len(nodes), lanes)
+            store(b, values, pointer, start, len(nodes), lanes)
 
 
 def _leaves(
@@ -306,7 +306,7 @@ def gather(b: ir.IRBuilder, pointer: ir.Value, position: int, stride: int, lanes
     return result
 
 
-def _store(
+def store(
     b: ir.IRBuilder, values: list[ir.Value], pointer: ir.Value, start: int, stride: int, lanes: int
 ) -> None:
     """Store consecutive results: lane ``l`` of value ``j`` goes to ``start + j + l * stride``."""

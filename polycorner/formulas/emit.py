@@ -59,21 +59,9 @@ class Emitter:
         self._circular: dict[int, tuple[ir.Value, ir.Value]] = {}
 
     def value(self, node: int) -> ir.Value:
-        """Return the value of a node, emitting what it needs (without recursion on deep graphs)."""
-        stack = [node]
-        while stack:
-            top = stack[-1]
-            op, args = self.graph.nodes[top]
-            children = (
-                [] if op in {"const", "var", "par"} else [a for a in args if isinstance(a, int)]
-            )
-            waiting = [a for a in children if a not in self._done]
-            if waiting:
-                stack += waiting
-                continue
-            stack.pop()
-            if top not in self._done:
-                self._done[top] = self._emit(op, args)
+        """Return the value of a node, emitting what it needs."""
+        for a in self.graph.needed([node], known=self._done):
+            self._done[a] = self._emit(*self.graph.nodes[a])
         return self._done[node]
 
     def _emit(self, op: str, args: tuple[Any, ...]) -> ir.Value:

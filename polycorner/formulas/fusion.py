@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from polycorner.formulas import cache, compositions, grafts
+from polycorner.formulas import cache, compositions, programs
 from polycorner.formulas.compositions import Term, composition, stationary, symbol
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.formulas.grafts import grafted
 from polycorner.formulas.programs import Graph, Program
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ class _Bound(NamedTuple):
         for i, k in enumerate(self.parameters):
             number = graph.node("par", abs(k) - 1) if k else zero
             inputs["par", i] = graph.neg(number) if k < 0 else number
-        placed = grafted(graph, program, inputs)
+        placed = graph.grafted(program, inputs)
         output = program.outputs[self.family.names.index(self.name)]
         return placed[output], [graph.core(placed[a]) for a in program.stationary]
 
@@ -126,7 +125,7 @@ def _family(bound: tuple[_Bound, ...], variables: int, parameters: int) -> Famil
 
 
 def _sources() -> str:
-    return cache.source_key(compositions.__name__, grafts.__name__, __name__)
+    return cache.source_key(compositions.__name__, programs.__name__, __name__)
 
 
 def _formulas(bound: tuple[_Bound, ...]) -> "Formulas":

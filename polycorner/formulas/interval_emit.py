@@ -8,6 +8,7 @@ bounds.  Infinities do not occur (:mod:`polycorner.formulas.ranges`).
 A condition is a pair of masks: it holds on the whole box, it fails on the whole box.
 """
 
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -21,9 +22,9 @@ from polycorner.formulas.ranges import (
     LOGIC,
     SMALLEST_DIVISOR,
     Fact,
-    arguments,
     outward,
     pattern,
+    reads,
     static,
 )
 from polycorner.formulas.rounding import Stepped, greatest, least
@@ -40,22 +41,10 @@ class IntervalEmitter:
         self._continuous: dict[int, ir.Value | None] = {}
 
     def value(self, node: int) -> Sides:
-        """Return the bounds of a node, emitting what it needs (without recursion)."""
-        stack = [node]
-        while stack:
-            top = stack[-1]
-            waiting = [a for a in self._reads(top) if a not in self._done]
-            if waiting:
-                stack += waiting
-                continue
-            stack.pop()
-            if top not in self._done:
-                self._done[top] = self._emit(top)
+        """Return the bounds of a node, emitting what it needs."""
+        for a in self.graph.needed([node], partial(reads, self.graph), self._done):
+            self._done[a] = self._emit(a)
         return self._done[node]
-
-    def _reads(self, node: int) -> list[int]:
-        found = pattern(self.graph, node)
-        return list(found.nodes) if found else arguments(self.graph, node)
 
     def _emit(self, node: int) -> Sides:
         op, args = self.graph.nodes[node]
@@ -200,7 +189,7 @@ class IntervalEmitter:
     def _select(self, node: int) -> Sides:
         found = pattern(self.graph, node)
         if found is None:
-            condition, yes, no = (self._done[a] for a in arguments(self.graph, node))
+            condition, yes, no = (self._done[a] for a in self.graph.children(node))
             hull = self._both(self._extremes(yes, no, "hull"), yes, no)
             result = blend(self.b, condition[0], yes, hull)
             return blend(self.b, condition[1], no, result)
@@ -226,35 +215,27 @@ class IntervalEmitter:
         It is where every selection it depends on is decided, or one of the patterns of
         :func:`~polycorner.formulas.ranges.pattern`, and every ``atan2`` keeps off its cut.
         """
-        stack = [node]
-        while stack:
-            top = stack[-1]
-            waiting = [a for a in self._parts(top) if a not in self._continuous]
-            if waiting:
-                stack += waiting
-                continue
-            stack.pop()
-            if top not in self._continuous:
-                self._continuous[top] = self._continuity(top)
+        for a in self.graph.needed([node], self._parts, self._continuous):
+            self._continuous[a] = self._continuity(a)
         return self._continuous[node]
 
-    def _parts(self, node: int) -> list[int]:
+    def _parts(self, node: int) -> tuple[int, ...]:
         """Return the nodes whose continuity matters, all but a condition."""
         is_branch = self.graph.nodes[node][0] == "select" and not pattern(self.graph, node)
-        return arguments(self.graph, node)[1:] if is_branch else self._reads(node)
+        return self.graph.children(node)[1:] if is_branch else reads(self.graph, node)
 
     def _continuity(self, node: int) -> ir.Value | None:
         b, op = self.b, self.graph.nodes[node][0]
         parts = [self._continuous[a] for a in self._parts(node)]
         if op == "select" and not pattern(self.graph, node):
-            condition = self.value(arguments(self.graph, node)[0])
+            condition = self.value(self.graph.children(node)[0])
             taken = [
                 side if part is None else b.and_(side, part)
                 for side, part in zip(condition, parts, strict=True)
             ]
             return b.or_(*taken)
         if op == "atan2":
-            y, x = (self.value(a) for a in arguments(self.graph, node))
+            y, x = (self.value(a) for a in self.graph.children(node))
             parts.append(functions.cut_free(self.r, y, x))
         result: ir.Value | None = None
         for part in parts:

@@ -1,11 +1,9 @@
 """Compiled enclosures: a program in interval arithmetic as machine code, cached on disk."""
 
 import ctypes
-import hashlib
 import logging
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from llvmlite import binding as llvm
@@ -16,7 +14,6 @@ from polycorner.formulas import (
     batches,
     emit,
     interval_emit,
-    interval_forms,
     interval_library,
     operations,
     programs,
@@ -24,18 +21,23 @@ from polycorner.formulas import (
     rounding,
     translate,
 )
-from polycorner.formulas.batches import POINTER, VOID, at_offset, gather, loop, transpose
-from polycorner.formulas.cache import read_code, source_key, write_code
+from polycorner.formulas.batches import POINTER, VOID, gather, loop, store
 from polycorner.formulas.interval_emit import IntervalEmitter
-from polycorner.formulas.interval_forms import Sharper
 from polycorner.formulas.interval_library import Sides
-from polycorner.formulas.machine_code import load_code, machine_code, machine_key
-from polycorner.formulas.programs import Graph
-from polycorner.formulas.rounding import ROUNDINGS, Stepped
+from polycorner.formulas.machine_code import code_name, kept_code, machine_code
+from polycorner.formulas.programs import LEAVES, Graph
+from polycorner.formulas.ranges import Fact
+from polycorner.formulas.rounding import ROUNDINGS, Stepped, greatest, least
 from polycorner.spaces.manifold import Array
 
 LOG = logging.getLogger("polycorner.compilation")
 LANES = emit.LANES
+ROOMS = (operations, programs, translate, adjoints, emit, batches)
+OURS = (ranges, rounding, interval_library, interval_emit)
+GENERATORS = (*(room.__name__ for room in (*ROOMS, *OURS)), __name__)
+
+FORMS = ("natural", "mean value", "monotone")
+NOTHING = Fact(nonnegative=False, nonpositive=False, size=0.0)
 
 # Nodes of results, entry by entry; None for a structural zero.
 Level = Sequence[int | None]
@@ -79,15 +81,15 @@ class IntervalKernel:
         self.kind = kind or best_rounding()
         self.form = form
         used, kept = compact(graph, levels)
-        name = _symbol((used.nodes, inputs, kept, continuity, form, self.kind))
-        code = read_code(name)
-        self.origin = "compiled" if code is None else "loaded"
-        if code is None:
+        content = (used.nodes, inputs, kept, continuity, form, self.kind)
+        name = code_name("polycorner_boxes", content, *GENERATORS)
+
+        def make() -> bytes:
             LOG.debug("compiling enclosures of %d results", sum(self.sizes))
             # Each node is emitted once and simplified before, so that LLVM's passes find nothing.
-            code = machine_code(str(self._module(used, kept, name)), optimise=False)
-            write_code(name, code)
-        self._engine, (address,) = load_code(code, [name])
+            return machine_code(str(self._module(used, kept, name)), optimise=False)
+
+        self._engine, (address,), self.origin = kept_code(name, [name], make)
         pointers = [ctypes.c_void_p] * (2 + len(self._widths()))
         self._call = ctypes.CFUNCTYPE(None, ctypes.c_int64, *pointers)(address)
 
@@ -133,7 +135,7 @@ class IntervalKernel:
             for start, size in _windows(level):
                 found = [result(j) for j in range(start, start + size)]
                 for column, target in zip(zip(*found, strict=True), targets, strict=True):
-                    _store(b, list(column), target, start, len(level))
+                    store(b, list(column), target, start, len(level), LANES)
 
     def _results(
         self, emitter: IntervalEmitter, levels: Sequence[Level], depth: int
@@ -176,8 +178,8 @@ def _bounds(emitter: IntervalEmitter, node: int | None) -> Sides:
 def _infinite(r: Stepped, x: Sides) -> Sides:
     """Replace the bounds of intervals that were given up by infinities."""
     return (
-        rounding.greatest(r.b, x[0], r.splat(-np.inf)),
-        rounding.least(r.b, x[1], r.splat(np.inf)),
+        greatest(r.b, x[0], r.splat(-np.inf)),
+        least(r.b, x[1], r.splat(np.inf)),
     )
 
 
@@ -205,53 +207,94 @@ def _windows(level: Level) -> list[tuple[int, int]]:
     return windows
 
 
-def _store(
-    b: ir.IRBuilder, values: list[ir.Value], pointer: ir.Value, start: int, stride: int
-) -> None:
-    """Store consecutive results: lane ``l`` of value ``j`` goes to ``start + j + l * stride``."""
-    if len(values) == LANES:
-        vector = ir.PointerType(emit.lane_type(LANES))
-        for lane, row in enumerate(transpose(b, values)):
-            target = at_offset(b, pointer, start + lane * stride)
-            b.store(row, b.bitcast(target, vector), align=8)
-        return
-    for j, value in enumerate(values):
-        for lane in range(LANES):
-            part = b.extract_element(value, ir.Constant(emit.I64, lane))
-            b.store(part, at_offset(b, pointer, start + j + lane * stride))
-
-
 def compact(graph: Graph, levels: Sequence[Level]) -> tuple[Graph, list[list[int | None]]]:
     """Return a graph of what the results need, in order, and the results in it."""
-    needed: set[int] = set()
-    waiting = [a for level in levels for a in level if a is not None]
-    while waiting:
-        a = waiting.pop()
-        if a not in needed:
-            needed.add(a)
-            waiting += ranges.arguments(graph, a)
     result = Graph()
     placed: dict[int, int] = {}
-    for a in sorted(needed):
+    for a in graph.needed(a for level in levels for a in level if a is not None):
         op, args = graph.nodes[a]
-        leaf = op in {"const", "var", "par"}
-        placed[a] = result.node(op, *(args if leaf else [placed[int(c)] for c in args]))
+        placed[a] = result.node(op, *(args if op in LEAVES else [placed[int(c)] for c in args]))
     return result, [[None if a is None else placed[a] for a in level] for level in levels]
+
+
+class Sharper:
+    """Bounds of values in one of ``FORMS``, by an emitter that has the natural ones.
+
+    Both other forms need ``f`` to be continuous on the box and the enclosure ``[g]`` to contain its
+    generalised gradient there; elsewhere the bounds stay as they are.
+
+    *Mean value form*: ``f(q)`` lies in ``f(c) + [g].([q] - c)`` for every ``c`` in the box
+    ([Neumaier] sec. 2.3); its excess width falls with the square of the width of the box.
+
+    *Monotone form*: where ``[g_i]`` has one sign, the least value is taken at one end of side ``i``
+    and the greatest at the other, so that both are enclosed on faces of the box.
+
+    ``values`` are the nodes of the functions, ``slopes`` those of their partial derivatives row by
+    row, None where one is zero.
+    """
+
+    def __init__(
+        self, emitter: IntervalEmitter, values: Sequence[int], slopes: Sequence[int | None]
+    ) -> None:
+        self.emitter, self.r, self.b = emitter, emitter.r, emitter.b
+        self.values, count = values, len(slopes) // max(len(values), 1)
+        self.rows = [slopes[j * count : (j + 1) * count] for j in range(len(values))]
+        self._offsets: dict[int, Sides] = {}
+        self._middle: IntervalEmitter | None = None
+
+    def mean_value(self, j: int) -> Sides:
+        """Return bounds of function ``j``, in the mean value form where that is better."""
+        if self._middle is None:
+            points = {i: (c, c) for i, c in self._centre().items()}
+            self._middle = IntervalEmitter(self.r, self.emitter.graph, points)
+        low, high = self._middle.value(self.values[j])
+        for i, slope in self._row(j).items():
+            part = self.emitter.product(NOTHING, slope, NOTHING, self._offsets[i])
+            low = self.r.add(low, part[0], up=False)
+            high = self.r.add(high, part[1], up=True)
+        return self._intersected(j, (low, high))
+
+    def monotone(self, j: int) -> Sides:
+        """Return bounds of function ``j`` on the faces where it is least and greatest."""
+        zero = self.r.splat(0.0)
+        lowest, highest = dict(self.emitter.boxes), dict(self.emitter.boxes)
+        for i, slope in self._row(j).items():
+            low, high = self.emitter.boxes[i]
+            rising = self.b.fcmp_ordered(">=", slope[0], zero)
+            constant_or_falling = self.b.fcmp_ordered("<=", slope[1], zero)
+            falling = self.b.and_(constant_or_falling, self.b.not_(rising))
+            lowest[i] = self.b.select(falling, high, low), self.b.select(rising, low, high)
+            highest[i] = self.b.select(rising, high, low), self.b.select(falling, low, high)
+        low, _ = IntervalEmitter(self.r, self.emitter.graph, lowest).value(self.values[j])
+        _, high = IntervalEmitter(self.r, self.emitter.graph, highest).value(self.values[j])
+        return self._intersected(j, (low, high))
+
+    def _row(self, j: int) -> dict[int, Sides]:
+        """Return the enclosures of the partial derivatives that are not zero."""
+        return {i: self.emitter.value(a) for i, a in enumerate(self.rows[j]) if a is not None}
+
+    def _centre(self) -> dict[int, ir.Value]:
+        """Return a point of the box; record the box as seen from it."""
+        centre = {}
+        for i, (low, high) in self.emitter.boxes.items():
+            half = self.r.splat(0.5)
+            near = self.b.fadd(self.b.fmul(half, low), self.b.fmul(half, high))
+            c = centre[i] = greatest(self.b, least(self.b, near, high), low)
+            self._offsets[i] = self.r.sub(low, c, up=False), self.r.sub(high, c, up=True)
+        return centre
+
+    def _intersected(self, j: int, form: Sides) -> Sides:
+        """Keep what is better of natural bounds and others, where those are valid."""
+        node, b = self.values[j], self.b
+        low, high = self.emitter.value(node)
+        better = greatest(b, form[0], low), least(b, form[1], high)
+        fine = self.emitter.continuous(node)
+        if fine is None:
+            return better
+        return b.select(fine, better[0], low), b.select(fine, better[1], high)
 
 
 @lru_cache(maxsize=1)
 def best_rounding() -> str:
     """Return the rounding for this processor: ``"embedded"`` where it has AVX-512."""
     return "embedded" if llvm.get_host_cpu_features().get("avx512f") else "stepped"
-
-
-@lru_cache(maxsize=1)
-def _generator_key() -> str:
-    rooms = (operations, programs, translate, adjoints, emit, batches)
-    ours = (ranges, rounding, interval_library, interval_emit, interval_forms)
-    return repr((source_key(*(m.__name__ for m in (*rooms, *ours)), __name__), machine_key()))
-
-
-def _symbol(content: Any) -> str:
-    digest = hashlib.sha256(repr((content, _generator_key())).encode()).hexdigest()
-    return f"polycorner_boxes_{digest[:32]}"

@@ -5,10 +5,8 @@ address from Numba as well as from Python.  Batches run in explicit vectors of `
 """
 
 import ctypes
-import hashlib
 import logging
 from collections.abc import Callable
-from functools import lru_cache
 from threading import Lock
 from typing import Any
 
@@ -17,12 +15,14 @@ from llvmlite import ir
 
 from polycorner.formulas import adjoints, batches, emit, operations, programs, translate
 from polycorner.formulas.batches import emit_lanes, emit_points
-from polycorner.formulas.cache import read_code, source_key, write_code
-from polycorner.formulas.machine_code import load_code, machine_code, machine_key
+from polycorner.formulas.cache import read_code
+from polycorner.formulas.machine_code import code_name, kept_code, machine_code
 from polycorner.formulas.programs import Polynomial, Program
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
+ROOMS = (operations, programs, translate, adjoints, emit, batches)
+GENERATORS = (*(room.__name__ for room in ROOMS), __name__)
 LOG = logging.getLogger("polycorner.compilation")
 MANY = 64  # points from which on they are evaluated in lanes
 # Numbers a point, above which code for lanes takes longer to compile than it will ever save: nine
@@ -101,7 +101,7 @@ class CompiledKernel:
 
     def __init__(self, kernel: Kernel, order: int) -> None:
         self.kernel, self.order = kernel, order
-        self._name = _symbol(kernel.key, order)
+        self._name = code_name("polycorner", (kernel.key, order), *GENERATORS)
         entries = ("point", "packed", "rows")
         self._engine, addresses, self.origin = self._code(emit_points, self._name, entries)
         self.point, packed, rows = addresses
@@ -120,17 +120,15 @@ class CompiledKernel:
         self, emitted: Callable[..., Any], name: str, entries: tuple[str, ...]
     ) -> tuple[Any, list[int], str]:
         """Return an engine with machine code, the addresses in it, and where it came from."""
-        code, kernel = read_code(name), self.kernel
-        origin = "compiled" if code is None else "loaded"
-        if code is None:
-            LOG.debug(
-                "compiling %d formulas with derivatives up to order %d", kernel.outputs, self.order
-            )
+        kernel, order = self.kernel, self.order
+
+        def make() -> bytes:
+            LOG.debug("compiling %d formulas with derivatives up to %d", kernel.outputs, order)
             module = ir.Module(name=name)
-            emitted(module, kernel.program, self.order, name)
-            code = machine_code(str(module))
-            write_code(name, code)
-        return *load_code(code, [f"{name}_{entry}" for entry in entries]), origin
+            emitted(module, kernel.program, order, name)
+            return machine_code(str(module))
+
+        return kept_code(name, [f"{name}_{entry}" for entry in entries], make)
 
     @cached_property
     def _lanes(self) -> Any:
@@ -174,15 +172,3 @@ class CompiledKernel:
 def address(array: Array) -> int:
     """Return the address of a writable, not empty array, faster than ``array.ctypes.data``."""
     return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
-
-
-@lru_cache(maxsize=1)
-def _generator_key() -> str:
-    rooms = (operations, programs, translate, adjoints, emit, batches)
-    code = source_key(*(room.__name__ for room in rooms), __name__)
-    return repr((code, machine_key()))
-
-
-def _symbol(key: str, order: int) -> str:
-    digest = hashlib.sha256(repr((key, order, _generator_key())).encode()).hexdigest()
-    return f"polycorner_{digest[:32]}_{order}"

@@ -2,8 +2,10 @@
 
 import ctypes
 import ctypes.util
+import hashlib
 import os
 import platform
+from collections.abc import Callable
 from functools import lru_cache
 from importlib.metadata import version
 from typing import Any
@@ -14,7 +16,7 @@ from llvmlite.binding.ffi import ObjectRef
 
 from polycorner import __version__
 from polycorner.formulas import emit
-from polycorner.formulas.cache import source_key
+from polycorner.formulas.cache import read_code, source_key, write_code
 from polycorner.formulas.operations import OPERATIONS
 
 OPTIMISATION = 2
@@ -66,6 +68,31 @@ def load_code(code: bytes, entries: list[str]) -> tuple[Any, list[int]]:
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     return engine, [engine.get_function_address(entry) for entry in entries]
+
+
+def kept_code(
+    name: str, entries: list[str], make: Callable[[], bytes]
+) -> tuple[Any, list[int], str]:
+    """Return what :func:`load_code` does of the code kept under a name, made where there is none.
+
+    Then ``"loaded"`` or ``"compiled"``.
+    """
+    code, origin = read_code(name), "loaded"
+    if code is None:
+        code, origin = make(), "compiled"
+        write_code(name, code)
+    return *load_code(code, entries), origin
+
+
+def code_name(prefix: str, content: Any, *generators: str) -> str:
+    """Return the name of code: a digest of its content, and of the modules that make it."""
+    digest = hashlib.sha256(repr((content, _generator_key(generators))).encode()).hexdigest()
+    return f"{prefix}_{digest[:32]}"
+
+
+@lru_cache(maxsize=8)
+def _generator_key(generators: tuple[str, ...]) -> str:
+    return repr((source_key(*generators), machine_key()))
 
 
 def _run_passes(parsed: Any, target: Any, options: Any) -> None:

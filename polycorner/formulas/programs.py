@@ -7,7 +7,7 @@ selections, whose derivative is the derivative of the branch taken.
 """
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -16,6 +16,7 @@ from polycorner.formulas.operations import OPERATIONS
 Payload = int | str | Fraction
 Node = tuple[str, tuple[Payload, ...]]
 
+LEAVES = frozenset({"const", "var", "par"})
 POWERS_OF_TWO = frozenset(Fraction(2) ** k for k in range(-4, 5) if k)
 
 
@@ -52,10 +53,8 @@ class Graph:
         """Return the variables that an operation depends on, one bit each."""
         if op == "var":
             return 1 << int(args[0])
-        if op in {"const", "par"}:
-            return 0
         support = 0
-        for child in args:
+        for child in () if op in LEAVES else args:
             support |= self.supports[int(child)]
         return support
 
@@ -66,6 +65,57 @@ class Graph:
                 self._zero = self.node("const", Fraction(0))
             return self._zero
         return self.node("const", value if isinstance(value, str) else Fraction(value))
+
+    def children(self, a: int) -> tuple[int, ...]:
+        """Return the nodes that an operation reads."""
+        op, args = self.nodes[a]
+        return () if op in LEAVES else tuple([int(child) for child in args])
+
+    def needed(
+        self,
+        outputs: Iterable[int],
+        reads: "Callable[[int], Iterable[int]] | None" = None,
+        known: Container[int] = (),
+    ) -> list[int]:
+        """Return the nodes that some nodes depend on, arguments before what reads them.
+
+        ``reads`` returns the nodes on which one depends directly, its :meth:`children` by default;
+        ``known`` ones are left out, with what only they depend on.
+        """
+        reads = reads or self.children
+        found: set[int] = set()
+        waiting = list(outputs)
+        while waiting:
+            a = waiting.pop()
+            if a not in found and a not in known:
+                found.add(a)
+                waiting += reads(a)
+        return sorted(found)
+
+    def rebuilt(self, op: str, args: Iterable[Payload], placed: Mapping[int, int]) -> int:
+        """Write an operation of another graph, whose arguments have places in this one."""
+        if op == "const":
+            return self.const(*args)
+        if op in LEAVES:
+            return self.node(op, *args)
+        children = [placed[int(arg)] for arg in args]
+        if op in {"add", "sub", "neg", "mul", "div", "select"}:
+            result: int = getattr(self, op)(*children)
+            return result
+        return self.unary(op, *children) if op in OPERATIONS else self.node(op, *children)
+
+    def grafted(self, program: "Program", inputs: Mapping[tuple[str, int], int]) -> list[int]:
+        """Write a program into the graph; return the places of its nodes there.
+
+        ``inputs`` are the nodes in place of its variables ``("var", i)`` and parameters
+        ``("par", i)``.  Operations on constants and on what the graph has already are simplified
+        and shared.
+        """
+        placed: dict[int, int] = {}
+        for a, (op, args) in enumerate(program.graph.nodes):
+            leaf = op in {"var", "par"}
+            placed[a] = inputs[op, int(args[0])] if leaf else self.rebuilt(op, args, placed)
+        return [*placed.values()]
 
     def _value(self, a: int) -> Fraction | None:
         op, args = self.nodes[a]

@@ -189,19 +189,10 @@ def is_zero(graph: Graph, node: int) -> bool:
     return graph.nodes[node] == ("const", (Fraction(0),))
 
 
-def number(graph: Graph, node: int) -> float | None:
-    """Return a constant that a double represents exactly, or None."""
-    op, args = graph.nodes[node]
-    if op != "const":
-        return None
-    low, high = outward(args[0])
-    return low if low == high else None
-
-
-def arguments(graph: Graph, node: int) -> list[int]:
-    """Return the nodes that an operation reads."""
-    op, args = graph.nodes[node]
-    return [] if op in {"const", "var", "par"} else [int(a) for a in args]
+def reads(graph: Graph, node: int) -> tuple[int, ...]:
+    """Return the nodes on which the bounds of a node depend directly."""
+    found = pattern(graph, node)
+    return found.nodes if found else graph.children(node)
 
 
 def static(graph: Graph, node: int, known: dict[int, Fact]) -> Fact:

@@ -12,14 +12,15 @@ import logging
 import lzma
 import pickle
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from polycorner.atomic import write_atomically
-from polycorner.formulas.cache import one_at_a_time, read_code, sources_digest, write_code
-from polycorner.formulas.machine_code import load_code, machine_code, machine_key
+from polycorner.formulas.cache import one_at_a_time, read_code, sources_digest
+from polycorner.formulas.machine_code import kept_code, machine_code, machine_key
 from polycorner.values import cached_property
 
 LOG = logging.getLogger("polycorner.compilation")
@@ -92,14 +93,9 @@ class Shipped:
         head = self.head
         key = repr((head, self.file, machine_key()))
         name = f"{self.file.partition('.')[0]}_{hashlib.sha256(key.encode()).hexdigest()[:32]}"
-        code = read_code(name)
-        if code is None:
-            with one_at_a_time(name):
-                code = read_code(name)
-                if code is None:
-                    code = self._made(head)
-                    write_code(name, code)
-        holder, addresses = load_code(code, list(self.names))
+        turn = one_at_a_time(name) if read_code(name) is None else nullcontext()
+        with turn:
+            holder, addresses, _ = kept_code(name, list(self.names), lambda: self._made(head))
         return tuple(self._function(address, holder) for address in addresses)
 
     def _made(self, head: str) -> bytes:

@@ -91,7 +91,7 @@ class BoxFunctions:
         mean_value, monotone : bool, optional
             Intersect the bounds of values with those of the mean value form, or with those on the
             faces where a monotone function is least and greatest
-            (:mod:`~polycorner.formulas.interval_forms`).  At most one of them.
+            (:class:`~polycorner.formulas.interval_kernels.Sharper`).  At most one of them.
         """
         if mean_value and monotone:
             checks.refuse("mean_value, monotone", "at most one form", (True, True))

@@ -17,12 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.formulas.grafts import rebuilt
 from polycorner.formulas.programs import Graph, Program
-from polycorner.formulas.ranges import arguments
 from polycorner.formulas.translate import compile_expressions
 from polycorner.intervals.balls import ANALYTIC, constant, operations
-from polycorner.intervals.tapes import Box, Tape, needed
+from polycorner.intervals.tapes import Box, Tape
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
@@ -94,7 +92,7 @@ def written(
         else:
             inputs["par", j] = graph.const(Fraction(value))
     placed: dict[int, int] = {}
-    for a in needed(program.graph, outputs):
+    for a in program.graph.needed(outputs):
         op, args = program.graph.nodes[a]
         if op in {"var", "par"}:
             placed[a] = inputs[op, int(args[0])]
@@ -102,7 +100,7 @@ def written(
             msg = f"{f.name}: the operation {op} has no enclosure in ball arithmetic"
             raise ValueError(msg)
         else:
-            placed[a] = rebuilt(graph, op, args, placed)
+            placed[a] = graph.rebuilt(op, args, placed)
     return placed
 
 
@@ -174,7 +172,7 @@ class Formulas:
             waiting, fixed = [output], self._fixed(tape)
             while waiting:
                 a = waiting.pop()
-                op, children = self.graph.nodes[a][0], arguments(self.graph, a)
+                op, children = self.graph.nodes[a][0], self.graph.children(a)
                 if a in fixed and not found[tape.slots[a]].is_finite():
                     return name
                 if op == "div" and children[1] in fixed and found[tape.slots[children[1]]] == 0:
@@ -189,7 +187,7 @@ class Formulas:
         for a in tape.nodes:
             op, args = self.graph.nodes[a]
             inputs = op == "var" and int(args[0]) < self.dimension
-            if not inputs and all(child in fixed for child in arguments(self.graph, a)):
+            if not inputs and all(child in fixed for child in self.graph.children(a)):
                 fixed.add(a)
         return fixed
 
@@ -200,7 +198,7 @@ class Formulas:
             a = waiting.pop()
             if a in taken:
                 continue
-            children = arguments(self.graph, a)
+            children = self.graph.children(a)
             given = [found[tape.slots[child]] for child in children]
             op = self.graph.nodes[a][0]
             if op == "select":
@@ -222,7 +220,7 @@ class Formulas:
         for a in sorted(taken):
             op, args = self.graph.nodes[a]
             direct = taken[a] == a
-            placed[a] = rebuilt(graph, op, args, placed) if direct else placed[taken[a]]
+            placed[a] = graph.rebuilt(op, args, placed) if direct else placed[taken[a]]
         outputs = tuple([placed[self.outputs[row]] for row in rows])
         return SmoothForms(graph, outputs, self.dimension, self.inputs)
 

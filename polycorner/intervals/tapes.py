@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.programs import Graph, Payload
-from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import (
     ANALYTIC,
     PARTIALS,
@@ -58,27 +57,11 @@ class Box:
         return cls(hull, middle, slopes, reach)
 
 
-def needed(
-    graph: Graph,
-    outputs: Sequence[int],
-    reads: Callable[[Graph, int], Sequence[int]] = arguments,
-) -> list[int]:
-    """Return the nodes that some nodes depend on, arguments before results."""
-    seen: set[int] = set()
-    waiting = list(outputs)
-    while waiting:
-        a = waiting.pop()
-        if a not in seen:
-            seen.add(a)
-            waiting += reads(graph, a)
-    return sorted(seen)
-
-
 class Tape:
     """A graph's outputs as a list of ball operations."""
 
     def __init__(self, graph: Graph, outputs: Sequence[int]) -> None:
-        self.nodes = needed(graph, outputs)
+        self.nodes = graph.needed(outputs)
         self.slots = {a: slot for slot, a in enumerate(self.nodes)}
         self.outputs = [self.slots[a] for a in outputs]
         self._constants: list[tuple[int, Payload]] = []

@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from polycorner.formulas.adjoints import LEAVES, derivatives
+from polycorner.formulas.adjoints import derivatives
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.operations import OPERATIONS
-from polycorner.formulas.programs import Graph
-from polycorner.formulas.ranges import arguments
+from polycorner.formulas.programs import LEAVES, Graph
 from polycorner.minimisation.series import Ring, ring
 from polycorner.spaces.manifold import Array
 
@@ -68,17 +67,8 @@ def _plan(family: Family, members: tuple[str, ...], slopes: bool) -> _Plan:
     targets = [
         [values[row], *(gradients[row * k : (row + 1) * k] if slopes else ())] for row in rows
     ]
-    needed, stack = set[int](), [node for some in targets for node in some]
-    while stack:
-        top = stack.pop()
-        if top not in needed:
-            needed.add(top)
-            stack += arguments(graph, top)
-    steps = []
-    for node in sorted(needed):
-        op, args = graph.nodes[node]
-        steps.append((node, op, args if op in LEAVES else tuple(arguments(graph, node))))
-    return _Plan(steps, targets)
+    needed = graph.needed(node for some in targets for node in some)
+    return _Plan([(node, *graph.nodes[node]) for node in needed], targets)
 
 
 @lru_cache(maxsize=256)

@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph
-from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import dot
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided, write
-from polycorner.intervals.tapes import Box, needed
+from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.symmetry import vector_field
 from polycorner.proofs.polynomials import Polynomial, TooLargeError, product, total
 from polycorner.spaces.manifold import Manifold
@@ -97,9 +96,9 @@ def translations(forms: SmoothForms) -> list[list[Fraction]]:
     zero = (Fraction(0),) * n
     slopes: dict[int, tuple[Fraction, ...]] = {}
     rows: set[tuple[Fraction, ...]] = set()
-    for a in needed(forms.graph, forms.outputs):
+    for a in forms.graph.needed(forms.outputs):
         op, args = forms.graph.nodes[a]
-        children = [slopes[child] for child in arguments(forms.graph, a)]
+        children = [slopes[child] for child in forms.graph.children(a)]
         slopes[a] = zero
         if op == "var" and int(args[0]) < n:
             slopes[a] = tuple(Fraction(int(k == args[0])) for k in range(n))
@@ -118,7 +117,7 @@ def translations(forms: SmoothForms) -> list[list[Fraction]]:
 
 def _factor(graph: Graph, a: int) -> tuple[Fraction, int] | None:
     """Return a rational factor of a product and the node of the other factor."""
-    u, v = arguments(graph, a)
+    u, v = graph.children(a)
     for constant, other in ((u, v), (v, u)):
         op, args = graph.nodes[constant]
         if op == "const" and isinstance(args[0], Fraction):
@@ -186,7 +185,7 @@ class _Slopes:
             return {(): args[0]} if args[0] else {}
         if op not in {"add", "sub", "neg", "mul"}:
             return {(a,): Fraction(1)}
-        parts = [self.written(child) for child in arguments(self.graph, a)]
+        parts = [self.written(child) for child in self.graph.children(a)]
         if op == "mul":
             return product(*parts)
         return total(parts, op)
@@ -202,7 +201,7 @@ class _Slopes:
         if op == "var":
             inside = int(args[0]) < len(self.components)
             return self.written(self.components[int(args[0])]) if inside else {}
-        children = arguments(self.graph, a)
+        children = self.graph.children(a)
         slopes = [self.slope(child) for child in children]
         if not any(slopes):
             return {}

@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload
-from polycorner.formulas.ranges import arguments
 from polycorner.intervals.balls import ball, constant, operations
 from polycorner.intervals.enclosures import Formulas
-from polycorner.intervals.tapes import needed
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.polynomials import Polynomial, TooLargeError
 
@@ -117,14 +115,14 @@ def evaluate(
 ) -> list[Any]:
     """Return exact values of nodes; None where a branch or a size is not decided."""
     values: dict[int, Any] = {}
-    for a in needed(graph, outputs):
+    for a in graph.needed(outputs):
         op, args = graph.nodes[a]
         if op == "var":
             values[a] = inputs[int(args[0])]
         elif op == "const":
             values[a] = _leaf(args[0], symbols)
         else:
-            values[a] = _applied(op, [values[child] for child in arguments(graph, a)], symbols)
+            values[a] = _applied(op, [values[child] for child in graph.children(a)], symbols)
     return [values[a] for a in outputs]
 
 

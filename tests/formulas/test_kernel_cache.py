@@ -16,11 +16,10 @@ from llvmlite.binding import ffi
 
 import polycorner
 from polycorner import Manifold, Polyhedron, SmoothFunction, minimise
-from polycorner.formulas import kernels, shapes
+from polycorner.formulas import kernels, machine_code, shapes
 from polycorner.formulas.bundles import resolve
 from polycorner.formulas.cache import cache_folder, cache_size, clear_cache, one_at_a_time
 from polycorner.formulas.families import Family
-from polycorner.formulas.machine_code import machine_code
 from polycorner.minimisation import problem
 
 ROOT = Path(polycorner.__file__).parents[1]
@@ -265,14 +264,14 @@ def test_equal_formulas_of_threads_share_one_kernel(monkeypatch):
 
 
 def test_code_goes_with_its_polyhedron(monkeypatch):
-    engines, load = weakref.WeakSet(), kernels.load_code
+    engines, load = weakref.WeakSet(), machine_code.load_code
 
     def noted(code, entries):
         engine, addresses = load(code, entries)
         engines.add(engine)
         return engine, addresses
 
-    monkeypatch.setattr(kernels, "load_code", noted)
+    monkeypatch.setattr(machine_code, "load_code", noted)
     plane = Manifold.euclidean("x y")
     x, y = plane.symbols
     for k in range(3):
@@ -296,6 +295,6 @@ def test_compiling_leaves_nothing_behind(monkeypatch):
 
         monkeypatch.setitem(ffi.lib._fntab, f"LLVMPY_{name}", counted)
     for _ in range(3):
-        assert machine_code("define double @twice(double %x) { ret double %x }")
+        assert machine_code.machine_code("define double @twice(double %x) { ret double %x }")
     gc.collect()
     assert [*counts.values()] == [3, 3]

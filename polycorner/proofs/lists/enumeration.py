@@ -32,7 +32,7 @@ from polycorner.formulas.ranges import LARGEST
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms
-from polycorner.intervals.tapes import Box, needed
+from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
 from polycorner.minimisation.parametric import lifted_family
 from polycorner.minimisation.problem import Problem, pose
@@ -185,7 +185,7 @@ def _rank(matrix: Array) -> int:
 def _is_complete(field: Generator) -> bool:
     """Whether the derivatives of the components are bounded, without branches."""
     formulas = field.formulas
-    nodes = needed(formulas.graph, formulas.outputs)
+    nodes = formulas.graph.needed(formulas.outputs)
     if any(formulas.graph.nodes[a][0] == "select" for a in nodes):
         return False
     forms = SmoothForms(formulas.graph, formulas.outputs, formulas.dimension, formulas.inputs)

@@ -30,7 +30,7 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.intervals.enclosures import Formulas, Undecided
-from polycorner.intervals.tapes import Box, needed
+from polycorner.intervals.tapes import Box
 from polycorner.proofs.definite import pivots
 from polycorner.proofs.lists.acceptance import QUARTERINGS, WIDEST
 from polycorner.proofs.lists.branches import Mask
@@ -73,7 +73,7 @@ class LocusRegion(Value):
 
 def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ...]:
     """Return the free coordinates that the energy depends on."""
-    nodes = (formulas.graph.nodes[a] for a in needed(formulas.graph, formulas.outputs[-1:]))
+    nodes = (formulas.graph.nodes[a] for a in formulas.graph.needed(formulas.outputs[-1:]))
     read = {int(args[0]) for op, args in nodes if op == "var"}
     return tuple(i for i in free if i in read)
 

@@ -24,6 +24,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +33,8 @@ from numpy.typing import NDArray
 
 from polycorner.atomic import write_atomically
 from polycorner.formulas.programs import Graph
-from polycorner.formulas.ranges import arguments, pattern
+from polycorner.formulas.ranges import pattern, reads
 from polycorner.intervals.enclosures import Formulas
-from polycorner.intervals.tapes import needed
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain
@@ -198,7 +198,7 @@ def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list
     """
     places: dict[int, int] = {}
     nodes: list[list[Any]] = []
-    for a in needed(graph, outputs, _reads):
+    for a in graph.needed(outputs, partial(reads, graph)):
         op, args = graph.nodes[a]
         found = pattern(graph, a)
         if found:
@@ -206,16 +206,11 @@ def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list
         if op in {"const", "var"}:
             nodes.append([op, str(args[0]) if op == "const" else int(args[0])])
         else:
-            nodes.append([op, *(places[b] for b in _reads(graph, a))])
+            nodes.append([op, *(places[b] for b in reads(graph, a))])
         if found and found.kind == "-abs":
             nodes.append(["neg", len(nodes) - 1])
         places[a] = len(nodes) - 1
     return nodes, [places[a] for a in outputs]
-
-
-def _reads(graph: Graph, a: int) -> tuple[int, ...]:
-    found = pattern(graph, a)
-    return found.nodes if found else tuple(arguments(graph, a))
 
 
 def period(value: float) -> str | None:
