@@ -27,9 +27,15 @@ from pathlib import Path
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_times
-from polycorner.models.wells.escape import mean_escape_time, overdamped_escape_time
-from polycorner.models.wells.holding import Escapes, escapes, kick_of, ladder
-from polycorner.models.wells.wells import Well
+from polycorner.models.wells import (
+    Escapes,
+    Well,
+    escapes,
+    kick_of,
+    ladder,
+    mean_escape_time,
+    overdamped_escape_time,
+)
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 DEPTH, DRAG = 1.5, 0.8  # units of the temperature, of sqrt(m T) / a
@@ -80,7 +86,7 @@ def times(wells: Sequence[Well]) -> list[float]:
 def draw(path: Path, count: int = 40) -> Path:
     """Draw wells, paths, times to escape, capture, and the wells of the dyad."""
     from polycorner.dumbbells.pictures import draw_wells
-    from polycorner.models.wells.holding import compare
+    from polycorner.models.wells import compare
     from polycorner.pictures import save
 
     return save(draw_wells(compare(count=count), PAIR), path)

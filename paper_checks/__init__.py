@@ -1,31 +1,5 @@
 """The statements of [GMBN], each restated and checked; ``CLAIMS`` in the order of its sections."""
 
-from itertools import chain
+import lazy_loader
 
-from paper_checks import (
-    appendixA,
-    appendixB,
-    appendixC,
-    section2,
-    section3,
-    section4,
-    section5,
-    section6,
-    section7,
-    section8,
-)
-from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.records import SECTIONS
-
-ORDER = tuple(SECTIONS)  # sections of the paper first, then appendices
-PARTS = (section2, section3, section4, section5, section6, section7, section8)
-APPENDICES = (appendixA, appendixB, appendixC)
-
-CLAIMS: tuple[Claim, ...] = tuple(
-    sorted(
-        chain.from_iterable(part.CLAIMS for part in (*PARTS, *APPENDICES)),
-        key=lambda claim: ORDER.index(claim.section),
-    )
-)
-
-__all__ = ["CLAIMS", "Claim", "Finding", "Means", "Verdict"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

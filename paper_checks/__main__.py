@@ -1,8 +1,8 @@
 """``python -m paper_checks``: the same as ``polycorner paper``."""
 
+import runpy
 import sys
 
-from polycorner.cli.main import main
-
 if __name__ == "__main__":
-    main(["paper", *sys.argv[1:]])
+    sys.argv.insert(1, "paper")
+    runpy.run_module("polycorner", run_name="__main__")

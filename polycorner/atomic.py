@@ -17,7 +17,7 @@ def is_part(path: Path) -> bool:
 
 
 @contextmanager
-def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replace_atomically(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary name in the same folder, and move it to ``path`` if all goes well.
 
     The folder is created if it does not exist.  The temporary name has the suffix of ``path``, by
@@ -39,7 +39,7 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     --------
     >>> import tempfile
     >>> target = Path(tempfile.mkdtemp()) / "answer.txt"
-    >>> with atomic(target) as temporary:
+    >>> with replace_atomically(target) as temporary:
     ...     _ = temporary.write_text("42")
     >>> target.read_text()
     '42'
@@ -65,19 +65,19 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
 def write_atomically(
     path: str | os.PathLike[str], content: bytes | str, *, suffix: str = ""
 ) -> Path:
-    """Write bytes, or text in UTF-8, with :func:`atomic`, and return the path.
+    """Write bytes, or text in UTF-8, with :func:`replace_atomically`, and return the path.
 
     Raises
     ------
     ValueError
         If a suffix is required and the name has another one.
     OSError
-        See :func:`atomic`.
+        See :func:`replace_atomically`.
     """
     target = Path(path)
     if suffix and target.suffix.lower() != suffix:
         refuse("path", f"a name ending in {suffix}", target.name)
-    with atomic(target) as temporary:
+    with replace_atomically(target) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
     return target
 

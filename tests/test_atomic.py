@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from polycorner.atomic import PART, atomic, write_atomically
+from polycorner.atomic import PART, replace_atomically, write_atomically
 
 
 def full(*_, **__):
@@ -27,7 +27,7 @@ def test_a_file_replaces_another_and_leaves_nothing_else(tmp_path):
     path = write_atomically(tmp_path / "new" / "thing.txt", "first")
     assert write_atomically(path, b"second") == path
     assert path.read_bytes() == b"second"
-    with atomic(path) as temporary:
+    with replace_atomically(path) as temporary:
         assert temporary.suffix == ".txt"
         assert temporary.parent == path.parent
         temporary.write_text("third")
@@ -63,7 +63,7 @@ def test_an_exception_while_writing_passes_and_leaves_the_old_file(tmp_path, err
     path = write_atomically(tmp_path / "thing", b"before")
 
     def write():
-        with atomic(path) as temporary:
+        with replace_atomically(path) as temporary:
             temporary.write_bytes(b"half")
             raise error
 
@@ -77,7 +77,7 @@ def test_an_error_without_a_number_keeps_its_words(tmp_path):
     message = "the encoder failed"
     with (
         pytest.raises(OSError, match=r"^the encoder failed: nothing was written to .*film$"),
-        atomic(tmp_path / "film"),
+        replace_atomically(tmp_path / "film"),
     ):
         raise OSError(message)
 
@@ -102,8 +102,8 @@ def test_a_read_only_folder_is_one_sentence(tmp_path):
 
 KILLED = """
 import os, signal, sys
-from polycorner.atomic import atomic
-with atomic(sys.argv[1]) as temporary:
+from polycorner.atomic import replace_atomically
+with replace_atomically(sys.argv[1]) as temporary:
     temporary.write_bytes(b"half of it")
     os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -36,6 +36,15 @@ def test_the_api_shows_every_public_name_under_one_package(room):
             assert hasattr(import_module(package), name), (package, name)
 
 
+@pytest.mark.parametrize("others", [{}, {"": "Manifold Manifold"}, {"": "Polytope"}])
+def test_the_api_has_every_public_name_once(monkeypatch, others):
+    first, *rest = api.GROUPS
+    names = first.names | {"": f"{first.names['']} {others['']}"} if others else {}
+    monkeypatch.setattr(api, "GROUPS", (first._replace(names=names), *rest))
+    with pytest.raises(ValueError, match="every public name once"):
+        api.page()
+
+
 @pytest.mark.parametrize("file", sorted((DOCS / "inventories").glob("*.txt")), ids=lambda f: f.stem)
 def test_names_of_other_projects_exist(file):
     head, *entries = file.read_text().splitlines()

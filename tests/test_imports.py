@@ -1,6 +1,9 @@
 """Importing the package is cheap, and every public name is there."""
 
+import ast
+import importlib
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,9 +12,13 @@ import networkx as nx
 import pytest
 
 import polycorner
+import polycorner.cli
+import polycorner.toolkit
+from docs.extensions import homes
 
 ROOT = Path(polycorner.__file__).parents[1]
 HEAVY = ("sympy", "numba", "llvmlite", "scipy", "cvxpy", "clarabel", "matplotlib", "rich", "click")
+OUTSIDE = re.compile(r"polycorner(?!\.dumbbells)\b")
 LOADED = """
 import sys
 before = set(sys.modules)
@@ -111,3 +118,31 @@ def test_warnings_of_numpy_are_those_of_a_users_own_lines():
     command = [sys.executable, "-c", UNDEFINED]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.split("\n")[:2] == ["polycorner.motion.anywhere 0", "mine 2"]
+
+
+def _declared():
+    """Return the public names of every package, and of what applications are built with."""
+    packages = [polycorner, *map(importlib.import_module, homes.ROOMS[1:])]
+    doors = ("polycorner.cli", "polycorner.toolkit", "polycorner.models.wells")
+    packages += map(importlib.import_module, doors)
+    return {package.__name__: {*package.__all__, "__version__"} for package in packages}
+
+
+@pytest.mark.parametrize("application", ["polycorner/dumbbells", "paper_checks"])
+def test_an_application_imports_public_names_only(application):
+    declared = _declared()
+    private = []
+    for file in sorted((ROOT / application).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = [alias.name for alias in getattr(node, "names", ())]
+            if isinstance(node, ast.Import):
+                private += [f"{file}: {name}" for name in names if name.startswith("polycorner")]
+            elif isinstance(node, ast.ImportFrom) and OUTSIDE.match(node.module):
+                known = declared.get(node.module, ())
+                private += [f"{file}: {node.module}.{n}" for n in names if n not in known]
+    assert private == []
+
+
+def test_every_name_that_applications_are_built_with_resolves():
+    for door in (polycorner.cli, polycorner.toolkit):
+        assert all(getattr(door, name) is not None for name in door.__all__)

@@ -10,7 +10,7 @@ import numpy as np
 from paper_checks.appendixA.forces import STATIC, TILT, frame, is_zero, judged, tex
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.statics.keel import RestRegion
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 ROUNDING = 1.0  # degree: the uncertainty of "about 20 degrees"
 SAMPLES = 20_000

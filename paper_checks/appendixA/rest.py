@@ -11,9 +11,8 @@ from paper_checks.appendixA.forces import STATIC, TILT, does, frame, judged, tex
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import RestRegion, exact_eastern_boundary
-from polycorner.motion.simulation import simulate
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Trajectory, simulate
+from polycorner.toolkit import Array
 
 DYNAMIC = (0.06, 0.2)  # dynamic coefficients of rolling and sliding; the paper gives none
 NUDGE = 1.0  # mm/s

@@ -14,7 +14,7 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.singles import follow
 from polycorner.dumbbells.statics.keel import RestRegion
 from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 DRUM = DumbbellDrum(sliding=(STATIC[1], DYNAMIC[1]), rolling=(STATIC[0], DYNAMIC[0]))
 

@@ -12,7 +12,7 @@ from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.singles import Zigzag, follow, keel_of, onset_azimuths, zigzags
 from polycorner.dumbbells.statics.keel import RestRegion
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 DRUM = DumbbellDrum(sliding=(STATIC[1], DYNAMIC[1]), rolling=(STATIC[0], DYNAMIC[0]))
 STEP = 1e-4  # rad, angle by which the drum is turned in one step

@@ -22,7 +22,7 @@ from polycorner.models import Tutorial
 if TYPE_CHECKING:
     import sympy
 
-    from polycorner.spaces.manifold import Array
+    from polycorner.toolkit import Array
 
 PLANE, SPACE, FOUR = (Manifold.euclidean(names) for names in ("x y", "x y z", "x y z w"))
 Points = Sequence[Sequence[float]]

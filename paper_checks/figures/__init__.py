@@ -16,8 +16,7 @@ from paper_checks.figures import (
     solid,
 )
 from paper_checks.figures.figure import Figure
-from polycorner import checks
-from polycorner.progress import Progress, silent
+from polycorner.toolkit import Progress, checks, silent
 
 FIGURES: dict[str, Figure] = {
     figure.name: figure

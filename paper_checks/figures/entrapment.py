@@ -12,8 +12,7 @@ from matplotlib.figure import Figure as Drawing
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from polycorner.dumbbells import dyad_minima
-from polycorner.models.wells.holding import ladder
-from polycorner.models.wells.wells import Well
+from polycorner.models.wells import Well, ladder
 
 FRICTION, RESTITUTION = 0.04, 0.6  # friction in units of depth per rim; restitution of the wall
 # starting position of the mass, in rims; duration, in rims times sqrt(mass / depth)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from PIL import Image
 
 from paper_checks.figures.style import styled
-from polycorner.atomic import atomic
+from polycorner.toolkit import replace_atomically
 
 DPI = 200
 SHADES = 128  # of a PNG
@@ -63,7 +63,7 @@ class Figure:
         paths = [folder / f"{self.name}.{ending}" for ending in ("png", "svg")]
         with styled():
             _save_png(drawing, paths[0])
-            with atomic(paths[1]) as temporary:
+            with replace_atomically(paths[1]) as temporary:
                 drawing.savefig(temporary, metadata={"Date": None, "Title": self.title})
         return paths
 
@@ -75,5 +75,5 @@ def _save_png(drawing: Drawing, path: Path) -> None:
     drawing.savefig(raw, format="png", dpi=DPI)
     with Image.open(raw) as image:
         few = image.convert("RGB").quantize(SHADES, dither=Image.Dither.NONE)
-        with atomic(path) as temporary:
+        with replace_atomically(path) as temporary:
             few.save(temporary, optimize=True, dpi=(DPI, DPI))

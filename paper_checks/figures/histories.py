@@ -14,8 +14,7 @@ from paper_checks.figures.style import minus
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
 from polycorner.dumbbells.dynamics.singles import Zigzag, follow, zigzags
 from polycorner.dumbbells.pair import Chirality
-from polycorner.motion.noise import Noise
-from polycorner.motion.trajectory import Trajectory
+from polycorner.motion import Noise, Trajectory
 
 STEP = 2e-3  # s
 EARLY = 60.0  # s, duration shown enlarged

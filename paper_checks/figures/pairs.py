@@ -13,7 +13,7 @@ from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from paper_checks.figures.style import minus
 from polycorner.dumbbells import DyadMinimum, PairAtlas, dyad_minima, pair_atlas
-from polycorner.skeletons.refinement import traced
+from polycorner.skeletons import traced
 
 PAIR = style.PLANE
 TOUCH = 1e-6  # mm

@@ -9,7 +9,7 @@ from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from polycorner.models import Tutorial
 from polycorner.pictures import draw_region
-from polycorner.polyhedra.strata import LocalType, stratum_at
+from polycorner.polyhedra import LocalType, stratum_at
 
 REGION = Tutorial()
 BOUNDS = (-3.9, 4.1, -3.2, 3.5)

@@ -19,7 +19,7 @@ from paper_checks.figures.pairs import LETTERS, PAIR, atlas
 from polycorner.dumbbells.pictures.placements import forbidden_solid
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
 from polycorner.pictures import SharpSurface, View, place_solid
-from polycorner.skeletons.refinement import traced
+from polycorner.skeletons import traced
 
 RESOLUTION = 112  # cells of the solid along each side
 REACH = (0.0, 0.45, 0.9)  # distances from the corner of the instants shown, in scales

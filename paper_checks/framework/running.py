@@ -12,9 +12,7 @@ from importlib import import_module
 from multiprocessing import active_children, get_context
 
 from paper_checks.framework.claims import Claim, Finding
-from polycorner import checks
-from polycorner.progress import Progress, silent
-from polycorner.workers import serve
+from polycorner.toolkit import Progress, checks, serve, silent
 
 # Each process has a core of its own; threads of the linear algebra would compete for it.
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")

@@ -9,7 +9,7 @@ from functools import cache
 from html import escape
 from xml.etree import ElementTree as ET
 
-from polycorner import checks
+from polycorner.toolkit import checks
 
 NAMESPACE = ' xmlns="http://www.w3.org/1998/Math/MathML"'
 FORMULA = re.compile(r"\$([^$]+)\$")

@@ -28,10 +28,8 @@ from polycorner.dumbbells.dynamics.dyads import handedness
 from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed
-from polycorner.motion.events import EventKind
-from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
-from polycorner.spaces.manifold import Array
+from polycorner.motion import EventKind, Noise, simulate
+from polycorner.toolkit import Array
 
 PICTURE = (8.0, 2.0, 0.5)  # l, r, t of the paper's picture of a bunch
 LARGER = (16.0, 3.0, 1.5)  # l, r, t of its dyads

@@ -21,8 +21,8 @@ from paper_checks.framework.disturbances import ALONG, Disturbance, which
 from polycorner.dumbbells.dynamics.singles import follow, zigzags
 from polycorner.dumbbells.statics.keel import Keel
 from polycorner.dumbbells.studies.driven import disturbed
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Trajectory
+from polycorner.toolkit import Array
 
 NOISY = Disturbance("chatter", 0.35, 0.01)  # headings decay while dumbbells climb at first
 MILD, QUIET = NOISY._replace(strength=0.2), NOISY._replace(strength=0.0)

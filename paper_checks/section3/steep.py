@@ -13,7 +13,7 @@ from paper_checks.section3.singles import risen
 from polycorner.dumbbells.dynamics.singles import follow
 from polycorner.dumbbells.statics.keel import Keel
 from polycorner.dumbbells.statics.keel_formulas import s_curve
-from polycorner.motion.noise import Noise
+from polycorner.motion import Noise
 
 RAPID = 1.0  # mm/s, threshold of a rapid descent: several times the speed of climbing
 

@@ -16,9 +16,8 @@ from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from paper_checks.section7.driven import one_dyad
 from polycorner.dumbbells.dynamics.singles import onset_azimuths
 from polycorner.dumbbells.statics.keel import RestRegion
-from polycorner.motion.events import EventKind
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.motion import EventKind, Trajectory
+from polycorner.toolkit import Array
 
 
 def highest(path: Trajectory) -> float:

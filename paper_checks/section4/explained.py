@@ -10,7 +10,7 @@ from paper_checks.appendixA.forces import STATIC, frame, is_zero, judged, row, t
 from paper_checks.appendixA.torque import DRUM, potential
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.dynamics.singles import follow, keel_ratio, zigzags
-from polycorner.motion.noise import Noise
+from polycorner.motion import Noise
 
 LEVEL = replace(DRUM, tilt=0.0)
 

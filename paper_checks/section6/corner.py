@@ -26,13 +26,14 @@ from paper_checks.section6.experiment import (
     proof,
     rests,
 )
-from polycorner import checks, stationary_on
+from polycorner import stationary_on
 from polycorner.dumbbells import (
     DumbbellPair,
     critical_rod_radius,
     heading_error_bar,
     plane_heading_formula,
 )
+from polycorner.toolkit import checks
 
 LENGTH, BALL, ROD = sympy.symbols("l r t", positive=True)
 PRINTED_HEADING = sympy.atan(BALL / LENGTH)

@@ -37,9 +37,9 @@ import sympy as sp
 
 from polycorner import Manifold, Polyhedron, SmoothFunction
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
-from polycorner.intervals.boxes import BoxFunctions
 from polycorner.proofs import StationaryList, stationary_points
 from polycorner.sweeps import Axis, SweepError, sweep
+from polycorner.toolkit import BoxFunctions
 
 BALL = 3.0
 LENGTHS, RODS = (14.0, 18.0), (1.2, 1.8)

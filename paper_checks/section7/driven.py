@@ -12,9 +12,7 @@ from paper_checks.framework.disturbances import ALONG, Disturbance
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, follow_pairs
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed
-from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
-from polycorner.motion.trajectory import Trajectory
+from polycorner.motion import Noise, Trajectory, simulate
 
 Kind = Literal["end_to_end", "side_by_side"]
 Starts = tuple[tuple[Chirality, float], ...]  # chirality and heading, in degrees

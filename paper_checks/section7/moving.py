@@ -26,9 +26,8 @@ from paper_checks.section7.driven import (
     settled,
 )
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, handedness, minimiser_heading
-from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Noise, simulate
+from polycorner.toolkit import Array
 
 BOTH: Starts = (("R", 8.0), ("L", -8.0))
 MILD, STRONG = 0.3, 0.4  # chatter with which right-handed pairs climb, and do not

@@ -21,7 +21,7 @@ from polycorner.models import Pinball
 from polycorner.polyhedra import LocalType
 
 if TYPE_CHECKING:
-    from polycorner.spaces.manifold import Array
+    from polycorner.toolkit import Array
 
 BOARD = Pinball()
 ASIDE = 1e-3  # distance from a corner at which balls are released

@@ -15,7 +15,7 @@ from polycorner import checks
 from polycorner.bodies import gaps
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.pairs import PlacedPart, function_of, nearest
-from polycorner.bodies.waves import checked_waves, depth
+from polycorner.bodies.waves import checked_waves, wave_depth
 from polycorner.checks import refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
@@ -196,8 +196,8 @@ def within(
 ) -> list[tuple[SmoothFunction, Array]]:
     """Return the gaps of a part and a wall, and the points of the part that they are of."""
     radius = member.part.radius
-    if isinstance(wall, Cylinder) and wall.radius - depth(wall.waves) <= radius:
-        room = f" plus {depth(wall.waves):g} for its waves" if wall.waves else ""
+    if isinstance(wall, Cylinder) and wall.radius - wave_depth(wall.waves) <= radius:
+        room = f" plus {wave_depth(wall.waves):g} for its waves" if wall.waves else ""
         refuse("walls", f"a radius of {name!r} above that of {member.name!r}{room}", wall.radius)
     numbers, family = wall.numbers(radius), wall.family(member.frame)
     points = list(enumerate(member.part.points))

@@ -32,13 +32,13 @@ def checked_waves(given: Any, radius: float) -> dict[int, tuple[float, float]]:
             refuse("waves", expected, given, TypeError)
         amplitude, phase = (checks.real("waves", x) for x in pair)
         found[checks.whole("waves", k, least=1)] = amplitude, phase
-    if found and depth(found) >= radius:
+    if found and wave_depth(found) >= radius:
         least = "amplitudes a_k with the sum of |a_k| (k^2 + 1) below the radius, for a convex wall"
         refuse("waves", least, given)
     return found
 
 
-def depth(given: Mapping[int, tuple[float, float]]) -> float:
+def wave_depth(given: Mapping[int, tuple[float, float]]) -> float:
     """Return ``sum |a_k| (k^2 + 1)``.
 
     A curve ``rho(phi) = s + sum a_k cos(k phi + p_k)`` bounds a convex set if ``rho^2 + 2 rho'^2 -

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from polycorner.models.pinball import Pinball
     from polycorner.models.tutorial import Tutorial
 
-MEMBERS = {"dyad": "polycorner.dumbbells.cli.atlas:dyad"}
 STARTS = 60  # random points from which a search in the plane descends
 CROWDED = 12  # corners above which a picture is clearer without their names
 RESUMING = """
@@ -31,7 +30,7 @@ the same command with --resume continues it, also after the process was killed.
 
 @click.group(
     cls=LazyGroup,
-    members=MEMBERS,
+    prefix="atlas.",
     epilog=examples("atlas dyad --plane", "atlas spheres --count 6", "atlas tutorial --out out"),
     no_args_is_help=True,
 )

@@ -1,30 +1,59 @@
-"""Groups of commands whose members are imported when they are needed."""
+"""Groups of commands whose members are imported when they are needed, those of applications too.
+
+An application registers its commands as entry points of the group ``polycorner.commands``:
+``drum`` is a command, ``atlas.dyad`` one of the group ``atlas``.  Tables of studies, which stand
+beside their files, are entry points of ``polycorner.studies`` (:mod:`polycorner.cli.sweep`).
+"""
 
 from collections.abc import Mapping
+from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from polycorner.cli.options import GroupedCommand, everywhere
+from polycorner.cli.output import fail
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+UNREGISTERED = (
+    "no application is registered in this environment, which was installed before applications "
+    "registered their commands: install it again, by `make env` or `pip install -e .`"
+)
+
+
+@cache
+def registered(kind: str) -> Mapping[str, "EntryPoint"]:
+    """Return the entry points of applications, ``commands`` or ``studies``, by name."""
+    from importlib.metadata import entry_points  # takes as long as all the rest of a start
+
+    return {point.name: point for point in entry_points(group=f"polycorner.{kind}")}
 
 
 class LazyGroup(click.Group):
-    """A group with members given as ``module:attribute``.
+    """A group with members given as ``module:attribute``, and those of applications.
 
     Parameters
     ----------
     members : mapping from str to str
         Module and attribute of each command, imported when it runs or its help is shown.
+    prefix : str, optional
+        What precedes the names of this group's members among the entry points.
     """
 
     command_class = GroupedCommand
 
     def __init__(
-        self, *args: Any, members: Mapping[str, str] | None = None, **options: Any
+        self,
+        *args: Any,
+        members: Mapping[str, str] | None = None,
+        prefix: str = "",
+        **options: Any,
     ) -> None:
         super().__init__(*args, **options)
-        self.members = dict(members or {})
+        self.members, self.prefix = dict(members or {}), prefix
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
         """Add a command, together with the options that all commands share."""
@@ -32,11 +61,53 @@ class LazyGroup(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
-        return sorted({*super().list_commands(ctx), *self.members})
+        names = (n for n in registered("commands") if n.startswith(self.prefix))
+        beyond = {rest for n in names if "." not in (rest := n.removeprefix(self.prefix))}
+        return sorted({*super().list_commands(ctx), *self.members, *beyond})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return a command, importing it if necessary."""
-        if cmd_name in self.members and cmd_name not in self.commands:
-            module, _, attribute = self.members[cmd_name].partition(":")
-            self.add_command(getattr(import_module(module), attribute), cmd_name)
+        if cmd_name not in self.commands:
+            if cmd_name in self.members:
+                module, _, attribute = self.members[cmd_name].partition(":")
+                self.add_command(getattr(import_module(module), attribute), cmd_name)
+            elif self.prefix + cmd_name in registered("commands"):
+                point = registered("commands")[self.prefix + cmd_name]
+                self.add_command(_loaded(point), cmd_name)
         return super().get_command(ctx, cmd_name)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the arguments name, and the arguments that are left."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            if registered("commands"):
+                raise
+            msg = f"{error.message.rstrip('.')}; {UNREGISTERED}"
+            raise click.UsageError(msg, ctx) from error
+
+
+def _loaded(point: "EntryPoint") -> click.Command:
+    """Load the command of an application, or make one that says why it cannot be loaded."""
+    try:
+        command = point.load()
+    except Exception as error:  # code of others: whatever it raises, the other commands work
+        why = f"{point.name}: {point.value} cannot be loaded ({type(error).__name__}: {error})"
+    else:
+        if isinstance(command, click.Command):
+            return command
+        why = f"{point.name}: expected a command of click in {point.value}; got {command!r}"
+
+    def refuse(rest: object) -> NoReturn:
+        del rest
+        fail(why)
+
+    return click.Command(
+        point.name,
+        callback=refuse,
+        short_help="(cannot be loaded)",
+        params=[click.Argument(["rest"], nargs=-1, type=click.UNPROCESSED)],
+        context_settings={"ignore_unknown_options": True},
+    )

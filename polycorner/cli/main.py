@@ -37,14 +37,8 @@ EXIT_CODES = {
     BROKEN_PIPE: "broken pipe",
 }
 COMMANDS = {
-    **{
-        name: f"polycorner.cli.{name}:{name}"
-        for name in ("atlas", "cache", "completion", "minima", "sweep")
-    },
-    **{
-        name: f"polycorner.dumbbells.cli.{name}:{name}"
-        for name in ("drum", "dyad", "paper", "prove", "view")
-    },
+    name: f"polycorner.cli.{name}:{name}"
+    for name in ("atlas", "cache", "completion", "minima", "sweep")
 }
 EXAMPLES = examples(
     "dyad", "dyad --rod 1 --drum inf --json", "atlas spheres --count 6", "dyad --help"

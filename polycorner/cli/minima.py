@@ -14,13 +14,12 @@ if TYPE_CHECKING:
     from polycorner.minimisation import Certificate, Minima
     from polycorner.printing import Sheet
 
-MEMBERS = {"dyad": "polycorner.dumbbells.cli.minima:dyad"}
 WORDS = "minimising"
 
 
 @click.group(
     cls=LazyGroup,
-    members=MEMBERS,
+    prefix="minima.",
     epilog=examples("minima dyad --starts 300", "minima pinball --starts 200"),
     no_args_is_help=True,
 )
@@ -55,10 +54,10 @@ def pinball(starts: int, seed: int, as_json: bool, out: Path | None) -> None:
     def described(certificate: "Certificate") -> dict[str, Any]:
         return {"name": " ".join(certificate.active)}
 
-    report("pinball", {}, found, described, "", as_json=as_json, out=out)
+    report_minima("pinball", {}, found, described, "", as_json=as_json, out=out)
 
 
-def report(
+def report_minima(
     model: str,
     chosen: dict[str, Any],
     found: "Minima",

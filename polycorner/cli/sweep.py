@@ -5,12 +5,12 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from polycorner.cli.lazy import registered
 from polycorner.cli.options import GroupedCommand, answer_options, option
 from polycorner.cli.output import (
     deliver,
@@ -30,27 +30,28 @@ if TYPE_CHECKING:
     from polycorner.printing import Sheet
     from polycorner.sweeps.study_files import NamedStudy, StudyFile
 
-NAMED = "polycorner.dumbbells.studies"  # package with the table STUDIES and its study files
 STORE = "sweep.zarr"
 SHOWN = 5  # messages of failed points
 
 
 def named_files() -> dict[str, Path]:
-    """Return the study files of the package by name."""
+    """Return the study files of the registered packages by name."""
     from importlib.resources import files
 
-    folder = Path(str(files(NAMED)))
-    return {file.stem: file for file in sorted(folder.glob("*.toml"))}
+    folders = (Path(str(files(point.module))) for point in registered("studies").values())
+    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
 
 
 def _epilog() -> str:
-    """Return the end of the help text, which lists the studies of the package."""
+    """Return the end of the help text, which lists the registered studies."""
     titles = [
         f"  {name:<9} {file.read_text(encoding='utf-8').partition(':')[0].lstrip('# ')}"
         for name, file in named_files().items()
     ]
-    folder = next(iter(named_files().values())).parent
-    return EPILOG.format(studies="\n".join(titles), folder=folder)
+    folders = sorted({str(file.parent) for file in named_files().values()})
+    return EPILOG.format(
+        studies="\n".join(titles or ["  (none)"]), folder="\n  ".join(folders or ["(none)"])
+    )
 
 
 EPILOG = """\b
@@ -133,9 +134,12 @@ def _check(
 
 
 def _named() -> "Mapping[str, NamedStudy]":
-    """Return the installed studies by name."""
-    found: Mapping[str, NamedStudy] = import_module(NAMED).STUDIES
-    return found
+    """Return the registered studies by name."""
+    return {
+        name: study
+        for point in registered("studies").values()
+        for name, study in point.load().items()
+    }
 
 
 def _file(study: str) -> Path:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import flag, real, reals, refuse, whole
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.drum_motion import COORDINATES, imperfect_body, perfect_motion, rub
@@ -26,17 +25,27 @@ from polycorner.dumbbells.imperfections import (
     Wobble,
 )
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.formulas.bundles import Call
-from polycorner.kinds import checked
-from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies, PairContacts, PairLaw
-from polycorner.motion.friction import Disc, Interval
-from polycorner.motion.mechanics import MechanicalSystem, State
-from polycorner.motion.simulation import SHORTEST_STEP
-from polycorner.spaces.manifold import Array
-from polycorner.values import cached_property
+from polycorner.motion import Disc, Interval, MechanicalSystem, State
+from polycorner.toolkit import (
+    SHORTEST_STEP,
+    Array,
+    Call,
+    FrictionContact,
+    IdenticalBodies,
+    MovingBody,
+    PairContacts,
+    PairLaw,
+    cached_property,
+    checked,
+    flag,
+    real,
+    reals,
+    refuse,
+    whole,
+)
 
 if TYPE_CHECKING:
-    from polycorner.motion.trajectory import Trajectory
+    from polycorner.motion import Trajectory
 
 GRAVITY = 9806.65  # mm/s^2
 FREE_FALL = 0.1  # part of the rod radius by which a ball may fall within one step
@@ -155,7 +164,7 @@ class DumbbellDrum(MechanicalSystem):
         )
 
     @cached_property
-    def _body(self) -> Body:
+    def _body(self) -> MovingBody:
         length, r, rho = self.length, self.ball_radius, self.centre_radius
         m, g = self.ball_mass, GRAVITY
         weight, pull = m * g * math.cos(self.tilt), m * g * math.sin(self.tilt)
@@ -175,7 +184,7 @@ class DumbbellDrum(MechanicalSystem):
         names = ("floor1", "floor2") if self.floor else ()
         gaps = [Call(drum_formulas.floors(), (1, 2), np.array([length, r]), (0, 1), (0, 1))]
         units = np.array([rho, 1.0, length / 2, r])
-        body = Body(
+        body = MovingBody(
             perfect_motion(),
             np.array(numbers),
             friction,

@@ -23,10 +23,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.dumbbells import formulas as dumbbell_formulas
-from polycorner.formulas import cache, families, kernels
-from polycorner.spaces.manifold import Array
+from polycorner.formulas import Family
+from polycorner.toolkit import Array, checks, source_key
 
 if TYPE_CHECKING:
     import sympy
@@ -44,7 +43,7 @@ RATES = tuple(f"{name}{k}_dot" for k in (1, 2) for name in ("phi", "eta", "theta
 
 
 @lru_cache(maxsize=1)
-def grip() -> families.Family:
+def grip() -> Family:
     """Return slip velocities and normal loads of a dumbbell on the drum.
 
     ``slip1_r``, ``slip1_s``, ``slip2_r``, ``slip2_s`` are the velocities of the balls' lowest
@@ -59,7 +58,7 @@ def grip() -> families.Family:
 
 
 @lru_cache(maxsize=1)
-def weight() -> families.Family:
+def weight() -> Family:
     """Return the ``potential`` energy of a dumbbell, zero on the axis of the drum at ``eta = 0``.
 
     Reads ``phi eta theta``; parameters ``l rho weight pull`` with ``weight = m g cos alpha`` and
@@ -70,7 +69,7 @@ def weight() -> families.Family:
 
 
 @lru_cache(maxsize=1)
-def kinetic() -> families.Family:
+def kinetic() -> Family:
     """Return the ``kinetic`` energy of a dumbbell with a massless rod.
 
     Reads ``phi_dot eta_dot theta_dot psi_dot``; parameters ``l r rho m``, ``m`` of one ball.
@@ -79,7 +78,7 @@ def kinetic() -> families.Family:
 
 
 @lru_cache(maxsize=1)
-def floors() -> families.Family:
+def floors() -> Family:
     """Return the gaps ``floor1``, ``floor2`` between the balls and the bottom ``eta = 0``.
 
     Reads ``eta theta``; parameters ``l r``.
@@ -88,7 +87,7 @@ def floors() -> families.Family:
 
 
 @lru_cache(maxsize=3)
-def rubs(kind: Rub) -> families.Family:
+def rubs(kind: Rub) -> Family:
     """Return the slip velocity between the surfaces of body 1 and body 2.
 
     ``tangential`` is the component along ``t = (-n_y, n_x)`` in the developed plane, ``n`` the
@@ -123,8 +122,8 @@ def inertia(length: float, r: float, rho: float, m: float) -> Array:
     Lengths in mm, the mass ``m`` of one ball in g: entries in g mm^2 per squared radian, and in g
     for ``eta``.  There are no other entries.
     """
-    at_rest, numbers = np.zeros(len(SPEEDS)), np.array([length, r, rho, m], dtype=np.float64)
-    _, _, mass = kinetic().kernel.at(at_rest, kernels.address(numbers), 2)
+    at_rest, numbers = np.zeros(len(SPEEDS)), (length, r, rho, m)
+    _, _, mass = kinetic().evaluate(at_rest, numbers, 2)
     return np.diagonal(mass[0]).copy()
 
 
@@ -134,10 +133,10 @@ def _family(
     parameters: tuple[str, ...],
     formulas: "Callable[[], Formulas]",
     kind: str = "",
-) -> families.Family:
-    source = cache.source_key(dumbbell_formulas.__name__, __name__)
+) -> Family:
+    source = source_key(dumbbell_formulas.__name__, __name__)
     key = repr((source, kind, names, variables, parameters))
-    return families.Family(names, variables, parameters, formulas, key)
+    return Family(names, variables, parameters, formulas, key)
 
 
 def _symbols(*names: str) -> "list[sympy.Symbol]":

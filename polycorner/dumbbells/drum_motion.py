@@ -21,17 +21,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from polycorner.bodies import waves as waviness
-from polycorner.bodies.waves import waves
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
 from polycorner.dumbbells.imperfections import AXES, FIELD_MODES, SIGNAL_MODES, Imperfections
-from polycorner.formulas.cache import source_key
-from polycorner.formulas.families import Family
-from polycorner.formulas.kernels import address
-from polycorner.motion import formulation as equations
-from polycorner.motion.bodies import Body
-from polycorner.spaces.manifold import Array
+from polycorner.formulas import Family
+from polycorner.toolkit import TIME, Array, Formulation, Laws, MovingBody, source_key, waves
 
 if TYPE_CHECKING:
     import sympy
@@ -44,10 +38,10 @@ PARAMETERS = ("l", "r", "rho", "m", "surface", "weight", "pull")
 SIGNALS = ("turned", "side", "heavier", "steeper")
 SLIPS = ("slip1_r", "slip1_s", "slip2_r", "slip2_s", "spin")
 MODULES = (
-    equations.__name__,
+    Formulation.__module__,
     drum_formulas.__name__,
     dumbbell_formulas.__name__,
-    waviness.__name__,
+    waves.__module__,
     __name__,
 )
 
@@ -65,21 +59,21 @@ class Shape(NamedTuple):
         modes = range(FIELD_MODES if self.uneven else 0)
         place = [f"{name}{j}" for j in modes for name in ("waves", "along", "start")]
         amplitude = ["unevenness"] if self.uneven else []
-        return (*PARAMETERS, *wall, *amplitude, *place, equations.TIME, *SIGNALS)
+        return (*PARAMETERS, *wall, *amplitude, *place, TIME, *SIGNALS)
 
 
 @lru_cache(maxsize=1)
-def perfect_motion() -> equations.Formulation:
+def perfect_motion() -> Formulation:
     """Return the equations of motion of one dumbbell in a perfect drum."""
-    return equations.Formulation(COORDINATES, PARAMETERS, _laws, 5, 2, source_key(*MODULES))
+    return Formulation(COORDINATES, PARAMETERS, _laws, 5, 2, source_key(*MODULES))
 
 
 @lru_cache(maxsize=16)
-def imperfect_motion(shape: Shape) -> equations.Formulation:
+def imperfect_motion(shape: Shape) -> Formulation:
     """Return the equations of motion of one dumbbell in an imperfect drum."""
     key = repr((source_key(*MODULES), tuple(shape)))
     laws = partial(_imperfect_laws, shape)
-    return equations.Formulation(COORDINATES, shape.parameters, laws, 5, 2, key)
+    return Formulation(COORDINATES, shape.parameters, laws, 5, 2, key)
 
 
 @lru_cache(maxsize=4)
@@ -95,17 +89,17 @@ def signals(shaken: bool, wobbling: bool) -> Family:
         parameters += [name for axis in AXES for name in _signal_names(axis)]
     key = repr((source_key(*MODULES), "signals", shaken, wobbling))
     formulas = partial(_signals, shaken, wobbling)
-    return Family(SIGNALS, (equations.TIME,), tuple(parameters), formulas, key)
+    return Family(SIGNALS, (TIME,), tuple(parameters), formulas, key)
 
 
 def imperfect_body(
-    body: Body, found: Imperfections, rho: float, driven: tuple[float, float, float, float]
-) -> Body:
+    body: MovingBody, found: Imperfections, rho: float, driven: tuple[float, float, float, float]
+) -> MovingBody:
     """Return a dumbbell of the perfect drum as one of an imperfect drum.
 
     Parameters
     ----------
-    body : Body
+    body : MovingBody
     found : Imperfections
     rho : float
         Radius in mm on which the centres move.
@@ -114,7 +108,7 @@ def imperfect_body(
     """
     shaking, wall, _, uneven = found
     family, numbers = _driving(found, driven)
-    (now,) = family.kernel.at(np.zeros(1), address(numbers), 0)
+    (now,) = family.evaluate(np.zeros(1), numbers)
     fixed = body.parameters.tolist()
     fixed += [] if wall is None else wall.numbers
     fixed += [] if uneven is None else uneven.numbers(2 * math.pi * rho)
@@ -167,9 +161,9 @@ def _symbols(*names: str) -> "list[sympy.Symbol]":
     return [sympy.Symbol(name, real=True) for name in names]
 
 
-def _laws() -> equations.Laws:
+def _laws() -> Laws:
     grip = drum_formulas.grip()
-    return equations.Laws(
+    return Laws(
         drum_formulas.kinetic().expression("kinetic"),
         drum_formulas.weight().expression("potential"),
         {},
@@ -182,7 +176,7 @@ def _signals(shaken: bool, wobbling: bool) -> "tuple[Expressions, Expressions]":
     import sympy
 
     time, omega, m, g, tilt, angle, phase = _symbols(
-        equations.TIME, "omega", "m", "g", "tilt", "angle", "phase"
+        TIME, "omega", "m", "g", "tilt", "angle", "phase"
     )
     tilted = tilt + angle * sympy.cos(omega * time + phase) if wobbling else tilt
     a = [_signal(axis, time) if shaken else sympy.S.Zero for axis in AXES]
@@ -202,7 +196,7 @@ def _signal(axis: str, time: "sympy.Expr") -> "sympy.Expr":
     return amplitude * sympy.Add(*(sympy.cos(2 * sympy.pi * f * time + p) for f, p in pairs))
 
 
-def _imperfect_laws(shape: Shape) -> equations.Laws:
+def _imperfect_laws(shape: Shape) -> Laws:
     import sympy
 
     q = _symbols(*COORDINATES)
@@ -217,7 +211,7 @@ def _imperfect_laws(shape: Shape) -> equations.Laws:
         loads.append(_positive(load) * _unevenness(shape, azimuth, eta))
     perfect = _laws()
     forces = {str(x): -sympy.diff(energy, x) for x in q[:3]}
-    return equations.Laws(perfect.kinetic, perfect.potential, forces, perfect.slips, tuple(loads))
+    return Laws(perfect.kinetic, perfect.potential, forces, perfect.slips, tuple(loads))
 
 
 def _ball(e: int) -> "tuple[sympy.Expr, sympy.Expr, sympy.Expr, sympy.Expr]":

@@ -11,11 +11,8 @@ from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING
 
-from polycorner.bodies import frames, gaps
-from polycorner.bodies.frames import Frame
-from polycorner.formulas import cache, compositions, families
-from polycorner.formulas.compositions import Term, composition, stationary
-from polycorner.spaces import distances
+from polycorner.formulas import Family
+from polycorner.toolkit import SOURCES, Feature, placed_gaps, placed_stationary, source_key
 
 if TYPE_CHECKING:
     import sympy
@@ -23,10 +20,17 @@ if TYPE_CHECKING:
     Expressions = dict[str, sympy.Expr]
     Formulas = tuple[Expressions, Expressions]
 
-CONTACTS = ("A1B1", "A1B2", "A2B1", "A2B2", "A1b", "A2b", "aB1", "aB2", "ab")
 DRUM = ("phi", "eta", "theta")
 PLANE = ("x", "y", "theta")
-FREE = Frame.FIXED, Frame.FIXED, 3  # points of space, put anywhere
+A, B = ("A1", "A2"), ("B1", "B2")
+# Ball and ball, ball and rod, rod and rod: the gaps of points and segments of space.
+GAPS: dict[str, tuple[Feature, Feature]] = {
+    **{f"{ball}{other}": (ball, other) for ball, other in product(A, B)},
+    **{f"{ball}b": (ball, B) for ball in A},
+    **{f"a{ball}": (ball, A) for ball in B},
+    "ab": (A, B),
+}
+CONTACTS = tuple(GAPS)
 BALLS = (("A1", 1, -1), ("A2", 1, 1), ("B1", 2, -1), ("B2", 2, 1))
 
 
@@ -36,21 +40,23 @@ def variables(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=1)
-def drum_gaps() -> families.Family:
+def drum_gaps() -> Family:
     """Return the nine gaps in the drum; parameters ``l r t rho``."""
     symbols = DRUM, ("l", "r", "t", "rho")
-    return _family(CONTACTS, *symbols, lambda: _gaps(_drum_centres()), held=_stationary())
+    return _family(CONTACTS, *symbols, lambda: _gaps(_drum_centres()), held=placed_stationary(GAPS))
 
 
 @lru_cache(maxsize=1)
-def plane_gaps() -> families.Family:
+def plane_gaps() -> Family:
     """Return the nine gaps in the developed plane; parameters ``l r t``."""
     symbols = PLANE, ("l", "r", "t")
-    return _family(CONTACTS, *symbols, lambda: _gaps(_plane_centres()), held=_stationary())
+    return _family(
+        CONTACTS, *symbols, lambda: _gaps(_plane_centres()), held=placed_stationary(GAPS)
+    )
 
 
 @lru_cache(maxsize=1)
-def drum_energy() -> families.Family:
+def drum_energy() -> Family:
     """Return the weighted height of centres above the floor, in mm; parameters ``l R rho w``.
 
     Each ball counts once and each rod ``w`` times, at the middle of its chord.
@@ -59,7 +65,7 @@ def drum_energy() -> families.Family:
 
 
 @lru_cache(maxsize=1)
-def plane_energy() -> families.Family:
+def plane_energy() -> Family:
     """Return half the weighted sum of squared lateral positions, in mm^2; parameters ``l w``.
 
     It is the limit, as the drum grows, of ``rho`` times the height above the lowest one.
@@ -68,10 +74,10 @@ def plane_energy() -> families.Family:
 
 
 @lru_cache(maxsize=1)
-def mean_heading() -> families.Family:
+def mean_heading() -> Family:
     """Return ``sin((theta1 + theta2)/2 - h)``; parameter ``h``, in radians."""
-    key = repr((cache.source_key(__name__), "heading"))
-    return families.Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key, "1")
+    key = repr((source_key(__name__), "heading"))
+    return Family(("heading",), ("theta1", "theta2"), ("h",), _mean_heading, key, "1")
 
 
 def _mean_heading() -> "Formulas":
@@ -88,12 +94,11 @@ def _family(
     formulas: "Callable[[], Formulas]",
     unit: str = "mm",
     held: tuple[str, ...] = (),
-) -> families.Family:
-    modules = distances, frames, gaps, compositions
-    sources = cache.source_key(*(module.__name__ for module in modules), __name__)
+) -> Family:
+    sources = source_key(*SOURCES, __name__)
     key = repr((sources, names, coordinates, parameters))
     symbols = variables(coordinates), parameters
-    return families.Family(names, *symbols, formulas, key, unit, stationary=held)
+    return Family(names, *symbols, formulas, key, unit, stationary=held)
 
 
 def _symbols(names: str) -> "list[sympy.Symbol]":
@@ -136,32 +141,12 @@ def _plane_centres() -> "Expressions":
 
 
 def _gaps(centres: "Expressions") -> "Formulas":
-    """Ball-ball, ball-rod and rod-rod gaps: those of points of space, where the centres are put."""
+    """Return the gaps of balls and rods whose centres and ends are given."""
     r, t = _symbols("r t")
-    (a, b), found = (("A1", "A2"), ("B1", "B2")), {}
-    for ball, other in product(a, b):
-        found[f"{ball}{other}"] = _between(gaps.points(*FREE), 2 * r, p=ball, q=other)
-    for k, (ball, rod) in enumerate([*product(a, [b]), *product(b, [a])]):
-        ends = dict(zip("ab", rod, strict=True))
-        found[CONTACTS[4 + k]] = _between(gaps.segment(*FREE), r + t, p=ball, **ends)
-    ends = dict(zip("abgh", a + b, strict=True))
-    found["ab"] = _between(gaps.segments(*FREE[:2]), 2 * t, **ends)
-    definitions, expressions = composition(found)
+    rods = {name: sum(isinstance(part, tuple) for part in pair) for name, pair in GAPS.items()}
+    radii = {name: (2 * r, r + t, 2 * t)[count] for name, count in rods.items()}
+    definitions, expressions = placed_gaps(GAPS, radii)
     return {**centres, **definitions}, expressions
-
-
-def _between(family: families.Family, radii: "sympy.Expr", **balls: str) -> Term:
-    """Return the gap of a family for features with the centres of balls as their points."""
-    places = dict(zip(_symbols("s"), [radii], strict=True))
-    for letter, ball in balls.items():
-        local = _symbols(" ".join(gaps.numbers(letter, Frame.FIXED, 3)))
-        places |= dict(zip(local, _symbols(f"{ball}x {ball}y {ball}z"), strict=True))
-    return Term(family, "gap", places)
-
-
-def _stationary() -> tuple[str, ...]:
-    kinds = [gaps.points(*FREE)] * 4 + [gaps.segment(*FREE)] * 4 + [gaps.segments(*FREE[:2])]
-    return stationary(kinds)
 
 
 def _drum_heights() -> "Formulas":

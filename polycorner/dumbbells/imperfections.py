@@ -12,15 +12,18 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from polycorner.checks import instance, mapping, real, refuse, whole
-from polycorner.motion.random_functions import (
+from polycorner.toolkit import (
+    Array,
+    Checked,
     check_band,
     field_modes,
-    random_generator,
+    instance,
+    mapping,
+    real,
+    refuse,
     signal_modes,
+    whole,
 )
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
 
 AXES = ("across", "along", "up")
 SIGNAL_MODES, FIELD_MODES = 16, 32
@@ -94,7 +97,7 @@ class Shaking(Imperfection):
         """For each axis the amplitude of a mode, frequencies and phases of all modes."""
         found: list[float] = []
         for axis, rms in enumerate(self.rms):
-            rng = random_generator(self.seed, SHAKING, axis)
+            rng = np.random.default_rng([self.seed, SHAKING, axis])
             frequencies, phases = signal_modes(self.band, SIGNAL_MODES, rng)
             found += [rms * math.sqrt(2 / SIGNAL_MODES), *frequencies.tolist(), *phases.tolist()]
         return found
@@ -212,7 +215,7 @@ class UnevenFriction(Imperfection):
 
     def numbers(self, circumference: float) -> list[float]:
         """Amplitude of a mode; for each mode waves around, wave number along, phase."""
-        rng = random_generator(self.seed, UNEVEN_FRICTION)
+        rng = np.random.default_rng([self.seed, UNEVEN_FRICTION])
         modes: tuple[Array, ...] = field_modes(
             self.correlation_length, circumference, FIELD_MODES, rng
         )

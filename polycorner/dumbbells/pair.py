@@ -11,17 +11,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner import checks
 from polycorner.dumbbells import formulas
 from polycorner.dumbbells import symmetries as motions
-from polycorner.formulas.functions import SmoothFunction
-from polycorner.kinds import checked
-from polycorner.polyhedra.groups import AllOf
-from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.symmetry import Symmetry
-from polycorner.spaces.manifold import Array, Manifold
-from polycorner.tolerances import TOLERANCE
-from polycorner.values import Checked, cached_property
+from polycorner.formulas import SmoothFunction
+from polycorner.polyhedra import AllOf, Polyhedron, Symmetry
+from polycorner.spaces import Manifold
+from polycorner.toolkit import TOLERANCE, Array, Checked, cached_property, checked, checks
 
 Chirality = Literal["L", "R"]
 LONGEST = 1 / TOLERANCE  # l / r, above which a ball is smaller than what counts as zero

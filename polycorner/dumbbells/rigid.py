@@ -18,18 +18,21 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
-from polycorner.bodies.waves import depth
-from polycorner.checks import instance, reals, refuse
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
-from polycorner.kinds import checked
-from polycorner.motion.contacts import Friction
-from polycorner.motion.mechanics import State
-from polycorner.motion.simulation import LONGEST
-from polycorner.motion.system import System
-from polycorner.spaces.arguments import finite
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked, cached_property
+from polycorner.motion import Friction, State, System
+from polycorner.toolkit import (
+    LONGEST,
+    Array,
+    Checked,
+    cached_property,
+    checked,
+    finite,
+    instance,
+    reals,
+    refuse,
+    wave_depth,
+)
 
 BALLS = ("D.1-drum", "D.2-drum")  # contacts of the balls with the drum
 SIZE = 7  # coordinates of a placement in space: the centre and a quaternion
@@ -67,7 +70,7 @@ class RigidDumbbells(Checked):
         instance("drum", self.drum, DumbbellDrum, "DumbbellDrum()")
         if (oval := self.drum.out_of_round) is not None:
             room = self.drum.drum_radius - self.drum.ball_radius
-            if depth({k: (a, 0.0) for k, a in oval.amplitudes.items()}) >= room:
+            if wave_depth({k: (a, 0.0) for k, a in oval.amplitudes.items()}) >= room:
                 least = (
                     f"a convex wall, out of round with the sum of |a_k| (k^2 + 1) below {room:g} mm"
                 )

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from polycorner.dumbbells.formulas import CONTACTS
-from polycorner.polyhedra.symmetry import Element
-from polycorner.spaces.manifold import Array
+from polycorner.polyhedra import Element
+from polycorner.toolkit import Array
 
 
 def plane_tangents(q: Array) -> Array:

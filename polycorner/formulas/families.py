@@ -7,12 +7,17 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from polycorner.checks import about, names, refuse
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polycorner.checks import about, names, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, kinks
+from polycorner.formulas.kernels import address
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
 from polycorner.kinds import checked
+from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
@@ -156,6 +161,36 @@ class Family(Checked):
     def identity(self) -> str:
         """The key; without one, a hash of the program of the formulas."""
         return self.key or self.program().digest()
+
+    @checked
+    def evaluate(
+        self, points: ArrayLike, parameters: ArrayLike = (), order: int = 0
+    ) -> tuple[Array, ...]:
+        """Return values, and derivatives by the variables up to an order.
+
+        Parameters
+        ----------
+        points : (..., k) array
+            The variables.
+        parameters : (p,) array, optional
+        order : int, optional
+            0, 1 or 2.
+
+        Returns
+        -------
+        tuple of arrays
+            Values ``(..., m)``, gradients ``(..., m, k)``, Hessians ``(..., m, k, k)``.
+        """
+        k, p = len(self.variables), len(self.parameters)
+        at, numbers = reals("points", points), np.atleast_1d(reals("parameters", parameters))
+        if not at.ndim or at.shape[-1] != k:
+            refuse("points", f"an array of shape (..., {k})", at.shape)
+        if numbers.shape != (p,):
+            refuse("parameters", f"an array of shape ({p},)", numbers.shape)
+        order = whole("order", order, least=0, most=2)
+        fixed = np.array([*numbers, 0.0])  # not empty, and with an address that can be taken
+        found = self.kernel.over(at.reshape(-1, k), address(fixed), order)
+        return tuple(part.reshape(*at.shape[:-1], *part.shape[1:]) for part in found)
 
     @checked
     def expression(self, name: str) -> "sympy.Expr":

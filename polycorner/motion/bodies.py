@@ -44,7 +44,7 @@ class FrictionContact(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Body(Value):
+class MovingBody(Value):
     """One body, or a whole system that is not repeated.
 
     Attributes
@@ -87,6 +87,9 @@ class Body(Value):
     signals: Family | None = None
     signal_parameters: Array = field(default_factory=lambda: np.empty(0))
     slow_signals: bool = False
+
+
+Body = MovingBody  # as the engine calls it
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ class IdenticalBodies(Value):
 
     Attributes
     ----------
-    body : Body
+    body : MovingBody
     count : int
     contacts : PairContacts, optional
         Contacts between the bodies; none by default.
@@ -161,7 +164,7 @@ class IdenticalBodies(Value):
         Causes of dissipation.
     """
 
-    body: Body
+    body: MovingBody
     count: int = 1
     contacts: PairContacts | None = None
     position: tuple[int, int] = (0, 0)

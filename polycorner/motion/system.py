@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.checks import names, real, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.kinds import check_fields, checked
-from polycorner.motion.bodies import Body, FrictionContact, IdenticalBodies
+from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
 from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
 from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
@@ -215,7 +215,7 @@ class System(MechanicalSystem):
             for f, gap, loads in zip(self.friction, self.owners, self.load_sources, strict=True)
         )
         scales, coordinates = self.manifold.scale_array, self.manifold.names
-        body = Body(
+        body = MovingBody(
             self.formulation,
             self.parameters,
             friction,

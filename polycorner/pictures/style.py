@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from polycorner.atomic import atomic
+from polycorner.atomic import replace_atomically
 from polycorner.checks import listed, refuse
 from polycorner.kinds import checked
 
@@ -36,6 +36,6 @@ def save(figure: Figure, path: Path) -> Path:
     formats = FigureCanvasAgg(figure).get_supported_filetypes()
     if path.suffix[1:].lower() not in formats:
         refuse("path", f"a name ending in .{listed(formats)}", path.name)
-    with atomic(path) as temporary:
+    with replace_atomically(path) as temporary:
         figure.savefig(temporary, dpi=150)
     return path

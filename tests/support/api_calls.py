@@ -210,6 +210,7 @@ CALLS = {
     "SmoothFunction.sum": lambda: {"name": "f", "terms": [of.energy(), of.energy()]},
     "Family.of": lambda: {"expressions": {"f": of.X}, "variables": ("x", "y")},
     "Family.expression": lambda: {"name": "energy"},
+    "Family.evaluate": lambda: {"points": np.zeros((2, 2)), "parameters": np.ones(1), "order": 1},
     "Symmetry.directions": lambda: ON | {"q": SQUARE},
     "Symmetry.displacement": lambda: ON | BETWEEN,
     "Symmetry.possible": lambda: ON | {"p": SQUARE, "points": SQUARE[None], "tolerance": 1e-6},

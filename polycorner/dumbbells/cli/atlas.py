@@ -1,17 +1,23 @@
 """``polycorner atlas dyad``: corners, edges and faces of the placements of a pair."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
-from polycorner.cli.atlas import RESUMING, search_options
-from polycorner.cli.options import GroupedCommand, examples, given, option
-from polycorner.cli.output import fail
-from polycorner.cli.report import keys
-from polycorner.cli.search import SkeletonSearch
+from polycorner.cli import (
+    RESUMING,
+    GroupedCommand,
+    SkeletonSearch,
+    examples,
+    fail,
+    given,
+    option,
+    search_options,
+)
 from polycorner.dumbbells.cli.options import GROUP, chosen_pair, pair_options, parameters
 
 UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
@@ -52,11 +58,11 @@ def dyad(
         polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
     )
     whole = PairAtlas(pair, found, None if pair.is_plane else angle)
-    extra: dict[str, Any] = {"components": keys(whole.components)}
+    extra: dict[str, Any] = {"components": _counts(whole.components)}
     try:
         if search.finished:
-            extra["components_ordered"] = keys(whole.components_ordered)
-            extra["components_unordered"] = keys(whole.components_unordered)
+            extra["components_ordered"] = _counts(whole.components_ordered)
+            extra["components_unordered"] = _counts(whole.components_unordered)
     except ValueError:
         search.drawn = False
         found = replace(found, notes=(*found.notes, UNMATCHED))
@@ -76,3 +82,7 @@ def dyad(
         ]
 
     search.finish(answer, as_json=as_json, draw=draw)
+
+
+def _counts(found: Mapping[int, int]) -> dict[str, int]:
+    return {str(dimension): count for dimension, count in sorted(found.items())}

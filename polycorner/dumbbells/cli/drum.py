@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.options import command, examples
-from polycorner.cli.output import (
+from polycorner.cli import (
+    command,
     deliver,
+    examples,
     fail,
     prepare,
     remark,
@@ -32,10 +33,7 @@ from polycorner.dumbbells.cli.imperfection_options import (
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.motion.checkpoints import Checkpoint
-    from polycorner.motion.mechanics import State
-    from polycorner.motion.noise import Noise
-    from polycorner.motion.trajectory import Trajectory
+    from polycorner.motion import Checkpoint, Noise, State, Trajectory
 
 EPILOG = (
     examples(
@@ -201,18 +199,19 @@ def _checkpoint(
     out: Path | None, *, resume: bool,
 ) -> "Checkpoint":  # fmt: skip
     """Return where the run is saved: in the folder of --out, or else in the cache."""
-    from polycorner.motion.checkpoints import Checkpoint, fingerprint
+    from polycorner.motion import Checkpoint
 
     if out is not None:
         return Checkpoint(out / STATE, resume=resume)
-    told = repr((model, noise, values["duration"], values["dt"], fingerprint(state.q)))
+    start = hashlib.sha256(state.q.tobytes()).hexdigest()[:16]
+    told = repr((model, noise, values["duration"], values["dt"], start))
     name = hashlib.sha256(told.encode()).hexdigest()[:16]
     return Checkpoint(_cached(f"drum-{name}"), resume=resume)
 
 
 def _cached(name: str) -> Path:
     """Return a folder in the cache."""
-    from polycorner.formulas.cache import cache_folder
+    from polycorner.toolkit import cache_folder
 
     return cache_folder() / name
 
@@ -221,7 +220,7 @@ def _run(
     model: "DumbbellDrum", noise: "Noise", state: "State", values: dict[str, Any],
     checkpoint: "Checkpoint",
 ) -> "Trajectory":  # fmt: skip
-    from polycorner.motion.simulation import simulate
+    from polycorner.motion import simulate
 
     seconds, dt, folder = values["duration"], values["dt"], Path(checkpoint.folder)
     if checkpoint.resume and not folder.exists():
@@ -283,14 +282,14 @@ def _finish(
 def _write(run: "Trajectory", answer: dict[str, Any], out: Path) -> list[Path]:
     from polycorner.dumbbells.dynamics.files import save_run
     from polycorner.dumbbells.pictures import drum as pictures
-    from polycorner.pictures import style as plots
+    from polycorner.pictures import save
 
     with writing(out), timed("drawing and writing"):
         return [
             write_answer(answer, out, "drum.json"),
             save_run(run, out / "trajectory.nc"),
-            plots.save(pictures.draw_history(run), out / "history.png"),
-            plots.save(pictures.draw_drum(run), out / "drum.png"),
+            save(pictures.draw_history(run), out / "history.png"),
+            save(pictures.draw_drum(run), out / "drum.png"),
         ]
 
 

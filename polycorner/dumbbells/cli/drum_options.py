@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from polycorner.cli.options import Command, from_file, given, option, output_options, seed_option
+from polycorner.cli import Command, from_file, given, option, output_options, seed_option
 
 PLACING = "Dumbbells"
 DRUM = "Drum"

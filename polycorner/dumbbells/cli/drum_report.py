@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from polycorner.motion.trajectory import Trajectory
-    from polycorner.printing import Sheet
+    from polycorner.motion import Trajectory
+    from polycorner.toolkit import Sheet
 
 
 def drum_answer(path: "Trajectory", values: dict[str, Any]) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def _upright(degrees: float) -> float:
 
 def drum_sheet(answer: dict[str, Any]) -> "Sheet":
     """Return the answer as a table for people."""
-    from polycorner.printing import Sheet, facts
+    from polycorner.toolkit import Sheet, facts
 
     return Sheet("", (facts(_rows(answer)),))
 

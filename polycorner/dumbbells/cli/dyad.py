@@ -4,13 +4,22 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from polycorner.cli.options import command, examples, output_options
-from polycorner.cli.output import deliver, prepare, shown, working, write_answer, writing
+from polycorner.cli import (
+    command,
+    deliver,
+    examples,
+    output_options,
+    prepare,
+    shown,
+    working,
+    write_answer,
+    writing,
+)
 from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
     from polycorner.dumbbells import DumbbellPair, DyadMinimum
-    from polycorner.printing import Sheet
+    from polycorner.toolkit import Sheet
 
     Minima = tuple[DyadMinimum, ...]
 
@@ -91,21 +100,21 @@ def _write(
     import numpy as np
 
     from polycorner.dumbbells.pictures import dyads
-    from polycorner.pictures import style
+    from polycorner.pictures import save
 
     written = [write_answer(answer, out, "dyad.json")]
     with writing(out):
-        written += [style.save(dyads.draw_pair(e), out / f"{e.name}.png") for e in entries]
+        written += [save(dyads.draw_pair(e), out / f"{e.name}.png") for e in entries]
     longest = 2 * (pair.drum_radius - pair.ball_radius)
     lengths = np.linspace(2 * pair.ball_radius, min(10 * pair.ball_radius, longest), 49)
     rods = sorted({0.25 * pair.ball_radius, pair.rod_radius, 0.8 * pair.ball_radius})
     figure = dyads.draw_heading(pair, lengths.tolist(), rods)
     with writing(out):
-        return [*written, style.save(figure, out / "heading.png")]
+        return [*written, save(figure, out / "heading.png")]
 
 
 def _sheet(pair: "DumbbellPair", entries: "Minima", answer: dict[str, Any]) -> "Sheet":
-    from polycorner.printing import Sheet, Table, facts
+    from polycorner.toolkit import Sheet, Table, facts
 
     place = "the developed plane" if pair.is_plane else f"a drum of radius {pair.drum_radius:g} mm"
     names = tuple(entry.name for entry in entries)

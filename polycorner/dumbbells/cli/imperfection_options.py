@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from polycorner.cli.options import Command, option
-from polycorner.cli.output import fail
+from polycorner.cli import Command, fail, option
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.imperfections import OutOfRound
-    from polycorner.motion.noise import Noise
+    from polycorner.motion import Noise
 
 IMPERFECT = "Imperfections"
 COORDINATES = ("phi", "eta", "theta", "psi")
@@ -83,7 +82,7 @@ def imperfections(values: dict[str, Any]) -> dict[str, Any]:
 
 def noise_of(values: dict[str, Any]) -> "Noise":
     """Return the noise that the options describe."""
-    from polycorner.motion.noise import Noise
+    from polycorner.motion import Noise
 
     given = {"chatter": values["noise"], "seed": values["seed"]}
     held = Noise(kick_time=values["kick_time"], **given)  # checks it also where it is not needed

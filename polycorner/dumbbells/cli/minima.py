@@ -5,9 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.minima import WORDS, report, start_options
-from polycorner.cli.options import GroupedCommand, examples
-from polycorner.cli.output import prepare, working
+from polycorner.cli import GroupedCommand, examples, prepare, report_minima, start_options, working
 from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
@@ -27,7 +25,7 @@ def dyad(starts: int, seed: int, as_json: bool, out: Path | None, **options: flo
     """
     pair = chosen_pair(options)
     prepare(out)
-    with working(WORDS, "starts") as progress:
+    with working("minimising", "starts") as progress:
         import numpy as np
 
         from polycorner.dumbbells.statics.minima_map import kind_of, pair_minima
@@ -44,4 +42,4 @@ def dyad(starts: int, seed: int, as_json: bool, out: Path | None, **options: flo
         }
 
     unit = "mm²" if pair.is_plane else "mm"
-    report("dyad", parameters(pair), found, described, unit, as_json=as_json, out=out)
+    report_minima("dyad", parameters(pair), found, described, unit, as_json=as_json, out=out)

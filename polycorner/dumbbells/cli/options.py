@@ -2,8 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from polycorner.cli.options import Command, option
-from polycorner.cli.output import fail, tell
+from polycorner.cli import Command, fail, option, tell
 
 if TYPE_CHECKING:
     from polycorner.dumbbells import DumbbellPair

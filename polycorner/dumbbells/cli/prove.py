@@ -5,10 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.options import command, examples, option, output_options
-from polycorner.cli.output import (
+from polycorner.cli import (
+    command,
     deliver,
+    examples,
     fail,
+    option,
+    output_options,
     prepare,
     shown,
     working,
@@ -18,8 +21,8 @@ from polycorner.cli.output import (
 from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
-    from polycorner.printing import Sheet
     from polycorner.proofs import Proof
+    from polycorner.toolkit import Sheet
 
 EPILOG = examples(
     "prove", "prove --drum inf --digits 100 --json", "prove --box t=1.49:1.51 --box l=15.9:16.1"
@@ -88,7 +91,7 @@ def prove(
 
 
 def _sheet(answer: dict[str, Any], proof: "Proof") -> "Sheet":
-    from polycorner.printing import Sheet, Table
+    from polycorner.toolkit import Sheet, Table
 
     degrees = Table(
         ("angle in degrees", "lower bound", "upper bound"),
@@ -145,9 +148,8 @@ def _answer(proof: "Proof") -> dict[str, Any]:
 def _write(proof: "Proof", answer: dict[str, Any], out: Path) -> list[Path]:
     written = [write_answer(answer, out, "proof.json")]
     if proof.cells:
-        from polycorner.pictures import parameter_boxes as cells
-        from polycorner.pictures import style as plots
+        from polycorner.pictures import draw_cells, save
 
         with writing(out):
-            written.append(plots.save(cells.draw_cells(proof, UNITS), out / "cells.png"))
+            written.append(save(draw_cells(proof, UNITS), out / "cells.png"))
     return written

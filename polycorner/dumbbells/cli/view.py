@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.options import (
+from polycorner.cli import (
     Command,
     GroupedCommand,
     config_option,
     examples,
+    fail,
     option,
+    remark,
+    verbosity,
     verbosity_options,
+    working,
+    writing,
 )
-from polycorner.cli.output import fail, remark, verbosity, working, writing
 from polycorner.dumbbells.cli.options import GROUP, chosen_pair, pair_options
 
 if TYPE_CHECKING:
@@ -170,7 +174,7 @@ def _viewer() -> Any:
 def _serve(make: "Callable[[], Application]", host: str, port: int, *, browser: bool) -> None:
     """Bind the port, prepare the pages and serve them until Ctrl-C."""
     if importlib.util.find_spec("tornado") is None:
-        from polycorner.checks import missing_extra
+        from polycorner.toolkit import missing_extra
 
         fail(str(missing_extra("tornado", "view")))
     from polycorner.dumbbells.viewer import server as viewer_server

@@ -14,7 +14,7 @@ import numpy as np
 
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.dynamics.dyads import SOLVER
-from polycorner.motion.simulation import simulate
+from polycorner.motion import simulate
 
 FLAT = 1e7  # mm: radius of a drum that is as good as a plane
 CONTACT = 1e-5  # mm between dumbbells before an impact

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.checks import instance, real, refuse
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import (
     LEFT_AS,
@@ -22,14 +21,8 @@ from polycorner.dumbbells.dynamics.pairs import (
 )
 from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.dynamics.starts import scatter
-from polycorner.motion.checkpoints import Checkpoint
-from polycorner.motion.events import EventKind
-from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
-from polycorner.motion.trajectory import Trajectory
-from polycorner.progress import Progress
-from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.motion import Checkpoint, EventKind, Noise, Trajectory, simulate
+from polycorner.toolkit import Array, Progress, Value, cached_property, instance, real, refuse
 
 TOP = 300.0  # mm, length of the drum, which [GMBN] does not give
 COUNT = 60

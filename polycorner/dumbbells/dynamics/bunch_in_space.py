@@ -10,17 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.checks import real
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import BunchRun, scattered, steps_between_records
 from polycorner.dumbbells.dynamics.pairs import Handed
 from polycorner.dumbbells.rigid import RigidDumbbells
-from polycorner.motion.checkpoints import Checkpoint
-from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
-from polycorner.progress import Progress
-from polycorner.spaces.manifold import Array
-from polycorner.values import cached_property
+from polycorner.motion import Checkpoint, Noise, simulate
+from polycorner.toolkit import Array, Progress, cached_property, real
 
 LAYER = 1.0  # of a ball's radius: dumbbells that are lifted less lie on the drum
 

@@ -12,17 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, chirality, gaps
 from polycorner.dumbbells.dynamics.singles import APART
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality
-from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import SHORTEST_STEP, simulate
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.motion import Noise, Solver, Trajectory, simulate
+from polycorner.toolkit import SHORTEST_STEP, Array, Value, cached_property, real
 
 Start = tuple[Chirality, float]
 SOLVER = Solver(tolerance=1e-6, sweeps=300)
@@ -251,8 +247,7 @@ def minimiser_heading(drum: DumbbellDrum, *, azimuth: float = 0.0) -> float:
     import sympy
 
     from polycorner.minimisation import minimise
-    from polycorner.polyhedra.groups import AllOf
-    from polycorner.polyhedra.polyhedron import Polyhedron
+    from polycorner.polyhedra import AllOf, Polyhedron
 
     pair = replace(drum, count=2).pair
     start = pair.nested("R")

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.container import BINARY, FileKind
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.drum_motion import COORDINATES
 from polycorner.dumbbells.imperfections import KINDS
-from polycorner.files.motions import (
+from polycorner.motion import Trajectory
+from polycorner.toolkit import (
+    BINARY,
+    FileKind,
     MotionUnits,
     column,
     load_dataset,
@@ -22,7 +24,6 @@ from polycorner.files.motions import (
     read_motion,
     save_dataset,
 )
-from polycorner.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr

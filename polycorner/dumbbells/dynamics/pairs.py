@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
-from polycorner.motion.events import EventKind
-from polycorner.spaces.manifold import Array
+from polycorner.motion import EventKind
+from polycorner.toolkit import Array
 
 if TYPE_CHECKING:
-    from polycorner.motion.trajectory import Trajectory
+    from polycorner.motion import Trajectory
 
 Dyad = tuple[int, int, Chirality]
 Handed = tuple[int, int, int]  # two numbers and the chirality, +1 right or -1 left

@@ -14,14 +14,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import reals
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import Keel, exact_eastern_boundary
-from polycorner.motion.events import EventKind
-from polycorner.motion.noise import Noise, Solver
-from polycorner.motion.simulation import simulate
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.motion import EventKind, Noise, Solver, Trajectory, simulate
+from polycorner.toolkit import Array, reals
 
 APART = 1e4  # mm along the drum, so that dumbbells of one run never meet
 STRIDE = 10  # steps between records; shorter rests count as parts of one slip

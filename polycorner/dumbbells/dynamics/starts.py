@@ -8,8 +8,7 @@ import numpy as np
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.minimisation import minimise
-from polycorner.polyhedra.faces import Face
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array, Face
 
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
 ROOM = 3.0  # area of that strip in areas of the dumbbells

@@ -11,8 +11,8 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, minimiser_heading
 from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.pair import Chirality
-from polycorner.motion.noise import Noise
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Noise
+from polycorner.toolkit import Array
 
 WINDOW = 5  # correlation times over which correlations are summed
 

@@ -20,9 +20,7 @@ from polycorner.dumbbells.pictures.relabelling import (
 )
 from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, WORDS, corner_symbol
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.kinds import checked
-from polycorner.pictures.style import BODIES
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import BODIES, Array, checked
 
 BOX = 1.7  # side of a corner's box
 DIAMOND = {"Delta_R": (-3.7, 0.0), "E_R": (0.0, 1.8), "E_L": (0.0, -1.8), "Delta_L": (3.7, 0.0)}

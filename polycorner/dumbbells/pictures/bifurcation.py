@@ -8,13 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from polycorner.checks import instance, real, refuse
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.critical import Branch, branches, critical_rod_radius
 from polycorner.dumbbells.statics.minima import paper_heading
-from polycorner.kinds import checked
-from polycorner.pictures.style import BODIES, SHADES
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import BODIES, SHADES, Array, checked, instance, real, refuse
 
 CORNER_COLOUR, PASS_COLOUR, ENDS_COLOUR = (*BODIES, SHADES[-1])
 SAMPLES = 60

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 MARGIN = 1.5  # least extent of the wall beyond the outermost centres, in ball radii
 SIDES = 12  # of a tube

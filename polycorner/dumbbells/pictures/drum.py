@@ -11,15 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from polycorner.checks import real
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, dyads, mean_heading
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.pictures.symbols import HANDS, WORDS, sizes_in_words
-from polycorner.kinds import checked
-from polycorner.motion.trajectory import Trajectory
-from polycorner.pictures.style import BODIES
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Trajectory
+from polycorner.toolkit import BODIES, Array, checked, real
 
 SINGLE = "#8C9BA8"
 ARROW = "0.35"

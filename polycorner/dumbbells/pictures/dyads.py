@@ -11,14 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from polycorner.checks import real, refuse
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import contact_point, rod_outlines
 from polycorner.dumbbells.pictures.symbols import multiplier_unit, sizes_in_words
 from polycorner.dumbbells.statics.minima import DyadMinimum, heading_curve
-from polycorner.kinds import checked
-from polycorner.pictures.style import BODIES, SHADES, bridged
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import BODIES, SHADES, Array, bridged, checked, real, refuse
 
 
 @checked

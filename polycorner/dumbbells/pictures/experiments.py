@@ -8,15 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from polycorner.checks import refuse
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import KINDS, BunchRun
 from polycorner.dumbbells.dynamics.dyads import heading_at_shift
 from polycorner.dumbbells.dynamics.singles import Zigzag
 from polycorner.dumbbells.dynamics.steady import Steady
-from polycorner.kinds import checked
-from polycorner.pictures.style import SHADES
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import SHADES, Array, checked, refuse
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import reals, refuse
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, Handed, dyads_among
 from polycorner.dumbbells.formulas import CONTACTS
@@ -16,17 +15,12 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.symbols import energy_unit
-from polycorner.kinds import checked
-from polycorner.motion.trajectory import Trajectory
-from polycorner.polyhedra.cones import rank
-from polycorner.polyhedra.strata import Stratum, stratum_at
-from polycorner.spaces.arguments import finite
-from polycorner.spaces.manifold import Array
-from polycorner.tolerances import DEFAULT
-from polycorner.values import Checked
+from polycorner.motion import Trajectory
+from polycorner.polyhedra import Stratum, stratum_at
+from polycorner.toolkit import DEFAULT, Array, Checked, checked, finite, rank, reals, refuse
 
 if TYPE_CHECKING:
-    from polycorner.motion.trajectory import Touch
+    from polycorner.toolkit import Touch
 
 TOUCHING = 1e-6  # scaled distance within which a contact of a configuration counts as closed
 FRAMES = 1000  # of a long run, at most

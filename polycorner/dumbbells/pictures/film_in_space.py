@@ -16,7 +16,7 @@ from polycorner.dumbbells.pictures.film import (
     motion_film,
 )
 from polycorner.dumbbells.pictures.movies import chosen_frames
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 
 def film_in_space(

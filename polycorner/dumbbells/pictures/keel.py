@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 
 from polycorner.dumbbells.statics.keel import Keel, RestRegion
 from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
-from polycorner.kinds import checked
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array, checked
 
 CURVE, POSITIVE, NEGATIVE = "#D55E00", "#0072B2", "#009E73"
 OUTER, INNER, GROWING = "#F3DFB8", "#DDBB77", "#D7B5D8"

@@ -14,10 +14,8 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import rod_outlines
 from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_clearance
 from polycorner.dumbbells.statics.skeleton import long_rod_length
-from polycorner.kinds import checked
 from polycorner.minimisation import Certificate
-from polycorner.pictures.style import BODIES
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import BODIES, Array, checked
 
 UNSEEN, NONE = "0.75", "white"
 NESTED = {"staggered": "#E69F00", "delta": "#56B4E9"}

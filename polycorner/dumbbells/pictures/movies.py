@@ -14,11 +14,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from numpy.typing import NDArray
 from PIL import Image
 
-from polycorner.atomic import atomic
-from polycorner.checks import MOST, missing_extra, refuse, whole
 from polycorner.dumbbells.pictures.drum import DrumView
-from polycorner.kinds import checked
-from polycorner.motion.trajectory import Trajectory
+from polycorner.motion import Trajectory
+from polycorner.toolkit import checked, missing_extra, refuse, replace_atomically, whole
 
 Picture = NDArray[np.uint8]
 FRAMES = 300  # at most
@@ -89,7 +87,7 @@ def write_movie(
         If the file cannot be written, as on a full disk; nothing is left of it then.
     """
     check_movie(path, "path")
-    whole("rate", rate, least=1, most=MOST)
+    whole("rate", rate, least=1)
     target = Path(path)
     numbers = chosen_frames(len(run), frames)
     suffix = target.suffix.lower()
@@ -101,7 +99,7 @@ def write_movie(
             if progress is not None:
                 progress(done, len(numbers))
 
-    with atomic(target) as temporary:
+    with replace_atomically(target) as temporary:
         write(pictures(), temporary, rate)
     return target
 

@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 from polycorner.dumbbells.pictures.symbols import corner_symbol
 from polycorner.dumbbells.statics.skeleton import long_rod_length
 from polycorner.dumbbells.statics.skeleton_map import PairMap, Signature
-from polycorner.kinds import checked
-from polycorner.pictures.style import SHADES
+from polycorner.toolkit import SHADES, checked
 
 
 @checked

@@ -10,13 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import real, reals, refuse
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.kinds import checked
-from polycorner.pictures.solids.charts import Gaps
-from polycorner.pictures.solids.grids import FEWEST_CELLS, Function
-from polycorner.pictures.solids.sharp_surfaces import SharpSurface, sharp_surface
-from polycorner.spaces.manifold import Array
+from polycorner.pictures import SharpSurface, sharp_surface
+from polycorner.toolkit import FEWEST_CELLS, Array, Function, Gaps, checked, real, reals, refuse
 
 
 @checked

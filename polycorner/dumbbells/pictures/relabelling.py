@@ -14,8 +14,7 @@ from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import contact_point, rod_outlines
 from polycorner.dumbbells.pictures.symbols import CONTACT, KINDS, sizes_in_words
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.pictures.style import BODIES
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import BODIES, Array
 
 
 @dataclass(frozen=True)

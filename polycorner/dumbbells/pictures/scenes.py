@@ -13,8 +13,6 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from numpy.typing import ArrayLike
 
-from polycorner.atomic import write_atomically
-from polycorner.checks import reals, refuse
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import (
@@ -30,11 +28,8 @@ from polycorner.dumbbells.pictures.placements import forbidden_solid
 from polycorner.dumbbells.pictures.solid import relative_corners, relative_curves
 from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, KIND_WORDS, KINDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.kinds import checked
-from polycorner.pictures.style import BODIES
-from polycorner.polyhedra.strata import stratum_at
-from polycorner.spaces.arguments import finite
-from polycorner.spaces.manifold import Array
+from polycorner.polyhedra import stratum_at
+from polycorner.toolkit import BODIES, Array, checked, finite, reals, refuse, write_atomically
 
 if TYPE_CHECKING:
     import trimesh

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.atomic import write_atomically
-from polycorner.checks import about, real
 from polycorner.dumbbells.pictures.placements import (
     forbidden_solid,
     relative_coordinates,
@@ -18,15 +16,9 @@ from polycorner.dumbbells.pictures.placements import (
 from polycorner.dumbbells.pictures.relabelling import contact_counts
 from polycorner.dumbbells.pictures.symbols import KIND_WORDS, corner_symbol
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.kinds import checked
-from polycorner.pictures.solids.charts import Chart
-from polycorner.pictures.solids.meshes import write_mesh
-from polycorner.pictures.solids.rendering import draw_solid
-from polycorner.pictures.solids.sharp_surfaces import SharpSurface
-from polycorner.pictures.style import save
-from polycorner.skeletons.refinement import traced
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.pictures import SharpSurface, draw_solid, save, write_mesh
+from polycorner.skeletons import traced
+from polycorner.toolkit import Array, Chart, Checked, about, checked, real, write_atomically
 
 SAME = 1e-6  # mm or radians
 

@@ -10,9 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from polycorner.kinds import checked
-from polycorner.pictures.style import SHADES, bridged
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import SHADES, Array, bridged, checked
 
 if TYPE_CHECKING:
     import xarray as xr

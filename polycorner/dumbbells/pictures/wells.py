@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import cycle
+from statistics import NormalDist
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,14 +11,19 @@ from matplotlib.figure import Figure
 
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_escapes, hold_times
-from polycorner.kinds import checked
 from polycorner.minimisation import Entrapment
-from polycorner.minimisation.abundance import NORMAL
-from polycorner.models.wells.escape import overdamped_escape_time
-from polycorner.models.wells.holding import Comparison, Escapes, kick_of, ladder, rests
-from polycorner.models.wells.wells import KINDS, Well
-from polycorner.motion.noise import Noise
-from polycorner.motion.simulation import simulate
+from polycorner.models.wells import (
+    KINDS,
+    Comparison,
+    Escapes,
+    Well,
+    kick_of,
+    ladder,
+    overdamped_escape_time,
+    rests,
+)
+from polycorner.motion import Noise, simulate
+from polycorner.toolkit import checked
 
 COLOURS = dict(zip(KINDS, ("#0072B2", "#E69F00", "#D55E00"), strict=True))
 SHAKEN = 120.0  # duration of sample paths, in a sqrt(m / D)
@@ -147,7 +153,7 @@ def _error_bar(
     if reference is not None:
         mean = mean / reference.mean
         spread = math.hypot(spread, reference.error / reference.mean)
-    factor = math.exp(NORMAL * spread)
+    factor = math.exp(NormalDist().inv_cdf(0.975) * spread)
     bar = [[mean - mean / factor], [mean * factor - mean]]
     style = colour or COLOURS[run.well.kind]
     axes.errorbar(where, mean, bar, fmt="o", color=style, markersize=4, capsize=3)

@@ -16,13 +16,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
-from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Verdict, certify, crossing, stationary_on
-from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.toolkit import Array, Value, checked, checks
 
 if TYPE_CHECKING:
     import sympy

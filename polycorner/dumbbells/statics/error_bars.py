@@ -5,15 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER
-from polycorner.kinds import checked
 from polycorner.minimisation import Sensitivity, sensitivity, stationary_on
-from polycorner.values import Checked
+from polycorner.toolkit import Checked, checked, checks
 
 if TYPE_CHECKING:
-    from polycorner.minimisation.sensitivities import Quantity
+    import sympy
+
+    from polycorner import SmoothFunction
 
 PLANE_RATES = {
     "length": {"l": 1.0},
@@ -53,7 +53,9 @@ class ErrorBar(Checked):
 
 
 def error_bar(
-    found: Sensitivity, quantity: "Quantity", tolerances: Mapping[str, float]
+    found: Sensitivity,
+    quantity: "SmoothFunction | sympy.Expr | str",
+    tolerances: Mapping[str, float],
 ) -> ErrorBar:
     """Return a quantity at an equilibrium with its spread from tolerances.
 

@@ -24,15 +24,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner import checks
-from polycorner.checks import reals
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells.statics.keel_formulas import force_ratio
-from polycorner.formulas import kernels
-from polycorner.kinds import check_fields
-from polycorner.spaces.arguments import scalar
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked, Value, cached_property
+from polycorner.toolkit import (
+    Array,
+    Checked,
+    Value,
+    cached_property,
+    check_fields,
+    checks,
+    reals,
+    scalar,
+)
 
 BISECTIONS = 60  # these bracket an azimuth in a quarter turn to one unit in the last place
 
@@ -274,13 +277,12 @@ def _acting(
     """
     azimuth, heading = np.broadcast_arrays(reals("phi", phi), reals("theta", theta))
     at = np.stack([azimuth, 0 * azimuth, heading], axis=-1).reshape(-1, 3)
-    sizes = np.array([2 * slenderness, 1.0, 1.0, math.tan(tilt)])
-    slopes = drum_formulas.weight().kernel.over(at, kernels.address(sizes), 1)[1]
+    sizes = 2 * slenderness, 1.0, 1.0, math.tan(tilt)
+    slopes = drum_formulas.weight().evaluate(at, sizes, 1)[1]
     east, north, yaw = -slopes[:, 0].T
     moving = np.zeros((len(at), 6))
     moving[:, :2] = at[:, [0, 2]]
-    sizes = np.array([2 * slenderness, 0.0, 1.0, 0.0, 1.0])
-    (grip,) = drum_formulas.grip().kernel.over(moving, kernels.address(sizes), 0)
+    (grip,) = drum_formulas.grip().evaluate(moving, (2 * slenderness, 0.0, 1.0, 0.0, 1.0))
     sine, cosine = np.sin(at[:, 2]), np.cos(at[:, 2])
     force = np.stack([sine * north - cosine * east, sine * east + cosine * north], axis=-1)
     loads = grip[:, [drum_formulas.GRIPS.index(f"load{k}") for k in (1, 2)]]

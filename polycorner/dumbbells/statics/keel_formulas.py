@@ -21,12 +21,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import reals
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells import formulas as dumbbell_formulas
-from polycorner.formulas import cache, families, kernels
-from polycorner.spaces.arguments import scalar
-from polycorner.spaces.manifold import Array
+from polycorner.formulas import Family
+from polycorner.toolkit import Array, reals, scalar, source_key
 
 if TYPE_CHECKING:
     import sympy
@@ -113,7 +111,7 @@ def _torques() -> "tuple[sympy.Expr, sympy.Expr]":
 
 
 @lru_cache(maxsize=1)
-def family() -> families.Family:
+def family() -> Family:
     """Return ``ratio_r``, ``ratio_s``, ``gravity``, ``lever`` of ``phi theta``, compiled.
 
     Parameters ``alpha kappa``; see :class:`Derivation`.
@@ -121,13 +119,13 @@ def family() -> families.Family:
     names = ("ratio_r", "ratio_s", "gravity", "lever")
     variables, parameters = ("phi", "theta"), ("alpha", "kappa")
     modules = (dumbbell_formulas.__name__, drum_formulas.__name__, __name__)
-    key = repr((cache.source_key(*modules), names))
+    key = repr((source_key(*modules), names))
 
     def formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
         d = derivation()
         return {}, dict(zip(names, (*d.ratio, d.gravity, d.lever), strict=True))
 
-    return families.Family(names, variables, parameters, formulas, key)
+    return Family(names, variables, parameters, formulas, key)
 
 
 def force_ratio(phi: ArrayLike, theta: ArrayLike, tilt: float) -> Array:
@@ -169,10 +167,8 @@ def net_torque(
 
 def _evaluated(phi: ArrayLike, theta: ArrayLike, tilt: float, slenderness: float) -> Array:
     first, second = np.broadcast_arrays(reals("phi", phi), reals("theta", theta))
-    inputs = np.stack([first.ravel(), second.ravel()], axis=-1)
-    numbers = np.array([tilt, slenderness], dtype=np.float64)
-    (found,) = family().kernel.over(inputs, kernels.address(numbers), 0)
-    return found.reshape(*first.shape, 4)
+    (found,) = family().evaluate(np.stack([first, second], axis=-1), (tilt, slenderness))
+    return found
 
 
 def _cosine(ratio: Array) -> Array:

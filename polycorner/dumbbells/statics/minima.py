@@ -6,12 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
-from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, minimise, stationary_on
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.toolkit import Array, Checked, checked, checks
 
 CORNER = ("A2B1", "A2b", "aB1")
 

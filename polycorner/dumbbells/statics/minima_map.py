@@ -21,15 +21,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner import checks
 from polycorner.dumbbells.pair import LONGEST, DumbbellPair
 from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
-from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Minima, certify, minima
-from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.progress import Progress, silent
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.polyhedra import Element, Symmetry
+from polycorner.toolkit import Array, Checked, Progress, checked, checks, silent
 
 CURVATURES = (0.128, 0.5, 1.0, 1.5)
 RODS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)

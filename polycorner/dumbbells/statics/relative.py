@@ -49,16 +49,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.formulas.families import Family
-from polycorner.formulas.functions import SmoothFunction
-from polycorner.polyhedra.groups import AllOf, AnyOf
-from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.spaces import distances
-from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Checked, cached_property
+from polycorner.formulas import Family, SmoothFunction
+from polycorner.polyhedra import AllOf, AnyOf, Element, Polyhedron, Symmetry
+from polycorner.spaces import Manifold
+from polycorner.toolkit import Array, Checked, cached_property, checks, dot, minus, norm
 
 if TYPE_CHECKING:
     import sympy
@@ -219,16 +214,16 @@ class RelativePlacements(Checked):
         gaps: dict[str, Any] = {}
         for a in ("A1", "A2"):
             for b in ("B1", "B2"):
-                gaps[a + b] = distances.norm(distances.minus(ends[a], ends[b])) - 2 * r
-        apart = distances.minus(centre["B"], centre["A"])
+                gaps[a + b] = norm(minus(ends[a], ends[b])) - 2 * r
+        apart = minus(centre["B"], centre["A"])
         ways: dict[str, Any] = {"apart": apart[0] ** 2 + apart[1] ** 2 - length**2}
         for end, point in ends.items():
             rod = "B" if end[0] == "A" else "A"
-            w, u = distances.minus(point, centre[rod]), axis[rod]
-            along = distances.dot(w, u)
+            w, u = minus(point, centre[rod]), axis[rod]
+            along = dot(w, u)
             foot = (sympy.Abs(along + half) - sympy.Abs(along - half)) / 2  # clamped to the rod
             rest = tuple(wi - foot * ui for wi, ui in zip(w, u, strict=True))
-            gaps[f"{end}b" if rod == "B" else f"a{end}"] = distances.norm(rest) - r - t
+            gaps[f"{end}b" if rod == "B" else f"a{end}"] = norm(rest) - r - t
             side = w[0] * u[1] - w[1] * u[0]
             ways[f"left{end}"], ways[f"right{end}"] = side, -side
         return gaps, ways

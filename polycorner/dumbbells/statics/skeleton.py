@@ -7,18 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import ball_relabellings, relabellings
-from polycorner.kinds import checked
-from polycorner.polyhedra.symmetry import Element
-from polycorner.progress import Progress
-from polycorner.skeletons.elements import Skeleton
-from polycorner.skeletons.orbits import Orbits, orbits
-from polycorner.skeletons.parts import Corner
-from polycorner.skeletons.search import BUDGET, skeleton
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked, cached_property
+from polycorner.polyhedra import Element
+from polycorner.skeletons import Budget, Corner, Skeleton, skeleton
+from polycorner.toolkit import (
+    Array,
+    Checked,
+    Orbits,
+    Progress,
+    cached_property,
+    checked,
+    checks,
+    orbits,
+)
 
 PLACEMENTS = 6
 
@@ -109,7 +111,7 @@ def pair_atlas(
     pair: DumbbellPair,
     *,
     heading: float = 0.0,
-    budget: int = BUDGET,
+    budget: int = Budget.edges,
     progress: Progress | None = None,
     rng: np.random.Generator | int | None = None,
 ) -> PairAtlas:

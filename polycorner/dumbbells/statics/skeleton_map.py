@@ -8,18 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner import checks
 from polycorner.dumbbells.pair import LONGEST, DumbbellPair
 from polycorner.dumbbells.statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from polycorner.dumbbells.symmetries import relabellings
-from polycorner.kinds import checked
-from polycorner.progress import Progress, silent
-from polycorner.skeletons.elements import Skeleton
-from polycorner.skeletons.orbits import Orbits
-from polycorner.skeletons.parts import Completeness, Edge
-from polycorner.skeletons.search import skeleton
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.skeletons import Completeness, Edge, Skeleton, skeleton
+from polycorner.toolkit import Array, Checked, Orbits, Progress, checked, checks, silent
 
 # Distance, in ball radii, below which corners are not distinguished reliably, and so the possible
 # error of the position of a change.

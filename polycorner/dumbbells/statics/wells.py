@@ -10,15 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_minima
 from polycorner.minimisation import Certificate, Entrapment
-from polycorner.models.wells.escape import mean_escape_time
-from polycorner.models.wells.holding import Escapes, escapes
-from polycorner.models.wells.wells import Well
-from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.models.wells import Escapes, Well, escapes, mean_escape_time
+from polycorner.toolkit import Array, Value, checks
 
 GRAVITY = 9810.0  # mm/s^2
 BALLS = 4  # number of balls whose inertia every direction has

@@ -6,12 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import choice, real, whole
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed, kicks_of
-from polycorner.kinds import checked
-from polycorner.motion.simulation import LONGEST
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import LONGEST, Array, checked, choice, real, whole
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum

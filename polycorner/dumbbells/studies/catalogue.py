@@ -8,7 +8,7 @@ from polycorner.dumbbells.studies.bunches import bunch
 from polycorner.dumbbells.studies.driven import driven
 from polycorner.dumbbells.studies.functions import climbing, heading
 from polycorner.dumbbells.studies.turning import turning
-from polycorner.sweeps.study_files import NamedStudy
+from polycorner.sweeps import NamedStudy
 
 FOLDER = Path(__file__).parent
 LENGTHS = dict.fromkeys(("length", "ball_radius", "rod_radius", "drum_radius"), "mm")

@@ -6,17 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import choice, real, refuse
-from polycorner.kinds import checked
-from polycorner.motion.simulation import LONGEST
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import LONGEST, Array, checked, choice, real, refuse
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.dyads import DyadPaths
     from polycorner.dumbbells.dynamics.steady import Steady
-    from polycorner.motion.noise import Noise
-    from polycorner.motion.trajectory import Trajectory
+    from polycorner.motion import Noise, Trajectory
 
 SINGLES = (12.0, 12.0, 6.0, -6.0)  # degrees: headings at the start
 PAIRS = 5  # of each hand
@@ -135,7 +131,7 @@ def disturbed(
 ) -> "tuple[DumbbellDrum, Noise]":
     """Return a drum with one kind of imperfection, and the noise; see :func:`driven`."""
     from polycorner.dumbbells.imperfections import OutOfRound, UnevenFriction, Wobble
-    from polycorner.motion.noise import Noise
+    from polycorner.motion import Noise
 
     choice("kind", kind, KINDS)
     real("strength", strength, least=0)

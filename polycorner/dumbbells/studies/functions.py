@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.checks import real, whole
+from polycorner import SolverError
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.statics.minima import CORNER, dyad_corner, paper_heading
-from polycorner.errors import SolverError
-from polycorner.kinds import checked
-from polycorner.motion.simulation import LONGEST
+from polycorner.toolkit import LONGEST, checked, real, whole
 
 FIRST, LAST = 2.0, 14.0  # degrees: headings of the first and the last pair at the start
 
@@ -120,7 +118,7 @@ def climbing(
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.dyads import Start, follow_dyads
     from polycorner.dumbbells.dynamics.steady import steady
-    from polycorner.motion.noise import Noise
+    from polycorner.motion import Noise
 
     whole("pairs", pairs, least=1)
     real("noise", noise, least=0)

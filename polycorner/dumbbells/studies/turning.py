@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.checks import choice, real
 from polycorner.dumbbells.studies.driven import TURN, disturbed
-from polycorner.kinds import checked
-from polycorner.motion.simulation import LONGEST
+from polycorner.toolkit import LONGEST, checked, choice, real
 
 PAIRS = 6  # and as many single dumbbells
 PARTS = {"all": ("phi", "eta", "theta"), "rolling": ("phi",), "sliding": ("eta", "theta")}

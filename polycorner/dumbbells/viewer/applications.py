@@ -21,7 +21,7 @@ from polycorner.dumbbells.viewer.board import Board
 from polycorner.dumbbells.viewer.page import page_file, three_script
 from polycorner.dumbbells.viewer.server import allowed, names_of
 from polycorner.dumbbells.viewer.sliders import MESSAGE, RefusedError, hello, parsed
-from polycorner.kinds import checked
+from polycorner.toolkit import checked
 
 RATE = 300  # most messages of a page in a second
 PAGES = 16  # most live pages at a time

@@ -22,9 +22,8 @@ from polycorner.dumbbells.pictures.symbols import energy_unit, multiplier_unit
 from polycorner.dumbbells.viewer.sliders import SHAPE, Slider, coordinates, sliders_for
 from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descent
 from polycorner.minimisation import Certificate, Verdict, certify
-from polycorner.polyhedra.strata import LocalType
-from polycorner.spaces.manifold import Array
-from polycorner.values import Value, cached_property
+from polycorner.polyhedra import LocalType
+from polycorner.toolkit import Array, Value, cached_property
 
 DRUM = 125.0 / 16.0  # ratio of drum radius to length for a pair that starts in the plane
 FRAMES = 150  # most frames of a descent

@@ -22,14 +22,13 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
-from polycorner.atomic import write_atomically
+from polycorner import PolycornerError
 from polycorner.dumbbells.pictures.bodies import box_of, sizes_of
 from polycorner.dumbbells.pictures.film import Film
 from polycorner.dumbbells.pictures.scenes import atlas_scene, glb, library
 from polycorner.dumbbells.pictures.symbols import HANDS, KIND_WORDS, KINDS, WORDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.errors import PolycornerError
-from polycorner.kinds import checked
+from polycorner.toolkit import checked, write_atomically
 
 END_OF_LIBRARY = "THREE.GLTFLoader=GLTFLoader;})();"  # trimesh's own page follows
 KEYS = " Space plays, ← and → step, Home and End go to the ends."

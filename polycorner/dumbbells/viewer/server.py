@@ -13,8 +13,7 @@ from tornado.httpserver import HTTPServer
 from tornado.iostream import IOStream
 from tornado.web import Application
 
-from polycorner.checks import refuse, whole
-from polycorner.kinds import checked
+from polycorner.toolkit import checked, refuse, whole
 
 LOCAL = ("127.0.0.1", "localhost", "[::1]")
 EVERYWHERE = frozenset({"0.0.0.0", "[::]"})

@@ -2,24 +2,16 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import real, refuse
-from polycorner.kinds import checked
-from polycorner.minimisation import Certificate, minimise
-from polycorner.minimisation.feasibility import approach
-from polycorner.minimisation.problem import Problem, pose
-from polycorner.polyhedra.faces import Face
-from polycorner.polyhedra.strata import distances
-from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.minimisation import Certificate, Problem, minimise
+from polycorner.toolkit import Array, Checked, Face, approach, checked, pose, real, refuse
 
 if TYPE_CHECKING:
-    from polycorner.minimisation.problem import Energy
-    from polycorner.polyhedra.polyhedron import Polyhedron
+    from polycorner.polyhedra import Polyhedron
 
 STRIDE = 0.15  # longest step of a path, in scale units
 LEAST = 1e-4  # shortest step, below which the minimiser takes over
@@ -58,7 +50,7 @@ class Descent(Checked):
 @checked
 def descent(
     polyhedron: "Polyhedron",
-    energy: "Energy",
+    energy: Any,
     start: ArrayLike,
     *,
     stride: float = STRIDE,
@@ -146,7 +138,7 @@ def _downhill(problem: Problem, q: Array) -> tuple[float, Array, Indices]:
     values, gradients = problem.evaluate(q, 1)
     m, slope = problem.inequalities, gradients[-1]
     pull = slope / (float(np.linalg.norm(slope)) or 1.0)
-    closed = np.flatnonzero(distances(values[:m], gradients[:m]) <= TOUCHING)
+    closed = np.flatnonzero(values[:m] <= TOUCHING * np.linalg.norm(gradients[:m], axis=1))
     if not len(closed):
         return float(values[-1]), -pull, closed
     rows = gradients[closed]

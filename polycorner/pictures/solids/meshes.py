@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.atomic import atomic
+from polycorner.atomic import replace_atomically
 from polycorner.checks import refuse
 from polycorner.errors import SolverError
 from polycorner.kinds import checked
@@ -251,7 +251,7 @@ def write_mesh(
             scene.add_geometry(drawn, geom_name=f"{name} {number + 1}")
     if len(marks):
         scene.add_geometry(made.PointCloud(marks * factors), geom_name="points")
-    with atomic(path) as temporary:
+    with replace_atomically(path) as temporary:
         (scene if suffix == ".glb" else solid).export(temporary)
     return path
 

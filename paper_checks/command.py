@@ -1,24 +1,29 @@
 """``polycorner paper``: the statements of the paper, checked one by one."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
-from polycorner.cli.options import command, examples, option, output_options
-from polycorner.cli.output import (
+from polycorner.cli import (
     columns,
+    command,
     deliver,
+    examples,
     fail,
     json_text,
+    option,
+    output_options,
     prepare,
     verbosity,
     working,
     writing,
 )
-from polycorner.dumbbells.cli.paper_names import check_names, claim_ids, figure_names, sections
+from polycorner.toolkit import nearest
 
 if TYPE_CHECKING:
     from paper_checks.framework.running import Run
@@ -38,6 +43,8 @@ was found and names what was not run (exit code 130).  `python -m paper_checks` 
 """
 )
 FIGURES = "figures"
+ID = re.compile(r'\bClaim\(\s*"(\w+)",\s*"(\w+)"')  # and the section
+FIGURE = re.compile(r'\bFigure\(\s*"(\w+)"')
 
 
 def _completed(
@@ -125,7 +132,7 @@ def _list(ids: Sequence[str], chosen: Sequence[str], *, as_json: bool) -> None:
     ]
 
     def text() -> str:
-        from polycorner.printing import Table
+        from polycorner.toolkit import Table
 
         rows = (
             (
@@ -160,7 +167,7 @@ def _write(run: "Run", out: Path, *, slow: bool) -> tuple[list[Path], list[str]]
     from paper_checks.figures.embedding import embedded_figures
     from paper_checks.framework.records import markdown, records
     from paper_checks.framework.report import html_report
-    from polycorner.atomic import write_atomically
+    from polycorner.toolkit import write_atomically
 
     with working("drawing the figures"):
         figures = embedded_figures(run, slow=slow)
@@ -190,3 +197,48 @@ def _draw(
     with writing(out), working("drawing", "figures") as progress:
         written = write(out, names or None, slow=slow, progress=progress)
     deliver([str(path) for path in written], str, lambda: written, as_json=as_json)
+
+
+# ----------------------------------------------------------------------------------------- names
+# Read from the sources without importing them: importing the checks takes seconds, completing or
+# refusing a name must not.
+
+
+def claim_ids() -> list[str]:
+    """Return the ids of all claims and, as ``E4`` for ``E4a`` and ``E4b``, of their groups."""
+    ids = [found[0] for source in _sources() for found in ID.findall(source)]
+    return sorted({*ids, *map(_group, ids)}, key=_order)
+
+
+def sections() -> list[str]:
+    """Return the sections and appendices of the paper that claims belong to."""
+    return sorted({found[1] for source in _sources() for found in ID.findall(source)})
+
+
+def figure_names() -> list[str]:
+    """Return the names of all figures."""
+    return sorted(name for source in _sources("figures") for name in FIGURE.findall(source))
+
+
+def check_names(what: str, given: Iterable[str], known: list[str]) -> None:
+    """End the command at the first name that is not known."""
+    for name in given:
+        if name not in known:
+            fail(f"{what}; got {nearest(name, known)}")
+
+
+def _group(name: str) -> str:
+    return name.rstrip("abcdefghijklmnopqrstuvwxyz")
+
+
+def _order(name: str) -> tuple[str, int, str]:
+    number = "".join(filter(str.isdigit, name))
+    letter, _, part = name.partition(number)
+    return letter, int(number), part
+
+
+def _sources(folder: str = "") -> Iterator[str]:
+    spec = find_spec("paper_checks")
+    for place in (spec.submodule_search_locations or ()) if spec else ():
+        for file in sorted((Path(place) / folder).rglob("*.py")):
+            yield file.read_text(encoding="utf-8")

@@ -1,0 +1,136 @@
+from . import checks
+from .atomic import replace_atomically, write_atomically
+from .bodies.placed import SOURCES, Feature, placed_gaps, placed_stationary
+from .bodies.waves import wave_depth, waves
+from .checks import (
+    about,
+    choice,
+    flag,
+    instance,
+    mapping,
+    missing_extra,
+    real,
+    reals,
+    refuse,
+    whole,
+)
+from .container import BINARY, FileKind
+from .errors import nearest
+from .files.motions import (
+    MotionUnits,
+    column,
+    load_dataset,
+    motion_attributes,
+    motion_coordinates,
+    motion_data,
+    read_motion,
+    save_dataset,
+)
+from .formulas.bundles import Call
+from .formulas.cache import cache_folder, source_key
+from .intervals.boxes import BoxFunctions
+from .kinds import check_fields, checked
+from .minimisation.feasibility import approach
+from .minimisation.problem import pose
+from .motion.bodies import FrictionContact, IdenticalBodies, MovingBody, PairContacts, PairLaw
+from .motion.formulation import TIME, Formulation, Laws
+from .motion.random_functions import check_band, field_modes, signal_modes
+from .motion.simulation import LONGEST, SHORTEST_STEP
+from .motion.trajectory import Touch
+from .pictures.solids.charts import Chart, Gaps
+from .pictures.solids.grids import FEWEST_CELLS, Function
+from .pictures.style import BODIES, SHADES, bridged
+from .polyhedra.cones import rank
+from .polyhedra.faces import Face
+from .printing import Sheet, Table, facts
+from .progress import Progress, silent
+from .skeletons.orbits import Orbits, orbits
+from .spaces.arguments import finite, scalar
+from .spaces.distances import dot, minus, norm
+from .spaces.manifold import Array
+from .tolerances import DEFAULT, TOLERANCE
+from .values import Checked, Value, cached_property
+from .workers import serve
+
+__all__ = [
+    "BINARY",
+    "BODIES",
+    "DEFAULT",
+    "FEWEST_CELLS",
+    "LONGEST",
+    "SHADES",
+    "SHORTEST_STEP",
+    "SOURCES",
+    "TIME",
+    "TOLERANCE",
+    "Array",
+    "BoxFunctions",
+    "Call",
+    "Chart",
+    "Checked",
+    "Face",
+    "Feature",
+    "FileKind",
+    "Formulation",
+    "FrictionContact",
+    "Function",
+    "Gaps",
+    "IdenticalBodies",
+    "Laws",
+    "MotionUnits",
+    "MovingBody",
+    "Orbits",
+    "PairContacts",
+    "PairLaw",
+    "Progress",
+    "Sheet",
+    "Table",
+    "Touch",
+    "Value",
+    "about",
+    "approach",
+    "bridged",
+    "cache_folder",
+    "cached_property",
+    "check_band",
+    "check_fields",
+    "checked",
+    "checks",
+    "choice",
+    "column",
+    "dot",
+    "facts",
+    "field_modes",
+    "finite",
+    "flag",
+    "instance",
+    "load_dataset",
+    "mapping",
+    "minus",
+    "missing_extra",
+    "motion_attributes",
+    "motion_coordinates",
+    "motion_data",
+    "nearest",
+    "norm",
+    "orbits",
+    "placed_gaps",
+    "placed_stationary",
+    "pose",
+    "rank",
+    "read_motion",
+    "real",
+    "reals",
+    "refuse",
+    "replace_atomically",
+    "save_dataset",
+    "scalar",
+    "serve",
+    "signal_modes",
+    "silent",
+    "source_key",
+    "wave_depth",
+    "waves",
+    "whole",
+    "write_atomically",
+]
