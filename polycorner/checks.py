@@ -17,7 +17,7 @@ from polycorner.errors import nearest
 
 T = TypeVar("T")
 MOST = 2**63 - 1  # the largest whole number of compiled code
-LONGEST = 500  # characters of a value in an error
+LONGEST_VALUE, LONGEST_REASON = 500, 300  # characters of a value, and of what is wrong, in errors
 
 
 def refuse(
@@ -28,9 +28,13 @@ def refuse(
         shown = " ".join(line.strip() for line in repr(got).splitlines())  # arrays have several
     except ValueError:  # of integers of thousands of digits, which Python does not write out
         shown = "a number that is too long to be shown"
-    shown = shown if len(shown) <= LONGEST else f"{shown[: LONGEST - 3]}..."
-    msg = f"{argument}: expected {expected}; got {shown}"
+    msg = f"{argument}: expected {expected}; got {shortened(shown)}"
     raise kind(msg)
+
+
+def shortened(text: str, most: int = LONGEST_VALUE) -> str:
+    """Return a text, or its beginning where it is too long."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
 @contextmanager

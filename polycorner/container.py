@@ -31,6 +31,7 @@ import numpy as np
 
 from polycorner import __version__
 from polycorner.atomic import write_atomically
+from polycorner.checks import LONGEST_REASON, shortened
 from polycorner.errors import PolycornerError
 
 JSON = (b' "polycorner": "', b'"}\n')
@@ -38,7 +39,6 @@ XML = (b"<!-- polycorner ", b" -->\n")
 BINARY = (b"\npolycorner ", b"\n")
 _SEAL = re.compile(rb"(?P<name>[a-z ]+) (?P<version>\d{1,9}) sha256 (?P<digest>[0-9a-f]{64})")
 _WORDS = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
-SHOWN = 300  # characters of what is wrong with a file
 
 
 @contextmanager
@@ -54,12 +54,11 @@ def one_sentence(refusal: Callable[[str], Exception]) -> Iterator[None]:
         raise
     except Exception as error:
         plain = isinstance(error, ValueError | TypeError) and str(error)
-        raise refusal(_shortened(plain or repr(error))) from error
+        raise refusal(_sentence(plain or repr(error))) from error
 
 
-def _shortened(why: object) -> str:
-    sentence = " ".join(str(why).split())  # what libraries report may have lines
-    return sentence if len(sentence) <= SHOWN else f"{sentence[: SHOWN - 3]}..."
+def _sentence(why: object) -> str:
+    return shortened(" ".join(str(why).split()), LONGEST_REASON)  # libraries report lines
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class FileKind:
 
     def refusal(self, path: str | os.PathLike[str], why: object) -> ValueError:
         """Return the error for a file that is not of this kind, or is damaged."""
-        msg = f"path: expected a {self.name} that {self.writer} wrote; {path} {_shortened(why)}"
+        msg = f"path: expected a {self.name} that {self.writer} wrote; {path} {_sentence(why)}"
         return FileError(msg)
 
     def reading(self, path: str | os.PathLike[str]) -> AbstractContextManager[None]:

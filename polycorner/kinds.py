@@ -122,16 +122,16 @@ def kind_of(annotation: Any, module: str) -> Kind:
         return Kind(*WORDS[annotation])
     parts = get_args(annotation)
     origin = get_origin(annotation) or annotation
-    if origin in (Union, types.UnionType) or isinstance(annotation, _Either):
-        return _either([kind_of(part, module) for part in parts or annotation.parts])
+    if origin in (Union, types.UnionType):
+        return _either([kind_of(part, module) for part in parts])
     if origin is Literal:
         return Kind(listed(map(repr, parts)), lambda v: isinstance(v, str))  # which word: `choice`
     if origin is np.ndarray:
         return _array(get_args(parts[1])[0] if len(parts) > 1 and get_args(parts[1]) else None)
-    name = annotation.name if isinstance(annotation, _Named) else ""
-    if "Expr" in (name, getattr(annotation, "__name__", "")):  # numbers are expressions, too
-        return _either([Kind("an expression", _named("Expr")), Kind(*WORDS[float])])
-    if name:
+    name = getattr(annotation, "__name__", "")
+    if name == "Expr":  # numbers are expressions, too
+        return _either([Kind("an expression", _named(name)), Kind(*WORDS[float])])
+    if isinstance(annotation, _Stranger):
         return Kind(_a(name), _named(name), True)
     return _of_class(origin, parts, module)
 
@@ -269,34 +269,16 @@ def _fields(kind: Any) -> tuple[tuple[str, Test, Kind], ...]:
     return tuple((name, k.test, k) for name, k in found if k.test is not None)
 
 
-@dataclass(frozen=True)
-class _Named:
-    """A class that is known to a type checker only."""
+class _Stranger(type):
+    """The class of stand-ins for classes that are known to a type checker only."""
 
-    name: str
+    def __getattr__(cls, name: str) -> "_Stranger":
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return _Stranger(name, (), {})
 
-    def __getattr__(self, name: str) -> "_Named":
-        return _Named(name)
-
-    def __getitem__(self, _: object) -> "_Named":
-        return self
-
-    def __or__(self, other: object) -> "_Either":
-        return _Either((self, other))
-
-    def __ror__(self, other: object) -> "_Either":
-        return _Either((other, self))
-
-
-@dataclass(frozen=True)
-class _Either:
-    parts: tuple[object, ...]
-
-    def __or__(self, other: object) -> "_Either":
-        return _Either((*self.parts, other))
-
-    def __ror__(self, other: object) -> "_Either":
-        return _Either((other, *self.parts))
+    def __getitem__(cls, _: object) -> "_Stranger":
+        return cls
 
 
 class _Names(dict[str, Any]):
@@ -309,8 +291,8 @@ class _Names(dict[str, Any]):
         if source is not None and source.partition(".")[0] == "polycorner":
             # Another name for a type, such as a pair of numbers, is not that of a class.
             found = getattr(sys.modules.get(source), name, Any)
-            return _Named(name) if isinstance(found, type) else found
-        return getattr(builtins, name, None) or sys.modules.get(name) or _Named(name)
+            return _Stranger(name, (), {}) if isinstance(found, type) else found
+        return getattr(builtins, name, None) or sys.modules.get(name) or _Stranger(name, (), {})
 
 
 @cache

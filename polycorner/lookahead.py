@@ -15,12 +15,7 @@ ATTEMPTS = 3  # how often workers may die while they compute the call whose resu
 
 
 class Lookahead:
-    """Calls of functions, a few in flight for each worker.
-
-    Parameters
-    ----------
-    workers : Workers
-    """
+    """Calls of functions, a few in flight for each worker."""
 
     def __init__(self, workers: Workers) -> None:
         self.workers = workers

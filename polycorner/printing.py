@@ -13,7 +13,7 @@ from itertools import islice, zip_longest
 
 WIDTH = 96  # columns at which sentences are wrapped unless a width is given
 GAP = 2  # columns between two columns of a table
-MOST = 20  # rows that are shown of a long table
+MOST_ROWS = 20  # rows that are shown of a long table
 
 
 @dataclass(frozen=True)
@@ -195,8 +195,8 @@ def listed(
     numbers: tuple[int, ...] = (),
 ) -> Table:
     """Return the first of ``count`` rows as a table whose caption says that rows are left out."""
-    shown = tuple(islice(rows, MOST))
-    left = f" (the first {MOST} of {count})" if count > len(shown) else ""
+    shown = tuple(islice(rows, MOST_ROWS))
+    left = f" (the first {MOST_ROWS} of {count})" if count > len(shown) else ""
     return Table(tuple(head), shown, numbers, f"{caption}{left}".strip())
 
 

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import lru_cache
 from typing import Any
 
@@ -117,12 +117,7 @@ class Workers:
 
 
 class Processes(Workers):
-    """Processes that are started here, and replaced when one of them dies.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """Processes that are started here, and replaced when one of them dies."""
 
     def __init__(self, count: int) -> None:
         super().__init__(self._started(count), lambda: count)
@@ -188,6 +183,11 @@ def opened(executor: Any) -> Iterator[Workers]:
         at_once = False
     finally:
         workers.close(at_once=at_once)
+
+
+def opened_if_any(executor: Any) -> AbstractContextManager[Workers | None]:
+    """Yield the workers of :func:`opened`, or None where there is no executor."""
+    return nullcontext() if executor is None else opened(executor)
 
 
 def workers_of(executor: Any) -> Workers:

@@ -22,7 +22,7 @@ from polycorner import (
     stratum_at,
 )
 from polycorner.dumbbells import DumbbellPair
-from polycorner.printing import MOST, Sheet, Table, listed, number, titled
+from polycorner.printing import MOST_ROWS, Sheet, Table, listed, number, titled
 
 ODD = "<b>&\"'"
 cells = st.text(st.characters(codec="utf-8", categories=("L", "N", "P", "S")), max_size=8)
@@ -111,11 +111,11 @@ def test_long_tables_say_how_many_rows_are_left_out():
     def rows(count):
         return ((str(k),) for k in range(count))
 
-    short = listed("Things", ["k"], rows(MOST), MOST)
-    assert (len(short.rows), short.caption) == (MOST, "Things")
-    long = listed("Things", ["k"], rows(MOST + 5), MOST + 5)
-    assert len(long.rows) == MOST
-    assert long.caption == f"Things (the first {MOST} of {MOST + 5})"
+    short = listed("Things", ["k"], rows(MOST_ROWS), MOST_ROWS)
+    assert (len(short.rows), short.caption) == (MOST_ROWS, "Things")
+    long = listed("Things", ["k"], rows(MOST_ROWS + 5), MOST_ROWS + 5)
+    assert len(long.rows) == MOST_ROWS
+    assert long.caption == f"Things (the first {MOST_ROWS} of {MOST_ROWS + 5})"
 
 
 @given(st.text(min_size=1), st.text(min_size=1))

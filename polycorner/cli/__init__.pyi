@@ -1,4 +1,3 @@
-from .atlas import RESUMING, search_options
 from .minima import report_minima, start_options
 from .options import (
     Command,
@@ -29,10 +28,11 @@ from .output import (
     write_answer,
     writing,
 )
-from .search import SkeletonSearch
+from .search import RESUMING, Begin, SkeletonSearch, search_options
 
 __all__ = [
     "RESUMING",
+    "Begin",
     "Command",
     "GroupedCommand",
     "SkeletonSearch",

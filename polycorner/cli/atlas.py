@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 import click
 
 from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.options import (
-    Command,
-    examples,
-    option,
-    output_options,
-    seed_option,
+from polycorner.cli.options import examples, option, output_options, seed_option
+from polycorner.cli.search import (
+    RESUMING,
+    Begin,
+    DiskSearch,
+    SkeletonSearch,
+    critical_sheet,
+    label,
+    resume_option,
+    search_options,
 )
-from polycorner.cli.report import critical_sheet, label
-from polycorner.cli.search import DiskSearch, SkeletonSearch
 
 if TYPE_CHECKING:
     from polycorner.models.pinball import Pinball
@@ -22,10 +24,6 @@ if TYPE_CHECKING:
 
 STARTS = 60  # random points from which a search in the plane descends
 CROWDED = 12  # corners above which a picture is clearer without their names
-RESUMING = """
-A search is saved every few seconds.  Ctrl-C ends it and reports what was found (exit code 130);
-the same command with --resume continues it, also after the process was killed.
-"""
 
 
 @click.group(
@@ -42,33 +40,6 @@ def atlas() -> None:
     """
 
 
-resume_option = option(
-    "--resume",
-    is_flag=True,
-    group="Search",
-    help="Continue a search that was stopped, killed or out of budget.",
-)
-
-
-def search_options(function: Command) -> Command:
-    """Add ``--seed``, ``--budget``, ``--workers``, ``--resume`` and the options of every answer."""
-    for add in (
-        output_options,
-        resume_option,
-        option(
-            "--workers", type=click.IntRange(min=1), group="Search",
-            help="Processes that walk along edges. [this one]",
-        ),
-        option(
-            "--budget", type=click.IntRange(min=1), default=100_000, group="Search",
-            help="Most edges to trace.",
-        ),
-        seed_option("the random directions"),
-    ):  # fmt: skip
-        function = add(function)
-    return function
-
-
 def _epilog(*lines: str) -> str:
     return examples(*(f"atlas {line}" for line in lines)) + RESUMING
 
@@ -76,10 +47,7 @@ def _epilog(*lines: str) -> str:
 @atlas.command(epilog=_epilog("spheres --count 6"))
 @option("--count", type=click.IntRange(min=2), default=6, group="Model", help="Number of spheres.")
 @search_options
-def spheres(
-    count: int, as_json: bool, out: Path | None, seed: int, budget: int, workers: int | None,
-    resume: bool,
-) -> None:  # fmt: skip
+def spheres(count: int, begin: Begin) -> None:
     """List rigid clusters of sticky unit spheres.
 
     Clusters are counted up to congruence and relabelling; edges are motions with one degree of
@@ -88,8 +56,8 @@ def spheres(
     from polycorner.models.spheres import SphereCluster
 
     model = SphereCluster(count)
-    search = SkeletonSearch("spheres", {"count": count}, out, seed, budget, workers)
-    found = search.run(model.polyhedron, lambda _: model.starts(), model.symmetry, resume=resume)
+    search = begin("spheres", {"count": count})
+    found = search.run(model.polyhedron, lambda _: model.starts(), model.symmetry)
     special = [k for k, corner in enumerate(found.corners) if corner.singular]
     extra = {
         "corners_count": len(found.corners),
@@ -107,29 +75,25 @@ def spheres(
         figure = clusters.draw_clusters(model, points, singular=special)
         return [style.save(figure, folder / "clusters.png")]
 
-    search.finish(search.answer(found, extra), as_json=as_json, draw=draw)
+    search.finish(search.answer(found, extra), draw)
 
 
 @atlas.command(epilog=_epilog("tutorial", "tutorial --out out"))
 @search_options
-def tutorial(
-    as_json: bool, out: Path | None, seed: int, budget: int, workers: int | None, resume: bool
-) -> None:
+def tutorial(begin: Begin) -> None:
     """List the sides of a planar region with seven corners."""
     from polycorner.models.tutorial import Tutorial
 
-    _planar("tutorial", Tutorial(), as_json, out, seed, budget, workers, resume)
+    _planar(begin("tutorial", {}), Tutorial())
 
 
 @atlas.command(epilog=_epilog("pinball --seed 1 --json"))
 @search_options
-def pinball(
-    as_json: bool, out: Path | None, seed: int, budget: int, workers: int | None, resume: bool
-) -> None:
+def pinball(begin: Begin) -> None:
     """List the walls of a pinball board with pins, wedges and cups."""
     from polycorner.models.pinball import Pinball
 
-    _planar("pinball", Pinball(), as_json, out, seed, budget, workers, resume)
+    _planar(begin("pinball", {}), Pinball())
 
 
 @atlas.command(
@@ -151,8 +115,9 @@ def disks(count: int, torus: str, seed: int, resume: bool, as_json: bool, out: P
     from polycorner.models import TorusDisks
 
     model = TorusDisks(count, "hexagonal" if torus == "hexagonal" else "square")
-    search = DiskSearch("disks", {"count": count, "torus": torus}, out, seed)
-    found = search.run(model, resume=resume)
+    chosen = {"count": count, "torus": torus}
+    search = DiskSearch("disks", chosen, out=out, seed=seed, resume=resume, as_json=as_json)
+    found = search.run(model)
     rows = [
         {
             "radius": c.radius,
@@ -175,21 +140,11 @@ def disks(count: int, torus: str, seed: int, resume: bool, as_json: bool, out: P
 
         return [style.save(disks.draw_critical(model, found), folder / "critical.png")]
 
-    search.finish(answer, as_json=as_json, draw=draw, sheet=critical_sheet)
+    search.finish(answer, draw, critical_sheet)
 
 
-def _planar(
-    name: str,
-    model: "Tutorial | Pinball",
-    as_json: bool,
-    out: Path | None,
-    seed: int,
-    budget: int,
-    workers: int | None,
-    resume: bool,
-) -> None:
-    search = SkeletonSearch(name, {}, out, seed, budget, workers)
-    found = search.run(model.polyhedron, lambda rng: model.starts(rng, STARTS), None, resume=resume)
+def _planar(search: SkeletonSearch, model: "Tutorial | Pinball") -> None:
+    found = search.run(model.polyhedron, lambda rng: model.starts(rng, STARTS), None)
 
     def draw(folder: Path) -> list[Path]:
         import numpy as np
@@ -206,6 +161,6 @@ def _planar(
         ]
         window = (low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin)
         figure = regions.draw_region(model.polyhedron, window, corners=corners, edges=curves)
-        return [style.save(figure, folder / f"{name}.png")]
+        return [style.save(figure, folder / f"{search.model}.png")]
 
-    search.finish(search.answer(found, {}), as_json=as_json, draw=draw)
+    search.finish(search.answer(found, {}), draw)

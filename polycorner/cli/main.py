@@ -1,15 +1,4 @@
-"""The command ``polycorner``: subcommands, errors in one line, exit codes.
-
-=====  ====================================================================
-0      success, whatever the answer
-1      a check of ``polycorner paper`` failed to run
-2      bad input, or a file that cannot be read or written
-70     unexpected error: a defect of the program
-74     standard output cannot be written
-130    interrupted; the message says whether results were kept
-141    broken pipe
-=====  ====================================================================
-"""
+"""The command ``polycorner``: subcommands, errors in one line, exit codes."""
 
 import os
 import sys
@@ -21,11 +10,11 @@ from time import perf_counter
 import click
 
 from polycorner import __version__
-from polycorner.cli.completion import VARIABLE
 from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.options import examples, verbosity_options
+from polycorner.cli.options import command, examples, verbosity_options
 from polycorner.cli.output import Verbosity, notices
 
+VARIABLE = "_POLYCORNER_COMPLETE"  # by which shells ask for completions
 UNEXPECTED, NO_OUTPUT, INTERRUPTED, BROKEN_PIPE = 70, 74, 130, 141
 EXIT_CODES = {
     0: "success, whatever the answer",
@@ -36,10 +25,7 @@ EXIT_CODES = {
     INTERRUPTED: "interrupted; the message says whether results were kept",
     BROKEN_PIPE: "broken pipe",
 }
-COMMANDS = {
-    name: f"polycorner.cli.{name}:{name}"
-    for name in ("atlas", "cache", "completion", "minima", "sweep")
-}
+COMMANDS = {name: f"polycorner.cli.{name}:{name}" for name in ("atlas", "cache", "minima", "sweep")}
 EXAMPLES = examples(
     "dyad", "dyad --rod 1 --drum inf --json", "atlas spheres --count 6", "dyad --help"
 )
@@ -68,6 +54,28 @@ EPILOG = EXAMPLES + UNITS + "\n".join(f"  {code:<3}  {words}" for code, words in
 @verbosity_options
 def cli() -> None:
     """Corners, minima and proofs on curvilinear polyhedra, and motion on them."""
+
+
+@command(
+    epilog="""\b
+Examples:
+  source <(polycorner completion bash)
+  polycorner completion zsh > ~/.zfunc/_polycorner
+  polycorner completion fish > ~/.config/fish/completions/polycorner.fish
+"""
+)
+@click.argument("shell", metavar="SHELL", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    """Print the completion script of SHELL: bash, zsh or fish."""
+    from click.shell_completion import get_completion_class
+
+    found = get_completion_class(shell)
+    assert found is not None  # click knows the three shells
+    root = click.get_current_context().find_root().command
+    click.echo(found(root, {}, "polycorner", VARIABLE).source())
+
+
+cli.add_command(completion)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

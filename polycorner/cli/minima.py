@@ -69,19 +69,8 @@ def report_minima(
 ) -> None:
     """Print minima and write their file.
 
-    Parameters
-    ----------
-    model : str
-        Name of the model.
-    chosen : dict
-        Its parameters.
-    found : Minima
-    described : callable
-        Returns the entries that only this model's minima have, their ``name`` among them.
-    unit : str
-        Unit of the energy; may be empty.
-    as_json, out
-        The options.
+    ``described`` returns the entries that only this model's minima have, their ``name`` among them;
+    ``unit`` is that of the energy and may be empty.
     """
     richness = found.richness
     rows = [

@@ -141,12 +141,7 @@ def shows_progress() -> bool:
 def working(words: str, unit: str = "") -> Iterator[Report]:
     """Show a bar on a terminal while some work is done; yield the callable that moves it.
 
-    Parameters
-    ----------
-    words : str
-        The work, shown before the bar; with ``--verbose`` it is also timed.
-    unit : str, optional
-        Unit of ``done`` and ``total``, such as ``"s"`` or ``"edges"``.
+    The unit is that of ``done`` and ``total``, such as ``"edges"``; ``--verbose`` times the work.
     """
     with timed(words):
         if not shows_progress():

@@ -1,15 +1,14 @@
-"""Searches that are saved as they go, resumed, and reported."""
+"""Searches that are saved as they go, resumed, and reported as tables."""
 
 import hashlib
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from polycorner.cli.options import option, output_options, seed_option
 from polycorner.cli.output import (
     deliver,
     fail,
@@ -22,34 +21,68 @@ from polycorner.cli.output import (
     write_answer,
     writing,
 )
-from polycorner.cli.report import atlas_sheet, keys, label
 
 if TYPE_CHECKING:
     from polycorner.container import FileKind
     from polycorner.models import CriticalConfiguration, CriticalSearch, TorusDisks
     from polycorner.polyhedra.polyhedron import Polyhedron
     from polycorner.polyhedra.symmetry import Symmetry
-    from polycorner.printing import Sheet
+    from polycorner.printing import Sheet, Table
     from polycorner.skeletons.elements import Skeleton
-    from polycorner.workers import Workers
 
-SAVED_EVERY = 10.0  # seconds between two savings of a long search
-SEARCHING = 10.0  # seconds of search, at least, for each second that savings take
+COUNTS = {
+    "components": "components of the strata",
+    "components_ordered": "for ordered pairs of dumbbells whose balls are alike",
+    "components_unordered": "for unordered pairs",
+}
+MOST = 60  # characters of the active functions of a corner; above it only their number is shown
+SEARCH = ("out", "seed", "budget", "workers", "resume", "as_json")
+RESUMING = """
+A search is saved every few seconds.  Ctrl-C ends it and reports what was found (exit code 130);
+the same command with --resume continues it, also after the process was killed.
+"""
+Begin = Callable[[str, dict[str, Any]], "SkeletonSearch"]
+resume_option = option(
+    "--resume",
+    is_flag=True,
+    group="Search",
+    help="Continue a search that was stopped, killed or out of budget.",
+)
+
+
+def search_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Add ``--seed``, ``--budget``, ``--workers``, ``--resume`` and the options of every answer.
+
+    The command gets them as ``begin``, which returns the search of a model and its parameters.
+    """
+
+    @wraps(function)
+    def command(**given: Any) -> None:
+        own = {name: value for name, value in given.items() if name not in SEARCH}
+        options = {name: given[name] for name in SEARCH}
+        function(begin=partial(SkeletonSearch, **options), **own)
+
+    for add in (
+        output_options,
+        resume_option,
+        option(
+            "--workers", type=click.IntRange(min=1), group="Search",
+            help="Processes that walk along edges. [this one]",
+        ),
+        option(
+            "--budget", type=click.IntRange(min=1), default=100_000, group="Search",
+            help="Most edges to trace.",
+        ),
+        seed_option("the random directions"),
+    ):  # fmt: skip
+        command = add(command)
+    return command
 
 
 class Kept:
     """A search with the file of its state and its report.
 
-    Parameters
-    ----------
-    model : str
-        Name of the model.
-    chosen : dict
-        Its parameters.
-    out : path, optional
-        Folder of the answer, where an unfinished search is kept too; else it is kept in the cache.
-    seed : int
-        Seed of whatever is random.
+    An unfinished search is kept in the folder of the answer, or in the cache where there is none.
 
     Attributes
     ----------
@@ -58,8 +91,18 @@ class Kept:
         fit for pictures.
     """
 
-    def __init__(self, model: str, chosen: dict[str, Any], out: Path | None, seed: int) -> None:
+    def __init__(
+        self,
+        model: str,
+        chosen: dict[str, Any],
+        *,
+        out: Path | None,
+        seed: int,
+        resume: bool,
+        as_json: bool,
+    ) -> None:
         self.model, self.parameters, self.out, self.seed = model, chosen, out, seed
+        self.resume, self.as_json = resume, as_json
         prepare(out)
         self.finished, self.interrupted, self.drawn = True, False, True
         self._unsaved: OSError | None = None
@@ -78,11 +121,11 @@ class Kept:
 
         return cache_folder() / f"atlas-{hashlib.sha256(self.label.encode()).hexdigest()[:16]}.json"
 
-    def has_kept(self, *, resume: bool) -> bool:
+    def has_kept(self) -> bool:
         """Whether there is something to resume, as asked; else say that the search begins."""
-        if resume and not self.state.exists():
+        if self.resume and not self.state.exists():
             remark(f"nothing to resume in {self.state}; the search starts from the beginning")
-        return resume and self.state.exists()
+        return self.resume and self.state.exists()
 
     def keep(self, save: Callable[[], object]) -> None:
         """Save the state; a failure is reported after the answer, which it must not cost."""
@@ -103,10 +146,8 @@ class Kept:
     def finish(
         self,
         answer: dict[str, Any],
-        *,
-        as_json: bool,
         draw: Callable[[Path], list[Path]],
-        sheet: "Callable[[dict[str, Any]], Sheet]" = atlas_sheet,
+        sheet: "Callable[[dict[str, Any]], Sheet] | None" = None,
     ) -> None:
         """Print the answer, write the files, and end the process if it was interrupted."""
 
@@ -117,7 +158,7 @@ class Kept:
                     with writing(self.out), timed("drawing"):
                         yield from draw(self.out)
 
-        deliver(answer, lambda: shown(sheet(answer)), write, as_json=as_json)
+        deliver(answer, lambda: shown((sheet or atlas_sheet)(answer)), write, as_json=self.as_json)
         if not self.finished:
             with writing(self.state):
                 if self._unsaved is not None:
@@ -128,83 +169,53 @@ class Kept:
 
 
 class SkeletonSearch(Kept):
-    """A search for corners, edges and faces.
-
-    Parameters
-    ----------
-    budget : int
-        The most edges to trace.
-    workers : int, optional
-        Processes that walk along edges; default this one.
-    """
+    """A search for corners, edges and faces."""
 
     def __init__(
-        self, model: str, chosen: dict[str, Any], out: Path | None, seed: int, budget: int,
-        workers: int | None = None,
-    ) -> None:  # fmt: skip
-        super().__init__(model, chosen, out, seed)
+        self,
+        model: str,
+        chosen: dict[str, Any],
+        *,
+        budget: int,
+        workers: int | None,
+        **options: Any,
+    ) -> None:
+        super().__init__(model, chosen, **options)
         self.budget, self.workers = budget, workers
-        self._seconds = SAVED_EVERY
 
     def run(
         self,
         polyhedron: "Polyhedron",
         starts: Callable[[Any], Any],
         symmetry: "Symmetry | None",
-        *,
-        resume: bool,
     ) -> "Skeleton":
-        """Search, or resume, saving by the clock; return also what an interruption left."""
+        """Search, or resume; return also what an interruption left."""
         import numpy as np
 
-        from polycorner.skeletons import Budget, skeleton
-        from polycorner.skeletons import resume as resumed
+        from polycorner import skeletons
         from polycorner.skeletons.parts import Completeness
 
-        known, resume = 0, self.has_kept(resume=resume)
-        with (
-            self._opened() as executor,
-            working(f"searching {self.model}", "edges") as progress,
-        ):
-            begun = monotonic()
+        resume = self.has_kept()
+        with working(f"searching {self.model}", "edges") as progress:
+            options: dict[str, Any] = {
+                "budget": self.budget,
+                "executor": self.workers,
+                "progress": progress,
+                "keep": self._save,
+            }
             if resume:
-                found = self._load(polyhedron, symmetry)
-                known = len(found.edges)
+                found = skeletons.resume(self._load(polyhedron, symmetry), **options)
             else:
                 rng = np.random.default_rng(self.seed)
-                found = skeleton(
-                    polyhedron,
-                    starts(rng),
-                    symmetry=symmetry,
-                    budget=Budget(self.budget, self._seconds),
-                    executor=executor,
-                    progress=progress,
-                    rng=rng,
+                found = skeletons.skeleton(
+                    polyhedron, starts(rng), symmetry=symmetry, rng=rng, **options
                 )
-            while resume or found.complete is Completeness.BUDGET:
-                resume = False
-                self._save(found)
-                self._seconds = max(SAVED_EVERY, self._longer(monotonic() - begun))
-                left = self.budget - (len(found.edges) - known)
-                if left < 1:
-                    break
-                limits, begun = Budget(left, self._seconds), monotonic()
-                found = resumed(found, budget=limits, executor=executor, progress=progress)
         interrupted = found.complete is Completeness.INTERRUPTED
         unfinished = interrupted or found.complete is Completeness.BUDGET
         if unfinished:
             self._save(found)
         self.end(finished=not unfinished, interrupted=interrupted)
         return found
-
-    def _opened(self) -> "AbstractContextManager[Workers | None]":
-        from polycorner.workers import opened
-
-        return nullcontext() if self.workers is None else opened(self.workers)
-
-    def _longer(self, taken: float) -> float:
-        """Return the time to search for after a search, its assembly and saving took some time."""
-        return SEARCHING * max(0.0, taken - self._seconds)
 
     def _save(self, found: "Skeleton") -> None:
         from polycorner.files import save_skeleton
@@ -271,12 +282,12 @@ class SkeletonSearch(Kept):
 class DiskSearch(Kept):
     """A search for the critical radii of disks, saved after every round."""
 
-    def run(self, model: "TorusDisks", *, resume: bool) -> "tuple[CriticalConfiguration, ...]":
+    def run(self, model: "TorusDisks") -> "tuple[CriticalConfiguration, ...]":
         """Search, or resume; an interruption loses the round under way only."""
         from polycorner.container import JSON, FileKind
 
         kind = FileKind("search of disks", "polycorner atlas disks", JSON)
-        resume = self.has_kept(resume=resume)
+        resume = self.has_kept()
         with working(f"searching {self.model}", "rounds") as progress:
             search = self._load(model, kind) if resume else model.critical_search(self.seed)
             try:
@@ -301,3 +312,96 @@ class DiskSearch(Kept):
             return CriticalSearch.restored(model, content["search"])
         except (ValueError, LookupError, TypeError) as error:
             fail(f"--resume: {error}")
+
+
+# ------------------------------------------------------------------------------------------ tables
+
+
+def keys(counts: dict[int, int]) -> dict[str, int]:
+    """Return counts by dimension with the keys of JSON."""
+    return {str(dimension): count for dimension, count in sorted(counts.items())}
+
+
+def label(corner: int | None) -> str:
+    """Return the name of a corner by its position, ``-`` where an edge has no corner at an end."""
+    return "-" if corner is None else f"C{corner}"
+
+
+def atlas_sheet(answer: dict[str, Any]) -> "Sheet":
+    """Return an atlas as a sheet."""
+    from polycorner.printing import Sheet, Table
+
+    parts: list[Table | str] = [f"{words}: {_counts(answer[key])}" for key, words in _told(answer)]
+    if "singular_count" in answer:
+        parts.append(
+            f"{answer['corners_count']} rigid clusters ({answer['singular_count']} singular), "
+            f"{answer['edges_count']} one-dimensional motions"
+        )
+    characteristic = answer["euler_characteristic"]
+    if characteristic is None:
+        characteristic = (
+            "not determined (it takes a finished search and closed faces bounded by finite edges)"
+        )
+    return Sheet(
+        "",
+        (
+            *parts,
+            _corners(answer),
+            f"Euler characteristic: {characteristic}",
+            f"complete: {answer['complete']}",
+            *(f"note: {note}" for note in answer["notes"]),
+        ),
+    )
+
+
+def critical_sheet(answer: dict[str, Any]) -> "Sheet":
+    """Return the critical configurations of disks as a sheet."""
+    from polycorner.printing import Sheet, Table
+
+    head = ("radius", "index", "nullity", "contacts", "hits")
+    rows = (
+        (f"{row['radius']:.9f}", *(str(row[key]) for key in head[1:])) for row in answer["critical"]
+    )
+    caption = "Critical radii, in units of the torus's side"
+    table = Table(head, tuple(rows), tuple(range(len(head))), caption)
+    return Sheet("", (table, f"complete: {answer['complete']}"))
+
+
+def _told(answer: dict[str, Any]) -> list[tuple[str, str]]:
+    return [(key, words) for key, words in COUNTS.items() if key in answer]
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{n} of dimension {d}" for d, n in counts.items())
+
+
+def _corners(answer: dict[str, Any]) -> "Table":
+    from polycorner.printing import Table
+
+    kinds = any("kind" in corner for corner in answer["corners"])
+    head = ("corner", *["kind"] * kinds, "active", "rank", "type", "edges to")
+    return Table(
+        head,
+        tuple(
+            (
+                corner["name"],
+                *[corner.get("kind", "")] * kinds,
+                _active(corner["active"]),
+                str(corner["rank"]),
+                corner["local_type"] + (", singular" if corner["singular"] else ""),
+                ", ".join(map(label, _reached(k, answer["edges"]))),
+            )
+            for k, corner in enumerate(answer["corners"])
+        ),
+    )
+
+
+def _active(names: list[str]) -> str:
+    shown = " ".join(names)
+    return shown if len(shown) < MOST else f"{len(names)} contacts"
+
+
+def _reached(corner: int, edges: list[dict[str, Any]]) -> list[int | None]:
+    """Return the other ends of the edges at a corner."""
+    ends = [edge["ends"] for edge in edges if corner in edge["ends"]]
+    return [b if a == corner else a for a, b in ends]

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from polycorner.checks import refuse
+from polycorner.checks import refuse, shortened
 from polycorner.formulas.expressions import KINKED, as_expression
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.polyhedra.groups import MOST_BRANCHES
@@ -260,5 +260,4 @@ def _unaccepted(node: ast.expr) -> _Unaccepted:
 
 
 def _short(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= 60 else f"{line[:57]}..."
+    return shortened(" ".join(text.split()), 60)

@@ -20,7 +20,7 @@ from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AnyOf, Part, collect
-from polycorner.printing import MOST, Printed, Sheet, Table
+from polycorner.printing import MOST_ROWS, Printed, Sheet, Table
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
@@ -90,9 +90,9 @@ def _coordinates(manifold: Manifold) -> Iterator[str]:
 
 
 def _table(head: tuple[str, str], functions: Sequence[SmoothFunction]) -> Table:
-    rows = tuple((f.name, _formula(f)) for f in functions[:MOST])
+    rows = tuple((f.name, _formula(f)) for f in functions[:MOST_ROWS])
     hidden = len(functions) - len(rows)
-    return Table(head, rows, caption=f"The first {MOST} of {len(functions)}" if hidden else "")
+    return Table(head, rows, caption=f"The first {MOST_ROWS} of {len(functions)}" if hidden else "")
 
 
 def _formula(f: SmoothFunction) -> str:

@@ -2,15 +2,15 @@
 
 import copy
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
-from time import monotonic
 
 import numpy as np
 
 from polycorner.lookahead import Lookahead
 from polycorner.progress import Progress, silent
+from polycorner.searches import Clock, Ending, Task, Told, work_through
 from polycorner.skeletons.curves import Curve
 from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.links import singular_figure
@@ -92,7 +92,11 @@ class Explorer(Prober):
         )
 
     def run(
-        self, budget: Budget, progress: Progress, workers: Workers | None = None
+        self,
+        budget: Budget,
+        progress: Progress,
+        workers: Workers | None = None,
+        clock: Clock | None = None,
     ) -> Completeness:
         """Work until nothing is left, budget or time is used up, or Ctrl-C.
 
@@ -101,35 +105,28 @@ class Explorer(Prober):
         order in which they were found, so that the result is the same for any workers.
         """
         self.lookahead = None if workers is None else Lookahead(workers)
+        tasks = self._work(budget.edges)
         try:
-            complete = self._worked(budget, progress)
+            ending = work_through(tasks, self._told, progress, seconds=budget.seconds, clock=clock)
             self.expand()
         except KeyboardInterrupt:
-            complete = Completeness.INTERRUPTED
+            ending = Ending.INTERRUPTED
             self.expand()
         finally:
             if self.lookahead is not None:
                 self.lookahead.close()
             self.lookahead = None
-        return complete
-
-    def _worked(self, budget: Budget, progress: Progress) -> Completeness:
-        deadline, first = monotonic() + budget.seconds, True
-        try:
-            for allowed, work in self._work(budget.edges):
-                if not allowed or (monotonic() > deadline and not first):
-                    return Completeness.BUDGET
-                work()
-                first = False
-                count = len(self.curves)
-                progress(count, count + len(self.pending), f"{len(self.records)} corners")
-        except KeyboardInterrupt:
-            return Completeness.INTERRUPTED
+        if ending is not Ending.FINISHED:
+            return Completeness[ending.name]
         if not self.curves and not self.records and not self.patches:
             return Completeness.SEEDS
         return Completeness.GAPS if self.registry.lost else Completeness.EXHAUSTED
 
-    def _work(self, budget: int) -> Iterator[tuple[bool, Callable[[], None]]]:
+    def _told(self) -> Told:
+        count = len(self.curves)
+        return count, count + len(self.pending), f"{len(self.records)} corners"
+
+    def _work(self, budget: int) -> Iterator[Task]:
         """Yield what to do next, and whether the budget allows it.
 
         Work leaves the lists only once it is done, so that an interruption loses nothing.

@@ -1,6 +1,7 @@
 """Search for the skeleton of a polyhedron, from the start or resumed."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,7 @@ from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
+from polycorner.searches import Clock
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
@@ -20,8 +22,9 @@ from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
-from polycorner.workers import Workers, opened
+from polycorner.workers import opened_if_any
 
+Keep: TypeAlias = Callable[[Skeleton], object]
 UNFINISHED = (Completeness.BUDGET, Completeness.INTERRUPTED)
 EXTENT = 1000.0
 BUDGET = 100_000
@@ -35,6 +38,7 @@ def skeleton(
     budget: int | Budget = BUDGET,
     executor: Any = None,
     progress: Progress | None = None,
+    keep: Keep | None = None,
     rng: np.random.Generator | int | None = None,
     tolerance: float = TOLERANCE,
     rank_tolerance: float = RANK_TOLERANCE,
@@ -70,6 +74,9 @@ def skeleton(
     progress : callable, optional
         Called as ``progress(edges, edges + pending, note)`` after every edge, descent and crossing;
         ``pending`` counts the ends of edges to trace; see :class:`~polycorner.progress.Progress`.
+    keep : callable, optional
+        Called every few seconds with what was found so far, a Skeleton to be saved: what it does
+        takes a twentieth of the time at most.
     rng : Generator or int, optional
         Random directions of the descents; default a generator with seed 0.
     tolerance : float, optional
@@ -119,7 +126,7 @@ def skeleton(
     points = polyhedron.manifold.placed(points, "starts")
     quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerances, float(extent), points)
     explorer = Explorer(quotient, points, checks.generator("rng", rng))
-    return _run(explorer, budget, executor, progress)
+    return _run(explorer, budget, executor, progress, keep)
 
 
 @checked
@@ -129,6 +136,7 @@ def resume(
     budget: int | Budget = BUDGET,
     executor: Any = None,
     progress: Progress | None = None,
+    keep: Keep | None = None,
 ) -> Skeleton:
     """Resume a search that was interrupted or ran out of budget or time, to the same tolerances.
 
@@ -136,7 +144,7 @@ def resume(
     ----------
     skeleton : Skeleton
         What was found so far, also from a pickle; it stays as it is.
-    budget, executor, progress
+    budget, executor, progress, keep
         As for :func:`skeleton`.
 
     Returns
@@ -146,7 +154,7 @@ def resume(
     """
     state = checks.instance("skeleton", skeleton, Skeleton, "polycorner.skeleton").state
     checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
-    return _run(Explorer.resumed(state), budget, executor, progress)
+    return _run(Explorer.resumed(state), budget, executor, progress, keep)
 
 
 @checked
@@ -188,49 +196,44 @@ def examine_faces(
     checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
     if skeleton.complete in UNFINISHED:
         checks.refuse("skeleton", "the result of a finished search", skeleton.complete.value)
-    explorer, limits = Explorer.resumed(state), _limits(budget, progress)
-    if executor is None:
-        return _examined(explorer, skeleton.complete, limits, progress or silent, None)
-    with opened(executor) as workers:
-        return _examined(explorer, skeleton.complete, limits, progress or silent, workers)
-
-
-def _examined(
-    explorer: Explorer,
-    complete: Completeness,
-    limits: Budget,
-    progress: Progress,
-    workers: Workers | None,
-) -> Skeleton:
-    """Examine faces and go on from what is found, until nothing more is."""
-    examined: set[Flag] = set()
-    try:
-        while add_inner_corners(explorer, examined, progress, workers):
-            complete = explorer.run(limits, progress, workers)
-            if complete in UNFINISHED:
-                break
-    except KeyboardInterrupt:
-        complete = Completeness.INTERRUPTED
+    explorer, limits = Explorer.resumed(state), _limits(budget, progress=progress)
+    complete, examined = skeleton.complete, set[Flag]()
+    with opened_if_any(executor) as workers:
+        try:
+            while add_inner_corners(explorer, examined, progress or silent, workers):
+                complete = explorer.run(limits, progress or silent, workers)
+                if complete in UNFINISHED:
+                    break
+        except KeyboardInterrupt:
+            complete = Completeness.INTERRUPTED
     if complete not in UNFINISHED and explorer.registry.lost:
         complete = Completeness.GAPS
     return assembled(explorer, complete)
 
 
-def _limits(budget: int | Budget, progress: Progress | None) -> Budget:
-    if progress is not None and not callable(progress):
-        checks.refuse("progress", "a callable or None", progress, TypeError)
+def _limits(budget: int | Budget, **called: Any) -> Budget:
+    for name, function in called.items():
+        if function is not None and not callable(function):
+            checks.refuse(name, "a callable or None", function, TypeError)
     return budget if isinstance(budget, Budget) else Budget(budget)
 
 
 def _run(
-    explorer: Explorer, budget: int | Budget, executor: Any, progress: Progress | None
+    explorer: Explorer,
+    budget: int | Budget,
+    executor: Any,
+    progress: Progress | None,
+    keep: Keep | None,
 ) -> Skeleton:
-    limits = _limits(budget, progress)
-    if executor is None:
-        complete = explorer.run(limits, progress or silent)
-    else:
-        with opened(executor) as workers:
-            complete = explorer.run(limits, progress or silent, workers)
+    def save() -> None:
+        explorer.expand()
+        if keep is not None:
+            keep(assembled(explorer, Completeness.BUDGET))
+
+    limits = _limits(budget, progress=progress, keep=keep)
+    clock = None if keep is None else Clock(save)
+    with opened_if_any(executor) as workers:
+        complete = explorer.run(limits, progress or silent, workers, clock)
     try:
         return assembled(explorer, complete)
     except KeyboardInterrupt:

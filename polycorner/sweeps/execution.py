@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import names, whole
+from polycorner.checks import MOST, names, refuse, whole
 from polycorner.errors import WorkersError
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.progress import Progress, silent
 from polycorner.sweeps.grid import Grid
 from polycorner.sweeps.points import Job, Outcome, evaluate, one_line
-from polycorner.sweeps.store import Store
+from polycorner.sweeps.store import StoredResults
 from polycorner.sweeps.study import Study, SweepError, canonical
-from polycorner.sweeps.tables import Table
+from polycorner.sweeps.tables import Results
 from polycorner.workers import LARGEST, Shared, Workers, is_broken, killed_workers, workers_of
 
 if TYPE_CHECKING:
@@ -39,20 +39,10 @@ Batch = list[int]
 
 
 class Scheduler:
-    """One pass over the points of a study.
+    """One pass over the points of a study, of which ``todo`` are to be computed.
 
-    Parameters
-    ----------
-    workers : Workers
-    job : Job
-    grid : Grid
-    todo : iterator of int
-        The points to compute.
-    record : callable
-        Takes lists of outcomes; called at least every :data:`TICK` seconds while points are in
-        flight elsewhere.
-    stopped : callable
-        Whether to submit nothing more.
+    ``record`` takes outcomes, at least every :data:`TICK` seconds while points are in flight
+    elsewhere; once ``stopped`` nothing more is submitted.
     """
 
     def __init__(
@@ -268,7 +258,7 @@ def sweep(
     axes, constants = Grid.of(grid), dict(fixed or {})
     random = check_arguments(function, axes, constants)
     study = Study(axes, _name(function), canonical(constants), _seed(rng, wanted=random))
-    table = Table(study) if store is None else Store(Path(store), study)
+    table = Results(study) if store is None else StoredResults(Path(store), study)
     try:
         finished = _compute(table, Job(function, constants, study.seed), executor, retry, progress)
         table.close(complete="finished" if finished else "interrupted")
@@ -282,7 +272,7 @@ def sweep(
     return table.dataset()
 
 
-def _compute(table: Table, job: Job, executor: Any, retry: bool, progress: Progress) -> bool:
+def _compute(table: Results, job: Job, executor: Any, retry: bool, progress: Progress) -> bool:
     """Compute the missing points, until Ctrl-C; return whether all are finished."""
     grid, stop = table.study.grid, threading.Event()
     reported = (-1, -1)
@@ -312,7 +302,7 @@ def _compute(table: Table, job: Job, executor: Any, retry: bool, progress: Progr
     return table.done + table.failed == grid.size and not (retry and stop.is_set())
 
 
-def _close(table: Table) -> None:
+def _close(table: Results) -> None:
     """Keep what is finished as far as that is possible."""
     try:
         table.close(complete="interrupted")
@@ -320,9 +310,9 @@ def _close(table: Table) -> None:
         return  # a full disk has been reported already
 
 
-def _kept(table: Table) -> str:
+def _kept(table: Results) -> str:
     finished = f"{table.done + table.failed} of {table.study.grid.size} points are finished"
-    if isinstance(table, Store):
+    if isinstance(table, StoredResults):
         return f"{finished} and kept in {table.path}; the same call computes the others"
     return f"{finished}, the `results` of this exception; with a store the study could be resumed"
 
@@ -342,8 +332,7 @@ def check_arguments(
     ``called`` are the names of ``grid`` and ``fixed`` in the errors.
     """
     if not callable(function):
-        msg = f"function: expected something to call; got {function!r}"
-        raise TypeError(msg)
+        refuse("function", "something to call", function, TypeError)
     both = sorted(set(grid.names) & set(fixed))
     if both:
         msg = f"{called[1]}: expected parameters that are no axis; got {', '.join(both)}"
@@ -372,12 +361,11 @@ def _is_needed(parameter: inspect.Parameter) -> bool:
 def _seed(rng: Any, *, wanted: bool) -> int | None:
     if not wanted:
         if rng is not None:
-            msg = f"rng: expected none for a function without a parameter rng; got {rng!r}"
-            raise ValueError(msg)
+            refuse("rng", "none for a function without a parameter rng", rng)
         return None
     if rng is None or isinstance(rng, np.random.Generator):
         return 0 if rng is None else int(rng.integers(2**63))
-    return whole("rng", rng, least=0, most=2**63 - 1)
+    return whole("rng", rng, least=0, most=MOST)
 
 
 def _name(function: Any) -> str:

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner.checks import instance, refuse, whole
+from polycorner.checks import about, instance, refuse, whole
 from polycorner.values import Checked, cached_property
 
 Scalar: TypeAlias = bool | int | float | str
@@ -129,8 +129,5 @@ def _axis(name: str, given: Any) -> Axis:
     if isinstance(given, Axis):
         return given
     pair = isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str)
-    try:
+    with about(f"grid: {name}"):
         return Axis(*given) if pair and not isinstance(given[0], str) else Axis(given)
-    except (TypeError, ValueError) as error:
-        msg = f"grid: {name}: {error}"
-        raise type(error)(msg) from None

@@ -30,20 +30,9 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """The outcome of one point.
+    """The outcome of one point: its number, the time it took, what the function returned or raised.
 
-    Attributes
-    ----------
-    number : int
-        Number of the point.
-    seconds : float
-        Time that it took.
-    columns : tuple of Column
-        What the function returned; empty if the point failed.
-    values : tuple
-        The values of the columns.
-    message : str
-        Type and message of the exception; empty if there was none.
+    A point that failed has no columns, and as message type and message of the exception.
     """
 
     number: int
@@ -55,16 +44,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Job:
-    """The computation at every point.
-
-    Attributes
-    ----------
-    function : callable
-    fixed : mapping from str
-        Arguments with the same value at every point.
-    seed : int or None
-        Seed of the random streams; None if the function takes no generator.
-    """
+    """The computation at every point; without a seed the function takes no generator."""
 
     function: Callable[..., Mapping[str, Any]]
     fixed: Mapping[str, Any]

@@ -28,13 +28,20 @@ from polycorner import forms
 from polycorner.atomic import is_part
 from polycorner.checks import missing_extra
 from polycorner.kinds import checked
-from polycorner.sweeps.checksums import ROOT, check_store, checked_root, write_root
-from polycorner.sweeps.metadata import reading, stored_columns, stored_grid
+from polycorner.sweeps.metadata import (
+    ROOT,
+    check_store,
+    checked_root,
+    reading,
+    stored_columns,
+    stored_grid,
+    write_root,
+)
 from polycorner.sweeps.study import Study, SweepError, difference, versions
 from polycorner.sweeps.tables import (
     FAILED,
     PENDING,
-    Table,
+    Results,
     Variable,
     coordinate_arrays,
     coordinates,
@@ -48,14 +55,8 @@ POINTS = 4096  # in a chunk, at most
 BYTES = 4 << 20  # in a chunk, at most, unless one point has more
 
 
-class Store(Table):
-    """A table of results on disk.
-
-    Parameters
-    ----------
-    path : Path
-        The folder; it is created if it does not exist.
-    study : Study
+class StoredResults(Results):
+    """Results on disk, in a folder that is created if it does not exist.
 
     Raises
     ------

@@ -39,17 +39,7 @@ class SweepError(PolycornerError):
 
 @dataclass(frozen=True)
 class Study:
-    """Function, grid, fixed arguments and seed.
-
-    Attributes
-    ----------
-    grid : Grid
-    function : str
-        ``module:name`` of the function.
-    fixed : str
-        Arguments with the same value at every point, as :func:`canonical` writes them.
-    seed : int or None
-    """
+    """Grid, ``module:name`` of the function, fixed arguments as :func:`canonical` writes, seed."""
 
     grid: Grid
     function: str

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from polycorner.checks import choice, instance, real, whole
+from polycorner.checks import about, choice, instance, real, refuse, whole
 from polycorner.errors import nearest
 from polycorner.kinds import checked
 from polycorner.sweeps.execution import check_arguments
@@ -124,8 +124,7 @@ def _study(content: dict[str, Any], named: Mapping[str, NamedStudy]) -> StudyFil
     _check_keys("", content, KEYS)
     name = content.get("study")
     if not isinstance(name, str):
-        msg = f"study: expected {_expected(named)}; got {name!r}"
-        raise TypeError(msg)
+        refuse("study", _expected(named), name, TypeError)
     function, units = _function(name, named)
     axes = instance("axes", content.get("axes", {}), dict)
     if not axes:
@@ -176,11 +175,8 @@ def _axis(name: str, entry: Any, unit: str) -> Axis:
     if isinstance(entry, dict):
         _check_keys(field, entry, AXIS)
     table = entry if isinstance(entry, dict) else {"values": entry}
-    try:
+    with about(field):
         return Axis(_values(table), table.get("unit", unit))
-    except (TypeError, ValueError) as error:
-        msg = f"{field}: {error}"
-        raise ValueError(msg) from error
 
 
 def _values(table: dict[str, Any]) -> Any:

@@ -1,7 +1,6 @@
 """Tables of results: a row for every point of a grid, kept in memory."""
 
 import math
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.searches import Clock
 from polycorner.sweeps.grid import Grid
 from polycorner.sweeps.points import Column, Outcome
 from polycorner.sweeps.study import Study
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PENDING, DONE, FAILED = 0, 1, 2
-SHARE = 0.05  # of the time, for writing
 TEXT = np.dtypes.StringDType()
 
 
@@ -77,20 +76,15 @@ def units(unit: str) -> dict[str, Any]:
     return {"units": unit} if unit else {}
 
 
-class Table:
-    """The results of a study in memory.
-
-    Parameters
-    ----------
-    study : Study
-    """
+class Results:
+    """The results of a study in memory."""
 
     def __init__(self, study: Study) -> None:
         self.study, self.complete = study, "unfinished"
         self.columns: tuple[Column, ...] = ()
         self.arrays: dict[str, Any] = {}  # of NumPy or zarr
         self.waiting: list[Outcome] = []  # to be written
-        self.written, self.cost = -math.inf, 0.0  # s: when rows were written, and how long it took
+        self.clock = Clock(self.flush, every=0)
         self.set_status(np.zeros(study.grid.size, dtype=np.int8))
 
     def set_status(self, status: NDArray[np.int8]) -> None:
@@ -118,21 +112,17 @@ class Table:
     def add(self, outcomes: Sequence[Outcome]) -> None:
         """Take the outcomes of points, and write what waits when it is time."""
         self.waiting += [self.fitting(outcome) for outcome in outcomes]
-        if time.monotonic() - self.written > self.cost / SHARE:
-            self.flush()
+        self.clock.tick()
 
     def flush(self) -> None:
         """Write all rows that wait."""
         if self.waiting:
-            start = time.monotonic()
             self.create()
             numbers, rows = self.rows(self.waiting)
             self.write(numbers, rows)
             self.status[numbers] = rows["status"]
             self.set_status(self.status)
             self.waiting.clear()
-            self.written = time.monotonic()
-            self.cost = self.written - start
 
     def fitting(self, outcome: Outcome) -> Outcome:
         """Return an outcome with the columns of the study, or a failure that names both.

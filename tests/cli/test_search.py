@@ -184,7 +184,7 @@ def test_what_a_killed_process_found_is_kept(tmp_path):
     """The search is saved by the clock, long before its first thousand edges."""
     search = ("spheres", "--count", "10", "--out", str(tmp_path), "--json")
     program = (
-        "import sys, polycorner.cli.search as s; s.SAVED_EVERY = 0.5\n"
+        "import sys, polycorner.searches as s; s.Clock.every = 0.5\n"
         "from polycorner.cli.main import main; main(sys.argv[1:])"
     )
     process = subprocess.Popen(

@@ -10,8 +10,8 @@ import click
 
 from polycorner.cli import (
     RESUMING,
+    Begin,
     GroupedCommand,
-    SkeletonSearch,
     examples,
     fail,
     given,
@@ -33,10 +33,7 @@ UNMATCHED = "relabelling leads to corners that are not in this section: not coun
     "--heading", type=float, default=0.0, help="Mean heading in the drum, degrees.", group=GROUP
 )
 @search_options
-def dyad(
-    plane: bool, heading: float, as_json: bool, out: Path | None, seed: int, budget: int,
-    workers: int | None, resume: bool, **options: float,
-) -> None:  # fmt: skip
+def dyad(plane: bool, heading: float, begin: Begin, **options: float) -> None:
     """List corners and edges of the placements of two dumbbells.
 
     In the drum the placements are a section at one mean heading.
@@ -52,11 +49,8 @@ def dyad(
 
     angle = math.radians(heading)
     polyhedron = pair.polyhedron if pair.is_plane else pair.section(angle)
-    chosen = parameters(pair) | {"heading_deg": heading}
-    search = SkeletonSearch("dyad", chosen, out, seed, budget, workers)
-    found = search.run(
-        polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry, resume=resume
-    )
+    search = begin("dyad", parameters(pair) | {"heading_deg": heading})
+    found = search.run(polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry)
     whole = PairAtlas(pair, found, None if pair.is_plane else angle)
     extra: dict[str, Any] = {"components": _counts(whole.components)}
     try:
@@ -81,7 +75,7 @@ def dyad(
             *write_solid(whole, folder),
         ]
 
-    search.finish(answer, as_json=as_json, draw=draw)
+    search.finish(answer, draw)
 
 
 def _counts(found: Mapping[int, int]) -> dict[str, int]:

@@ -324,13 +324,13 @@ def _run(
 
     def report(s: Search) -> None:
         if kept:
-            kept.save_by_the_clock()
+            kept.clock.tick()
         note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
         progress(float(s.tally.boxes), None, note)
 
     search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
     if kept:
-        kept.save()
+        kept.clock.save()
 
 
 @dataclass(frozen=True)

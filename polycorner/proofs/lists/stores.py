@@ -20,7 +20,6 @@ import io
 import json
 import os
 import re
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, fields
@@ -48,11 +47,10 @@ from polycorner.proofs.lists.records import (
 )
 from polycorner.proofs.lists.search import Search, Tally
 from polycorner.proofs.lists.tree import DIRECTED, SPLIT, Tree
+from polycorner.searches import Clock
 
 FORMAT = ["polycorner-search-of-stationary-points", 1]
 ROOT = "search.json"
-EVERY = 5.0  # s between two times of saving
-SHARE = 0.05  # of the time at most that saving takes
 BOXES = ("lower", "upper", "nodes", "since")
 PIECES = re.compile(r"(tree|boxes)-\d+\.npz")
 # What has to be the same, in words.
@@ -188,7 +186,8 @@ class Store:
             checks.refuse("store", "the path of a folder", path, TypeError)
         self.path, self.search = Path(path), search
         self._files: dict[str, str] = {}  # digests by name
-        self._marks, self._count, self._took, self._saved = (0, 0), 0, 0.0, time.monotonic()
+        self._marks, self._count = (0, 0), 0
+        self.clock = Clock(self._save)
         self._stated = json.loads(json.dumps(_stated(search)))
         found = self._found()
         with _writing(self.path):
@@ -207,19 +206,14 @@ class Store:
                 for file in self.path.iterdir():  # of a process that was killed as it saved
                     if _is_own(file) and file.name not in self._files:
                         file.unlink()
-            self.save()
+            self.clock.save()
         except BaseException:
             self._lock.release()
             raise
 
-    def save_by_the_clock(self) -> None:
-        """Save the search if the last time is long enough ago."""
-        if time.monotonic() - self._saved >= max(EVERY, self._took / SHARE):
-            self.save()
-
-    def save(self) -> None:
+    def _save(self) -> None:
         """Save the search as it is between two rounds."""
-        start, search, before = time.monotonic(), self.search, set(self._files)
+        search, before = self.search, set(self._files)
         waiting = _arrays(search.waiting, "waiting") | _arrays(
             joined([search.waiting.part(slice(0)), *search.undecided]), "undecided"
         )
@@ -237,8 +231,6 @@ class Store:
             for name in before - set(files):
                 (self.path / name).unlink(missing_ok=True)
         self._files, self._marks, self._count = files, search.tree.marks, self._count + 1
-        self._saved = time.monotonic()
-        self._took = self._saved - start
 
     def close(self) -> None:
         """Release the store."""

@@ -27,9 +27,9 @@ BOX = [(-3, 3), (-3, 3)]
 # The same problem in another process, which saves after every round and notes how far it is.
 RUN = """
 import sys, time
-from polycorner.proofs.lists import stores
+from polycorner.searches import Clock
 from test_stores import problem, stationary_points
-stores.EVERY, stores.SHARE = 0.0, float("inf")
+Clock.every, Clock.share = 0.0, float("inf")
 def note(done, total, words):
     with open(sys.argv[2], "a") as log:
         log.write(f"{done:.0f}\\n")
