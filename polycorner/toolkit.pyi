@@ -41,7 +41,8 @@ from .pictures.solids.charts import Chart, Gaps
 from .pictures.solids.grids import FEWEST_CELLS, Function
 from .pictures.style import BODIES, SHADES, bridged
 from .polyhedra.cones import rank
-from .polyhedra.faces import Face
+from .polyhedra.faces import project, projected
+from .polyhedra.quotients import Quotient
 from .printing import Sheet, Table, facts
 from .progress import Progress, silent
 from .skeletons.orbits import Orbits, orbits
@@ -68,7 +69,6 @@ __all__ = [
     "Call",
     "Chart",
     "Checked",
-    "Face",
     "Feature",
     "FileKind",
     "Formulation",
@@ -83,6 +83,7 @@ __all__ = [
     "PairContacts",
     "PairLaw",
     "Progress",
+    "Quotient",
     "Sheet",
     "Table",
     "Touch",
@@ -118,6 +119,8 @@ __all__ = [
     "placed_stationary",
     "pose",
     "rank",
+    "project",
+    "projected",
     "read_motion",
     "real",
     "reals",

@@ -31,6 +31,7 @@ from polycorner.forms import (
 )
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.strata import distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
@@ -39,9 +40,8 @@ from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.parts import Completeness
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import ISLAND, Anchor, Patch
-from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.registry import FoundCorner
 from polycorner.skeletons.search import UNFINISHED
 from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.tracing import FIGURE
@@ -227,7 +227,7 @@ def _symmetry(polyhedron: Polyhedron, symmetry: Symmetry, points: Sequence[Any])
     }
 
 
-def _corner(explorer: Explorer, record: CornerRecord) -> Entries:
+def _corner(explorer: Explorer, record: FoundCorner) -> Entries:
     names = explorer.polyhedron.names
     return {
         "point": record.point.q.tolist(),

@@ -16,7 +16,6 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
@@ -24,11 +23,9 @@ from polycorner.minimisation.methods import minimise
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import rank
 from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.strata import distances
-from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import Tolerances
-from polycorner.values import cached_property
 
 FINE = 0.05  # distance between samples of a segment, in scale units
 LONGEST = 50_000  # samples of the longest segment tried
@@ -43,49 +40,20 @@ PAIRS = 3  # nearest pairs of points tried to connect two loci
 
 
 @dataclass(frozen=True, eq=False)
-class Quotient:
-    """The points of a problem's manifold up to a symmetry, and paths between them."""
+class Paths(Quotient):
+    """The points of a problem's polyhedron up to a symmetry, and paths between them."""
 
-    problem: Problem
-    symmetry: Symmetry
-    tolerances: Tolerances
-
-    @cached_property
-    def _circles(self) -> tuple[NDArray[np.bool_], Array]:
-        """Mask of the coordinates that are circles, and their radii in scale units."""
-        manifold = self.problem.polyhedron.manifold
-        periods = np.array(manifold.periods)
-        closed = np.isfinite(periods)
-        return closed, periods[closed] / math.tau / manifold.scale_array[closed]
-
-    def place(self, q: Array) -> Array:
-        """Return coordinates that separate the orbits of the continuous symmetries."""
-        if self.symmetry.invariants is not None:
-            return self.symmetry.invariants(q)
-        u = q / self.problem.scales
-        closed, radii = self._circles
-        turn, lines = u[closed] / radii, ~closed
-        turned = [radii * np.cos(turn), radii * np.sin(turn)]
-        for factor in self.problem.polyhedron.manifold.factors:
-            if factor.turns:
-                lines[factor.at] = False
-                turned.append(factor.even(q) / self.problem.scales[factor.at.start])
-        return np.concatenate([u[lines], *turned])
-
-    def images(self, q: Array) -> list[Array]:
-        """Return a point and its images under the finite group."""
-        return [element.apply(q) for element in self.symmetry.group]
+    problem: Problem = field(kw_only=True)
 
     def are_relabelled(self, p: Array, q: Array) -> bool:
         """Whether a group too large to list carries ``p`` to the orbit of ``q``."""
-        manifold = self.problem.polyhedron.manifold
         return self.symmetry.relabel is not None and bool(
-            self.symmetry.relabellings(manifold, p, q, self.tolerances.same)
+            self.symmetry.relabellings(self.manifold, p, q, self.tolerances.same)
         )
 
     def flat_beyond(self, found: Certificate) -> bool:
         """Whether the energy is flat in more directions than the symmetry explains."""
-        known = self.symmetry.directions(self.problem.polyhedron.manifold, found.point)
+        known = self.orbit(found.point)
         return found.signature[2] > rank(known, found.rank_tolerance)
 
     def active_count(self, found: Certificate) -> int:
@@ -96,9 +64,9 @@ class Quotient:
 
     def is_straight(self, p: Array, q: Array, energy: float, slack: float) -> bool:
         """Whether the segment from ``p`` to ``q`` stays in the set and on a level of the energy."""
-        manifold = self.problem.polyhedron.manifold
+        manifold = self.manifold
         way = manifold.difference(q, p)
-        parts = math.ceil(float(abs(way / self.problem.scales).max()) / FINE) + 1
+        parts = math.ceil(float(abs(way / self.scales).max()) / FINE) + 1
         if parts > LONGEST:
             return False
         away, energies = self._along(
@@ -110,7 +78,7 @@ class Quotient:
 
     def _holds(self, away: Array) -> bool:
         inside, off = np.split(away, [self.problem.inequalities], axis=1)
-        enters = self.problem.polyhedron.implicit_of(inside) >= -self.tolerances.zero
+        enters = self.polyhedron.implicit_of(inside) >= -self.tolerances.zero
         return bool(enters.all() and (abs(off) <= self.tolerances.zero).all())
 
     def _along(self, points: Array) -> tuple[Array, Array]:
@@ -123,12 +91,12 @@ class Quotient:
         """Whether a step crosses no wall; contacts of ``p`` may be violated to second order."""
         parts = math.ceil(abs(step).max() / FINE)
         along = np.linspace(0, 1, parts + 1)[:, None]
-        manifold = self.problem.polyhedron.manifold
-        away, _ = self._along(manifold.moved(p, along * step * self.problem.scales))
+        manifold = self.manifold
+        away, _ = self._along(manifold.moved(p, along * step * self.scales))
         closed = abs(away[0]) <= self.tolerances.same
         bent = np.where(closed, (along * abs(step).max()) ** 2, 0.0)
         inside = (away + bent)[:, : self.problem.inequalities]
-        enters = self.problem.polyhedron.implicit_of(inside) >= -self.tolerances.zero
+        enters = self.polyhedron.implicit_of(inside) >= -self.tolerances.zero
         return bool(enters.all())
 
     def is_walkable(self, p: Array, q: Array, energy: float, slack: float) -> bool:
@@ -156,7 +124,7 @@ class Quotient:
         flat = curvature.vectors[:, abs(curvature.values) <= level]
         if not flat.shape[1] or curvature.least < -level:
             return None
-        moves = 1e-5 * flat.T * self.problem.scales
+        moves = 1e-5 * flat.T * self.scales
         slopes = [(self.place(p + v) - self.place(p - v)) / 2e-5 for v in moves]
         weights = np.linalg.lstsq(np.array(slopes).T, miss, rcond=1e-6)[0]
         if np.linalg.norm(miss - weights @ slopes) > (1 - LEAST) * np.linalg.norm(miss):
@@ -169,13 +137,13 @@ class Quotient:
         self, p: Array, step: Array, active: Piece, goal: Array, energy: float, slack: float
     ) -> Array | None:
         """Return the minimum near a fraction of ``p + step`` if that is nearer to the goal."""
-        manifold = self.problem.polyhedron.manifold
+        manifold = self.manifold
         before = float(np.linalg.norm(goal - self.place(p)))
         for part in PARTS:
             length = part * abs(step).max()
             if not self._is_clear(p, part * step):
                 continue
-            guess = manifold.moved(p, part * step * self.problem.scales)
+            guess = manifold.moved(p, part * step * self.scales)
             point = self._settled(guess, active, 0.5 * length, (energy, slack))
             left = np.inf if point is None else float(np.linalg.norm(goal - self.place(point)))
             if before - left >= GAIN * min(length, before):
@@ -202,7 +170,7 @@ class Quotient:
         return point if settled and same and self._apart(point, q) <= near else None
 
     def _apart(self, p: Array, q: Array) -> float:
-        return float(abs(self.problem.polyhedron.manifold.chord(p, q) / self.problem.scales).max())
+        return float(abs(self.polyhedron.manifold.chord(p, q) / self.scales).max())
 
 
 @dataclass(eq=False)
@@ -220,7 +188,7 @@ class Locus:
     points, images : list of (n,) arrays
         One, or a net of points of the locus, and all images of these.
     places : (k, d) array
-        Their invariants; see :meth:`Quotient.place`.
+        Their invariants; see :meth:`~polycorner.polyhedra.quotients.Quotient.place`.
     count : int
         How many starts ended here.
     """
@@ -248,7 +216,7 @@ Near = tuple[float, int, Locus]  # with the distance from a point and the neares
 class Loci:
     """The stationary points found so far, each locus once up to the symmetry."""
 
-    quotient: Quotient
+    quotient: Paths
     loci: list[Locus] = field(default_factory=list)
 
     def add(self, found: Certificate) -> None:
@@ -332,18 +300,18 @@ class Loci:
         return False
 
 
-def check_symmetry(quotient: Quotient, points: Array) -> None:
+def check_symmetry(quotient: Paths, points: Array) -> None:
     """Raise ValueError for a symmetry that changes the energy at points, or at others nearby.
 
     At a point alone, the energy may happen to be stationary along a motion.
     """
     problem, symmetry = quotient.problem, quotient.symmetry
-    manifold, changing = problem.polyhedron.manifold, 10 * quotient.tolerances.level
+    changing = 10 * quotient.tolerances.level
     beside = BESIDE * np.cos(np.arange(1, problem.dimension + 1)) * problem.scales
     for q in [*points, *(points + beside)]:
         values, gradients, hessians = problem.evaluate(q, 2)
         size = max(abs(gradients[-1]).max(), abs(hessians[-1]).max(), 1e-300)
-        slopes = symmetry.directions(manifold, q) @ gradients[-1]
+        slopes = quotient.orbit(q) @ gradients[-1]
         images = [float(problem.energy.value(g.apply(q))) for g in symmetry.elements]
         changes = abs(np.array(images) - values[-1])
         for part, wrong in (

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.checks import reals
-from polycorner.minimisation.loci import Loci, Locus, Quotient, check_symmetry
+from polycorner.minimisation.loci import Loci, Locus, Paths, check_symmetry
 from polycorner.minimisation.methods import minimise
 from polycorner.minimisation.outcomes import Minima
 from polycorner.minimisation.problem import Problem, pose
@@ -207,7 +207,7 @@ def minima(  # noqa: PLR0913 - all but two are options
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
     points = start_points(problem, starts, box, rng)
-    quotient = Quotient(problem, symmetry or Symmetry(), tolerances)
+    quotient = Paths(polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
     check_symmetry(quotient, points[:CHECKED])
     loci, failures = Loci(quotient), Counter[Verdict]()
     interrupted = False

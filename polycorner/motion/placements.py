@@ -4,8 +4,9 @@ import numpy as np
 
 from polycorner.formulas.bundles import Bundle
 from polycorner.motion.mechanics import OVERLAP
-from polycorner.polyhedra.faces import Face
+from polycorner.polyhedra.faces import project
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.spaces.manifold import Array
 
 
@@ -81,7 +82,7 @@ def onto_equations(polyhedron: Polyhedron, q: Array) -> Array:
     """Return the place ``(n,)`` on the equations to which Gauss and Newton's steps lead."""
     m = len(polyhedron.functions)
     equations = range(m, m + len(polyhedron.equations))
-    return Face.of(polyhedron, equations).project(q).point if equations else q
+    return project(Quotient(polyhedron), q, equations).point.q if equations else q
 
 
 def _slopes(polyhedron: Polyhedron, q: Array) -> Array:

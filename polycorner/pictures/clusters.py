@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from polycorner.checks import instance, reals, refuse, whole
 from polycorner.kinds import checked
 from polycorner.models.spheres import SphereCluster
-from polycorner.polyhedra.faces import Face
+from polycorner.polyhedra.faces import project
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -183,9 +184,10 @@ def _sampled(
     lengths = np.concatenate([[0.0], np.cumsum(steps)])
     moments = np.linspace(0, lengths[-1], frames)
     places = np.stack([np.interp(moments, lengths, column) for column in line.T], axis=-1)
-    face = Face.of(model.polyhedron, [model.pairs.index(pair) for pair in sorted(held)])
+    quotient = Quotient(model.polyhedron)
+    rows = [model.pairs.index(pair) for pair in sorted(held)]
     for k in range(1, frames - 1):
-        places[k] = face.project(places[k]).point
+        places[k] = project(quotient, places[k], rows).point.q
     return places, moments
 
 

@@ -1,108 +1,207 @@
 """Faces: the points where some functions vanish, and the way to them from points nearby.
 
-In scaled coordinates ``u = q / scales`` let ``f`` be the functions that are held and ``A`` their
-derivative.  The shortest step to the zeros of the linearised functions is ``d = -A^+ f`` (Gauss
-and Newton).  Where the gradients are independent at the solution the steps converge to it
-quadratically ([NW] sec. 10.3), so that a step below the square root of the rounding error is
-the last; where they are dependent convergence is linear, and directions along which ``A`` is small
-are cut off.
+In scaled coordinates ``u = q / scales`` let ``f`` be the functions that are held, each divided by
+the length of its gradient, and ``A`` their derivative.  The shortest step to the zeros of the
+linearised functions is ``d = -A^+ f`` (Gauss and Newton), orthogonal to the orbit of the symmetry.
+Where the gradients are independent at the solution the steps converge to it quadratically ([NW]
+sec. 10.3), so that a step below the square root of the rounding error is the last; where they are
+dependent convergence is linear, and directions along which ``A`` is small are cut off.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from scipy.linalg.lapack import dgeqrf, dorgqr, dormqr, dtrtrs
 
-from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.strata import evaluated
+from polycorner.polyhedra.cones import independent_rows, unit_rows
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import DEFAULT, Tolerances
-from polycorner.values import Value
+from polycorner.values import cached_property
 
-STEPS = 50
+# Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
+SINGULAR = 1e-14
+NEWTON = 8
+STEPS = 50  # where gradients may be dependent
+WORK = 64  # floats that LAPACK may use to apply reflections to one vector
+
+
+class HeldPoint(EvaluatedPoint):
+    """A point with an orthonormal frame of the held functions' gradients.
+
+    Attributes
+    ----------
+    kept : tuple of int
+        Inequalities that are held at zero, with independent gradients.
+    finite : bool
+        Whether values and gradients are finite; otherwise nothing else is defined.
+    condition : float
+        Smallest diagonal entry of the triangular factor of the unit gradients: zero where they
+        are dependent.
+    volume : float
+        Volume of the parallelepiped of the held gradients and the orbit.
+    """
+
+    def __init__(
+        self, quotient: Quotient, q: Array, kept: Sequence[int], orbit: Array | None = None
+    ) -> None:
+        values, gradients = quotient.evaluated(q)
+        super().__init__(quotient, q, values, gradients, orbit)
+        self.kept = tuple(kept)
+        self._factorise()
+        if len(self.orbit) and not self.condition > quotient.tolerances.dependent:
+            # Orbits are smaller at some points: motions about a line do not move what lies on it.
+            self.orbit = self.orbit[
+                independent_rows(unit_rows(self.orbit), quotient.tolerances.rank)
+            ]
+            self._factorise()
+
+    @classmethod
+    def placed(cls, quotient: Quotient, q: Array, kept: Sequence[int]) -> Self:
+        """Return a point where given functions are held."""
+        return cls(quotient, q, kept)
+
+    def _factorise(self) -> None:
+        held = self.quotient.held(self.kept)
+        rows = self.gradients[held]
+        rows = np.concatenate([rows, self.orbit]) if len(self.orbit) else rows
+        sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+        total = float(self.values.sum() + sizes.sum())
+        self.finite = math.isfinite(total) and float(sizes.min(initial=1.0)) > 0
+        self.condition, self.volume = 0.0, 0.0
+        self._target = np.zeros(len(rows) if self.finite else 0)
+        if self.finite:
+            self._target[: len(held)] = -self.values[held] / sizes[: len(held)]
+            self._factor, self._reflectors, *_ = dgeqrf((rows / sizes[:, None]).T, overwrite_a=True)
+            diagonal = abs(self._factor.diagonal())
+            self.condition = float(diagonal.min(initial=1.0))
+            self.volume = float(diagonal.prod() * sizes.prod())
+
+    @cached_property
+    def _normal(self) -> Array:
+        """Orthonormal columns that span the held gradients and the orbit."""
+        count = len(self._reflectors)
+        return np.asarray(dorgqr(self._factor[:, :count], self._reflectors)[0])
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_normal"}
+
+    def tangent(self, v: Array) -> Array:
+        """Return the unit vector nearest to ``v`` along which the held functions stay zero."""
+        t = v - self._normal @ (self._normal.T @ v)
+        return np.asarray(t / max(math.sqrt(float(t @ t)), 1e-300))
+
+    def correction(self) -> Array:
+        """Return the shortest scaled step to the zeros of the linearised held functions."""
+        count = len(self._reflectors)
+        step = np.zeros((len(self.q), 1))
+        if count:
+            found, info = dtrtrs(self._factor, self._target, trans=1)
+            if info:
+                msg = "the gradients of the held functions are dependent"
+                raise np.linalg.LinAlgError(msg)
+            step[:count, 0] = found[:count]
+            step = dormqr("L", "N", self._factor[:, :count], self._reflectors, step, WORK)[0]
+        return np.asarray(step[:, 0])
+
+    def truncated(self, along: Array | None) -> Array:
+        """Return :meth:`correction` without directions along which the gradients are small.
+
+        The step is combined of the columns of ``along``, by default of all directions.
+        """
+        matrix = self.matrix(self.kept)
+        matrix = matrix if along is None else matrix @ along
+        step = np.linalg.lstsq(matrix, self._target, rcond=self.quotient.tolerances.rank)[0]
+        return np.asarray(step if along is None else along @ step)
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether the held functions leave a curve, modulo the symmetry."""
+        return len(self._target) + 1 == len(self.q)
+
+    def orientation(self, t: Array) -> float:
+        """Return the sign of the determinant of held gradients and tangent, where it is square."""
+        if not self.is_curve:
+            return 1.0
+        frame = np.vstack([self._normal.T, t])
+        return float(np.sign(np.linalg.det(frame) * np.diagonal(self._factor).prod()))
 
 
 class Arrival(NamedTuple):
     """Where the way to a face ended: a point, and whether the last step was rounding there."""
 
-    point: Array
+    point: HeldPoint
     settled: bool
 
 
-@dataclass(frozen=True, eq=False)
-class Face(Value):
-    """The common zeros of some functions.
+def project(
+    quotient: Quotient,
+    q: Array,
+    kept: Sequence[int],
+    *,
+    along: Array | None = None,
+    reach: float = math.inf,
+    stride: float = math.inf,
+    steps: int = STEPS,
+    dependent: bool = True,
+) -> Arrival:
+    """Move a point onto a face by the shortest steps, orthogonal to the orbit through it.
 
-    Attributes
+    Parameters
     ----------
-    evaluate : callable
-        Returns the values ``(m,)`` and the scaled gradients ``(m, n)`` of all functions at a point.
-    scales : (n,) array
-        The scales of the coordinates.
-    held : sequence of int
-        The functions that vanish.
-    tolerances : Tolerances
+    quotient : Quotient
+        The polyhedron modulo its symmetry.
+    q : (n,) array
+        A point nearby.
+    kept : sequence of int
+        The functions that vanish, besides the equations that are solved.
+    along : (n, r) array, optional
+        Scaled directions that the steps are combined of; by default all.
+    reach : float, optional
+        Longest way, in scale units.
+    stride : float, optional
+        Longest step, in scale units; longer ones are shortened.
+    steps : int, optional
+        The most steps.
+    dependent : bool, optional
+        Whether the way goes on where gradients are dependent, by steps without the directions
+        along which they are small.
+
+    Returns
+    -------
+    Arrival
+        Not settled where a value or a derivative is not finite, beyond the reach, after the last
+        step, and where gradients are dependent if that is not allowed.
     """
+    tolerances, scales = quotient.tolerances, quotient.scales
+    moved, last, orbit = 0.0, math.inf, None
+    for _ in range(steps):
+        point = HeldPoint(quotient, q, kept, orbit)
+        orbit = point.orbit
+        if not point.finite or (point.condition < SINGULAR and not dependent):
+            return Arrival(point, settled=False)
+        step = point.truncated(along) if dependent else point.correction()
+        size = math.sqrt(float(step @ step))
+        moved += size
+        if moved > reach:
+            return Arrival(point, settled=False)
+        if size <= tolerances.rounding or (size < tolerances.settled and size > last / 2):
+            return Arrival(point if last == math.inf else HeldPoint(quotient, q, kept), True)
+        q, last = q + scales * (step if size <= stride else step * (stride / size)), size
+        if size < tolerances.settled * min(1.0, point.condition):
+            point = HeldPoint(quotient, q, kept)
+            return Arrival(point, point.finite)
+    still = size <= tolerances.settled / 10  # a step so short need not be taken
+    return Arrival(HeldPoint(quotient, point.q if still else q, kept), still)
 
-    evaluate: Callable[[Array], Sequence[Array]]
-    scales: Array
-    held: Sequence[int]
-    tolerances: Tolerances = DEFAULT
 
-    @classmethod
-    def of(
-        cls, polyhedron: Polyhedron, held: Sequence[int], tolerances: Tolerances = DEFAULT
-    ) -> "Face":
-        """Return a face of a polyhedron, whose equations are counted after its inequalities."""
-        scales = polyhedron.manifold.scale_array
-        return cls(partial(evaluated, polyhedron), scales, held, tolerances)
+def projected(
+    quotient: Quotient, q: Array, kept: Sequence[int], reach: float, steps: int = NEWTON
+) -> HeldPoint | None:
+    """Return the nearest point where the held functions, independent ones, vanish.
 
-    def project(
-        self,
-        q: Array,
-        *,
-        along: Array | None = None,
-        stride: float = math.inf,
-        steps: int = STEPS,
-    ) -> Arrival:
-        """Move a point onto the face by the shortest steps.
-
-        Parameters
-        ----------
-        q : (n,) array
-            A point nearby.
-        along : (n, r) array, optional
-            Scaled directions that the steps are combined of; by default all.
-        stride : float, optional
-            Longest step, in scale units; longer ones are shortened.
-        steps : int, optional
-            The most steps.
-
-        Returns
-        -------
-        Arrival
-            Not settled at the last point where a value or a derivative is not finite, and after
-            the last step.
-        """
-        rows, last = list(self.held), math.inf
-        for _ in range(steps):
-            values, gradients = (part[rows] for part in self.evaluate(q)[:2])
-            if not (np.isfinite(values).all() and np.isfinite(gradients).all()):
-                break
-            matrix = gradients if along is None else gradients @ along
-            d = np.linalg.lstsq(matrix, -values, rcond=self.tolerances.rank)[0]
-            d = d if along is None else along @ d
-            size = math.sqrt(float(d @ d))
-            q = q + self.scales * (d * min(1.0, stride / size) if size else d)
-            if self._is_last(q, size, last):
-                return Arrival(q, settled=True)
-            last = size
-        return Arrival(q, settled=False)
-
-    def _is_last(self, q: Array, size: float, before: float) -> bool:
-        """Whether a step was rounding, or no longer half as long as the one before."""
-        rounding = self.tolerances.rounding * (1.0 + float(abs(q / self.scales).max(initial=0.0)))
-        return size <= rounding or (size < self.tolerances.settled and size > before / 2)
+    None if Newton's method does not converge within ``reach`` scale units of ``q``.
+    """
+    found = project(quotient, q, kept, reach=reach, steps=steps, dependent=False)
+    return found.point if found.settled else None

@@ -178,11 +178,6 @@ def local_pieces(
     return polyhedron.signs_to_pieces(signs[:m].tolist())
 
 
-def check_tolerance(argument: str, value: float) -> None:
-    """Refuse a tolerance that is not strictly between 0 and 1."""
-    checks.real(argument, value, above=0, below=1)
-
-
 def _local_type(pieces: list[Piece], gradients: Array, m: int, rank_tolerance: float) -> LocalType:
     if not pieces:
         return LocalType.OUTSIDE

@@ -20,19 +20,20 @@ from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.incidences import (
     Flag,
+    Partition,
     edge_of,
     flags_of,
     groups_of,
     joins_of,
+    mask_of,
     masked,
+    positions_in,
     untold,
 )
-from polycorner.skeletons.masks import mask_of, positions_in
 from polycorner.skeletons.nets import Net
-from polycorner.skeletons.partitions import Partition
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
-from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.registry import FoundCorner
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.surfaces import Surface
 from polycorner.skeletons.vertex_figures import Ray
@@ -40,7 +41,7 @@ from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 
 
-def tip_of(explorer: Explorer, record: CornerRecord, sector: Sector) -> Tip | None:
+def tip_of(explorer: Explorer, record: FoundCorner, sector: Sector) -> Tip | None:
     """Return the tip of a face at a corner; None where no point of the face near it is known."""
     rays = [record.figure.rays[i] for i in sector.rays]
     beside = sector.sample or (rays[0].sample if rays else None)
@@ -73,20 +74,9 @@ def pointed_faces(explorer: Explorer) -> dict[int, list[Tip]]:
 def joined_by_nets(
     explorer: Explorer, mask: int, tips: list[Tip], curves: list[list[Flag]], notes: list[str]
 ) -> Iterator[tuple[Flag, Flag]]:
-    """Yield flags of curves around faces with tips, two by two, that belong to one face.
+    """Yield flags of boundary curves around faces with tips, two by two, that belong to one face.
 
-    Parameters
-    ----------
-    explorer : Explorer
-        A finished search.
-    mask : int
-        Functions that vanish on the faces.
-    tips : list of Tip
-        Where the faces are not smooth.
-    curves : list of list of Flag
-        Flags of each boundary curve of one of the faces.
-    notes : list of str
-        A sentence is added where a net leaves open what belongs together.
+    A sentence is added to the notes where a net leaves open what belongs together.
     """
     active = frozenset(positions_in(mask))
     left = [(curve[0], list(_points(explorer, curve, active))) for curve in curves]
@@ -172,7 +162,7 @@ def _ordered(explorer: Explorer, names: frozenset[str]) -> tuple[str, ...]:
     return tuple(name for name in explorer.polyhedron.names if name in names)
 
 
-def _corner(explorer: Explorer, record: CornerRecord) -> Corner:
+def _corner(explorer: Explorer, record: FoundCorner) -> Corner:
     ends = [record.edges.get(representative) for representative in record.orbit]
     return Corner(
         point=explorer.manifold.canonical(record.point.q),

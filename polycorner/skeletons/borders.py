@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from polycorner.skeletons.points import Quotient
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 

@@ -14,10 +14,11 @@ from math import comb
 
 import numpy as np
 
+from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Sample
 from polycorner.skeletons.branches import MAX_SETS, Branches
 from polycorner.skeletons.dependence import dependent_at, follow_edge
 from polycorner.skeletons.folds import DISTANCES, fold_figure
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Sample, projected
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
@@ -47,17 +48,7 @@ Ends = list[tuple[int, Ray]]
 def dependent_rays(
     point: EvaluatedPoint, active: frozenset[int], distance: float
 ) -> Iterator[Ray | frozenset[int]]:
-    """Yield the rays of dependent edges at a corner; in place of one that is unclear, what is held.
-
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        The corner.
-    active : set of int
-        Functions that vanish there.
-    distance : float
-        From the corner to the samples, in scale units.
-    """
+    """Yield the rays of dependent edges; in place of one that is unclear, what is held."""
     branches = Branches(point, sorted(active))
     found: list[Ray] = []
     for y, held in branches.double():
@@ -92,18 +83,9 @@ def branched_rays(
 ) -> tuple[list[Ray], list[frozenset[int]]]:
     """Return the rays at a degenerate corner, and sets of functions whose curves are unclear.
 
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        The corner.
-    active : set of int
-        Functions that vanish there.
-    distance : float
-        From the corner to the samples, in scale units.
-    least : int
-        Least dimension that the gradients of what stays zero leave; rays with fewer are left out.
+    Rays whose functions leave fewer than ``least`` dimensions to first order are left out.
     """
-    scales = point.quotient.polyhedron.manifold.scale_array
+    scales = point.quotient.scales
     branches = Branches(point, sorted(active))
     rays: list[Ray] = []
     for y, held in branches.simple(least):
@@ -163,7 +145,7 @@ def _known(
     point: EvaluatedPoint, rays: list[Ray], active: frozenset[int], q: Array, distance: float
 ) -> bool:
     """Whether an edge of given functions goes through a point at a distance from the corner."""
-    near = ALIKE * distance * point.quotient.polyhedron.manifold.scale_array
+    near = ALIKE * distance * point.quotient.scales
     return any(ray.active == active and (abs(ray.sample.q - q) < near).all() for ray in rays)
 
 
@@ -171,7 +153,7 @@ def _placed(
     point: EvaluatedPoint, curve: HeldPoint, way: Array, distance: float
 ) -> HeldPoint | None:
     """Return the point of a curve at a distance from where it begins."""
-    scales = point.quotient.polyhedron.manifold.scale_array
+    scales = point.quotient.scales
     there = None
     for _ in range(PLACED):
         q = point.q + distance * scales * way
@@ -185,8 +167,7 @@ def _placed(
 
 def _unclear(point: EvaluatedPoint, active: frozenset[int], held: frozenset[int]) -> str:
     """Return the note on an edge that second derivatives do not tell."""
-    names = point.quotient.polyhedron.names
-    opened, every = (", ".join(names[i] for i in sorted(some)) for some in (active - held, active))
+    opened, every = map(point.quotient.written, (active - held, active))
     return (
         f"whether an edge that opens {opened} leaves the corner {every} is not decided by second "
         f"derivatives: not followed"
@@ -216,15 +197,6 @@ def branched_figure(
 
     None where there are few, where the polyhedron is locally a union, and where the sets of
     functions are too many.
-
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        The corner.
-    active : set of int
-        Functions that vanish there.
-    rank, full : int
-        Rank of their gradients in the quotient, and its dimension.
     """
     if point.quotient.polyhedron.is_union or full <= SAMPLED:
         return None
@@ -235,18 +207,17 @@ def branched_figure(
     notes = [_unclear(point, active, held) for held in unclear]
     if Counter(ray.active for ray in near[0]) != Counter(ray.active for ray in rays):
         notes.append(f"{_unclear(point, active, frozenset())}: different ones at two distances")
-    arcs = _Arcs(point, rays, DISTANCES[0])
+    arcs = _ArcsAround(point, rays, DISTANCES[0])
     sectors = arcs.sectors()
     if arcs.lost:
-        names = point.quotient.polyhedron.names
         notes.append(
-            f"of the faces at the corner {', '.join(names[i] for i in sorted(active))} at least "
+            f"of the faces at the corner {point.quotient.written(active)} at least "
             f"{arcs.lost} could not be followed around it"
         )
     return VertexFigure(rank, full, tuple(rays), sectors, tuple(notes))
 
 
-class _Arcs:
+class _ArcsAround:
     """The arcs of a small sphere about a corner between the points of edges.
 
     ``lost`` counts those that were not found or not followed.
@@ -307,5 +278,5 @@ class _Arcs:
         walk = follow_edge(arc.start(self.link), arc.direction, arc.active)
         if walk.end is not End.CORNER:
             return None
-        scales = self.link.polyhedron.manifold.scale_array
+        scales = self.link.scales
         return np.asarray(walk.last.q - arc.distance * scales * walk.tangent)

@@ -36,9 +36,10 @@ from math import comb
 
 import numpy as np
 
-from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
+from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank
+from polycorner.polyhedra.faces import projected
+from polycorner.polyhedra.quotients import EvaluatedPoint
 from polycorner.skeletons.dependence import unit_hessians
-from polycorner.skeletons.points import EvaluatedPoint, projected
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.spheres_about import Link
 from polycorner.spaces.manifold import Array
@@ -133,13 +134,6 @@ def _lines(conics: list[Array], limit: float) -> list[Array]:
 class Branches:
     """The curves of functions that vanish at a corner.
 
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        The corner.
-    rows : list of int
-        Functions that vanish there.
-
     Attributes
     ----------
     full, free : int
@@ -152,7 +146,7 @@ class Branches:
         self.point, self.rows = point, rows
         self.tolerances, self.frame = point.quotient.tolerances, point.frame
         self.limit = self.tolerances.rank
-        self.slopes = unit_rows(point.gradients[rows]) @ self.frame
+        self.slopes = point.slopes(rows)
         self.full = int(self.frame.shape[1])
         every = Rows(self.slopes, self.limit)
         self.relations, self.free = every.relations, self.full - every.rank
@@ -288,7 +282,7 @@ class Branches:
             return True
         way = some.null_space @ np.random.default_rng(0).standard_normal(some.null_space.shape[1])
         quotient, kept = self.point.quotient, self.point.basis(held)
-        scales = quotient.polyhedron.manifold.scale_array
+        scales = quotient.scales
         beside = self.tolerances.beside  # where a relation is seen to persist
         q = self.point.q + beside * scales * (self.frame @ (way / np.linalg.norm(way)))
         there = projected(quotient, q, kept, beside / 2)
@@ -311,7 +305,7 @@ class Branches:
         if forms.shape != (1, 2, 2) or abs(forms).max() > self.limit:
             return None
         weights, kept = some.relations[:, 0], self.point.basis(held)
-        scales = self.point.quotient.polyhedron.manifold.scale_array
+        scales = self.point.quotient.scales
 
         def total(start: float, step: float, part: float = 0.0) -> tuple[float, Array]:
             angle = start + part * step

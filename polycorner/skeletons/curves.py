@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polycorner.polyhedra.faces import projected
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.symmetry import Relabelling
-from polycorner.skeletons.points import Quotient, projected
 from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
@@ -48,7 +49,7 @@ def lies_on(quotient: Quotient, q: Array, curve: Curve) -> bool:
 
     The nearest vertex may belong to another part of the curve.
     """
-    manifold = quotient.polyhedron.manifold
+    manifold = quotient.manifold
     apart = quotient.symmetry.separations(manifold, q, curve.points)
     near = np.minimum(apart[:-1], apart[1:])
     chords = np.linalg.norm(np.diff(curve.points, axis=0) / manifold.scale_array, axis=1)
@@ -58,18 +59,17 @@ def lies_on(quotient: Quotient, q: Array, curve: Curve) -> bool:
 
 def _on_arc(quotient: Quotient, q: Array, curve: Curve, k: int) -> bool:
     """Whether a point lies on the arc over chord ``k``: where the arc passes it."""
-    symmetry, manifold = quotient.symmetry, quotient.polyhedron.manifold
     same = quotient.tolerances.corner
     start, end = curve.points[k], curve.points[k + 1]
-    q = manifold.image(q, start)
+    q = quotient.manifold.image(q, start)
     kept = quotient.at(start).basis(curve.active)
-    along = symmetry.displacement(manifold, end, start)
+    along = quotient.displacement(end, start)
 
     def passed(s: float) -> tuple[float, Array]:
         at = projected(quotient, start + s * (end - start), kept, np.inf)
         p = start if at is None else at.q
-        return float(symmetry.displacement(manifold, p, q) @ along), p
+        return float(quotient.displacement(p, q) @ along), p
 
     if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
-        return min(symmetry.separation(manifold, q, p) for p in (start, end)) < same
-    return symmetry.separation(manifold, q, sign_change(passed)[1]) < same
+        return min(quotient.separation(q, p) for p in (start, end)) < same
+    return quotient.separation(q, sign_change(passed)[1]) < same

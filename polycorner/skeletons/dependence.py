@@ -17,9 +17,10 @@ from itertools import combinations, islice
 import numpy as np
 
 from polycorner.formulas.bundles import Bundle
-from polycorner.polyhedra.cones import Rows, rank, unit_rows
+from polycorner.polyhedra.cones import Rows, rank
+from polycorner.polyhedra.faces import HeldPoint
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
 
@@ -66,15 +67,6 @@ class DependentSet(Polyhedron):
     """A polyhedron with equations for the points where gradients have one relation.
 
     Its attribute ``outer`` is the quotient without these equations.
-
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        A point where they have.
-    rows : list of int
-        Positions of the functions and equations.
-    flaps : (F, n) array
-        Scaled directions along which the gradient of the related sum has to vanish.
     """
 
     def __init__(self, point: EvaluatedPoint, rows: list[int], flaps: Array) -> None:
@@ -120,19 +112,12 @@ def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoi
     """Return a point as one of a curve of dependent gradients, and the scaled unit tangent there.
 
     None if the gradients have no relation, or do not leave one null direction.
-
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        A point of the curve.
-    active : set of int
-        Functions that vanish along it.
     """
     quotient, rows = point.quotient, sorted(active)
     if not point.sizes[quotient.held(rows)].all():
         return None  # a relation of one gradient: there is no curve that it follows
     frame, limit = point.frame, quotient.tolerances.rank
-    slopes = unit_rows(point.gradients[rows]) @ frame
+    slopes = point.slopes(rows)
     for some in islice(_with_one_relation(slopes, limit), MAX_SETS):
         related, held = [rows[i] for i in some], Rows(slopes[some], limit)
         form = curvature(point, related, held.relations[:, 0], held.null_space)

@@ -9,13 +9,14 @@ from itertools import islice
 import numpy as np
 
 from polycorner.lookahead import Lookahead
+from polycorner.polyhedra.faces import HeldPoint
+from polycorner.polyhedra.quotients import VICINITY, EvaluatedPoint, Quotient
 from polycorner.progress import Progress, silent
 from polycorner.searches import Clock, Ending, Task, Told, work_through
 from polycorner.skeletons.curves import Curve
 from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.links import singular_figure
 from polycorner.skeletons.parts import Completeness
-from polycorner.skeletons.points import VICINITY, EvaluatedPoint, HeldPoint, Quotient
 from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
 from polycorner.skeletons.singularities import singular_point, singular_points
 from polycorner.skeletons.spheres_about import Link

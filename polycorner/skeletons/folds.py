@@ -40,9 +40,10 @@ from itertools import combinations
 
 import numpy as np
 
-from polycorner.polyhedra.cones import Rows, unit_rows
+from polycorner.polyhedra.cones import Rows
+from polycorner.polyhedra.faces import projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Sample
 from polycorner.skeletons.dependence import curvature, dependent_at
-from polycorner.skeletons.points import EvaluatedPoint, Sample, projected
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.spaces.manifold import Array
@@ -72,16 +73,8 @@ def fold_figure(
 ) -> VertexFigure | None:
     """Return the rays and sectors at a fold; None where the corner is none, or not clearly.
 
-    Parameters
-    ----------
-    point : EvaluatedPoint
-        The corner.
-    active : set of int
-        Functions that vanish there.
-    rank, full : int
-        Rank of their gradients in the quotient, and its dimension.
-    distances : tuple of float
-        Distances in scale units at which the edges are looked for.
+    The rank is that of the active gradients in the quotient, whose dimension is ``full``; edges are
+    looked for at the given distances, in scale units.
     """
     if point.quotient.polyhedron.is_union or len(active) != rank + 1 or rank == full:
         return None
@@ -103,11 +96,11 @@ class _Fold:
 
     def __init__(self, point: EvaluatedPoint, rows: list[int]) -> None:
         self.point, self.rows = point, rows
-        self.scales = point.quotient.polyhedron.manifold.scale_array
+        self.scales = point.quotient.scales
         # Distance of held functions from zero up to which a relation persists.
         self.limit, self.persists = point.quotient.tolerances.rank, point.quotient.tolerances.held
         frame = point.frame
-        held = Rows(unit_rows(point.gradients[rows]) @ frame, self.limit)
+        held = Rows(point.slopes(rows), self.limit)
         weights = held.relations[:, 0]
         weights = np.where(abs(weights) > self.limit, weights, 0.0)
         self.free = np.flatnonzero(weights == 0).tolist()
@@ -304,11 +297,11 @@ class _Fold:
         return Sector((), held, None if there is None else Sample.of(there))
 
     def _notes(self, rays: dict[Ends, Ray]) -> Iterator[str]:
-        every = self.point.quotient.polyhedron.names
-        names = ", ".join(every[i] for i in self.rows)
+        written = self.point.quotient.written
         for opening in self.dependent:
             if (opening, 0) not in rays:
                 yield (
-                    f"the edge that opens {', '.join(every[self.rows[k]] for k in opening)} out of "
-                    f"the singular corner {names} has dependent gradients: not followed"
+                    f"the edge that opens {written(self.rows[k] for k in opening)} out of "
+                    f"the singular corner {written(self.rows)} has dependent gradients: "
+                    f"not followed"
                 )

@@ -1,20 +1,101 @@
 """Incidences of a search: which beginnings of edges and faces belong to one face."""
 
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Hashable, Iterable, Iterator, Sequence
 from typing import Any
 
-from polycorner.polyhedra.symmetry import generators
+import numpy as np
+
+from polycorner.polyhedra.symmetry import Relabelling, generators
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import Flag as NamedFlag
-from polycorner.skeletons.masks import Renaming, mask_of
-from polycorner.skeletons.partitions import Partition
-from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.registry import FoundCorner
 from polycorner.skeletons.sectors import Sector
 
+# Sets of functions are bits of integers here: a fiftieth of the memory of sets of names.
 # An edge or an apex, as in :data:`~polycorner.skeletons.flags.Flag`, and the functions that vanish
 # on a face beside it, as bits.
 Flag = tuple[str, Any, int]
+
+
+def mask_of(positions: Iterable[int]) -> int:
+    """Return the integer whose bits are given positions.
+
+    >>> mask_of([0, 3])
+    9
+    """
+    mask = 0
+    for i in positions:
+        mask |= 1 << i
+    return mask
+
+
+def positions_in(mask: int) -> list[int]:
+    """Return the positions of the bits of an integer, in ascending order.
+
+    >>> positions_in(9)
+    [0, 3]
+    """
+    found = []
+    while mask:
+        lowest = mask & -mask
+        found.append(lowest.bit_length() - 1)
+        mask ^= lowest
+    return found
+
+
+class Renaming:
+    """A relabelling of named functions, acting on sets of them.
+
+    >>> Renaming(["a", "b", "c"], {"a": "c", "c": "a"})(0b011) == 0b110
+    True
+    """
+
+    def __init__(self, names: Sequence[str], relabelling: Relabelling) -> None:
+        place = {name: i for i, name in enumerate(names)}
+        self._images = [1 << place[relabelling.get(name, name)] for name in names]
+
+    def __call__(self, mask: int) -> int:
+        """Return the image of a set."""
+        return sum(self._images[i] for i in positions_in(mask))
+
+
+class Partition:
+    """The finest partition of some things in which joined things are in one class.
+
+    Parameters
+    ----------
+    things : iterable of hashable
+        Others are added when they are joined.
+    """
+
+    def __init__(self, things: Iterable[Hashable] = ()) -> None:
+        self._position = {thing: k for k, thing in enumerate(dict.fromkeys(things))}
+        self._pairs: list[tuple[int, int]] = []
+        self._classes: list[int] | None = None
+
+    def join(self, one: Hashable, other: Hashable) -> None:
+        """Put two things into one class."""
+        known = self._position
+        first = known.setdefault(one, len(known))
+        self._pairs.append((first, known.setdefault(other, len(known))))
+        self._classes = None
+
+    def __getitem__(self, thing: Hashable) -> int:
+        """Return the number of the class of a thing."""
+        if self._classes is None:
+            self._classes = self._connected()
+        return self._classes[self._position[thing]]
+
+    def _connected(self) -> list[int]:
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count = len(self._position)
+        rows, columns = np.array(self._pairs, dtype=np.int32).reshape(-1, 2).T
+        graph = coo_array((np.ones(len(rows), np.int32), (rows, columns)), shape=(count, count))
+        found: list[int] = connected_components(graph, directed=False)[1].tolist()
+        return found
 
 
 def groups_of(sets: Partition, flags: Iterable[Flag]) -> list[list[Flag]]:
@@ -91,7 +172,7 @@ def edge_of(explorer: Explorer, flag: Flag) -> int:
     return found
 
 
-def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
+def _sectors_by_ray(record: FoundCorner) -> dict[int, list[Sector]]:
     found: dict[int, list[Sector]] = {}
     for sector in record.figure.sectors:
         for ray in dict.fromkeys(sector.rays):
@@ -99,7 +180,7 @@ def _sectors_by_ray(record: CornerRecord) -> dict[int, list[Sector]]:
     return found
 
 
-def _joins_at(explorer: Explorer, k: int, record: CornerRecord) -> Iterator[tuple[Flag, Flag]]:
+def _joins_at(explorer: Explorer, k: int, record: FoundCorner) -> Iterator[tuple[Flag, Flag]]:
     """Yield flags at one corner that one sector has, or that a relabelling exchanges."""
     active = [mask_of(ray.active) for ray in record.figure.rays]
     alike: dict[int, list[int]] = {}

@@ -23,13 +23,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from polycorner.polyhedra.faces import HeldPoint
 from polycorner.polyhedra.symmetry import Element
 from polycorner.skeletons.borders import Border, Tip, seeds_of
-from polycorner.skeletons.heights import Height
 from polycorner.skeletons.nets import LEVELS, Net
-from polycorner.skeletons.points import HeldPoint
 from polycorner.skeletons.spheres_about import link_about
-from polycorner.skeletons.surfaces import Surface
+from polycorner.skeletons.surfaces import Height, Surface
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
 
@@ -420,10 +419,9 @@ def _sides(
     flat = np.stack([-across[:, 1], across[:, 0]], 1)
     along = np.einsum("knt,kt->kn", tangents, flat)
     along *= np.sign(np.einsum("kn,kn->k", along, chords))[:, None]
-    sides, across_edge = [], 10 * surface.tolerances.zero
-    for sign in (1, -1):
-        p, found = surface.projected(q + sign * across_edge * surface.scales * normal)
-        sides.append(found & surface.contains(surface.values(p)))
+    across_edge = 10 * surface.tolerances.zero
+    beside = (q + sign * across_edge * surface.scales * normal for sign in (1, -1))
+    sides = [surface.placed(p)[1] for p in beside]
     if not (sides[0] ^ sides[1]).all():
         return None
     inward = np.where(sides[0], 1.0, -1.0)[:, None] * normal

@@ -22,12 +22,17 @@ from numpy.typing import NDArray
 
 from polycorner.lookahead import Lookahead
 from polycorner.polyhedra.cones import unit_rows
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.progress import Progress
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.incidences import Flag, flags_of, groups_of, joins_of
-from polycorner.skeletons.masks import mask_of
-from polycorner.skeletons.partitions import Partition
-from polycorner.skeletons.points import Quotient
+from polycorner.skeletons.incidences import (
+    Flag,
+    Partition,
+    flags_of,
+    groups_of,
+    joins_of,
+    mask_of,
+)
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import singular_point
 from polycorner.spaces.manifold import Array
@@ -99,13 +104,6 @@ def touching_points(
 
     Only where no other function is negative.  Functions that are held by one start are as many as
     by another one.
-
-    Parameters
-    ----------
-    quotient : Quotient
-        The polyhedron.
-    starts : sequence of Start
-        Walks on two-dimensional faces, with independent gradients.
     """
     for first in range(0, len(starts), BATCH):
         found = list(_candidates(quotient, starts[first : first + BATCH]))
@@ -124,7 +122,7 @@ def _candidates(quotient: Quotient, starts: Sequence[Start]) -> Iterator[tuple[i
     held = np.array([s.held for s in starts], dtype=np.intp)  # which may be none
     walking, on = np.arange(len(starts)), _is_held(held, quotient.count)
     seen = on.copy()
-    scales, limit = quotient.polyhedron.manifold.scale_array, quotient.tolerances.rank
+    scales, limit = quotient.scales, quotient.tolerances.rank
     for _ in range(STEPS):
         here = _located(quotient, q[walking] + STEP * scales * t[walking], held[walking])
         away = np.linalg.norm((here.moved - q[walking]) / scales, axis=1)
@@ -160,7 +158,7 @@ def _polished(
     q = np.array([f[2] for f in found])
     held = np.array([starts[b].held for b in walks], dtype=np.intp)
     on = _is_held(held, quotient.count)
-    scales, tolerances = quotient.polyhedron.manifold.scale_array, quotient.tolerances
+    scales, tolerances = quotient.scales, quotient.tolerances
     last, touches = tolerances.settled / 10, tolerances.same
     going = np.arange(len(found))
     for _ in range(NEWTON):
@@ -184,7 +182,7 @@ def _polished(
 
 def _located(quotient: Quotient, q: Array, held: Positions) -> _Points:
     """Return points of faces with the derivatives there."""
-    scales, count = quotient.polyhedron.manifold.scale_array, quotient.count
+    scales, count = quotient.scales, quotient.count
     rows = np.concatenate(
         [held, np.tile(np.array(quotient.equations, held.dtype), (len(q), 1))], axis=1
     )
@@ -219,7 +217,7 @@ def _located(quotient: Quotient, q: Array, held: Positions) -> _Points:
 def _evaluated(quotient: Quotient, q: Array) -> tuple[Array, Array]:
     """Return values and scaled gradients at several points."""
     values, slopes = quotient.polyhedron.bundle.evaluate(q, 1)
-    return values, slopes * quotient.polyhedron.manifold.scale_array
+    return values, slopes * quotient.scales
 
 
 def _split(quotient: Quotient, q: Array, normals: Array) -> tuple[Array, Array, Array, Mask]:
@@ -227,8 +225,7 @@ def _split(quotient: Quotient, q: Array, normals: Array) -> tuple[Array, Array, 
 
     The factor is replaced where the normals are dependent.
     """
-    manifold = quotient.polyhedron.manifold
-    orbits = np.array([unit_rows(quotient.symmetry.directions(manifold, p)) for p in q])
+    orbits = np.array([unit_rows(quotient.orbit(p)) for p in q])
     every = np.concatenate([normals, orbits], axis=1)
     r = every.shape[1]
     full, factor = np.linalg.qr(every.transpose(0, 2, 1), mode="complete")
@@ -243,16 +240,7 @@ def add_inner_corners(
 ) -> bool:
     """Add the corners inside faces that were not examined yet; return whether there are any.
 
-    Parameters
-    ----------
-    explorer : Explorer
-        A finished search.
-    examined : set of Flag
-        Flags of faces that were examined; those that are now are added.
-    progress : callable
-        Called as ``progress(walks, all walks, note)``.
-    workers : Workers, optional
-        Who walks across the faces.
+    Flags of the faces that are examined now are added to ``examined``.
     """
     known = len(explorer.records)
     starts = list(_starts(explorer, examined))

@@ -16,9 +16,10 @@ from itertools import chain, combinations, islice
 import numpy as np
 
 from polycorner.polyhedra.cones import unit_rows
+from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient, Sample
 from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.folds import fold_figure
-from polycorner.skeletons.points import EvaluatedPoint, Quotient, Sample, projected
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.tracing import EdgeTracer
@@ -39,19 +40,7 @@ Search = Callable[[Quotient, Sequence[Array]], EdgeTracer]
 def singular_figure(
     search: Search, point: EvaluatedPoint, active: frozenset[int], rank: int
 ) -> VertexFigure:
-    """Return the rays and sectors at a singular corner.
-
-    Parameters
-    ----------
-    search : callable
-        From a quotient and starts to a finished search for its skeleton.
-    point : EvaluatedPoint
-        The corner.
-    active : set of int
-        Functions that vanish there.
-    rank : int
-        Rank of their gradients in the quotient.
-    """
+    """Return the rays and sectors at a singular corner."""
     frame = point.frame
     full = int(frame.shape[1])
     folded = fold_figure(point, active, rank, full) or branched_figure(point, active, rank, full)
@@ -66,9 +55,8 @@ def singular_figure(
             return figure
         before = figure
     assert before is not None
-    names = point.quotient.polyhedron.names
     note = (
-        f"at the singular corner {', '.join(names[i] for i in sorted(active))} "
+        f"at the singular corner {point.quotient.written(active)} "
         f"small spheres of different radii meet different edges"
     )
     return VertexFigure(rank, full, before.rays, before.sectors, (*before.notes, note))
@@ -93,10 +81,10 @@ def _link(
     """Return rays and sectors from the link of one radius."""
     quotient, link = point.quotient, link_about(point, radius)
     found = search(link, list(_starts(point, link, active, frame, radius, notes)))
-    names = ", ".join(quotient.polyhedron.names[i] for i in sorted(active))
+    names = quotient.written(active)
     if found.registry.lost:
         notes += [f"near the singular corner {names}: {note}" for note in found.notes]
-    scales = quotient.polyhedron.manifold.scale_array
+    scales = quotient.scales
     rays: list[Ray] = []
     position: dict[int, int] = {}
     for k, record in enumerate(found.records):
@@ -113,7 +101,7 @@ def _link(
     for curve in found.curves:
         ends = [None if end is None else position.get(end[0]) for end in (curve.start, curve.stop)]
         held = tuple(sorted(curve.active))
-        middle = Sample(curve.middle, tuple(quotient.at(curve.middle).basis(held)))
+        middle = Sample(curve.middle, tuple(quotient.at(curve.middle).basis(held)), HeldPoint)
         if curve.kinds[0] is End.CLOSED:
             sectors.append(Sector((), held, middle))
         elif ends[0] is None or ends[1] is None:
@@ -132,7 +120,7 @@ def _starts(
     notes: list[str],
 ) -> Iterator[Array]:
     """Yield points of the link: on its corners, edges and faces where its dimension is small."""
-    scales = radius * point.quotient.polyhedron.manifold.scale_array
+    scales = radius * point.quotient.scales
     full = frame.shape[1]
     if full > SAMPLED:
         ways = [(frame @ y, [tight]) for y, tight in singular_rays(point, active, notes)]

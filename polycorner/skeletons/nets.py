@@ -224,11 +224,7 @@ class Net:
         start = self.points[new][k]
         far = guess[k, r, count]
         low, high = count / (count + 1.0), np.ones(len(k))
-        for _ in range(BISECTIONS if len(k) else 0):
-            middle = (low + high) / 2
-            q, found = self.surface.projected(start + middle[:, None] * (far - start))
-            inside = found & self.surface.contains(self.surface.values(q))
-            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        _, high = self.surface.leave(start, far, low, high, BISECTIONS)
         end, _ = self.surface.projected(start + high[:, None] * (far - start))
         self.starts = np.concatenate([self.starts, start])
         self.ends = np.concatenate([self.ends, end])

@@ -1,5 +1,6 @@
 """Parts of skeletons: corners, edges, faces, and how much of them was found."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import pairwise
@@ -7,11 +8,11 @@ from itertools import pairwise
 import numpy as np
 
 from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.strata import LocalType, Stratum
 from polycorner.skeletons.borders import Border
 from polycorner.skeletons.dependence import held_at
 from polycorner.skeletons.indices import face_euler_characteristic
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property
@@ -58,7 +59,7 @@ def arc_length(quotient: Quotient, points: Array, rows: list[int]) -> float:
     )
 
 
-def _length(quotient: Quotient, points: Array, rows: list[int]) -> float:
+def _length(quotient: Quotient, points: Array, rows: Sequence[int]) -> float:
     """Return the length of a curve on which given functions with independent gradients vanish."""
     from scipy.integrate import quad_vec
 
@@ -75,9 +76,11 @@ class _Arcs:
     coordinates.
     """
 
-    def __init__(self, quotient: Quotient, starts: Array, moved: Array, rows: list[int]) -> None:
+    def __init__(
+        self, quotient: Quotient, starts: Array, moved: Array, rows: Sequence[int]
+    ) -> None:
         self.quotient, self.starts, self.held = quotient, starts, quotient.held(rows)
-        self.scales = quotient.polyhedron.manifold.scale_array
+        self.scales = quotient.scales
         self.chords = moved / self.scales
         self.sizes = np.linalg.norm(self.chords, axis=1)
         lifts = []
@@ -120,7 +123,7 @@ class _Arcs:
 
     def _orbit(self, q: Array) -> Array:
         """Return an orthonormal basis of the directions of the orbit."""
-        orbit = unit_rows(self.quotient.symmetry.directions(self.quotient.polyhedron.manifold, q))
+        orbit = unit_rows(self.quotient.orbit(q))
         limit = self.quotient.tolerances.rank
         return np.asarray(null_space(null_space(orbit, limit).T, limit).T)
 

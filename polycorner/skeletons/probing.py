@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.polyhedra.symmetry import renamed
 from polycorner.skeletons.curves import Curve, EdgeEnd
 from polycorner.skeletons.nets import Net
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.registry import SingularFigure, written_point
 from polycorner.skeletons.surfaces import Surface
 from polycorner.skeletons.tracing import EdgeTracer
@@ -91,8 +92,7 @@ class Cloud:
         way /= np.sqrt(n)
         parts = np.sort(self.rng.uniform(0, 1, (k, PARTS)), axis=1)
         chords = here[:, None] + parts[..., None] * way[:, None]
-        q, found = self.surface.projected(chords.reshape(-1, n))
-        inside = found & self.surface.contains(self.surface.values(q))
+        q, inside = self.surface.placed(chords.reshape(-1, n))
         q, inside = q.reshape(chords.shape), inside.reshape(k, PARTS)
         reached = np.logical_and.accumulate(inside, axis=1).sum(axis=1)
         moved = np.flatnonzero(reached)
@@ -105,12 +105,8 @@ class Cloud:
     def _keep(self, inside: Array, outside: Array) -> None:
         """Keep where chords from inside to outside leave the polyhedron."""
         surface = self.surface
-        low, high = np.zeros(len(inside)), np.ones(len(inside))
-        for _ in range(BISECTIONS if len(inside) else 0):
-            middle = (low + high) / 2
-            q, found = surface.projected(inside + middle[:, None] * (outside - inside))
-            within = found & surface.contains(surface.values(q))
-            low, high = np.where(within, middle, low), np.where(within, high, middle)
+        ends = np.zeros(len(inside)), np.ones(len(inside))
+        low, high = surface.leave(inside, outside, *ends, BISECTIONS)
         first, last = (
             surface.values(surface.projected(inside + s[:, None] * (outside - inside))[0])
             for s in (low, high)
@@ -156,7 +152,7 @@ def _solved(quotient: Quotient, q: Array, values: Array, row: int) -> Array:
 def _programme(quotient: Quotient, q: Array, rows: Sequence[int], row: int | None) -> Array:
     from scipy.optimize import minimize
 
-    bundle, scales = quotient.polyhedron.bundle, quotient.polyhedron.manifold.scale_array
+    bundle, scales = quotient.polyhedron.bundle, quotient.scales
     equations = quotient.equations
 
     def rated(which: Sequence[int], order: int) -> Any:
@@ -321,10 +317,7 @@ class Prober(EdgeTracer):
         for k in range(0, len(net.ends), max(1, len(net.ends) // WALKS)):
             start = HeldPoint(self.quotient, net.starts[k], kept)
             ahead = (net.ends[k] - start.q) / self.scales
-            walk = follow(start, ahead, passive=active, extent=self.quotient.extent)
-            there = walk.last.active() if walk.end is End.CORNER else None
-            if there is not None:
-                yield walk.last, there
+            yield from follow(start, ahead, passive=active).arrival
 
     def inside(
         self, point: EvaluatedPoint, active: frozenset[int]
@@ -340,10 +333,7 @@ class Prober(EdgeTracer):
         if start.active():
             return
         for way in self._ways_inside(start, normal):
-            walk = follow(start, way, extent=self.quotient.extent)
-            there = walk.last.active() if walk.end is End.CORNER else None
-            if there is not None:
-                yield walk.last, there
+            yield from follow(start, way).arrival
 
     def _ways_inside(self, start: EvaluatedPoint, normal: Array) -> Iterator[Array]:
         """Yield the normal of a facet, random ways inwards, and ways to boundary that is known.

@@ -4,9 +4,9 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.kinds import checked
+from polycorner.polyhedra.faces import projected
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.parts import Edge
-from polycorner.skeletons.points import projected
 from polycorner.skeletons.states import SearchState
 from polycorner.spaces.manifold import Array
 

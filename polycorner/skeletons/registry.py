@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from polycorner.polyhedra.faces import projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient, Sample
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.branched_corners import with_branches
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.singularities import SingularPoint, refined
 from polycorner.skeletons.spheres_about import SAMPLED
 from polycorner.skeletons.vertex_figures import VertexFigure, corner_rank, vertex_figure
@@ -28,7 +29,7 @@ NO_FIGURE = VertexFigure(0, 0, (), (), ())
 
 
 @dataclass
-class CornerRecord:
+class FoundCorner:
     """A corner while the skeleton grows.
 
     ``orbit[k]`` is the ray that stands for ray ``k``; ``edges`` the edges by such rays.  The figure
@@ -51,8 +52,8 @@ class CornerRegistry:
         self.singular_figure = singular
         self.quotient, self.symmetry = quotient, quotient.symmetry
         self.tolerances = quotient.tolerances
-        self.polyhedron, self.manifold = quotient.polyhedron, quotient.polyhedron.manifold
-        self.records: list[CornerRecord] = []
+        self.polyhedron, self.manifold = quotient.polyhedron, quotient.manifold
+        self.records: list[FoundCorner] = []
         self.notes: dict[str, None] = {}
         self.lost = False
         self._named: dict[frozenset[int], Names] = {}
@@ -68,7 +69,7 @@ class CornerRegistry:
 
     def written(self, rows: Iterable[int]) -> str:
         """Return the names of functions for a sentence."""
-        return ", ".join(self.polyhedron.names[i] for i in sorted(rows))
+        return self.quotient.written(rows)
 
     def note(self, sentence: str, *, lost: bool = False) -> None:
         """Keep a sentence for the user once; ``lost`` if something could not be traced."""
@@ -181,7 +182,7 @@ class CornerRegistry:
         self, point: EvaluatedPoint, active: frozenset[int], key: Array
     ) -> tuple[int, list[Relabelling]]:
         stabiliser = self._carried(point.q, point.q)
-        self.records.append(CornerRecord(point, active, key, stabiliser))
+        self.records.append(FoundCorner(point, active, key, stabiliser))
         return len(self.records) - 1, list(stabiliser)
 
     def figure(self, point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
@@ -214,7 +215,7 @@ class CornerRegistry:
 
     def match(
         self,
-        record: CornerRecord,
+        record: FoundCorner,
         sample: Array | None,
         active: frozenset[int],
         relabellings: Iterable[Relabelling],
@@ -252,34 +253,15 @@ class CornerRegistry:
         return min(ray.distance, *others, math.inf)
 
 
-@dataclass(frozen=True, eq=False)
-class BareCorner:
-    """A corner without values, which travels to a worker."""
-
-    q: Array
-    kind: type[HeldPoint] | None
-    kept: tuple[int, ...]
-    active: frozenset[int]
-
-    @classmethod
-    def of(cls, record: CornerRecord) -> "BareCorner":
-        """Return that of a corner in record."""
-        point = record.point
-        if isinstance(point, HeldPoint):
-            return cls(point.q, type(point), tuple(point.kept), record.active)
-        return cls(point.q, None, (), record.active)
-
-    def point(self, quotient: Quotient) -> EvaluatedPoint:
-        """Return the point with its values."""
-        if self.kind is None:
-            return quotient.at(self.q)
-        return self.kind(quotient, self.q, list(self.kept))
-
-
-def figured(quotient: Shared, singular: SingularFigure, corner: BareCorner) -> VertexFigure:
+def figured(
+    quotient: Shared,
+    singular: SingularFigure,
+    corner: Sample[EvaluatedPoint],
+    active: frozenset[int],
+) -> VertexFigure:
     """Return the vertex figure of a corner; called in a worker."""
     registry = CornerRegistry(quotient.value, singular)
-    return registry.figure(corner.point(quotient.value), corner.active)
+    return registry.figure(corner.at(quotient.value), active)
 
 
 def written_point(q: Array) -> str:

@@ -10,6 +10,7 @@ from polycorner import checks
 from polycorner.checks import reals
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.searches import Clock
@@ -19,7 +20,6 @@ from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.incidences import Flag
 from polycorner.skeletons.insides import add_inner_corners
 from polycorner.skeletons.parts import Completeness
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.states import Budget, SearchState
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.workers import opened_if_any

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows
-from polycorner.skeletons.points import EvaluatedPoint, Sample
+from polycorner.polyhedra.faces import HeldPoint
+from polycorner.polyhedra.quotients import EvaluatedPoint, Sample
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
@@ -29,7 +30,7 @@ class Sector:
 
     rays: tuple[int, ...]
     held: tuple[int, ...]
-    sample: Sample | None = None
+    sample: Sample[HeldPoint] | None = None
 
     @property
     def active(self) -> frozenset[int]:

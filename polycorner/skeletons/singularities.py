@@ -10,12 +10,13 @@ and Newton converges quadratically where two curves cross at an angle, and linea
 contacts, where it is extrapolated ([Gov] sec. 4.1).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from polycorner.polyhedra.cones import unit_rows
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient
+from polycorner.polyhedra.faces import HeldPoint
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.spaces.manifold import Array
 
 STEPS = 60
@@ -38,7 +39,7 @@ class SingularPoint(HeldPoint):
     Their values, and gradients that vanish but for rounding, are exactly zero.
     """
 
-    def __init__(self, quotient: Quotient, q: Array, kept: list[int]) -> None:
+    def __init__(self, quotient: Quotient, q: Array, kept: Sequence[int]) -> None:
         super().__init__(quotient, q, kept)
         held = quotient.held(kept)
         self.values = self.values.copy()
@@ -61,13 +62,13 @@ class SingularPoint(HeldPoint):
 
 def _second(quotient: Quotient, q: Array) -> tuple[Array, Array, Array]:
     """Return values and scaled first and second derivatives of all functions and equations."""
-    scales = quotient.polyhedron.manifold.scale_array
+    scales = quotient.scales
     values, gradients, hessians = quotient.polyhedron.bundle.evaluate(q, 2)
     return values, gradients * scales, hessians * np.outer(scales, scales)
 
 
 def singular_point(
-    quotient: Quotient, q: Array, kept: list[int], reach: float
+    quotient: Quotient, q: Array, kept: Sequence[int], reach: float
 ) -> SingularPoint | None:
     """Return the point near ``q`` where the held functions vanish with dependent gradients.
 
@@ -78,7 +79,7 @@ def singular_point(
     if found is None or not _sinks(quotient, found[0], held):
         return None
     at, way = found
-    scales, beside = quotient.polyhedron.manifold.scale_array, quotient.tolerances.beside
+    scales, beside = quotient.scales, quotient.tolerances.beside
     for start in (at + beside * scales * way, at - beside * scales * way):
         other = _solved(quotient, start, held, 2 * beside)
         if other is not None and np.linalg.norm((other[0] - at) / scales) > beside / 10:
@@ -101,7 +102,7 @@ def _solved(
     quotient: Quotient, q: Array, held: list[int], reach: float
 ) -> tuple[Array, Array] | None:
     """Return a solution of the equations, and the unit direction that changes them least."""
-    scales, tolerances = quotient.polyhedron.manifold.scale_array, quotient.tolerances
+    scales, tolerances = quotient.scales, quotient.tolerances
     start = q
     last: Array = np.zeros(len(q))
     mu: Array = np.zeros(0)
@@ -115,7 +116,7 @@ def _solved(
             sizes = np.linalg.norm(gradients, axis=1) + np.linalg.norm(hessians, axis=(1, 2))
             sizes[sizes == 0] = 1.0
             mu = np.linalg.svd(gradients / sizes[:, None])[0][:, -1]
-        orbit = unit_rows(quotient.symmetry.directions(quotient.polyhedron.manifold, q))
+        orbit = unit_rows(quotient.orbit(q))
         matrix, missed = _system(
             values / sizes, gradients / sizes[:, None], hessians / sizes[:, None, None], mu, orbit
         )
@@ -141,7 +142,7 @@ def _solved(
 
 def part_of_way(start: HeldPoint, end: HeldPoint, q: Array) -> float:
     """Return the part of the way from start to end at which ``q`` lies beside the chord."""
-    scales = start.quotient.polyhedron.manifold.scale_array
+    scales = start.quotient.scales
     chord = (end.q - start.q) / scales
     return float((q - start.q) / scales @ chord / (chord @ chord))
 
@@ -153,7 +154,7 @@ def dependent_between(
     most = 1 + start.quotient.tolerances.same
     if found is None or not 0 < part_of_way(start, end, found.q) <= most:
         return None
-    scales = start.quotient.polyhedron.manifold.scale_array
+    scales = start.quotient.scales
     chord, away = ((q - start.q) / scales for q in (end.q, found.q))
     aside = np.linalg.norm(away - part_of_way(start, end, found.q) * chord)
     return found if aside < ASIDE * np.linalg.norm(chord) and found.active() is not None else None
@@ -180,7 +181,7 @@ def _least(matrix: Array, orbit: Array) -> Array:
 
 def _sinks(quotient: Quotient, q: Array, held: list[int]) -> bool:
     """Whether the gradients are more dependent at a point than beside it, along some axis."""
-    beside = quotient.tolerances.beside * np.diag(quotient.polyhedron.manifold.scale_array)
+    beside = quotient.tolerances.beside * np.diag(quotient.scales)
     around = [quotient.at(p).gradients[held] for p in (*(q + beside), *(q - beside))]
     sizes = np.nanmax(np.linalg.norm(around, axis=2), axis=0)
     sizes[sizes == 0] = 1.0

@@ -5,8 +5,8 @@ import numpy as np
 from polycorner.formulas.bundles import Bundle
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.polyhedra.symmetry import Symmetry
-from polycorner.skeletons.points import EvaluatedPoint, Quotient
 from polycorner.spaces.manifold import Array, Manifold
 
 # Length of walks in a link, in radii.

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from polycorner import checks
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.skeletons.curves import Curve, EdgeEnd
 from polycorner.skeletons.flags import FaceCrossing, Flag
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.probing import Anchor, Patch
-from polycorner.skeletons.registry import CornerRecord
+from polycorner.skeletons.registry import FoundCorner
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -50,7 +50,7 @@ class SearchState(Value):
     ----------
     quotient : Quotient
         The polyhedron with its symmetry and tolerances.
-    records : tuple of CornerRecord
+    records : tuple of FoundCorner
         Corners.
     curves : tuple of Curve
         Edges.
@@ -81,7 +81,7 @@ class SearchState(Value):
     """
 
     quotient: Quotient
-    records: tuple[CornerRecord, ...]
+    records: tuple[FoundCorner, ...]
     curves: tuple[Curve, ...]
     crossings: tuple[FaceCrossing, ...]
     starts: tuple[tuple[int, Array], ...]
@@ -97,6 +97,6 @@ class SearchState(Value):
     rng: np.random.Generator
 
 
-def copied(record: CornerRecord) -> CornerRecord:
+def copied(record: FoundCorner) -> FoundCorner:
     """Return a corner whose edges can grow without those of the original."""
     return replace(record, edges=dict(record.edges))

@@ -15,14 +15,14 @@ from itertools import chain, islice
 import numpy as np
 
 from polycorner.lookahead import Lookahead
+from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient, Sample
 from polycorner.polyhedra.symmetry import Relabelling, renamed
 from polycorner.skeletons.curves import Curve, EdgeEnd, lies_on
 from polycorner.skeletons.dependence import follow_edge, held_at, is_dependent
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, projected
 from polycorner.skeletons.registry import (
-    BareCorner,
-    CornerRecord,
     CornerRegistry,
+    FoundCorner,
     SingularFigure,
     figured,
     written_point,
@@ -45,8 +45,8 @@ class Report:
     """A walk without the values at its end; see :class:`~polycorner.skeletons.walks.Walk`."""
 
     points: Array
-    kept: list[int]
-    kind: type[HeldPoint] | None
+    last: Sample[HeldPoint]
+    dependent: bool
     tangent: Array
     end: End
     length: float
@@ -54,16 +54,16 @@ class Report:
     @classmethod
     def of(cls, walk: Walk) -> "Report":
         """Return that of a walk."""
-        kind = None if is_dependent(walk.last) else type(walk.last)
-        return cls(walk.points, walk.last.kept, kind, walk.tangent, walk.end, walk.length)
+        last, dependent = Sample.of(walk.last), is_dependent(walk.last)
+        return cls(walk.points, last, dependent, walk.tangent, walk.end, walk.length)
 
     def walk(self, quotient: Quotient, active: frozenset[int]) -> Walk:
         """Return the walk along an edge with given active functions."""
-        if self.kind is None:
-            last = held_at(quotient, self.points[-1], active, self.kept)
-        else:
-            last = self.kind(quotient, self.points[-1], self.kept)
-        return Walk(self.points, last, self.tangent, self.end, self.length)
+        last = self.last
+        there = (
+            held_at(quotient, last.q, active, last.kept) if self.dependent else last.at(quotient)
+        )
+        return Walk(self.points, there, self.tangent, self.end, self.length)
 
 
 def walked(quotient: Shared, ray: Ray) -> Report:
@@ -99,8 +99,11 @@ class EdgeTracer:
             self.pending.append((known, FIGURE))
             self._arrivals[known] = []
             if self.lookahead is not None:
-                corner, singular = BareCorner.of(self.records[known]), self.registry.singular_figure
-                self.lookahead.start((known, FIGURE), figured, self._sent, singular, corner)
+                record, singular = self.records[known], self.registry.singular_figure
+                corner = Sample.of(record.point)
+                self.lookahead.start(
+                    (known, FIGURE), figured, self._sent, singular, corner, record.active
+                )
         return found
 
     def _furnish(self, k: int) -> None:
@@ -134,7 +137,7 @@ class EdgeTracer:
         return [(k, i) for i, twin in enumerate(orbit) if twin == i]
 
     @property
-    def records(self) -> list[CornerRecord]:
+    def records(self) -> list[FoundCorner]:
         """The corners."""
         return self.registry.records
 
@@ -235,7 +238,7 @@ class EdgeTracer:
             )
         return match
 
-    def _before(self, walk: Walk, record: CornerRecord, distance: float) -> HeldPoint | None:
+    def _before(self, walk: Walk, record: FoundCorner, distance: float) -> HeldPoint | None:
         """Return the point of a walk at a distance before the corner where it ends.
 
         Singular corners are known less exactly than edges beside each other are apart there, so

@@ -17,8 +17,9 @@ from itertools import combinations, islice
 import numpy as np
 
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
+from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient, Sample
 from polycorner.skeletons.dependence import curvature, held_at
-from polycorner.skeletons.points import EvaluatedPoint, HeldPoint, Quotient, Sample, projected
 from polycorner.skeletons.sectors import Sector, active_along, sectors_between
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
@@ -49,7 +50,7 @@ class Ray:
 
     direction: Array
     active: frozenset[int]
-    sample: Sample
+    sample: Sample[HeldPoint]
     distance: float
     dependent: bool = False
 
@@ -92,16 +93,15 @@ class VertexFigure:
 
 def corner_rank(point: EvaluatedPoint, active: frozenset[int]) -> tuple[int, int]:
     """Return the rank of the active gradients in the quotient, and the quotient's dimension."""
-    frame = point.frame
-    slopes = unit_rows(point.gradients[sorted(active)]) @ frame
-    return rank(slopes, point.quotient.tolerances.rank), int(frame.shape[1])
+    slopes = point.slopes(sorted(active))
+    return rank(slopes, point.quotient.tolerances.rank), int(slopes.shape[1])
 
 
 def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
     """Return the rays and sectors at a regular corner with the given active functions."""
     tolerances, frame = point.quotient.tolerances, point.frame
     rows = sorted(active)
-    slopes = unit_rows(point.gradients[rows]) @ frame
+    slopes = point.slopes(rows)
     full = frame.shape[1]
     notes: list[str] = []
     rays: list[Ray] = []
@@ -115,7 +115,7 @@ def vertex_figure(point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure
                     rays.append(ray)
         if len(rows) == full and len(rays) == known:
             notes.append(
-                f"an edge out of the corner {_names(point, rows)} is shorter than "
+                f"an edge out of the corner {point.quotient.written(rows)} is shorter than "
                 f"{10 * tolerances.zero:g} scale units: not followed"
             )
     sectors = sectors_between(point, rows, slopes, [x.direction @ frame for x in rays])
@@ -179,10 +179,11 @@ def singular_rays(
     zeros are, to second order, the null directions ``d`` of ``sum w_i d' H_i d``.
     """
     rows = sorted(active)
-    slopes = unit_rows(point.gradients[rows]) @ point.frame
+    slopes = point.slopes(rows)
     if not _isolated(point, rows, slopes):
         notes.append(
-            f"{_names(point, rows)}: rank too low, and second order does not show an isolated point"
+            f"{point.quotient.written(rows)}: rank too low, and second order does not show an "
+            f"isolated point"
         )
     for k in range(len(rows)):
         rest = [i for i in range(len(rows)) if i != k]
@@ -201,10 +202,6 @@ def singular_rays(
                 f"breaking {point.quotient.polyhedron.names[rows[k]]} leaves "
                 f"{plane.shape[1]} free directions to first order: not followed"
             )
-
-
-def _names(point: EvaluatedPoint, rows: list[int]) -> str:
-    return ", ".join(point.quotient.polyhedron.names[i] for i in rows)
 
 
 def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
@@ -254,7 +251,7 @@ def rounding(point: EvaluatedPoint) -> float:
 
     Far from the origin rounding errors of the coordinates count.
     """
-    size = abs(point.q / point.quotient.polyhedron.manifold.scale_array).max()
+    size = abs(point.q / point.quotient.scales).max()
     return max(10 * point.quotient.tolerances.rounding, RELATIVE_ROUNDING * float(size))
 
 
@@ -267,7 +264,7 @@ def _tested(
     is not zero to rounding farther out does not vanish along the curve.
     """
     quotient, union = point.quotient, point.quotient.polyhedron.is_union
-    scales = quotient.polyhedron.manifold.scale_array
+    scales = quotient.scales
     kept, rows = sorted(base), np.array(sorted(active.difference(base)), dtype=np.int64)
     least = 10 * quotient.tolerances.zero
     opened = np.zeros(len(rows))  # signs of the functions farther out
@@ -286,5 +283,5 @@ def _tested(
         if there is not None and there < active and union:
             kept_there = sample.basis(there)
             if len(kept_there) == len(kept):
-                return Ray(direction, there, Sample(sample.q, tuple(kept_there)), h)
+                return Ray(direction, there, Sample(sample.q, tuple(kept_there), HeldPoint), h)
     return None

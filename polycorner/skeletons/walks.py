@@ -7,13 +7,14 @@ again between two points, or just touches, is not missed.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from operator import attrgetter
 
 import numpy as np
 
-from polycorner.skeletons.points import HeldPoint, projected
+from polycorner.polyhedra.faces import HeldPoint, projected
 from polycorner.skeletons.sign_changes import may_vanish, sign_change
 from polycorner.skeletons.singularities import (
     SingularPoint,
@@ -73,6 +74,13 @@ class Walk:
     end: End
     length: float
 
+    @property
+    def arrival(self) -> Iterator[tuple[HeldPoint, frozenset[int]]]:
+        """Yield the corner where it ends in the polyhedron, and what vanishes there, if so."""
+        active = self.last.active() if self.end is End.CORNER else None
+        if active is not None:
+            yield self.last, active
+
 
 def follow(
     start: HeldPoint,
@@ -108,7 +116,7 @@ class _Follower:
         *, home: bool, extent: float | None,
     ) -> None:  # fmt: skip
         self.quotient = quotient = start.quotient
-        self.scales = quotient.polyhedron.manifold.scale_array
+        self.scales = quotient.scales
         self.point, self.t = start, start.tangent(direction)
         self.out, self.bend = self.t, np.zeros(len(self.t))
         self.start, self.home = start, home
@@ -157,7 +165,7 @@ class _Follower:
         """Return the longest step: longer far out, short on small circles and where it turns."""
         away = abs(self.point.distances[self.watched])
         room = float(away.min(initial=self.extent))
-        manifold = self.quotient.polyhedron.manifold
+        manifold = self.quotient.manifold
         turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
         circle = 0.05 / turning if turning > 0 else math.inf
         far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), circle)
@@ -326,9 +334,8 @@ class _Follower:
 
     def _return(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
         """Return where this step passes the start of the walk again, and the tangent there."""
-        symmetry, manifold = self.quotient.symmetry, self.quotient.polyhedron.manifold
         tolerances = self.quotient.tolerances
-        near = 2 * symmetry.separation(manifold, point.q, self.point.q)
+        near = 2 * self.quotient.separation(point.q, self.point.q)
         if self.length < 2 * self._chord(point) or abs(self._from_home(point.q)).max() > near:
             return None
         ahead = self._from_home(self.start.q + tolerances.difference * self.scales * self.out)
@@ -345,5 +352,4 @@ class _Follower:
 
     def _from_home(self, q: Array) -> Array:
         """Return the displacement from the start's orbit, by the invariants."""
-        quotient = self.quotient
-        return quotient.symmetry.displacement(quotient.polyhedron.manifold, q, self.start.q)
+        return self.quotient.displacement(q, self.start.q)

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry
 from polycorner.polyhedra.cones import rank, unit_rows
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.skeletons import branches
 from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.branches import common_zeros
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.folds import fold_figure
-from polycorner.skeletons.points import Quotient
 from polycorner.skeletons.sectors import Ranks
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.vertex_figures import corner_rank

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.skeletons import End, links
 from polycorner.skeletons.dependence import follow_edge
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.parts import arc_length
-from polycorner.skeletons.points import Quotient
 from polycorner.tolerances import DEFAULT
 
 SPACE = Manifold.euclidean("t a b")

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry, skeleton
 from polycorner.models import SphereCluster
+from polycorner.polyhedra.faces import projected
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.symmetry import Element
 from polycorner.skeletons import Completeness, examine_faces
 from polycorner.skeletons.insides import Start, touching_points
-from polycorner.skeletons.points import Quotient, projected
 from polycorner.tolerances import DEFAULT
 
 SPACE = Manifold.euclidean("x y z")

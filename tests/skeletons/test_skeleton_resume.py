@@ -6,7 +6,8 @@ import sympy as sp
 from skeleton_shapes import ball, counts, identical, isomorphic, polytope, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
-from polycorner.skeletons import Budget, Completeness, points, resume
+from polycorner.polyhedra import quotients
+from polycorner.skeletons import Budget, Completeness, resume
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")
 x, y, z = SPACE.symbols
@@ -29,14 +30,14 @@ class Interrupter:
 
 def interrupted_evaluation(monkeypatch, when, *arguments, **options):
     """Return a skeleton that was interrupted in the middle of a given evaluation, and the count."""
-    alarm, evaluated = Interrupter(when), points.evaluated
+    alarm, evaluated = Interrupter(when), quotients.evaluated
 
     def wrapped(polyhedron, q):
         alarm()
         return evaluated(polyhedron, q)
 
     with monkeypatch.context() as patch:
-        patch.setattr(points, "evaluated", wrapped)
+        patch.setattr(quotients, "evaluated", wrapped)
         try:
             return skeleton(*arguments, **options), when - alarm.left
         except KeyboardInterrupt:

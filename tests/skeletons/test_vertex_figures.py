@@ -12,8 +12,8 @@ from oracles_skeletons import Cells
 from skeleton_shapes import ball, boxes_union, half_spaces, polytope, space
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.points import Quotient
 from polycorner.tolerances import DEFAULT
 
 PLANE, SPACE = Manifold.euclidean("x y"), Manifold.euclidean("x y z")

@@ -13,8 +13,9 @@ from strategies import directions
 
 from polycorner import AllOf, Manifold, Polyhedron, SmoothFunction, Symmetry
 from polycorner.formulas.families import Family
+from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.skeletons import End
-from polycorner.skeletons.points import HeldPoint, Quotient, projected
 from polycorner.skeletons.walks import follow
 from polycorner.tolerances import DEFAULT
 

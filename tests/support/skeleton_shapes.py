@@ -122,6 +122,11 @@ def identical(one, other):
     )
 
 
+def whole(atlas):
+    """Return the numbers of corners, edges and faces, and the Euler characteristic."""
+    return counts(atlas), atlas.euler_characteristic
+
+
 def counts(atlas):
     """Return how many corners, edges and faces there are."""
     return len(atlas.corners), len(atlas.edges), len(atlas.faces)

@@ -8,7 +8,7 @@ import numpy as np
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.minimisation import minimise
-from polycorner.toolkit import Array, Face
+from polycorner.toolkit import Array, Quotient, project
 
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
 ROOM = 3.0  # area of that strip in areas of the dumbbells
@@ -96,7 +96,8 @@ def _cornered(pair: DumbbellPair, q: Array) -> Array:
     """Return the nearby pair with the same mean placement whose three nearest contacts touch."""
     nearest = np.argsort(pair.polyhedron.values(q))[:3]
     opposite = np.concatenate([-np.eye(3), np.eye(3)])
-    q = Face.of(pair.polyhedron, nearest.tolist()).project(q, along=opposite, stride=1.0).point
+    quotient = Quotient(pair.polyhedron)
+    q = project(quotient, q, nearest.tolist(), along=opposite, stride=1.0).point.q
     gaps = pair.polyhedron.values(q)
     if not (gaps.min() > -1e-9 and np.abs(gaps[nearest]).max() < 1e-9):
         msg = (

@@ -12,7 +12,7 @@ from polycorner.dumbbells.pictures.relabelling import (
 )
 from polycorner.dumbbells.pictures.symbols import HANDS, corner_symbol
 from polycorner.dumbbells.statics.skeleton import PairAtlas
-from polycorner.toolkit import Array, Face, checked
+from polycorner.toolkit import Array, checked, projected
 
 FRAMES = 5
 TOUCH = 1e-6  # ball radii within which a contact of a frame counts as closed
@@ -56,5 +56,8 @@ def _frames(atlas: PairAtlas, motion: EdgeClass) -> list[Array]:
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     at = np.linspace(0.0, travelled[-1], FRAMES)
     chords = np.stack([np.interp(at, travelled, x) for x in way.T], axis=-1)
-    face = Face.of(polyhedron, [polyhedron.names.index(name) for name in motion.active])
-    return [way[0], *(face.project(q).point for q in chords[1:-1]), way[-1]]
+    quotient = atlas.skeleton.edges[0].quotient
+    held = [polyhedron.names.index(name) for name in motion.active]
+    settled = [projected(quotient, q, quotient.at(q).basis(held), 1.0) for q in chords[1:-1]]
+    inner = [q if s is None else s.q for q, s in zip(chords[1:-1], settled, strict=True)]
+    return [way[0], *inner, way[-1]]

@@ -1,14 +1,23 @@
 """Steepest descent inside a polyhedron, contact by contact."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.minimisation import Certificate, Problem, minimise
-from polycorner.toolkit import Array, Checked, Face, approach, checked, pose, real, refuse
+from polycorner.toolkit import (
+    Array,
+    Checked,
+    Quotient,
+    approach,
+    checked,
+    pose,
+    project,
+    real,
+    refuse,
+)
 
 if TYPE_CHECKING:
     from polycorner.polyhedra import Polyhedron
@@ -98,7 +107,7 @@ def descent(
 
 def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Array]:
     """Return the points of the path; none if the polyhedron is not reached."""
-    everything = frozenset(range(problem.inequalities))
+    everything, quotient = frozenset(range(problem.inequalities)), Quotient(problem.polyhedron)
     reached, nearby = problem.restore(everything, q)
     if not reached:
         found = approach(problem, everything, q)
@@ -112,8 +121,8 @@ def _steepest(problem: Problem, q: Array, stride: float, most: int) -> list[Arra
         size = float(np.linalg.norm(way))
         if size <= LEAST:
             break
-        closed = Face(partial(problem.evaluate, order=1), problem.scales, pressed.tolist())
-        ahead = closed.project(q + step / size * way * problem.scales).point
+        ahead = q + step / size * way * problem.scales
+        ahead = project(quotient, ahead, pressed.tolist()).point.q
         reached, trial = problem.restore(everything, ahead)
         lower, onward, held = _downhill(problem, trial)
         # A reversed direction means that the step overshot; contacts only deflect.

@@ -1,0 +1,230 @@
+"""Polyhedra modulo their symmetry, and points with the values of all functions there."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
+from polycorner.polyhedra.equations import independent_equations
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.strata import distances, evaluated, local_pieces
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT, Tolerances
+from polycorner.values import Value, cached_property
+
+# Tolerances within which a gradient must keep its direction.
+VICINITY = 10.0
+
+
+@dataclass(frozen=True)
+class Quotient:
+    """A polyhedron modulo its symmetry, with the tolerances of a search.
+
+    Attributes
+    ----------
+    polyhedron : Polyhedron
+        The set.
+    symmetry : Symmetry
+        The symmetry to divide by.
+    tolerances : Tolerances
+        What counts as zero, equal and dependent.
+    extent : float
+        Length, in scale units, after which a walk counts as unbounded.
+    equations : tuple of int
+        Positions of equations with independent gradients that imply the others nearby: those that
+        are solved.  Walks only watch that the others stay zero.
+    """
+
+    polyhedron: Polyhedron
+    symmetry: Symmetry = field(default_factory=Symmetry)
+    tolerances: Tolerances = DEFAULT
+    extent: float = math.inf
+    equations: tuple[int, ...] = ()
+
+    @classmethod
+    def near(
+        cls,
+        polyhedron: Polyhedron,
+        symmetry: Symmetry,
+        tolerances: Tolerances,
+        extent: float,
+        points: Iterable[Array],
+    ) -> "Quotient":
+        """Return it with the equations that are independent near some points."""
+        equations = independent_equations(polyhedron, points)
+        return cls(polyhedron, symmetry, tolerances, extent, equations)
+
+    @property
+    def manifold(self) -> Manifold:
+        """The manifold of the points."""
+        return self.polyhedron.manifold
+
+    @property
+    def scales(self) -> Array:
+        """The scales of the coordinates."""
+        return self.polyhedron.manifold.scale_array
+
+    @property
+    def count(self) -> int:
+        """The number of inequalities; equations have the positions after them."""
+        return len(self.polyhedron.functions)
+
+    def held(self, rows: Iterable[int]) -> list[int]:
+        """Return the positions of given inequalities and of the equations that are solved."""
+        return [*rows, *self.equations]
+
+    def written(self, rows: Iterable[int]) -> str:
+        """Return the names of inequalities for a sentence."""
+        return ", ".join(self.polyhedron.names[i] for i in sorted(rows))
+
+    def at(self, q: Array) -> "EvaluatedPoint":
+        """Return values, gradients and orbit at a point."""
+        return EvaluatedPoint.placed(self, q, ())
+
+    def evaluated(self, q: Array) -> tuple[Array, Array]:
+        """Return values and scaled gradients of all functions."""
+        return evaluated(self.polyhedron, q)
+
+    def orbit(self, q: Array) -> Array:
+        """Return the scaled tangent vectors of the orbit through a point, ``(g, n)``."""
+        return self.symmetry.directions(self.manifold, q)
+
+    def displacement(self, p: Array, q: Array) -> Array:
+        """Return the displacement from one continuous orbit to another, by the invariants."""
+        return self.symmetry.displacement(self.manifold, p, q)
+
+    def separation(self, p: Array, q: Array) -> float:
+        """Return how far the continuous orbits of two points are apart, in scale units."""
+        return self.symmetry.separation(self.manifold, p, q)
+
+    def images(self, q: Array) -> list[Array]:
+        """Return a point and its images under the finite group."""
+        return [element.apply(q) for element in self.symmetry.group]
+
+    @cached_property
+    def _circles(self) -> tuple[NDArray[np.bool_], Array]:
+        """Mask of the coordinates that are circles, and their radii in scale units."""
+        periods = np.array(self.manifold.periods)
+        closed = np.isfinite(periods)
+        return closed, periods[closed] / math.tau / self.scales[closed]
+
+    def place(self, q: Array) -> Array:
+        """Return coordinates that separate the orbits of the continuous symmetries."""
+        if self.symmetry.invariants is not None:
+            return self.symmetry.invariants(q)
+        u = q / self.scales
+        closed, radii = self._circles
+        turn, lines = u[closed] / radii, ~closed
+        turned = [radii * np.cos(turn), radii * np.sin(turn)]
+        for factor in self.manifold.factors:
+            if factor.turns:
+                lines[factor.at] = False
+                turned.append(factor.even(q) / self.scales[factor.at.start])
+        return np.concatenate([u[lines], *turned])
+
+
+class EvaluatedPoint:
+    """A point with values and scaled gradients of all functions, and the orbit through it."""
+
+    kept: Sequence[int] = ()
+
+    def __init__(
+        self,
+        quotient: Quotient,
+        q: Array,
+        values: Array,
+        gradients: Array,
+        orbit: Array | None = None,
+    ) -> None:
+        self.quotient, self.q, self.values, self.gradients = quotient, q, values, gradients
+        if orbit is None:
+            orbit = quotient.orbit(q)
+        self.orbit = orbit
+
+    @classmethod
+    def placed(cls, quotient: Quotient, q: Array, kept: Sequence[int]) -> Self:  # noqa: ARG003 - none is held
+        """Return a point."""
+        return cls(quotient, q, *quotient.evaluated(q))
+
+    @cached_property
+    def distances(self) -> Array:
+        """Signed distances ``f / |grad f|`` in scale units."""
+        return distances(self.values, self.gradients)
+
+    @property
+    def sizes(self) -> Array:
+        """Lengths of the scaled gradients."""
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", self.gradients, self.gradients)))
+
+    def active(self) -> frozenset[int] | None:
+        """Return the functions that vanish and matter here; None outside the polyhedron."""
+        quotient = self.quotient
+        zero = quotient.tolerances.zero
+        found = local_pieces(quotient.polyhedron, self.values, self.gradients, zero)
+        return frozenset().union(*found) if found else None
+
+    def matrix(self, rows: Sequence[int]) -> Array:
+        """Return unit gradients of given functions, of the equations, and the orbit."""
+        return unit_rows(np.vstack([self.gradients[self.quotient.held(rows)], self.orbit]))
+
+    @property
+    def frame(self) -> Array:
+        """Orthonormal columns that span the directions across equations and orbit."""
+        return null_space(self.matrix([]), self.quotient.tolerances.rank)
+
+    def slopes(self, rows: Sequence[int]) -> Array:
+        """Return unit gradients of given functions in the frame, ``(k, r)``."""
+        return unit_rows(self.gradients[list(rows)]) @ self.frame
+
+    def basis(self, rows: Iterable[int]) -> list[int]:
+        """Return rows whose gradients span those of all rows, modulo equations and orbit."""
+        others = sorted(rows)
+        chosen = independent_rows(self.slopes(others), self.quotient.tolerances.rank)
+        return sorted(others[i] for i in chosen)
+
+    def vanishing(self, rows: Iterable[int]) -> list[int]:
+        """Return which of some functions have no direction here.
+
+        Their gradients vanish, or change by more than their own lengths within a few tolerances,
+        so that rounding decides the direction.
+        """
+        quotient, others = self.quotient, sorted(rows)
+        reach = VICINITY * quotient.tolerances.zero
+        steps = reach * unit_rows(self.gradients[others])
+        steps[~steps.any(axis=1)] = reach
+        nearby = self.q + steps * quotient.scales
+        moved = [quotient.evaluated(q)[1][row] for row, q in zip(others, nearby, strict=True)]
+        return [
+            row
+            for row, gradient in zip(others, moved, strict=True)
+            if np.linalg.norm(gradient - self.gradients[row]) >= np.linalg.norm(self.gradients[row])
+        ]
+
+
+P = TypeVar("P", bound=EvaluatedPoint)
+
+
+@dataclass(frozen=True, eq=False)
+class Sample(Value, Generic[P]):
+    """A point without its values: coordinates, what is held there, and the kind of point.
+
+    Thousands are kept and sent to workers; values, gradients and frame are computed again.
+    """
+
+    q: Array
+    kept: tuple[int, ...]
+    kind: type[P]
+
+    @classmethod
+    def of(cls, point: P) -> "Sample[P]":
+        """Return that of a point."""
+        return Sample(point.q, tuple(point.kept), type(point))
+
+    def at(self, quotient: Quotient) -> P:
+        """Return the point."""
+        return self.kind.placed(quotient, self.q, self.kept)
