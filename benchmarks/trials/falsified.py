@@ -14,7 +14,7 @@ import flint
 import numpy as np
 
 from benchmarks.trials.known import Posed
-from polycorner.proofs.lists.checker.balls import RefusedError
+from polycorner.proofs.lists.checker.balls import NotShownError
 from polycorner.proofs.lists.checker.verdict import check
 from polycorner.proofs.lists.stationary import StationaryList
 from polycorner.proofs.lists.tree import CLOSED, OPEN
@@ -96,7 +96,7 @@ def verified(path: Path) -> str:
     try:
         with contextlib.redirect_stderr(io.StringIO()):
             check(str(path), None, 1)
-    except (RefusedError, ArithmeticError, LookupError, TypeError, ValueError) as error:
+    except (NotShownError, ArithmeticError, LookupError, TypeError, ValueError) as error:
         return str(error)[:200] or repr(error)
     finally:
         flint.ctx.prec = before

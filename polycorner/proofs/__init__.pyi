@@ -1,11 +1,9 @@
-from .lists.corner_lists import CornerList, CornerPoint
-from .lists.corners import corners
+from .hypotheses import Status
+from .lists.corners import CornerList, CornerPoint, corners
 from .lists.enumeration import stationary_points
 from .lists.stationary import StationaryList, StationaryLocus, StationaryPoint
 from .parameter_boxes import ParameterCell
-from .proof import Proof
-from .statements import Status
-from .verification import prove
+from .verification import Proof, prove
 
 __all__ = [
     "CornerList",

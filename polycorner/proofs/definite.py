@@ -40,19 +40,14 @@ def positive_on_cone(curvature: Rows, rows: Rows, slopes: Rows, scales: Sequence
     if not basis:
         return basis is not None
     form = _restricted(curvature, basis, scales)
-    if _definite(form):
+    if is_definite(_turned(form)):
         return True
     across = matrix([_scaled(row, scales, 1.0) for row in slopes]) * matrix(basis).transpose()
     weights = _weights(_middle(form), _middle(across))
     if weights is None:
         return False
     shifted = form - across.transpose() * matrix(weights.tolist()) * across
-    return _definite(shifted)
-
-
-def _definite(form: "Matrix") -> bool:
-    found = pivots(_turned(form))
-    return len(found) == form.nrows() and all(pivot > 0 for pivot in found)
+    return is_definite(_turned(shifted))
 
 
 def _weights(form: "Array", slopes: "Array") -> "Array | None":
@@ -147,6 +142,21 @@ def tangents(rows: Rows, n: int) -> "list[list[Ball]] | None":
             vector[j] = -row[free]
         basis.append(vector)
     return basis
+
+
+def is_definite(form: Rows) -> bool:
+    """Whether every symmetric matrix enclosed is shown to be positive definite."""
+    found = pivots(form)
+    return len(found) == len(form) and all(pivot > 0 for pivot in found)
+
+
+def is_regular(rows: Rows) -> bool:
+    """Whether every matrix enclosed is shown to be regular."""
+    try:
+        matrix(rows).inv()
+    except ZeroDivisionError:
+        return False
+    return True
 
 
 def pivots(form: Rows) -> "list[Ball]":

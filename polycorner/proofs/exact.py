@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from polycorner.intervals.balls import exact, integer_relation
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
-from polycorner.proofs.krawczyk import Enclosure
+from polycorner.proofs.kkt import Enclosure
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate, opened
 

@@ -1,4 +1,4 @@
-"""KKT equations of a face as a square system in balls, and Newton's method for them.
+"""KKT equations of a face as a square system in balls: Newton's method and Krawczyk's test.
 
 Unknowns are ``z = (q, lam, nu)``: the point, the multipliers of the active functions and
 equations, and one multiplier for every gauge.  The equations are
@@ -6,6 +6,22 @@ equations, and one multiplier for every gauge.  The equations are
 - ``dE - sum lam_i df_i - sum nu_k n_k = 0``,
 - ``f_i = 0`` for the active functions and the equations of the set,
 - ``n_k (q - q0) = 0`` for the gauges.
+
+Krawczyk's test is for boxes in which they have exactly one solution.  Without parameters, ``Y``
+being near the inverse of the Jacobian at ``z0`` and ``J`` enclosing the Jacobian over ``z0 + W``,
+
+``K = -Y F(z0) + (I - Y J) W``
+
+inside the interior of ``W`` proves that there is exactly one solution in ``z0 + W``, that it lies
+in ``z0 + K``, and that every matrix in ``J`` is regular ([Krawczyk], [Neumaier] sec. 5.1, [Rump]).
+
+With parameters ``p = p0 + delta`` the same holds for the remainder ``w`` added to a predictor
+``z0 + Z1 delta``.  There ``F(z0)`` becomes ``F`` along the predictor: its Taylor polynomial of
+first order at ``delta = 0`` and its second derivatives over the cell.
+
+Since ``J`` is convex and all its matrices are regular, the inertia of the KKT matrix is the same at
+``z0`` and at every solution.  Whether the reduced Hessian is definite, which the inertia says
+([NW] thm 16.3), is therefore decided at ``z0``.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,6 +34,8 @@ from polycorner.intervals.balls import (
     column,
     dot,
     entries,
+    identity,
+    matrix,
     middle_inverse,
     midpoints,
     precision,
@@ -25,13 +43,18 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
+    from polycorner.intervals.balls import Ball, Matrix
 
 FIRST_BITS = 128  # precision at which Newton's method starts; it then doubles
 MOST_STEPS = 25
 SUBJECT = "the KKT equations"
+MOST_INFLATIONS = 6
+SLACK_BITS = 16  # last binary digits of a unit that a candidate box covers at least
+GROWTH = 1.3  # ratio of a candidate box to the image it has to contain
+WIDEST = 10  # size in units from which on a candidate box is given up
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,19 +139,15 @@ class KKTSystem:
         values, gradients, hessians = forms.evaluate(box, 2)
         weights = [*(-lam for lam in z[n : n + k]), ball(1)]
         normals = [[ball(x) for x in gauge] for gauge in self.gauges]
-        bent = [_combined(weights, [h[i] for h in hessians]) for i in range(n)]
-        slope = _combined(weights, [g[:n] for g in gradients])
+        slope, bent = lagrangian(weights, gradients, hessians, range(n), range(len(gradients[0])))
         for nu, normal in zip(z[n + k :], normals, strict=True):
             slope = [u - nu * v for u, v in zip(slope, normal, strict=True)]
         away = [q - a for q, a in zip(z[:n], self.anchor, strict=True)]
         rows = [*(g[:n] for g in gradients[:k]), *normals]
-        no_rows, no_drift = [ball(0)] * len(rows), [ball(0)] * (self.formulas.inputs - n)
+        no_drift = [ball(0)] * (self.formulas.inputs - n)
         return Linearisation(
             residual=[*slope, *values[:k], *(dot(normal, away) for normal in normals)],
-            jacobian=[
-                *([*bent[i][:n], *(-row[i] for row in rows)] for i in range(n)),
-                *([*row, *no_rows] for row in rows),
-            ],
+            jacobian=bordered([row[:n] for row in bent], rows),
             drift=[
                 *(row[n:] for row in bent),
                 *(g[n:] for g in gradients[:k]),
@@ -171,8 +190,23 @@ class KKTSystem:
         return self.formulas.smooth(box, (*self.held, len(self.formulas.names) - 1))
 
 
-def _combined(weights: "Sequence[Ball]", rows: "Sequence[Sequence[Ball]]") -> "list[Ball]":
-    return [dot(weights, entry) for entry in zip(*rows, strict=True)]
+def lagrangian(
+    weights: "Sequence[Ball]",
+    gradients: "list[list[Ball]]",
+    hessians: "list[list[list[Ball]]]",
+    places: Sequence[int],
+    columns: Sequence[int],
+) -> "tuple[list[Ball], list[list[Ball]]]":
+    """Return gradient and Hessian of a combination of functions, in some coordinates each."""
+    slope = [dot(weights, [g[i] for g in gradients]) for i in places]
+    return slope, [[dot(weights, [h[i][j] for h in hessians]) for j in columns] for i in places]
+
+
+def bordered(bent: "list[list[Ball]]", rows: "list[list[Ball]]") -> "list[list[Ball]]":
+    """Return the Jacobian of KKT equations, from the Lagrangian's Hessian and the rows held."""
+    nothing = [ball(0)] * len(rows)
+    above = ([*line, *(-row[i] for row in rows)] for i, line in enumerate(bent))
+    return [*above, *([*row, *nothing] for row in rows)]
 
 
 def _pairs(reach: "Sequence[Ball]") -> "Iterator[tuple[int, int, Ball]]":
@@ -225,3 +259,198 @@ def _settled(
         sizes = zip(step, system.units, strict=True)
         last = all(abs(dx) <= small * unit for dx, unit in sizes)
     return Undecided(SUBJECT, "Newton's method found no solution near the point")
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """Parameters ``p0 + delta``, for ``delta`` in a box that contains 0; or none."""
+
+    middle: "Sequence[Ball]" = ()
+    reach: "Sequence[Ball]" = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """Unknowns ``z0 + Z1 delta`` for the parameters of a cell.
+
+    Attributes
+    ----------
+    system : KKTSystem
+        The equations.
+    cell : Cell
+        The parameters.
+    centre : list of Ball
+        ``z0``.
+    tangents : list of list of Ball
+        ``Z1``, ``[N][p]``; empty without parameters.
+    """
+
+    system: KKTSystem
+    cell: Cell
+    centre: "list[Ball]"
+    tangents: "list[list[Ball]]"
+
+    def unknowns(self, remainder: "Sequence[Ball]") -> "list[Ball]":
+        """Return enclosures of all unknowns over the cell, for a remainder."""
+        around = [a + b for a, b in zip(self.centre, remainder, strict=True)]
+        if not self.tangents:
+            return around
+        return [a + dot(t, self.cell.reach) for a, t in zip(around, self.tangents, strict=True)]
+
+    def box(self, remainder: "Sequence[Ball]") -> Box:
+        """Return a joint enclosure of the point and the parameters."""
+        n, cell = self.system.dimension, self.cell
+        around = [a + b for a, b in zip(self.centre[:n], remainder[:n], strict=True)]
+        if not self.tangents:
+            return Box(around)
+        own = unit_rows(len(cell.reach))
+        return Box.moving([*around, *cell.middle], [*self.tangents[:n], *own], cell.reach)
+
+    def part(self, reach: "Sequence[Ball]") -> "Predictor":
+        """Return the same predictor for ``delta`` in a part of the cell."""
+        start = midpoints(reach)
+        centre = [c + dot(t, start) for c, t in zip(self.centre, self.tangents, strict=True)]
+        middle = [p + s for p, s in zip(self.cell.middle, start, strict=True)]
+        cell = Cell(middle, [d - s for d, s in zip(reach, start, strict=True)])
+        return Predictor(self.system, cell, centre, self.tangents)
+
+
+def unit_rows(size: int) -> "list[list[Ball]]":
+    """Return the rows of the unit matrix."""
+    rows: list[list[Ball]] = identity(size).tolist()
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosure:
+    """A box with exactly one solution for every parameter in a cell.
+
+    Attributes
+    ----------
+    predictor : Predictor
+        The centre of the box, as a function of the parameters.
+    candidate : list of Ball
+        ``W``, in which the remainder of the solution is unique.
+    remainder : list of Ball
+        ``K``, which contains it, in the interior of ``W``.
+    preconditioner : Matrix
+        ``Y``.
+    start, linear : Linearisation
+        The equations and their derivatives at the centre, and over the whole box.
+    """
+
+    predictor: Predictor
+    candidate: "list[Ball]"
+    remainder: "list[Ball]"
+    preconditioner: "Matrix"
+    start: Linearisation
+    linear: Linearisation
+
+    @cached_property
+    def solution(self) -> "list[Ball]":
+        """Enclosures of all unknowns of the solution, over the whole cell."""
+        return self.predictor.unknowns(self.remainder)
+
+    def neighbourhood(self, part: "Sequence[Ball]" = ()) -> Box:
+        """Return a neighbourhood of the solution, for ``delta`` in a part of the cell."""
+        return (self.predictor.part(part) if part else self.predictor).box(self.candidate)
+
+
+def enclose(
+    system: KKTSystem, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
+) -> Enclosure | Undecided:
+    """Prove that the equations have exactly one solution in a box about ``centre``.
+
+    The candidate box starts slightly larger than ``Y F`` and grows until it contains the image.
+    The working precision is ``bits`` binary digits, set by the caller.
+    """
+    cell = cell or Cell()
+    start = system.at(centre, cell.middle)
+    if isinstance(start, Undecided):
+        return start
+    preconditioner = middle_inverse(start.jacobian)
+    if preconditioner is None:
+        return Undecided(SUBJECT, "their Jacobian is singular")
+    tangents = (-(preconditioner * matrix(start.drift))).mid().tolist() if cell.reach else []
+    predictor = Predictor(system, cell, centre, tangents)
+    base = _base(predictor, start, preconditioner)
+    if isinstance(base, Undecided):
+        return base
+    least = [unit * ball(2) ** (SLACK_BITS - bits) for unit in system.units]
+    image = entries(base)
+    for _ in range(MOST_INFLATIONS):
+        grown = zip(image, least, strict=True)
+        candidate = [ball(0, (GROWTH * x.abs_upper() + small).upper()) for x, small in grown]
+        if not all(
+            w.rad() < WIDEST * unit for w, unit in zip(candidate, system.units, strict=True)
+        ):
+            break
+        linear = system.linear(predictor.unknowns(candidate), predictor.box(candidate))
+        if isinstance(linear, Undecided):
+            return linear
+        image = entries(base + defect(linear.jacobian, preconditioner) * column(candidate))
+        if strictly_inside(image, candidate):
+            return Enclosure(predictor, candidate, image, preconditioner, start, linear)
+    return Undecided(
+        SUBJECT, "Krawczyk's operator does not map the box into itself: it is too wide"
+    )
+
+
+def defect(jacobian: "list[list[Ball]]", preconditioner: "Matrix") -> "Matrix":
+    """Return ``I - Y J``."""
+    return identity(preconditioner.nrows()) - preconditioner * matrix(jacobian)
+
+
+def krawczyk(
+    residual: "list[Ball]",
+    jacobian: "list[list[Ball]]",
+    preconditioner: "Matrix",
+    unknowns: "list[Ball]",
+    centre: "list[Ball]",
+) -> "list[Ball]":
+    """Return ``c - Y F(c) + (I - Y J) (Z - c)``."""
+    apart = [x - c for x, c in zip(unknowns, centre, strict=True)]
+    base = -(preconditioner * column(residual))
+    moved = entries(base + defect(jacobian, preconditioner) * column(apart))
+    return [c + x for c, x in zip(centre, moved, strict=True)]
+
+
+def strictly_inside(inner: "Sequence[Ball]", outer: "Sequence[Ball]") -> bool:
+    """Whether enclosures of unknowns lie in the interior of others."""
+    return all(x.contains_interior(y) for x, y in zip(outer, inner, strict=True))
+
+
+def _base(
+    predictor: Predictor, start: Linearisation, preconditioner: "Matrix"
+) -> "Matrix | Undecided":
+    """Return ``-Y F`` along the predictor."""
+    system, tangents = predictor.system, predictor.tangents
+    value = column(start.residual)
+    if tangents:
+        nothing = [ball(0)] * system.size
+        bend = system.bend(predictor.unknowns(nothing), tangents, predictor.box(nothing))
+        if isinstance(bend, Undecided):
+            return bend
+        drift = matrix(start.jacobian) * matrix(tangents) + matrix(start.drift)
+        value = value + drift * column(predictor.cell.reach) + column(bend)
+    return -(preconditioner * value)
+
+
+def widened(enclosure: Enclosure, attempts: int = 12) -> "list[Ball]":
+    """Return the widest box tried, without parameters, in which the solution is unique.
+
+    If ``|I - Y J| w < w`` over the box of radii ``w``, no matrix in ``J`` is singular, and two
+    solutions in the box would contradict the mean value theorem ([Neumaier] sec. 5.1).
+    """
+    predictor = enclosure.predictor
+    for power in range(1, attempts + 1):
+        candidate = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
+        linear = predictor.system.linear(predictor.unknowns(candidate), predictor.box(candidate))
+        if isinstance(linear, Undecided):
+            continue
+        image = entries(defect(linear.jacobian, enclosure.preconditioner) * column(candidate))
+        alone = all(x.abs_upper() < w.abs_upper() for w, x in zip(candidate, image, strict=True))
+        inside = zip(candidate, enclosure.remainder, strict=True)
+        if alone and all(w.contains(x) for w, x in inside):
+            return candidate
+    return enclosure.candidate

@@ -1,12 +1,16 @@
-"""Proofs for boxes of parameters, cell by cell."""
+"""Proofs for boxes of parameters, cell by cell, and what is asked of their parameters."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from itertools import count
-from math import nextafter, prod
-from typing import TYPE_CHECKING
+from itertools import count, product
+from math import isfinite, nextafter, prod
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from polycorner import checks
 from polycorner.intervals.balls import (
     ball,
     between,
@@ -18,12 +22,19 @@ from polycorner.intervals.balls import (
     midpoints,
     precision,
 )
-from polycorner.intervals.enclosures import Undecided
+from polycorner.intervals.enclosures import Formulas, Undecided
+from polycorner.intervals.tapes import Box
+from polycorner.minimisation import Certificate, Problem
 from polycorner.progress import Progress, silent
-from polycorner.proofs.hypotheses import check_hypotheses, without_enclosure
-from polycorner.proofs.kkt import newton
-from polycorner.proofs.krawczyk import Cell, Enclosure, enclose
-from polycorner.proofs.statements import Claim, ConditionResult, Status
+from polycorner.proofs.hypotheses import (
+    Claim,
+    ConditionResult,
+    Status,
+    check_hypotheses,
+    without_enclosure,
+)
+from polycorner.proofs.kkt import Cell, Enclosure, enclose, newton
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
 if TYPE_CHECKING:
@@ -33,8 +44,8 @@ CELL_BITS = 64
 MOST_STRIDES = 16  # into which a path through the parameters is divided
 STRIDE_STEPS = 8  # steps of Newton's method at the end of a stride
 FARTHEST = 0.5  # largest distance of a solution from its prediction, in scale units
-
 Interval = tuple[float, float]
+CHECK_BITS = 128
 
 
 @dataclass(frozen=True)
@@ -271,3 +282,60 @@ def _stride(
 def shown_box(sides: Mapping[str, Interval]) -> str:
     """Return the sides of a box of parameters in words."""
     return ", ".join(f"{name} in [{a:g}, {b:g}]" for name, (a, b) in sides.items())
+
+
+def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
+    """Raise ValueError for a certificate whose functions have changed since it was made.
+
+    A certificate computes with kernels bound once, a proof with the formulas as they are now.
+    """
+    problem = certificate.problem
+    point = certificate.point
+    seen, gradients = problem.evaluate(point, 1)
+    rows = range(problem.rows)
+    with precision(CHECK_BITS):
+        now = formulas.values(Box([ball(x) for x in point.tolist()]), rows)
+    sizes = 1 + abs(seen) + np.nan_to_num(abs(gradients).max(axis=1), nan=np.inf, posinf=np.inf)
+    for name, before, value, size in zip(formulas.names, seen, now, sizes, strict=True):
+        if not (isfinite(before) and value.is_finite() and isfinite(size)):
+            continue
+        if abs(float(value.mid()) - before) > 1e4 * DEFAULT.alike * size + float(value.rad()):
+            msg = (
+                f"certificate: expected the problem it was made for; {name} was {before:g} at its "
+                f"point and is {float(value.mid()):g} now"
+            )
+            raise ValueError(msg)
+
+
+def check_parameters(problem: Problem, parameters: Any) -> tuple[dict[str, Interval], list[float]]:
+    """Return the box of parameters, and their values in the problem."""
+    if parameters is None:
+        return {}, []
+    if not isinstance(parameters, Mapping) or not parameters:
+        checks.refuse("parameters", "a mapping from names to (lower, upper)", parameters, TypeError)
+    problem.check_parameters(parameters)
+    sides = {name: _side(name, side) for name, side in parameters.items()}
+    return sides, [min(problem.parameter_values[name]) for name in sides]
+
+
+def _side(name: str, side: Any) -> Interval:
+    pair = isinstance(side, tuple | list | np.ndarray) and len(side) == 2
+    if not pair or not all(isinstance(x, Real) and not isinstance(x, bool) for x in side):
+        msg = f"parameters: expected {name} as a pair of numbers (lower, upper); got {side!r}"
+        raise TypeError(msg)
+    lower, upper = float(side[0]), float(side[1])
+    if not (isfinite(lower) and isfinite(upper) and lower < upper):
+        msg = f"parameters: expected finite lower < upper for {name}; got ({lower:g}, {upper:g})"
+        raise ValueError(msg)
+    return lower, upper
+
+
+def check_domain(formulas: Formulas, sides: Mapping[str, Interval]) -> None:
+    """Raise ValueError for a box of parameters with a corner at which a function is undefined."""
+    with precision(CHECK_BITS):
+        for corner in product(*sides.values()):
+            name = formulas.undefined([ball(x) for x in corner])
+            if name:
+                place = ", ".join(f"{p} = {x:g}" for p, x in zip(sides, corner, strict=True))
+                msg = f"parameters: expected values for which {name} is defined; got {place}"
+                raise ValueError(msg)

@@ -14,8 +14,7 @@ from polycorner import Manifold, Polyhedron, SmoothFunction
 from polycorner.intervals.balls import ball, between, bounds, exact, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.proofs.definite import pivots, tangent_form
-from polycorner.proofs.kkt import KKTSystem, newton
-from polycorner.proofs.krawczyk import Cell, Enclosure, enclose, widened
+from polycorner.proofs.kkt import Cell, Enclosure, KKTSystem, enclose, newton, widened
 
 M1, M2 = Manifold.euclidean("x"), Manifold.euclidean("x y")
 x, y = M2.symbols

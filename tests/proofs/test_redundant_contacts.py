@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, certify, prove
-from polycorner.proofs.statements import Status
+from polycorner.proofs.hypotheses import Status
 
 numbers = st.integers(-3, 3)
 

@@ -1,36 +1,38 @@
 """Attempts to find the stationary points near items that are left.
 
-Guesses of boxes in which Krawczyk's operator will show one KKT point, many at a time.
-
-The same tests as in :mod:`~polycorner.proofs.lists.acceptance`, with compiled enclosures of
-derivatives and matrices in floating point without regard to rounding: they prove nothing and
-save nearly all attempts in ball arithmetic that would fail.
+Newton's method in doubles, many points at a time, proposes KKT points; a screen then guesses boxes
+in which Krawczyk's operator will show one.  It makes the same tests as
+:mod:`~polycorner.proofs.lists.faces`, with compiled enclosures of derivatives and matrices in
+floating point without regard to rounding: they prove nothing and save nearly all attempts in ball
+arithmetic that would fail.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from polycorner.proofs.lists.acceptance import (
+from polycorner.minimisation.problem import Problem
+from polycorner.proofs.lists.branches import Mask
+from polycorner.proofs.lists.examination import Examined
+from polycorner.proofs.lists.faces import (
     GROWTH,
     MOST_WIDENING,
     QUARTERINGS,
     WIDENINGS,
     WIDEST,
 )
-from polycorner.proofs.lists.batches import bordered, inverted, solved
-from polycorner.proofs.lists.branches import Mask
-from polycorner.proofs.lists.candidates import active_sets, newton
-from polycorner.proofs.lists.examination import Examined
-from polycorner.proofs.lists.known import Known, Tried
+from polycorner.proofs.lists.known import Setting, Tried
 from polycorner.proofs.lists.loci import locus, met
-from polycorner.proofs.lists.settings import Setting
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
+MOST_STEPS = 20
+STRIDE = 0.5  # longest step in scale units
+RELEVANT = 1e-6  # share of the largest force at which a function counts as active
 Sides = tuple[Array, Array]
 SURE = 0.8  # of the unknowns' radii, below which those of the image are small enough
 Mapped: TypeAlias = Callable[..., Iterable[Any]]
@@ -40,6 +42,159 @@ WIDER = 64.0  # sides of the largest region that is tried, over those of the box
 EVERY = 2  # bisections of every coordinate between two attempts at a box
 LOCUS = (-1,)  # in place of the functions of a face
 MANY = 48  # candidates for which it is worth compiling second derivatives
+
+
+def bordered(bent: Array, rows: Array) -> Array:
+    """Return the Jacobians of KKT equations, from Hessians ``(B, n, n)`` and rows ``(B, k, n)``."""
+    n, k = bent.shape[1], rows.shape[1]
+    found = np.zeros((len(bent), n + k, n + k))
+    found[:, :n, :n], found[:, n:, :n] = bent, rows
+    found[:, :n, n:] = -rows.transpose(0, 2, 1)
+    return found
+
+
+def solved(matrix: Array, right: Array) -> Array:
+    """Return the solutions ``(B, N)`` of linear systems, NaN for those that are singular."""
+    columns = right[:, :, None]
+    return _each(np.linalg.solve, np.full_like(columns, np.nan), matrix, columns)[:, :, 0]
+
+
+def inverted(matrix: Array) -> Array:
+    """Return the inverses ``(B, N, N)``, NaN for matrices that are singular."""
+    return _each(np.linalg.inv, np.full_like(matrix, np.nan), matrix)
+
+
+def _each(function: Callable[..., Array], found: Array, *arrays: Array) -> Array:
+    """Put results of a function into an array, where the matrix is not singular."""
+    fine = _regular(arrays[0])
+    try:
+        found[fine] = function(*(array[fine] for array in arrays))
+    except np.linalg.LinAlgError:  # a pivot was zero after all: rounding decides that
+        for k in np.flatnonzero(fine):
+            with suppress(np.linalg.LinAlgError):
+                found[k] = function(*(array[k] for array in arrays))
+    return found
+
+
+def _regular(matrix: Array) -> NDArray[np.bool_]:
+    """Return which matrices are eliminated without a pivot of zero."""
+    regular: NDArray[np.bool_] = np.linalg.slogdet(matrix)[0] != 0
+    return regular
+
+
+@dataclass
+class FacesOfPoints:
+    """Rows of the functions that vanish on faces, one face for each point.
+
+    Attributes
+    ----------
+    rows : (B, k) array of int
+        The active inequalities, filled up to the most that a face has, then the equations.
+    filled : (B, k) array of bool
+        Which of them only fill up.
+    """
+
+    rows: NDArray[np.intp]
+    filled: Mask
+
+    @classmethod
+    def of(cls, problem: Problem, active: Mask) -> "FacesOfPoints":
+        """Return the faces with some active inequalities ``(B, m)``."""
+        counts = active.sum(axis=1)
+        most = int(counts.max(initial=0))
+        first = np.argsort(~active, axis=1, kind="stable")[:, :most]
+        others = np.arange(problem.inequalities, problem.rows - 1)
+        rows = np.hstack([first, np.broadcast_to(others, (len(active), len(others)))])
+        filled = np.zeros(rows.shape, dtype=np.bool_)
+        filled[:, :most] = np.arange(most) >= counts[:, None]
+        return cls(rows, filled)
+
+    def of_rows(self, which: NDArray[np.intp], quantity: Array) -> Array:
+        """Return the rows of a quantity ``(b, M, ...)`` at some of the points, 0 for fillings."""
+        found: Array = quantity[np.arange(len(which))[:, None], self.rows[which]]
+        found[self.filled[which]] = 0.0
+        return found
+
+
+def newton(
+    problem: Problem,
+    q: Array,
+    active: Mask,
+    free: Sequence[int],
+    reach: ArrayLike = np.inf,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return solutions near some points of the KKT equations of a face each.
+
+    Parameters
+    ----------
+    problem : Problem
+    q : (B, n) array
+        Starting points.
+    active : (B, m) array of bool
+        Inequalities that vanish on the face.
+    free : sequence of int
+        Coordinates that are unknowns.
+    reach : (B,) array, optional
+        How far from the start in scale units a solution may be; the method is ended at points that
+        are twice as far.
+
+    Returns
+    -------
+    points : (B, n) array
+    found : (B,) array of bool
+        Where the method has settled, with positive multipliers of the inequalities.
+    """
+    faces, free = FacesOfPoints.of(problem, active), list(free)
+    n, units, count = len(free), problem.scales[free], faces.rows.shape[1]
+    start, reach = q, np.broadcast_to(reach, len(q))
+    q, lam, found = q.copy(), np.zeros((len(q), count)), np.zeros(len(q), dtype=np.bool_)
+    going, unit = np.arange(len(q)), np.arange(n, n + count)
+    for step in range(MOST_STEPS):
+        values, gradients, hessians = problem.evaluate(q[going], 2)
+        bends = faces.of_rows(going, hessians)[:, :, free][:, :, :, free]
+        bent = hessians[:, -1][:, free][:, :, free]
+        fine = np.isfinite(values).all(axis=1) & np.isfinite(bends).all(axis=(1, 2, 3))
+        fine &= np.isfinite(bent).all(axis=(1, 2))
+        slopes = faces.of_rows(going, gradients)[fine][:, :, free]
+        pull, values = gradients[fine, -1][:, free], faces.of_rows(going, values)[fine]
+        going, bends, bent = going[fine], bends[fine], bent[fine]
+        if step == 0 and count:
+            lam[going] = np.einsum("bik,bi->bk", np.linalg.pinv(slopes), pull)
+        weights = lam[going]
+        matrix = bordered(bent - np.einsum("bk,bkij->bij", weights, bends), slopes)
+        matrix[:, unit, unit] = faces.filled[going]
+        balance = pull - np.einsum("bk,bki->bi", weights, slopes)
+        change = solved(matrix, -np.concatenate([balance, values], axis=1))
+        length = abs(change[:, :n]).max(axis=1, initial=0.0)
+        with np.errstate(divide="ignore"):
+            change *= np.minimum(1.0, STRIDE / length)[:, None]
+        fine = np.isfinite(change).all(axis=1)
+        going, change, length = going[fine], change[fine], length[fine]
+        q[going[:, None], free] += change[:, :n] * units
+        lam[going] += change[:, n:]
+        away = abs((q[going] - start[going])[:, free] / units).max(axis=1, initial=0.0)
+        found[going[(length < DEFAULT.rounding) & (away <= reach[going])]] = True
+        going = going[(length >= DEFAULT.rounding) & (away <= 2 * reach[going])]
+        if not going.size:
+            break
+    most = count - (problem.rows - 1 - problem.inequalities)
+    return q, found & ((lam > 0) | faces.filled)[:, :most].all(axis=1)
+
+
+def active_sets(weights: Array, pulls: Array) -> Mask:
+    """Return the functions ``(B, m)`` that balance the energy in nearest combinations.
+
+    Parameters
+    ----------
+    weights : (B, m + 1) array
+        Weights of the gradients, the energy's last.
+    pulls : (B, m + 1) array
+        Lengths of the gradients.
+    """
+    forces = weights * pulls
+    most = forces.max(axis=1, keepdims=True, initial=0.0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((forces[:, :-1] > RELEVANT * most) & (most > 0))
 
 
 @dataclass
@@ -182,7 +337,6 @@ class Attempts:
     """
 
     setting: Setting
-    known: Known
     sharp: bool = False
     failed: Tried = field(init=False)
 
@@ -257,14 +411,16 @@ class Attempts:
         inside = np.zeros((len(starts), setting.problem.inequalities), dtype=np.bool_)
         points, found = newton(setting.problem, starts, inside, z)
         for q in points[found]:
-            if self.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
+            if self.setting.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue
             place = locus(setting.faces.formulas, z, q, setting.problem.scales, setting.domain.held)
             if place is None:
                 self.failed.add(LOCUS, q, WIDEST)
-            elif not self.known.has_locus(place):
+            elif not self.setting.known.has_locus(place):
                 shown = met(place, setting.functions, setting.conj, setting.domain)
-                (self.known.missed if shown is None else self.known.loci).append(shown or place)
+                (self.setting.known.missed if shown is None else self.setting.known.loci).append(
+                    shown or place
+                )
 
     def _candidates(self, starts: Starts) -> Array:
         """Return KKT points near some points, ``(B, n)``, NaN where there is none."""
@@ -299,7 +455,9 @@ class Attempts:
             if region is None:
                 self.failed.add(active, q, size)
             else:
-                self.known.add(region)
+                self.setting.known.add(region)
 
     def _is_new(self, q: Array, active: tuple[int, ...], widest: float) -> bool:
-        return not self.known.has(q, frozenset(active)) and not self.failed.has(active, q, widest)
+        return not self.setting.known.has(q, frozenset(active)) and not self.failed.has(
+            active, q, widest
+        )

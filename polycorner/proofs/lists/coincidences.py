@@ -7,7 +7,7 @@ are zero, at a point that it recognises or as combinations of the functions that
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +15,7 @@ import numpy as np
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.exact import MOST_CONSTANTS, ExactPoint, implied, in_ideal, number_in
-from polycorner.proofs.lists.operators import BITS, outward
-from polycorner.proofs.lists.vertices import Vertices
+from polycorner.proofs.lists.faces import BITS, EnclosedFaces, outward
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate
 from polycorner.spaces.manifold import Array
@@ -52,9 +51,9 @@ class Place:
     unique: bool = True
 
 
-def signs(vertices: Vertices, place: Place, count: int) -> list[int]:
+def signs(faces: EnclosedFaces, place: Place, count: int) -> list[int]:
     """Return the signs of the first ``count`` functions at a point, ``OPEN`` where not decided."""
-    formulas = vertices.formulas
+    formulas = faces.formulas
     with precision(BITS):
         values = formulas.values(Box(place.point), range(count))
         found = [POSITIVE if v > 0 else NEGATIVE if v < 0 else OPEN for v in values]
@@ -63,7 +62,7 @@ def signs(vertices: Vertices, place: Place, count: int) -> list[int]:
                 found[row] = ZERO
         left = [i for i, sign in enumerate(found) if sign == OPEN and values[i].is_finite()]
         if left:
-            exact = common_zero(vertices, place) if place.unique else None
+            exact = common_zero(faces, place) if place.unique else None
             for i in left:
                 shown = exact is not None and exact.vanishes(formulas, i)
                 if shown or implied(formulas, place.rows, i):
@@ -71,7 +70,7 @@ def signs(vertices: Vertices, place: Place, count: int) -> list[int]:
     return found
 
 
-def common_zero(vertices: Vertices, place: Place) -> ExactPoint | None:
+def common_zero(faces: EnclosedFaces, place: Place) -> ExactPoint | None:
     """Return the point of a place exactly, or None.
 
     Some coordinates are recognised as combinations of constants.  Where they have these values
@@ -80,7 +79,7 @@ def common_zero(vertices: Vertices, place: Place) -> ExactPoint | None:
     polynomials.  The point found lies in the box in which the functions have one common zero only:
     it is the one.
     """
-    formulas, symbols = vertices.formulas, Symbols()
+    formulas, symbols = faces.formulas, Symbols()
     sought = constants(formulas, symbols)
     pi = symbols.of("const", "pi")
     sought += [pi] if pi not in sought else []
@@ -92,7 +91,7 @@ def common_zero(vertices: Vertices, place: Place) -> ExactPoint | None:
         if p is None or not w.contains(symbols.ball(p)):
             known[i] = None
     left = tuple(i for i, p in enumerate(known) if p is None)
-    if not set(left) <= set(vertices.free):
+    if not set(left) <= set(faces.free):
         return None
     hull = [
         x + ball(0, REACH) if p is None else symbols.ball(p)
@@ -115,8 +114,7 @@ def common_zero(vertices: Vertices, place: Place) -> ExactPoint | None:
         return None
     if left:
         ends = np.array([outward(x) for x in hull])
-        on = Vertices(formulas, 0, 0, left, vertices.scales)
-        if on.zero(ends[:, 0], ends[:, 1], chosen) is None:
+        if replace(faces, free=left).zero(ends[:, 0], ends[:, 1], chosen) is None:
             return None
     return ExactPoint(tuple(unknowns), symbols, tuple(zeros))
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.entries import UNIT
+from polycorner.proofs.lists.tree import Boxes
 from polycorner.spaces.manifold import Array
 
 KEPT = 0.05  # of what could be cut off, so that the function is negative by a margin

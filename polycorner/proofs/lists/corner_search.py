@@ -10,20 +10,18 @@ from dataclasses import dataclass, field
 from itertools import combinations, islice
 
 import numpy as np
-from numpy.typing import NDArray
 
-from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.attempts import WIDER, Mapped
-from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.contraction import narrowed
-from polycorner.proofs.lists.dependence import Enclosures, Places, Truths
+from polycorner.proofs.lists.faces import Region
 from polycorner.proofs.lists.images import dropped
-from polycorner.proofs.lists.levels import Levels, Rows, levels
-from polycorner.proofs.lists.pinning import STRAY
+from polycorner.proofs.lists.levels import Enclosures, Levels, Places, Rows, Truths, levels
+from polycorner.proofs.lists.redundancy import STRAY
 from polycorner.proofs.lists.relations import Relation, relation
-from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.search import BoxSearch, Treated
 from polycorner.proofs.lists.tips import TipRegion, tips
+from polycorner.proofs.lists.tree import Boxes
 from polycorner.spaces.manifold import Array
 
 ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
@@ -32,36 +30,24 @@ NEWTON = 12
 MOST_SETS = 200  # of one size that relations are sought in
 
 
-@dataclass(frozen=True, eq=False)
-class Chunk:
-    """Boxes, and which of them are left.
+@dataclass
+class Chunk(Treated):
+    """Boxes, and the sets of functions that may vanish in those that are left.
 
     Attributes
     ----------
-    images : (I,) array of int
-        Numbers in the tree of boxes that a symmetry carries to others; they are left out below.
-    boxes : Boxes
-    outside, left : (B,) arrays of bool
-        Whether they miss the set, and whether there may be other corners in them.
     regular : list of (tuple of int, array of int)
         Sets of functions that may have a common zero in some boxes, where they are independent.
     singular : list of (int, list of int)
         Boxes in which no such set is, and the functions that may vanish there.
-    inner : (2, B, n) array
-        Narrower sides of the boxes, beyond which no point of the set lies.
     """
 
-    images: NDArray[np.int64]
-    boxes: Boxes
-    outside: Truths
-    left: Truths
-    regular: list[tuple[Rows, Places]]
-    singular: list[tuple[int, list[int]]]
-    inner: Array
+    regular: list[tuple[Rows, Places]] = field(default_factory=list)
+    singular: list[tuple[int, list[int]]] = field(default_factory=list)
 
 
 @dataclass
-class CornerSearch(Search):
+class CornerSearch(BoxSearch):
     """One run: what is to be treated, and the regions in which one corner may be.
 
     Attributes
@@ -72,18 +58,16 @@ class CornerSearch(Search):
 
     relations: dict[Rows, Relation | None] = field(default_factory=dict)
 
-    def _compile(self) -> None:
-        self._examined(self.waiting.part(slice(0, 1)))
+    def prepare(self, boxes: Boxes) -> None:
+        """Compile or load what threads would each compile by themselves."""
+        self._examined(boxes)
 
-    def round(self, mapped: Mapped = map) -> None:
-        """Treat the last boxes that wait; ``mapped`` is like ``map``."""
-        chunks = self._chunks()
+    def treat(self, chunks: list[Boxes], mapped: Mapped) -> list[Treated]:
+        """Look at the functions that may vanish in boxes, then try to find corners."""
         found: list[Chunk] = list(mapped(self._examined, chunks))
         for chunk in found:
             self._attempt(chunk)
-        taken = sum(map(len, chunks))
-        before = self.waiting.part(slice(None, len(self.waiting) - taken))
-        self.waiting = joined([before, *map(self._closed, found)])
+        return list(found)
 
     def _examined(self, boxes: Boxes) -> Chunk:
         """Return what is shown of some boxes; nothing is changed."""
@@ -123,13 +107,13 @@ class CornerSearch(Search):
             part, [side[kept] for side in (v_lo, v_hi, *gradients)],
             self.functions.continuous(part.lower, part.upper), self.conj, k,
         )  # fmt: skip
-        return Chunk(images, boxes, ~inside, left, located, singular, inner)
+        return Chunk(images, boxes, ~inside, left, inner, regular=located, singular=singular)
 
     def _regular(self, found: Enclosures, result: Levels) -> list[tuple[Rows, Places]]:
         """Return the largest sets and the boxes in which their gradients are independent."""
         chosen = []
         for rows, at in result.largest:
-            independent = found.independent(at, self.vertices.rows(rows))
+            independent = found.independent(at, self.faces.rows(rows))
             if independent.any():
                 chosen.append((rows, at[independent]))
         return chosen
@@ -150,7 +134,7 @@ class CornerSearch(Search):
             self._relate(open_)
         for box, open_ in [(box, rows) for box, rows in ripe if sizes[box] < SMALL][:RARE]:
             boxes.since[box] = 0
-            for tip in tips(self.vertices, boxes.middles[box], open_, 2 * sizes[box]):
+            for tip in tips(self.faces, boxes.middles[box], open_, 2 * sizes[box]):
                 if not self.known.has(0.5 * (tip.lower + tip.upper), frozenset(tip.active)):
                     self.known.add(tip)
 
@@ -163,30 +147,19 @@ class CornerSearch(Search):
                 if rows not in self.relations and not any(parts):
                     self.relations[rows] = relation(self.problem, rows)
 
-    def _closed(self, chunk: Chunk) -> Boxes:
-        """Record which boxes are closed; return the halves of the others."""
-        boxes, left = chunk.boxes, chunk.left
-        nothing = np.zeros((0, boxes.lower.shape[1]))
-        self.tally.images += len(chunk.images)
-        self.tally.outside += int(chunk.outside.sum())
-        self.tally.covered += int((~chunk.outside & ~left).sum())
-        for nodes in (chunk.images, boxes.nodes[~left]):
-            self.tree.close(nodes, boxes.nodes[:0], nothing)
-        return self._halves(boxes.part(left), chunk.inner[:, left])
-
     def _vertex(self, q: Array, rows: Rows, size: float) -> bool:
         """Seek the common zero of functions near a point; return whether a region was tried."""
         point = self._newton(q, rows, STRAY * size)
         if point is None or self.known.has(point, frozenset(rows)):
             return False
-        region = self.vertices.region(point, rows, WIDER * size)
+        region = self.faces.vertex(point, rows, WIDER * size)
         if region is not None:
             self.known.add(region)
         return True
 
     def _newton(self, q: Array, rows: Rows, reach: float) -> Array | None:
         """Return a common zero within some scale units of a point, or None."""
-        free, at = list(self.domain.free), list(self.vertices.rows(rows))
+        free, at = list(self.domain.free), list(self.faces.rows(rows))
         start, scales = q, self.problem.scales[free]
         q = q.copy()
         for _ in range(NEWTON):

@@ -40,17 +40,16 @@ from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.proofs.arguments import check_parameters
 from polycorner.proofs.invariance import Generator, annihilated, generators, translations
 from polycorner.proofs.lists.domains import Domain, domain
+from polycorner.proofs.lists.faces import BITS
 from polycorner.proofs.lists.images import Motion, closed, motion, permutation
-from polycorner.proofs.lists.listing import listed
-from polycorner.proofs.lists.multiples import pieces, without_multiples
-from polycorner.proofs.lists.operators import BITS
-from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.listing import listed, united
+from polycorner.proofs.lists.relations import pieces, without_multiples
+from polycorner.proofs.lists.search import BoxSearch, StationarySearch
 from polycorner.proofs.lists.stationary import StationaryList
-from polycorner.proofs.lists.stores import Store
-from polycorner.proofs.lists.unions import united
+from polycorner.proofs.lists.stores import SearchStore
+from polycorner.proofs.parameter_boxes import check_parameters
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
 
@@ -60,7 +59,7 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
 Interval = tuple[float, float]
-S = TypeVar("S", bound=Search)
+S = TypeVar("S", bound=BoxSearch)
 RESOLUTION = 1e-6
 MOST_BOXES = 10_000_000
 
@@ -289,21 +288,17 @@ def stationary_points(
     if several and symmetry is not None:
         msg = "symmetry: expected None, as branches have equations of their own; got a Symmetry"
         raise ValueError(msg)
-    checks.whole("max_boxes", max_boxes, least=1)
-    checks.whole("workers", workers, least=1)
-    checks.real("max_seconds", max_seconds, above=0, infinite=True)
-    if not callable(progress):
-        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
+    limits = Limits(max_boxes, max_seconds, workers, progress)
 
     searches, stop = [], threading.Event()
     with first_interrupt(stop.set):
         for k, part in enumerate(branches.parts):
-            search = question.begun(Search, part, minima_only=minima_only)
+            search = question.begun(StationarySearch, part, minima_only=minima_only)
             searches.append(search)
             folder = store if store is None or not several else Path(store) / f"piece_{k}"
-            kept = None if folder is None else Store(folder, search)
+            kept = None if folder is None else SearchStore(folder, search)
             try:
-                _run(search, kept, max_boxes, max_seconds, workers, stop, progress)
+                limits.run(search, stop, kept)
             finally:
                 if kept:
                     kept.close()
@@ -311,26 +306,38 @@ def stationary_points(
     return united(posed, searches, branches.alike) if several else listed(searches[0], posed)
 
 
-def _run(
-    search: Search,
-    kept: Store | None,
-    max_boxes: int,
-    max_seconds: float,
-    workers: int,
-    stop: threading.Event,
-    progress: Progress,
-) -> None:
-    """Run a search to its end, saving it by the clock."""
+@dataclass(frozen=True)
+class Limits:
+    """Where a search ends at the latest, and how it is run."""
 
-    def report(s: Search) -> None:
+    max_boxes: int
+    max_seconds: float
+    workers: int
+    progress: Progress
+
+    def __post_init__(self) -> None:
+        checks.whole("max_boxes", self.max_boxes, least=1)
+        checks.whole("workers", self.workers, least=1)
+        checks.real("max_seconds", self.max_seconds, above=0, infinite=True)
+        if not callable(self.progress):
+            expected = "a function (done, total, note)"
+            checks.refuse("progress", expected, self.progress, TypeError)
+
+    def run(
+        self, search: BoxSearch, stop: threading.Event, kept: SearchStore | None = None
+    ) -> None:
+        """Run a search to its end, saving it by the clock."""
+
+        def report() -> None:
+            if kept:
+                kept.clock.tick()
+            note = f"{len(search.waiting)} boxes wait, {len(search.regions)} points"
+            self.progress(float(search.tally.boxes), None, note)
+
+        limits = self.max_boxes, self.max_seconds
+        search.run(*limits, report, workers=self.workers, stopped=stop.is_set)
         if kept:
-            kept.clock.tick()
-        note = f"{len(s.waiting)} boxes wait, {len(s.regions)} points"
-        progress(float(s.tally.boxes), None, note)
-
-    search.run(max_boxes, max_seconds, report, workers=workers, stopped=stop.is_set)
-    if kept:
-        kept.clock.save()
+            kept.clock.save()
 
 
 @dataclass(frozen=True)
@@ -411,7 +418,7 @@ def _motions(
     return tuple(group), tuple(group.values())
 
 
-def _check_fixed(search: Search, symmetry: Symmetry | None) -> None:
+def _check_fixed(search: BoxSearch, symmetry: Symmetry | None) -> None:
     """Raise ValueError unless continuous symmetries carry every point to the fixed values."""
     fields = symmetry.fields if symmetry else ()
     left = unreached(search.faces.formulas, search.domain, fields)

@@ -3,19 +3,17 @@
 An *item* is a box and a branch that points of the set in it may lie in.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.images import dropped
-from polycorner.proofs.lists.intermediate import covered, directions
-from polycorner.proofs.lists.known import Known
-from polycorner.proofs.lists.saddles import without_minima
-from polycorner.proofs.lists.settings import Setting
+from polycorner.proofs.lists.intermediate import bent, covered, directions
+from polycorner.proofs.lists.known import Setting
+from polycorner.proofs.lists.tree import Boxes
 from polycorner.spaces.manifold import Array
 
 
@@ -67,6 +65,8 @@ class Examined:
     inner : (2, B, n) array
         Narrower sides of the boxes that are open, beyond which no point of the set lies.
     rest : Rest
+    further : list of (int, (T, n) array)
+        Boxes that several directions close, one for each set of functions, and these.
     """
 
     images: NDArray[np.int64]
@@ -78,6 +78,7 @@ class Examined:
     v: Array
     inner: Array
     rest: Rest
+    further: list[tuple[int, Array]] = field(default_factory=list)
 
     @property
     def open_items(self) -> NDArray[np.intp]:
@@ -85,7 +86,7 @@ class Examined:
         return np.flatnonzero(~self.done[self.rest.items])
 
 
-def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examined:
+def examine(setting: Setting, sharp: bool, boxes: Boxes) -> Examined:
     """Close what can be closed in some boxes; ``sharp``: by second derivatives, too."""
     gone = np.zeros(len(boxes), dtype=np.bool_)
     if setting.motions:
@@ -120,7 +121,7 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
     kept = Rest(rest, weights[rest], pulls, smooth[rest], g_lo[some], g_hi[some])
     inner = np.stack([boxes.lower, boxes.upper])
     examined = Examined(images, boxes, where, masks, found.copy(), found, v, inner, kept)
-    reconsider(setting, known, examined)
+    reconsider(setting, examined)
     if sharp and setting.minima_only:
         at = examined.rest.items[examined.open_items]
         saddles, v[at] = without_minima(setting, boxes, where[at], masks[at])
@@ -133,11 +134,9 @@ def examine(setting: Setting, known: Known, sharp: bool, boxes: Boxes) -> Examin
     return examined
 
 
-def reconsider(
-    setting: Setting, known: Known, examined: Examined, regions: int = 0, loci: int = 0
-) -> None:
+def reconsider(setting: Setting, examined: Examined, regions: int = 0, loci: int = 0) -> None:
     """Close items in regions and at loci that are known, but for the first ones of both."""
-    rest, boxes = examined.rest, examined.boxes
+    rest, boxes, known = examined.rest, examined.boxes, setting.known
     at = rest.items[examined.open_items]
     if at.size and len(known.regions) > regions:
         inside = covered(
@@ -169,3 +168,53 @@ def reconsider(
             stored = into & examined.masks[at].any(axis=1)
             examined.directed[at[stored]] = True
             examined.v[at[stored]] = u[stored]
+
+
+def without_minima(
+    setting: Setting, boxes: Boxes, where: NDArray[np.intp], masks: Mask
+) -> tuple[NDArray[np.bool_], Array]:
+    """Return which items contain no local minimum, and the directions ``(I, n)`` that show it."""
+    m, n = setting.problem.inequalities, setting.problem.dimension
+    found, directions = np.zeros(len(where), dtype=np.bool_), np.zeros((len(where), n))
+    if not len(where):
+        return found, directions
+    which, place = np.unique(where, return_inverse=True)
+    low, high = boxes.lower[which], boxes.upper[which]
+    bounds = setting.functions.mean_value_gradients(low, high, hessians=True)
+    smooth = setting.functions.differentiable(low, high)
+    kinds, kind = np.unique(masks, axis=0, return_inverse=True)
+    for number, mask in enumerate(kinds):
+        rows = [*np.flatnonzero(mask).tolist(), *range(m, setting.problem.rows)]
+        at = np.flatnonzero(kind.ravel() == number)
+        at = at[smooth[place[at]][:, rows].all(axis=1)]
+        if at.size and len(rows) <= len(setting.domain.free):
+            parts = tuple([side[place[at]][:, rows] for side in bounds])
+            found[at], directions[at] = _bent(setting, parts)
+    return found, directions
+
+
+def _bent(setting: Setting, bounds: tuple[Array, ...]) -> tuple[NDArray[np.bool_], Array]:
+    """Return the same for items with the same rows, by bounds of their derivatives."""
+    free, units = list(setting.domain.free), setting.domain.units[list(setting.domain.free)]
+    g_lo, g_hi = (side[:, :, free] for side in bounds[:2])
+    h_lo, h_hi = (side[:, :, free][:, :, :, free] for side in bounds[2:])
+    found = np.zeros(len(g_lo), dtype=np.bool_)
+    directions = np.zeros((len(g_lo), setting.problem.dimension))
+    fine = np.isfinite(g_hi - g_lo).all(axis=(1, 2)) & np.isfinite(h_hi - h_lo).all(axis=(1, 2, 3))
+    at = np.flatnonzero(fine)
+    if not at.size:
+        return found, directions
+    slopes = 0.5 * (g_lo[at] + g_hi[at]) * units
+    bends = 0.5 * (h_lo[at] + h_hi[at]) * np.outer(units, units)
+    left = np.linalg.pinv(slopes[:, :-1].transpose(0, 2, 1))
+    lam = np.einsum("bij,bj->bi", left, slopes[:, -1])
+    flat = np.eye(len(free)) - left.transpose(0, 2, 1) @ slopes[:, :-1]
+    weights = np.concatenate([-lam, np.ones((len(at), 1))], axis=1)
+    bent_form = flat.transpose(0, 2, 1) @ np.einsum("bk,bkij->bij", weights, bends) @ flat
+    values, vectors = np.linalg.eigh(0.5 * (bent_form + bent_form.transpose(0, 2, 1)))
+    likely = np.flatnonzero(values[:, 0] < 0)
+    at, start = at[likely], (vectors[likely, :, 0] * units).astype(np.float32).astype(np.float64)
+    sides = tuple(side[at] for side in (g_lo, g_hi, h_lo, h_hi))
+    found[at] = bent(sides, left[likely] * units, start)
+    directions[at[:, None], free] = start
+    return found, directions

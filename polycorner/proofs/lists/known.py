@@ -1,12 +1,18 @@
-"""Regions with one stationary point and loci: the state of a search."""
+"""State of a search: problem, domain, symmetries and evaluators; regions and loci found."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.proofs.lists.acceptance import Region
-from polycorner.proofs.lists.loci import LocusRegion
+from polycorner.intervals.boxes import BoxFunctions
+from polycorner.intervals.enclosures import Formulas
+from polycorner.minimisation.problem import Problem
+from polycorner.proofs.lists.branches import Mask, conjunctions
+from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.faces import EnclosedFaces, Region
+from polycorner.proofs.lists.images import Motion, weights
+from polycorner.proofs.lists.loci import LocusRegion, read_coordinates
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
@@ -140,3 +146,74 @@ class Known:
         """
         found, n = self._all.array[since:], self._dimension
         return (found[:, :n], found[:, n : 2 * n]), found[:, 2 * n :] > 0
+
+
+@dataclass
+class Setting:
+    """What is searched in, which does not change during a search, and what is known so far.
+
+    Attributes
+    ----------
+    problem : Problem
+    domain : Domain
+    resolution : float
+        Largest side, in scale units, of boxes that are not bisected.
+    motions : tuple of Motion
+        Symmetries.
+    maps : tuple of tuple of int
+        Where they take inequalities.
+    minima_only : bool
+        Whether only local minima are searched.
+    functions : BoxFunctions
+        Inequalities, equations, energy.
+    faces : EnclosedFaces
+    conj : (c, m) array of bool
+        The set as a union of intersections.
+    reads : tuple of int
+        Free coordinates that the energy depends on.
+    weights : (n,) array
+        Of orbits, points with the largest ``weights . q`` are searched.
+    known : Known
+        Regions and loci that were found.
+    """
+
+    problem: Problem
+    domain: Domain
+    resolution: float
+    motions: tuple[Motion, ...] = ()
+    maps: tuple[tuple[int, ...], ...] = ()
+    minima_only: bool = False
+    functions: BoxFunctions = field(init=False)
+    faces: EnclosedFaces = field(init=False)
+    conj: Mask = field(init=False)
+    reads: tuple[int, ...] = field(init=False)
+    weights: Array = field(init=False)
+    known: Known = field(init=False)
+
+    def __post_init__(self) -> None:
+        manifold = self.problem.polyhedron.manifold
+        self.functions = BoxFunctions(self.problem.functions, manifold)
+        formulas = Formulas(self.problem.functions, manifold)
+        free = self.domain.free
+        about = formulas, self.problem.inequalities, free, self.problem.scales
+        self.faces = EnclosedFaces(*about, self.domain.held)
+        self.conj = conjunctions(self.problem.polyhedron)
+        self.reads = read_coordinates(formulas, free)
+        self.weights = weights(self.domain)
+        size = self.problem.dimension
+        self.known = Known(size, self.problem.inequalities, self.domain.parameters)
+
+    @property
+    def branches(self) -> tuple[tuple[int, ...], ...]:
+        """The set as a union of intersections: the functions of each."""
+        return tuple(tuple(np.flatnonzero(branch).tolist()) for branch in self.conj)
+
+    @property
+    def equations(self) -> int:
+        """The number of equations."""
+        return self.faces.equations
+
+    @property
+    def may_have_loci(self) -> bool:
+        """Whether the energy does not depend on some free coordinate."""
+        return self.reads != self.domain.free

@@ -1,20 +1,53 @@
-"""What is made of a search that has ended: its points, loci and undecided boxes."""
+"""Lists made of searches that have ended: points, loci and undecided boxes.
+
+Lists of a set that is a union of pieces with equations of their own, from the lists of these.
+
+The tangent cone of a finite union of closed sets is the union of their tangent cones.  A point is
+therefore stationary in the union, or a strict local minimum of it, if and only if it is in each
+piece that contains it.
+
+Let ``p`` be the point of a region of one piece.  It solves the KKT equations of all functions of
+its face, equations included, whatever the signs of multipliers; so it is the point of a region of
+another piece if that carries the same functions and its box contains ``p``, and it is not
+stationary in another piece that contains it if nothing of that piece's list is near.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from polycorner.minimisation.problem import Problem
-from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import LocusRegion
-from polycorner.proofs.lists.members import OPEN, Listed, Member, full, images, moved, settled
+from polycorner.proofs.lists.members import (
+    IN,
+    OPEN,
+    OUT,
+    Listed,
+    Member,
+    full,
+    images,
+    inside,
+    moved,
+    settled,
+)
 from polycorner.proofs.lists.records import record
-from polycorner.proofs.lists.search import Search
-from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint, locus_of
+from polycorner.proofs.lists.search import BoxSearch, Tally
+from polycorner.proofs.lists.stationary import (
+    StationaryList,
+    StationaryLocus,
+    StationaryPoint,
+    locus_of,
+)
+from polycorner.proofs.lists.tree import Boxes
 from polycorner.spaces.manifold import Array
 
+Names = frozenset[str]
 
-def listed(search: Search, problem: Problem) -> StationaryList:
+
+def listed(search: BoxSearch, problem: Problem) -> StationaryList:
     """Return what a search found for a problem, in whose coordinates parameters are left out."""
     points: list[StationaryPoint] = []
     open_points: list[StationaryPoint] = []
@@ -42,19 +75,24 @@ def listed(search: Search, problem: Problem) -> StationaryList:
         undecided(search)[:, :, : problem.dimension],
         tuple(open_points),
         search.tally,
-        record(search, members, ways),
+        record(
+            search,
+            (k for k, member in members if member.place == IN),
+            (k for k, member in members if member.place == OPEN),
+            ways=ways,
+        ),
         search.minima_only,
     )
 
 
-def box_of(search: Search, problem: Problem) -> tuple[Domain, dict[str, tuple[float, float]]]:
+def box_of(search: BoxSearch, problem: Problem) -> tuple[Domain, dict[str, tuple[float, float]]]:
     """Return the box in the coordinates of a problem, and the sides of parameters by name."""
     n, names, domain = problem.dimension, search.domain.manifold.names, search.domain
     box = Domain(problem.polyhedron.manifold, domain.lower[:n], domain.upper[:n])
     return box, {names[i]: side for i, side in domain.held.items()}
 
 
-def undecided(search: Search) -> Array:
+def undecided(search: BoxSearch) -> Array:
     """Return the boxes that are left or wait, ``(k, 2, n)``."""
     parts: list[Boxes] = [*search.undecided, search.waiting]
     lower = np.concatenate([p.lower for p in parts])
@@ -62,7 +100,7 @@ def undecided(search: Search) -> Array:
     return np.stack([lower, upper], axis=1)
 
 
-def loci_of(search: Search) -> list[LocusRegion]:
+def loci_of(search: BoxSearch) -> list[LocusRegion]:
     """Return the loci that were found, or those of minima, and their images, each once."""
     domain, z = search.domain, search.reads
     found: list[LocusRegion] = []
@@ -79,7 +117,7 @@ def loci_of(search: Search) -> list[LocusRegion]:
     return found
 
 
-def _locus_image(search: Search, place: LocusRegion, g: Motion) -> LocusRegion:
+def _locus_image(search: BoxSearch, place: LocusRegion, g: Motion) -> LocusRegion:
     z, ends = list(place.z), []
     for lower, upper in ((place.lower, place.upper), (place.sharp_lower, place.sharp_upper)):
         sides = search.domain.lower.copy(), search.domain.upper.copy()
@@ -89,7 +127,7 @@ def _locus_image(search: Search, place: LocusRegion, g: Motion) -> LocusRegion:
     return LocusRegion(place.z, ends[0], ends[1], ends[2], ends[3], place.index, sample)
 
 
-def point_of(search: Search, member: Member, orbit: int) -> StationaryPoint:
+def point_of(search: BoxSearch, member: Member, orbit: int) -> StationaryPoint:
     """Return a member as it is told in a list."""
     region = member.region
     lower, upper = full(search, region)
@@ -101,3 +139,128 @@ def point_of(search: Search, member: Member, orbit: int) -> StationaryPoint:
     some = slice(0, len(lower) - len(search.domain.parameters))
     index = region.index if region.index == 0 or not more else None
     return StationaryPoint(lower[some], upper[some], active, multipliers, index, orbit, more)
+
+
+@dataclass(frozen=True, eq=False)
+class _Searched:
+    """A search that has ended, its members by the functions of their faces, and its loci."""
+
+    search: BoxSearch
+    members: tuple[Member, ...]
+    loci: tuple[LocusRegion, ...]
+    alike: Mapping[str, str]
+
+    def face(self, member: Member) -> Names:
+        """Return the functions that carry the point of a region, by their names in all pieces."""
+        d = self.search.problem.polyhedron
+        names = (*(d.names[i] for i in member.region.active), *d.equation_names)
+        return frozenset(self.alike[name] for name in names)
+
+    def zeros(self, member: Member) -> Names:
+        """Return the functions that vanish at the point of a region."""
+        names = self.search.problem.polyhedron.names
+        return self.face(member) | {self.alike[names[i]] for i in member.zeros}
+
+    def place(self, lower: Array, upper: Array, zeros: Names) -> str:
+        """Return whether points of a box at which some functions vanish lie in the piece."""
+        d, m = self.search.problem.polyhedron, self.search.problem.inequalities
+        low, high = self.search.functions.values(lower[None], upper[None])
+        names = (*d.names, *d.equation_names)
+        zero = np.array([self.alike[name] in zeros for name in names], dtype=np.bool_)
+        below, above = (high[0, : len(names)] < 0) & ~zero, (low[0, : len(names)] > 0) & ~zero
+        possible = [c for c in self.search.conj if not (below[:m] & c).any()]
+        if not possible or (below | above)[m:].any():
+            return OUT
+        sure = any(not (c & ~(above | zero)[:m]).any() for c in possible)
+        return IN if sure and zero[m:].all() else OPEN
+
+    def is_empty_near(self, lower: Array, upper: Array) -> bool:
+        """Whether nothing that may be stationary in the piece lies near the points of a box."""
+        domain = self.search.domain
+        boxes = [full(self.search, member.region) for member in self.members]
+        boxes += [(box[0], box[1]) for box in undecided(self.search)]
+        boxes += [self.sides(place) for place in self.loci]
+        return all(domain.apart(lower, upper, *box) for box in boxes)
+
+    def sides(self, place: LocusRegion) -> tuple[Array, Array]:
+        """Return the sides of a locus in all coordinates."""
+        lower, upper = self.search.domain.lower.copy(), self.search.domain.upper.copy()
+        lower[list(place.z)], upper[list(place.z)] = place.sharp_lower, place.sharp_upper
+        return lower, upper
+
+
+def united(
+    problem: Problem, searches: Sequence[BoxSearch], alike: Mapping[str, str]
+) -> StationaryList:
+    """Return the list of a union from the searches in its pieces, which have ended."""
+    every = []
+    for search in searches:
+        members = tuple(member for _, member in settled(search)[0])
+        every.append(_Searched(search, members, tuple(loci_of(search)), alike))
+    points: list[StationaryPoint] = []
+    open_points: list[StationaryPoint] = []
+    loci: list[StationaryLocus] = []
+    rest = [undecided(piece.search) for piece in every]
+    for k, piece in enumerate(every):
+        others = (every[:k], every[k + 1 :])
+        for member in piece.members:
+            where, minimum = _judged(piece, member, others)
+            if where != OUT:
+                to = points if where == IN else open_points
+                point = point_of(piece.search, member, len(to))
+                to.append(point if minimum else replace(point, index=None))
+        for place in piece.loci:
+            sides = piece.sides(place)
+            if all(p.place(*sides, frozenset()) == OUT for p in every if p is not piece):
+                loci.append(locus_of(piece.search, place))
+            else:
+                rest.append(np.array([sides]))
+    return StationaryList(
+        problem,
+        *box_of(searches[0], problem),
+        tuple(points),
+        tuple(loci),
+        np.concatenate(rest)[:, :, : problem.dimension],
+        tuple(open_points),
+        _total([piece.search.tally for piece in every]),
+        None,
+        searches[0].minima_only,
+    )
+
+
+def _judged(
+    piece: _Searched, member: Member, others: tuple[Sequence[_Searched], Sequence[_Searched]]
+) -> tuple[str, bool]:
+    """Return whether a point of a piece is stationary in the union, and whether its index counts.
+
+    In a point of several pieces it does if it is 0 in all of them.
+    """
+    place, several = member.place, [member]
+    zeros, (lower, upper) = piece.zeros(member), full(piece.search, member.region)
+    for earlier, pieces in zip((True, False), others, strict=True):
+        for other in pieces:
+            there = other.place(lower, upper, zeros)
+            if there == OUT:
+                continue
+            same = _same(piece, member, other)
+            if same is not None and there == IN:
+                if earlier:
+                    return OUT, False  # it is told with the other piece
+                place = same.place if place == IN else place
+                several.append(same)
+            elif same is None and there == IN and other.is_empty_near(lower, upper):
+                return OUT, False
+            else:
+                place = OPEN
+    return place, len(several) == 1 or all(one.region.index == 0 for one in several)
+
+
+def _same(piece: _Searched, member: Member, other: _Searched) -> Member | None:
+    """Return the member of another piece whose point is that of a region."""
+    face = piece.face(member)
+    alike = (one for one in other.members if other.face(one) == face)
+    return next((o for o in alike if inside(other.search, member.region, o.region)), None)
+
+
+def _total(tallies: Sequence[Tally]) -> Tally:
+    return Tally(*(sum(getattr(t, f.name) for t in tallies) for f in fields(Tally)))

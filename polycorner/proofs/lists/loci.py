@@ -22,8 +22,6 @@ from types import MappingProxyType
 import numpy as np
 
 from polycorner.intervals.balls import (
-    ball,
-    between,
     matrix,
     middle_inverse,
     precision,
@@ -31,11 +29,11 @@ from polycorner.intervals.balls import (
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.definite import pivots
-from polycorner.proofs.lists.acceptance import QUARTERINGS, WIDEST
+from polycorner.proofs.definite import is_definite
+from polycorner.proofs.kkt import krawczyk, strictly_inside
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.domains import Domain
-from polycorner.proofs.lists.operators import BITS, inertia, krawczyk, outward
+from polycorner.proofs.lists.faces import BITS, QUARTERINGS, WIDEST, enclosing, inertia, outward
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -112,11 +110,11 @@ def _shown(
 ) -> LocusRegion | None:
     places = list(z)
     lower, upper = q[places] - radii, q[places] + radii
-    hull = [ball(x) for x in q.tolist()]
+    ends = np.array([q, q])
     for i, side in held.items():
-        hull[i] = between(*side)
-    for i, a, b in zip(places, lower.tolist(), upper.tolist(), strict=True):
-        hull[i] = between(a, b)
+        ends[:, i] = side
+    ends[:, places] = lower, upper
+    hull = list(enclosing(*ends).hull)
     row = len(formulas.names) - 1
     forms = formulas.smooth(Box(hull), [row])
     if isinstance(forms, Undecided):
@@ -125,9 +123,7 @@ def _shown(
     form = [[hessian[i][j] for j in places] for i in places]
     middle = matrix([[x.mid() for x in line] for line in form])
     product = matrix(form).transpose() * middle
-    symmetric = (product + product.transpose()).tolist()
-    found = pivots(symmetric)
-    if len(found) < len(places) or not all(p > 0 for p in found):
+    if not is_definite((product + product.transpose()).tolist()):
         return None
     unknowns = [hull[i] for i in places]
     centre = [x.mid() for x in unknowns]
@@ -139,10 +135,10 @@ def _shown(
     if inverse is None or signs is None:
         return None
     image = krawczyk([slopes[0][i] for i in places], form, inverse, unknowns, centre)
-    if not all(x.contains_interior(y) for x, y in zip(unknowns, image, strict=True)):
+    if not strictly_inside(image, unknowns):
         return None
-    ends = np.array([outward(x) for x in image]).reshape(-1, 2)  # none where nothing moves
-    return LocusRegion(z, lower, upper, ends[:, 0], ends[:, 1], signs[0])
+    sharp = np.array([outward(x) for x in image]).reshape(-1, 2)  # none where nothing moves
+    return LocusRegion(z, lower, upper, sharp[:, 0], sharp[:, 1], signs[0])
 
 
 def met(

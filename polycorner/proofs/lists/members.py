@@ -4,16 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, between, precision
-from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.acceptance import Region
-from polycorner.proofs.lists.boxes import Boxes
+from polycorner.intervals.balls import ball, precision
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
+from polycorner.proofs.lists.examination import without_minima
+from polycorner.proofs.lists.faces import BITS, Region, enclosing
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.known import Sides
-from polycorner.proofs.lists.operators import BITS
-from polycorner.proofs.lists.saddles import without_minima
-from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.search import BoxSearch
+from polycorner.proofs.lists.tips import TipRegion
+from polycorner.proofs.lists.tree import Boxes
 from polycorner.spaces.manifold import Array, Manifold
 
 IN, OUT, OPEN = "in", "out", "open"
@@ -59,7 +58,7 @@ class Member(RegionPoint):
 class Listed:
     """Regions by their active sets, with the question whether a point is the one of a region."""
 
-    def __init__(self, search: Search) -> None:
+    def __init__(self, search: BoxSearch) -> None:
         self.search, self.free = search, list(search.domain.free)
         self.top = len(self.free) - search.equations
         self.boxes = Sides(len(self.free))
@@ -89,7 +88,7 @@ class Listed:
         return True if True in found else None if None in found else False
 
 
-def same(search: Search, one: RegionPoint, other: RegionPoint, least: int = 0) -> bool | None:
+def same(search: BoxSearch, one: RegionPoint, other: RegionPoint, least: int = 0) -> bool | None:
     """Whether the points of two regions are the same; None where that is not decided.
 
     Regions of ``least`` functions or more have one common zero of these.
@@ -106,19 +105,19 @@ def same(search: Search, one: RegionPoint, other: RegionPoint, least: int = 0) -
     return None
 
 
-def inside(search: Search, region: Region, other: Region) -> bool:
+def inside(search: BoxSearch, region: Region, other: Region) -> bool:
     """Whether the point of a region lies in the box of another one."""
     free = list(search.domain.free)
     lower, upper = region.sharp_lower[: len(free)], region.sharp_upper[: len(free)]
     return bool(search.domain.within(lower, upper, other.lower[free], other.upper[free], free))
 
 
-def apart(search: Search, region: Region, other: Region) -> bool:
+def apart(search: BoxSearch, region: Region, other: Region) -> bool:
     """Whether the enclosures of two points are disjoint."""
     return search.domain.apart(*full(search, region), *full(search, other))
 
 
-def settled(search: Search) -> tuple[list[tuple[int, Member]], dict[int, Array]]:
+def settled(search: BoxSearch) -> tuple[list[tuple[int, Member]], dict[int, Array]]:
     """Return the regions whose points are in the list or may be, each once, with numbers.
 
     And directions of negative curvature, by the numbers of regions whose points are no minima for
@@ -147,7 +146,7 @@ def settled(search: Search) -> tuple[list[tuple[int, Member]], dict[int, Array]]
     return found, ways
 
 
-def _bent(search: Search, member: Member) -> Array | None:
+def _bent(search: BoxSearch, member: Member) -> Array | None:
     """Return a direction of negative curvature at a point, tangent to all that may vanish there.
 
     It shows that the point is no minimum of any branch (:mod:`~polycorner.proofs.lists.curvature`).
@@ -166,7 +165,7 @@ def _order(pair: tuple[int, Member]) -> tuple[bool, bool]:
     return member.place == OPEN, not member.is_plain and member.region.index != 0
 
 
-def full(search: Search, region: Region) -> tuple[Array, Array]:
+def full(search: BoxSearch, region: Region) -> tuple[Array, Array]:
     """Return the enclosure of a region's point in all coordinates."""
     lower, upper = search.domain.lower.copy(), search.domain.upper.copy()
     free = list(search.domain.free)
@@ -174,7 +173,7 @@ def full(search: Search, region: Region) -> tuple[Array, Array]:
     return lower, upper
 
 
-def judged(search: Search, region: Region) -> Member:
+def judged(search: BoxSearch, region: Region) -> Member:
     """Return the point of a region, and whether it is a stationary point of the set in the domain.
 
     The signs of the other functions at the point say in which branches of the tree it lies.  As
@@ -185,8 +184,7 @@ def judged(search: Search, region: Region) -> Member:
     lower, upper = full(search, region)
     m = search.problem.inequalities
     with precision(BITS):
-        hull = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
-        values = search.faces.formulas.values(Box(hull), range(m))
+        values = search.faces.formulas.values(enclosing(lower, upper), range(m))
         below = np.array([bool(v < ball(0)) for v in values], dtype=np.bool_)
         above = np.array([bool(v > ball(0)) for v in values], dtype=np.bool_)
     # Balls give up square roots that may reach 0, as of the distance of centres that coincide.
@@ -198,7 +196,7 @@ def judged(search: Search, region: Region) -> Member:
     zeros = held.copy()
     outside = search.domain.misses(lower, upper, range(len(lower)))
     if not outside and (~below & ~above & ~held).any():
-        found = signs(search.vertices, placed(search, region), m)
+        found = signs(search.faces, placed(search, region), m)
         zeros |= np.array([sign == ZERO for sign in found])
     below, above = below & ~zeros, above & ~zeros
     unknown = ~below & ~above & ~zeros
@@ -215,27 +213,30 @@ def judged(search: Search, region: Region) -> Member:
     return Member(region, *sets, IN if any(sure) and not any(some) else OPEN, free)
 
 
-def placed(search: Search, region: Region) -> Place:
-    """Return the point of a region, enclosed as well as its functions allow."""
-    rows = search.vertices.rows(region.active)
+def placed(search: BoxSearch, region: Region) -> Place:
+    """Return the point of a region, enclosed as well as its kind allows."""
+    rows = search.faces.rows(region.active)
+    if isinstance(region, TipRegion):
+        with precision(BITS):
+            return Place([ball(x) for x in region.exact], region.lower, region.upper, rows)
     unique = len(rows) == len(search.domain.free) and not search.domain.parameters
     lower, upper = full(search, region)
     with precision(BITS):
-        point = [between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
+        point = list(enclosing(lower, upper).hull)
         sides = region.lower, region.upper
-        zero = search.vertices.zero(*sides, region.active) if unique else None
+        zero = search.faces.zero(*sides, rows) if unique else None
         for i, x in zip(search.domain.free, zero or (), strict=bool(zero)):
             point[i] = x
         return Place(point, *sides, rows, unique)
 
 
-def images(search: Search, member: Member) -> list[Member]:
+def images(search: BoxSearch, member: Member) -> list[Member]:
     """Return a member carried along by all symmetries of a search."""
     pairs = zip(search.motions, search.maps, strict=True)
     return [image_of(search, member, g, p) for g, p in pairs]
 
 
-def image(search: Search, region: Region, g: Motion, p: tuple[int, ...]) -> Region:
+def image(search: BoxSearch, region: Region, g: Motion, p: tuple[int, ...]) -> Region:
     """Return a region carried along by a symmetry, which takes inequalities to ``p``."""
     manifold = search.domain.manifold
     free, n = list(search.domain.free), len(search.domain.free)
@@ -276,7 +277,7 @@ def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
     )
 
 
-def image_of(search: Search, member: Member, g: Motion, p: tuple[int, ...]) -> Member:
+def image_of(search: BoxSearch, member: Member, g: Motion, p: tuple[int, ...]) -> Member:
     """Return a member carried along by a symmetry, as :func:`image` does a region."""
     inverse = {there: i for i, there in enumerate(p)}
     zeros, unknown = (

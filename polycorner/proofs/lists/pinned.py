@@ -37,14 +37,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, between, column, dot, entries, matrix, precision
+from polycorner.intervals.balls import ball, column, dot, entries, matrix, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
-from polycorner.proofs.lists.acceptance import WIDEST, Region
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
-from polycorner.proofs.lists.operators import BITS, outward
-from polycorner.proofs.lists.vertices import Vertices
+from polycorner.proofs.lists.faces import BITS, WIDEST, EnclosedFaces, Region, enclosing, outward
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
@@ -82,16 +80,12 @@ class Pinned(Region):
     weights: Array
 
 
-def pinned(
-    vertices: Vertices, energy: int, q: Array, slopes: Array, widest: float
-) -> Pinned | None:
+def pinned(faces: EnclosedFaces, q: Array, slopes: Array, widest: float) -> Pinned | None:
     """Return the widest box tried about a point at which some functions vanish, or None.
 
     Parameters
     ----------
-    vertices : Vertices
-    energy : int
-        The row of the energy.
+    faces : EnclosedFaces
     q : (n,) array
         The point, approximately.
     slopes : (m, n) array
@@ -103,19 +97,18 @@ def pinned(
     corner = _independent(slopes)
     if corner is None:
         return None
-    around = vertices.region(q, corner, widest)
+    around = faces.vertex(q, corner, widest)
     if around is None:
         return None
     with precision(BITS):
-        lower, upper = around.lower.tolist(), around.upper.tolist()
-        point = [between(a, b) for a, b in zip(lower, upper, strict=True)]
-        zero = vertices.zero(around.lower, around.upper, corner)
-        for i, x in zip(vertices.free, zero or (), strict=bool(zero)):
+        point = list(enclosing(around.lower, around.upper).hull)
+        zero = faces.zero(around.lower, around.upper, corner)
+        for i, x in zip(faces.free, zero or (), strict=bool(zero)):
             point[i] = x
         place = Place(point, around.lower, around.upper, corner)
-        found = signs(vertices, place, vertices.inequalities)
+        found = signs(faces, place, faces.inequalities)
         zeros = tuple(i for i, sign in enumerate(found) if sign == ZERO)
-        return _within(vertices, (*zeros, energy), corner, point, widest)
+        return _within(faces, (*zeros, faces.inequalities), corner, point, widest)
 
 
 def _independent(slopes: Array) -> tuple[int, ...] | None:
@@ -126,33 +119,33 @@ def _independent(slopes: Array) -> tuple[int, ...] | None:
 
 
 def _within(
-    vertices: Vertices,
+    faces: EnclosedFaces,
     rows: tuple[int, ...],
     corner: tuple[int, ...],
     point: "list[Ball]",
     widest: float,
 ) -> Pinned | None:
     """Return the widest box tried around an enclosed point, or None."""
-    free, zeros = list(vertices.free), rows[:-1]
-    forms = vertices.formulas.smooth(Box(point), rows)
+    free, zeros = list(faces.free), rows[:-1]
+    forms = faces.formulas.smooth(Box(point), rows)
     if isinstance(forms, Undecided):
         return None
     slopes = [[g[i] for i in free] for g in forms.evaluate(Box(point), 1)[1]]
     middles = np.array([[float(x.mid()) for x in g] for g in slopes])
-    guess = _guessed(middles, vertices.scales[free]) if np.isfinite(middles).all() else None
+    guess = _guessed(middles, faces.scales[free]) if np.isfinite(middles).all() else None
     if guess is None:
         return None
     steps, weights = guess
     exact = _corrected(slopes, steps, weights)
     if exact is None:
         return None
-    middle, radii = np.array([float(x.mid()) for x in point]), np.zeros_like(vertices.scales)
-    radii[free] = min(widest, WIDEST) * vertices.scales[free]
+    middle, radii = np.array([float(x.mid()) for x in point]), np.zeros_like(faces.scales)
+    radii[free] = min(widest, WIDEST) * faces.scales[free]
     for _ in range(SHRINKINGS):
         lower, upper = middle - radii, middle + radii
-        box = Box([between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)])
+        box = enclosing(lower, upper)
         reach = [(box.hull[i] - point[i]).abs_upper() for i in free]
-        found, share = vertices.formulas.smooth(box, rows), None
+        found, share = faces.formulas.smooth(box, rows), None
         if not isinstance(found, Undecided):
             into = _into(found, box, free, reach)
             share = _shown(found, box, free, reach, steps, exact, into)

@@ -14,6 +14,11 @@ A file is a zip archive of
     How many directions belong to each closed box (16 bits), and these (single precision).
 
 Numbers are little-endian.  Derivatives are not stored.
+
+Lists of corners have another format, no loci and no directions.  The energy is the constant 0.
+Regions have as many functions as there are free coordinates, without multipliers; those of singular
+corners have the exact point, the combination of gradients that vanishes, the weight, and the
+functions whose gradient vanishes.  Linear relations of functions are stated with their weights.
 """
 
 import io
@@ -21,7 +26,7 @@ import json
 import math
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -36,19 +41,22 @@ from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import pattern, reads
 from polycorner.intervals.enclosures import Formulas
 from polycorner.minimisation.problem import Problem
-from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.faces import Region
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import LocusRegion
-from polycorner.proofs.lists.members import IN, OPEN, Member
 from polycorner.proofs.lists.pinned import Pinned
-from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.relations import Relation
+from polycorner.proofs.lists.search import BoxSearch
+from polycorner.proofs.lists.tips import TipRegion
 from polycorner.proofs.lists.tree import OPEN as OPEN_BOX
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 FORMAT = ("polycorner-stationary-list", 1)
+CORNERS = ("polycorner-corner-list", 1)
 SIDES = ("lower", "upper", "sharp_lower", "sharp_upper")
+EXACT = ("exact", "combination")
 PINNED = ("into", "steps", "weights")
 MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
@@ -76,6 +84,10 @@ class Record(Value):
         Directions of negative curvature, by the regions whose points are no minima for their sake.
     minima_only : bool
         Whether the list is one of local minima.
+    active : tuple of tuple of int, or None
+        Functions that are active at the listed corners; None in a list of stationary points.
+    relations : tuple of Relation
+        Linear relations between functions, in a list of corners.
     """
 
     problem: Problem
@@ -93,12 +105,14 @@ class Record(Value):
     directions: NDArray[np.float32]
     ways: Mapping[int, Array] = field(default_factory=dict)
     minima_only: bool = False
+    active: tuple[tuple[int, ...], ...] | None = None
+    relations: tuple[Relation, ...] = ()
 
 
 def record(
-    search: Search, members: Sequence[tuple[int, Member]], ways: Mapping[int, Array]
+    search: BoxSearch, listed: Iterable[int], open_points: Iterable[int], **more: Any
 ) -> Record:
-    """Return the record of a search and the members of its list; see :class:`Record`."""
+    """Return the record of a search and of its list, by the numbers of regions; see `Record`."""
     return Record(
         search.problem,
         search.domain,
@@ -107,37 +121,26 @@ def record(
         search.weights,
         tuple(search.regions),
         tuple(search.loci),
-        tuple(k for k, member in members if member.place == IN),
-        tuple(k for k, member in members if member.place == OPEN),
+        tuple(listed),
+        tuple(open_points),
         *search.tree.preorder(),
-        ways,
-        search.minima_only,
+        minima_only=search.minima_only,
+        **more,
     )
 
 
 def save(path: str | os.PathLike[str], record: Record) -> Path:
     """Save a list and its proof; return the path.
 
-    Parameters
-    ----------
-    path : path
-        Ends in ``.zip``.
-    record : Record
-
     Raises
     ------
     ValueError
-        If the name has another suffix.
+        If the name does not end in ``.zip``.
     OSError
         If the file could not be written.
     """
-    return written(path, record, described(record))
-
-
-def written(path: str | os.PathLike[str], record: Record, data: dict[str, Any]) -> Path:
-    """Save what is described with the subdivision of a record; see :func:`save`."""
     parts = {
-        "problem.json": json.dumps(data, indent=1).encode(),
+        "problem.json": json.dumps(described(record), indent=1).encode(),
         "tree.bin": record.codes.astype("<i1").tobytes(),
         "positions.bin": record.positions.astype("<f8").tobytes(),
         "counts.bin": record.counts.astype("<u2").tobytes(),
@@ -153,21 +156,31 @@ def written(path: str | os.PathLike[str], record: Record, data: dict[str, Any]) 
 
 def described(record: Record) -> dict[str, Any]:
     """Return a problem, its regions, loci and symmetries, and the list, as plain data."""
+    corners = record.active is not None
+    told = [list(a) for a in record.active or ()] or [
+        record.regions[k].index for k in record.listed
+    ]
+    what = "active" if corners else "index"
+    relations = [
+        {"rows": list(r.rows), "weights": [str(w) for w in r.weights]} for r in record.relations
+    ]
     return {
-        "format": list(FORMAT),
+        "format": list(CORNERS if corners else FORMAT),
         **posed(record),
         "regions": [
             region_data(region) | ({"way": _hex(record.ways[k])} if k in record.ways else {})
             for k, region in enumerate(record.regions)
         ],
         "loci": [locus_data(place) for place in record.loci],
-        "points": [{"region": k, "index": record.regions[k].index} for k in record.listed],
+        "points": [
+            {"region": k, what: entry} for k, entry in zip(record.listed, told, strict=True)
+        ],
         "open_points": list(record.open_points),
         "open": int((record.codes == OPEN_BOX).sum()),
-    }
+    } | ({"relations": relations} if corners else {})
 
 
-def posed(record: "Record | Search") -> dict[str, Any]:
+def posed(record: "Record | BoxSearch") -> dict[str, Any]:
     """Return a problem with its domain and symmetries as plain data."""
     problem, domain = record.problem, record.domain
     manifold = problem.polyhedron.manifold
@@ -241,6 +254,9 @@ def region_data(region: Region) -> dict[str, Any]:
     if isinstance(region, Pinned):
         found["corner"] = list(region.corner)
         found |= {name: _hex(getattr(region, name).ravel()) for name in PINNED}
+    if isinstance(region, TipRegion):
+        found |= {name: [str(x) for x in getattr(region, name)] for name in EXACT}
+        found |= {"weight": region.weight.hex(), "critical": list(region.critical)}
     return found
 
 

@@ -29,71 +29,51 @@ increase along one direction, so that none of their gradients cancel.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
-from polycorner.intervals.balls import between, precision
+from polycorner.intervals.balls import precision
 from polycorner.intervals.enclosures import Undecided
-from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.attempts import WIDER, Starts
+from polycorner.proofs.lists.attempts import WIDER, Attempts, Starts, active_sets
 from polycorner.proofs.lists.branches import Mask
-from polycorner.proofs.lists.candidates import active_sets
 from polycorner.proofs.lists.examination import Examined
+from polycorner.proofs.lists.faces import BITS, enclosing
 from polycorner.proofs.lists.intermediate import covered, directions
-from polycorner.proofs.lists.known import Known
-from polycorner.proofs.lists.operators import BITS
-from polycorner.proofs.lists.settings import Setting
+from polycorner.proofs.lists.known import Known, Setting
+from polycorner.proofs.lists.pinned import Pinned, pinned
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 MOST_SETS = 500  # of one item
 MOST_ITEMS = 64  # of one chunk
+NEWTON = 6  # steps towards a point where all functions of a box vanish
+STRAY = 4.0  # sides of a box that such a point may be away from its middle
+PINS = -2  # before the functions of such a point, where it is tried in vain
 
 
-@dataclass
-class Closing:
-    """What items with redundant functions are closed with, and what is missing.
-
-    Attributes
-    ----------
-    boxes : (I,) array of int
-        Boxes of directions that items are closed with.
-    v : (I, n) array
-        The directions.
-    starts : list of Starts
-        Where to look for the points of faces that have no direction.
-    """
-
-    boxes: NDArray[np.intp]
-    v: Array
-    starts: list[Starts]
-
-
-def close_redundant(setting: Setting, known: Known, e: Examined) -> Closing:
-    """Close items with redundant functions, or say which faces are missing for that."""
-    owners, vectors, missing = [np.zeros(0, dtype=np.intp)], [e.v[:0]], list[Starts]()
-    for item in _candidates(setting, known, e):
+def close_redundant(setting: Setting, e: Examined) -> list[Starts]:
+    """Close items with redundant functions; return where to look for faces missing for that."""
+    missing = list[Starts]()
+    for item in _candidates(setting, e):
         box = e.where[item]
         if not _smooth(setting, e, item):
             continue
-        sets = largest_sets(setting, known, e, item)
+        sets = largest_sets(setting, e, item)
         if not len(sets):
             e.done[item] = True
             continue
         found, v = _directions(setting, e, box, sets)
         if found.all():
             e.done[item] = True
-            owners.append(np.full(len(v), box))
-            vectors.append(v)
+            e.further.append((box, v))
         else:
             missing.append(starts(setting, e, box, sets[~found]))
-    return Closing(np.concatenate(owners), np.concatenate(vectors), missing)
+    return missing
 
 
-def _candidates(setting: Setting, known: Known, e: Examined) -> Iterator[int]:
+def _candidates(setting: Setting, e: Examined) -> Iterator[int]:
     """Yield open items with more functions than can be independent, in regions or just tried.
 
     Of those that were tried, the ones that more functions seem to hold than can be independent.
@@ -106,7 +86,9 @@ def _candidates(setting: Setting, known: Known, e: Examined) -> Iterator[int]:
         return
     items = e.rest.items[left]
     anything = np.zeros((len(left), e.masks.shape[1]), dtype=np.bool_)
-    chosen = covered((e.boxes.lower, e.boxes.upper), e.where[items], anything, *known.sides())
+    chosen = covered(
+        (e.boxes.lower, e.boxes.upper), e.where[items], anything, *setting.known.sides()
+    )
     holding = active_sets(e.rest.weights[left], e.rest.pulls[left]).sum(axis=1)
     chosen |= (holding > top) & (e.boxes.since[e.where[items]] == 0)
     for item in items[chosen][:MOST_ITEMS].tolist():
@@ -116,17 +98,17 @@ def _candidates(setting: Setting, known: Known, e: Examined) -> Iterator[int]:
 
 def _smooth(setting: Setting, e: Examined, item: int) -> bool:
     """Whether all functions of an item, the equations and the energy are smooth on its box."""
-    lower, upper = (side[e.where[item]].tolist() for side in (e.boxes.lower, e.boxes.upper))
-    rows = setting.faces.rows(np.flatnonzero(e.masks[item]).tolist())
+    box, faces = e.where[item], setting.faces
+    rows = (*faces.rows(np.flatnonzero(e.masks[item]).tolist()), setting.problem.rows - 1)
     with precision(BITS):
-        box = Box([between(a, b) for a, b in zip(lower, upper, strict=True)])
-        return not isinstance(setting.faces.formulas.smooth(box, rows), Undecided)
+        box = enclosing(e.boxes.lower[box], e.boxes.upper[box])
+        return not isinstance(faces.formulas.smooth(box, rows), Undecided)
 
 
-def largest_sets(setting: Setting, known: Known, e: Examined, item: int) -> Mask:
+def largest_sets(setting: Setting, e: Examined, item: int) -> Mask:
     """Return the largest sets of functions that no region around the box has, ``(T, m)``."""
     lower, upper = e.boxes.lower[e.where[item]], e.boxes.upper[e.where[item]]
-    (left, right), active = known.sides()
+    (left, right), active = setting.known.sides()
     within = (left < lower) & (upper < right) | (left == right)
     around = active[within.all(axis=1)]
     rows = np.flatnonzero(e.masks[item]).tolist()
@@ -157,3 +139,59 @@ def starts(setting: Setting, e: Examined, box: int, sets: Mask) -> Starts:
     widths = (e.boxes.upper[box] - e.boxes.lower[box]) / setting.problem.scales
     widest = np.full(len(sets), WIDER * widths[list(setting.domain.free)].max())
     return Starts(q, sets, widest, np.zeros(len(q), dtype=np.bool_))
+
+
+def pin(setting: Setting, e: Examined, attempts: Attempts) -> None:
+    """Look for points that are held to first order, near open boxes that were just tried.
+
+    In boxes where more functions may vanish than can be independent.
+    """
+    free, units = list(setting.domain.free), setting.problem.scales
+    left = e.open_items
+    counts = e.masks[e.rest.items[left]].sum(axis=1)
+    tried = e.boxes.since[e.where[e.rest.items[left]]] == 0
+    left = left[e.rest.smooth[left] & (counts > len(free)) & tried][:MOST_ITEMS]
+    if len(setting.conj) > 1 or setting.equations or setting.domain.parameters or not left.size:
+        return
+    items = e.rest.items[left]
+    boxes, masks = e.boxes.part(e.where[items]), e.masks[items]
+    widths = ((boxes.upper - boxes.lower) / units)[:, free].max(axis=1)
+    q = boxes.middles
+    for _ in range(NEWTON):
+        values, slopes = _vanishing(setting, q, masks)
+        step = np.clip(np.einsum("bij,bj->bi", np.linalg.pinv(slopes), -values), -1, 1)
+        q[:, free] += step * units[free]
+    values, slopes = _vanishing(setting, q, masks)
+    sizes = abs(slopes).max(axis=(1, 2), initial=0.0)
+    fine = abs(values).max(axis=1, initial=0.0) <= DEFAULT.feasible * sizes
+    fine &= (abs(q - boxes.middles) / units)[:, free].max(axis=1) <= STRAY * widths
+    for i in np.flatnonzero(fine):
+        rows, reach = tuple(np.flatnonzero(masks[i]).tolist()), WIDER * float(widths[i])
+        if _is_pinned(setting.known, q[i], masks[i]) or attempts.failed.has(
+            (PINS, *rows), q[i], reach
+        ):
+            continue
+        region = pinned(setting.faces, q[i], slopes[i], reach)
+        if region is None or not set(rows) <= set(region.active):
+            attempts.failed.add((PINS, *rows), q[i], reach)
+        else:
+            if comb(len(rows), len(free)) <= MOST_SETS:  # listed with as few functions as possible
+                sets = largest_sets(setting, e, items[i])
+                attempts.run(starts(setting, e, e.where[items[i]], sets))
+            setting.known.add(region)
+
+
+def _is_pinned(known: Known, q: Array, mask: Mask) -> bool:
+    """Whether a point lies in a box around one that some functions, and more, hold."""
+    rows = set(np.flatnonzero(mask).tolist())
+    held = (r for r in known.regions if isinstance(r, Pinned) and rows <= set(r.active))
+    return any(bool(np.all((r.lower <= q) & (q <= r.upper))) for r in held)
+
+
+def _vanishing(setting: Setting, q: Array, masks: Mask) -> tuple[Array, Array]:
+    """Return values and scaled gradients of some functions, 0 of the others."""
+    m, free = masks.shape[1], list(setting.domain.free)
+    values, gradients = setting.problem.evaluate(q, 1)
+    values, gradients = (np.nan_to_num(x[:, :m], posinf=0, neginf=0) for x in (values, gradients))
+    slopes = (gradients * setting.problem.scales)[:, :, free]
+    return values * masks, slopes * masks[:, :, None]

@@ -2,7 +2,7 @@
 
 A box is discarded where no point of the set lies in it, or where each of its branches has a
 direction along which the energy decreases (:mod:`~polycorner.proofs.lists.directions`), or lies in
-a region whose only stationary point is known (:mod:`~polycorner.proofs.lists.acceptance`), with
+a region whose only stationary point is known (:mod:`~polycorner.proofs.lists.faces`), with
 redundant functions perhaps (:mod:`~polycorner.proofs.lists.redundancy`,
 :mod:`~polycorner.proofs.lists.pinned`); all others are bisected, once what lies outside of the set
 is cut off (:mod:`~polycorner.proofs.lists.contraction`).
@@ -15,6 +15,7 @@ changes the result.
 """
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -25,16 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.formulas.kernels import MANY
-from polycorner.proofs.lists.acceptance import Region
 from polycorner.proofs.lists.attempts import Attempts, Mapped, Starts
-from polycorner.proofs.lists.boxes import Boxes, joined
+from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.examination import Examined, examine, reconsider
-from polycorner.proofs.lists.known import Known
+from polycorner.proofs.lists.faces import Region
+from polycorner.proofs.lists.known import Setting
 from polycorner.proofs.lists.loci import LocusRegion
-from polycorner.proofs.lists.pinning import pin
-from polycorner.proofs.lists.redundancy import Closing, close_redundant
-from polycorner.proofs.lists.settings import Setting
-from polycorner.proofs.lists.tree import Tree
+from polycorner.proofs.lists.redundancy import close_redundant, pin
+from polycorner.proofs.lists.tree import Boxes, Tree, joined
 from polycorner.spaces.manifold import Array
 
 CHUNKS = 8  # that a round consists of
@@ -70,29 +69,58 @@ class Tally:
 
 
 @dataclass
-class Search(Setting):
-    """One run: what is to be treated and what was found."""
+class Treated:
+    """Boxes that were treated, and how they ended.
 
-    known: Known = field(init=False)
+    Attributes
+    ----------
+    images : (I,) array of int
+        Numbers in the tree of boxes that a symmetry carries to others; they are left out below.
+    boxes : Boxes
+    outside, left : (B,) arrays of bool
+        Whether they miss the set, and whether they are not closed.
+    inner : (2, B, n) array
+        Narrower sides of the boxes, beyond which no point of the set lies.
+    descending : int
+        How many are closed by directions.
+    owners, vectors : (V,) array of int, (V, n) array
+        Directions, and the boxes that they close.
+    """
+
+    images: NDArray[np.int64]
+    boxes: Boxes
+    outside: Mask
+    left: Mask
+    inner: Array
+    descending: int = 0
+    owners: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    vectors: Array | None = None
+
+
+@dataclass
+class BoxSearch(Setting, ABC):
+    """One run: what is to be treated and what was found.
+
+    What is searched for decides how boxes are closed: :meth:`treat`.
+    """
+
     attempts: Attempts = field(init=False)
     waiting: Boxes = field(init=False)
     tally: Tally = field(default_factory=Tally)
     tree: Tree = field(default_factory=Tree)
     undecided: list[Boxes] = field(default_factory=list)
+    sharp: bool = True  # whether all tests are used, so that small boxes are left undecided
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.known = Known(
-            self.problem.dimension, self.problem.inequalities, self.domain.parameters
-        )
-        self.attempts = Attempts(self, self.known)
+        self.attempts = Attempts(self)
         lower, upper = self.domain.lower[None].copy(), self.domain.upper[None].copy()
         start = np.zeros(1, dtype=np.int64)
         self.waiting = Boxes(lower, upper, start, start)
 
     @property
     def regions(self) -> list[Region]:
-        """Regions with one stationary point of a face each."""
+        """Regions with one point each that is sought, on a face."""
         return self.known.regions
 
     @property
@@ -100,11 +128,19 @@ class Search(Setting):
         """Loci that were found."""
         return self.known.loci
 
+    @abstractmethod
+    def treat(self, chunks: list[Boxes], mapped: Mapped) -> list[Treated]:
+        """Close what can be closed in some boxes, and find what is in them."""
+
+    @abstractmethod
+    def prepare(self, boxes: Boxes) -> None:
+        """Compile or load what threads would each compile by themselves."""
+
     def run(
         self,
         most: int,
         seconds: float,
-        report: Callable[["Search"], None],
+        report: Callable[[], None],
         *,
         workers: int = 1,
         stopped: Callable[[], bool] = lambda: False,
@@ -114,42 +150,21 @@ class Search(Setting):
         with pool(workers) as executor:
             mapped: Mapped = map
             if executor:
-                self._compile()
+                self.prepare(self.waiting.part(slice(0, 1)))
                 mapped = executor.map
             while len(self.waiting) and self.tally.boxes < most and time.monotonic() < end:
                 if stopped():
                     break
                 self.round(mapped)
-                report(self)
-
-    def _compile(self) -> None:
-        """Compile or load what threads would each compile by themselves."""
-        first = self.waiting.part(slice(0, 1))
-        examine(self, self.known, False, first)
-        for count in (1, MANY):
-            self.problem.evaluate(np.repeat(first.middles, count, axis=0), 2)
+                report()
 
     def round(self, mapped: Mapped = map) -> None:
         """Treat the last boxes that wait; ``mapped`` is like ``map``."""
         chunks = self._chunks()
-        late = self.tally.boxes >= SHARP or self.tally.undecided > 0
-        sharp = late or any(self._small(boxes).any() for boxes in chunks)
-        self.attempts.sharp = sharp
-        found = list(mapped(partial(examine, self, self.known, sharp), chunks))
-        regions, loci = len(self.regions), len(self.loci)
-        self.attempts.at(found, mapped)
-        if len(self.regions) > regions or len(self.loci) > loci:
-            for e in found:
-                reconsider(self, self.known, e, regions, loci)
-        more = [close_redundant(self, self.known, e) for e in found]
-        starts = [start for closing in more for start in closing.starts]
-        if starts:
-            self.attempts.run(Starts.joined(starts), mapped)
-        for e in found:
-            pin(self, self.known, e, self.attempts)
+        found = self.treat(chunks, mapped)
         taken = sum(map(len, chunks))
         before = self.waiting.part(slice(None, len(self.waiting) - taken))
-        self.waiting = joined([before, *map(self._finish, found, more)])
+        self.waiting = joined([before, *map(self._finish, found)])
 
     def _chunks(self) -> list[Boxes]:
         """Return the last boxes that wait, in chunks of a size that the problem determines."""
@@ -160,24 +175,21 @@ class Search(Setting):
         last = self.waiting.part(slice(len(self.waiting) - count, None))
         return [last.part(slice(i, i + size)) for i in range(0, count, size)]
 
-    def _finish(self, e: Examined, more: Closing) -> Boxes:
+    def _finish(self, t: Treated) -> Boxes:
         """Record how boxes are closed; return the halves of those that are left."""
-        boxes, where, count = e.boxes, e.where, len(e.boxes)
-        seen, left, by_region = (np.zeros(count, dtype=np.bool_) for _ in range(3))
-        seen[where], left[where[~e.done]], by_region[where[e.done & ~e.directed]] = True, True, True
-        self.tally.images += len(e.images)
-        self.tally.outside += int((~seen).sum())
-        self.tally.covered += int((by_region & ~left).sum())
-        self.tally.descending += int((seen & ~by_region & ~left).sum())
-        used = e.directed & ~left[where]
-        self.tree.close(e.images, e.images[:0], e.v[:0])
-        self.tree.close(boxes.nodes[~left], boxes.nodes[where[used]], e.v[used])
-        kept = ~left[more.boxes]
-        self.tree.close(boxes.nodes[:0], boxes.nodes[more.boxes[kept]], more.v[kept])
-        rest = boxes.part(left)
-        again = self._small(rest) & (not self.attempts.sharp)
-        halves = self._halves(rest.part(~again), e.inner[:, left][:, ~again])
-        return halves.with_others(rest.part(again))
+        closed = int((~t.outside & ~t.left).sum())
+        self.tally.images += len(t.images)
+        self.tally.outside += int(t.outside.sum())
+        self.tally.covered += closed - t.descending
+        self.tally.descending += t.descending
+        nothing = np.zeros((0, t.boxes.lower.shape[1]))
+        self.tree.close(t.images, t.images[:0], nothing)
+        vectors = nothing if t.vectors is None else t.vectors
+        self.tree.close(t.boxes.nodes[~t.left], t.boxes.nodes[t.owners], vectors)
+        rest, inner = t.boxes.part(t.left), t.inner[:, t.left]
+        # Small boxes wait for the sharper tests, if these were not used.
+        again = self._small(rest) & (not self.sharp)
+        return joined([self._halves(rest.part(~again), inner[:, ~again]), rest.part(again)])
 
     def _relative(self, boxes: Boxes) -> Array:
         """Return the sides of boxes in the units of the domain."""
@@ -227,6 +239,48 @@ class Search(Setting):
                 self.tally.split += len(at)
                 self.tally.outside += len(at)
         return Boxes(lower, upper, nodes, boxes.since)
+
+
+class StationarySearch(BoxSearch):
+    """A search for stationary points."""
+
+    def prepare(self, boxes: Boxes) -> None:
+        """Compile or load what threads would each compile by themselves."""
+        examine(self, False, boxes)
+        for count in (1, MANY):
+            self.problem.evaluate(np.repeat(boxes.middles, count, axis=0), 2)
+
+    def treat(self, chunks: list[Boxes], mapped: Mapped) -> list[Treated]:
+        """Examine boxes, then try candidates near what is left."""
+        late = self.tally.boxes >= SHARP or self.tally.undecided > 0
+        self.sharp = late or any(self._small(boxes).any() for boxes in chunks)
+        self.attempts.sharp = self.sharp
+        found = list(mapped(partial(examine, self, self.sharp), chunks))
+        regions, loci = len(self.regions), len(self.loci)
+        self.attempts.at(found, mapped)
+        if len(self.regions) > regions or len(self.loci) > loci:
+            for e in found:
+                reconsider(self, e, regions, loci)
+        starts = [start for e in found for start in close_redundant(self, e)]
+        if starts:
+            self.attempts.run(Starts.joined(starts), mapped)
+        for e in found:
+            pin(self, e, self.attempts)
+        return list(map(_treated, found))
+
+
+def _treated(e: Examined) -> Treated:
+    """Return how boxes ended, from their items."""
+    where, count = e.where, len(e.boxes)
+    seen, left, by_region = (np.zeros(count, dtype=np.bool_) for _ in range(3))
+    seen[where], left[where[~e.done]], by_region[where[e.done & ~e.directed]] = True, True, True
+    used = e.directed & ~left[where]
+    # Of an item that is not closed, or shares its box with such a one, no directions are stored.
+    further = [(box, v) for box, v in e.further if not left[box]]
+    owners = np.concatenate([where[used], *(np.full(len(v), box) for box, v in further)])
+    vectors = np.concatenate([e.v[used], *(v for _, v in further)])
+    descending = int((seen & ~by_region & ~left).sum())
+    return Treated(e.images, e.boxes, ~seen, left, e.inner, descending, owners, vectors)
 
 
 @contextmanager

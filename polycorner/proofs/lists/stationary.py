@@ -1,8 +1,9 @@
 """Lists of all stationary points of an energy on a polyhedron in a box, and what is proved."""
 
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, certify
@@ -11,7 +12,7 @@ from polycorner.printing import Printed, Sheet, Table, facts, number, units
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.records import Record, save
-from polycorner.proofs.lists.search import Search, Tally
+from polycorner.proofs.lists.search import BoxSearch, Tally
 from polycorner.proofs.parameter_boxes import Interval, shown_box
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE
@@ -22,10 +23,23 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 Bounds = tuple[float, float]
+P = TypeVar("P", bound="EnclosedPoint")
+
+
+class EnclosedPoint(Checked):
+    """A box with exactly one point that is sought."""
+
+    lower: Array
+    upper: Array
+
+    @property
+    def point(self) -> Array:
+        """The middle of the enclosure, ``(n,)``."""
+        return 0.5 * (self.lower + self.upper)
 
 
 @dataclass(frozen=True, eq=False)
-class StationaryPoint(Checked):
+class StationaryPoint(EnclosedPoint):
     """A box with exactly one stationary point.
 
     It is a nondegenerate KKT point of the active functions, or they are more than can be
@@ -57,11 +71,6 @@ class StationaryPoint(Checked):
     index: int | None
     orbit: int
     redundant: tuple[str, ...] = ()
-
-    @property
-    def point(self) -> Array:
-        """The middle of the enclosure, ``(n,)``."""
-        return 0.5 * (self.lower + self.upper)
 
     @property
     def is_minimum(self) -> bool:
@@ -98,8 +107,51 @@ class StationaryLocus(Checked):
         return self.index == 0
 
 
+class ProvedList(Printed, Checked, Generic[P]):
+    """Points in a box, of which it is proved that they are all, or what is undecided."""
+
+    points: tuple[P, ...]
+    record: Record | None
+
+    @property
+    @abstractmethod
+    def statement(self) -> str:
+        """What is proved, in a sentence."""
+
+    def __len__(self) -> int:
+        """Return the number of isolated points."""
+        return len(self.points)
+
+    def __iter__(self) -> Iterator[P]:
+        """Iterate over the isolated points."""
+        return iter(self.points)
+
+    def __repr__(self) -> str:
+        """Return the statement."""
+        return f"{type(self).__name__}({self.statement})"
+
+    @checked
+    def save(self, path: "str | os.PathLike[str]") -> "Path":
+        """Save the list and its proof, for an independent checker; return the path.
+
+        See :mod:`polycorner.proofs.lists.checker`.
+
+        Raises
+        ------
+        ValueError
+            If the name does not end in ``.zip``, and for a union of branches with equations of
+            their own, which are saved one by one.
+        OSError
+            If the file could not be written.
+        """
+        if self.record is None:
+            msg = "save: expected a list of one polyhedron; got one of branches with equations"
+            raise ValueError(msg)
+        return save(path, self.record)
+
+
 @dataclass(frozen=True, eq=False)
-class StationaryList(Printed, Checked):
+class StationaryList(ProvedList[StationaryPoint]):
     """Stationary points of an energy on a polyhedron in a box; see :func:`stationary_points`.
 
     Attributes
@@ -151,14 +203,6 @@ class StationaryList(Printed, Checked):
         """The strict local minima among the isolated points."""
         return tuple(p for p in self.points if p.is_minimum)
 
-    def __len__(self) -> int:
-        """Return the number of isolated points."""
-        return len(self.points)
-
-    def __iter__(self) -> Iterator[StationaryPoint]:
-        """Iterate over the isolated points."""
-        return iter(self.points)
-
     @checked
     def certificates(
         self, *, tolerance: float = TOLERANCE, rank_tolerance: float = RANK_TOLERANCE
@@ -209,10 +253,6 @@ class StationaryList(Printed, Checked):
         rest += f", and whether {empty} loci are empty" if empty else ""
         return f"Not complete: {count} {kind}{loci} are shown {where}; {rest}."
 
-    def __repr__(self) -> str:
-        """Return the statement."""
-        return f"StationaryList({self.statement})"
-
     def _sheet(self) -> Sheet:
         names = self.problem.polyhedron.manifold.names
         energies = () if self.parameters else ("energy",)
@@ -255,27 +295,8 @@ class StationaryList(Printed, Checked):
         head = (*given, "index", f"a point ({', '.join(names)})")
         return Table(head, rows, tuple(range(len(given) + 1)), "Loci")
 
-    @checked
-    def save(self, path: "str | os.PathLike[str]") -> "Path":
-        """Save the list and its proof, for an independent checker; return the path.
 
-        See :mod:`polycorner.proofs.lists.checker`.
-
-        Raises
-        ------
-        ValueError
-            If the name does not end in ``.zip``, and for a union of branches with equations of
-            their own, which are saved one by one.
-        OSError
-            If the file could not be written.
-        """
-        if self.record is None:
-            msg = "save: expected a list of one polyhedron; got one of branches with equations"
-            raise ValueError(msg)
-        return save(path, self.record)
-
-
-def locus_of(search: Search, place: LocusRegion) -> StationaryLocus:
+def locus_of(search: BoxSearch, place: LocusRegion) -> StationaryLocus:
     """Return a locus by the names of its coordinates."""
     keys = [search.domain.manifold.names[i] for i in place.z]
     n = len(search.domain.lower) - len(search.domain.parameters)

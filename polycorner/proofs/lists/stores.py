@@ -37,7 +37,6 @@ from polycorner.atomic import is_part, write_atomically
 from polycorner.checks import choice, refuse, whole
 from polycorner.container import one_sentence, read_arrays
 from polycorner.formulas.cache import sources_digest
-from polycorner.proofs.lists.boxes import Boxes, joined
 from polycorner.proofs.lists.records import (
     locus_data,
     locus_from,
@@ -45,8 +44,8 @@ from polycorner.proofs.lists.records import (
     region_data,
     region_from,
 )
-from polycorner.proofs.lists.search import Search, Tally
-from polycorner.proofs.lists.tree import DIRECTED, SPLIT, Tree
+from polycorner.proofs.lists.search import BoxSearch, Tally
+from polycorner.proofs.lists.tree import DIRECTED, SPLIT, Boxes, Tree, joined
 from polycorner.searches import Clock
 
 FORMAT = ["polycorner-search-of-stationary-points", 1]
@@ -65,7 +64,7 @@ DIFFERENCES = {
 }
 
 
-def check_progress(root: Mapping[str, Any], search: Search) -> None:
+def check_progress(root: Mapping[str, Any], search: BoxSearch) -> None:
     """Check what is known, before it is made again.
 
     Raises
@@ -141,7 +140,7 @@ def check_tree(records: Mapping[str, Any], before: Tree, n: int) -> None:
         forms.array("vectors", vectors, "f", (len(owners), n))
 
 
-def check_boxes(name: str, boxes: Boxes, search: Search) -> None:
+def check_boxes(name: str, boxes: Boxes, search: BoxSearch) -> None:
     """Check boxes that wait or are undecided."""
     n, domain = search.problem.dimension, search.domain
     shape = (len(boxes.nodes), n)
@@ -163,14 +162,14 @@ def check_leaves(tree: Tree, boxes: Sequence[Boxes]) -> None:
         refuse("boxes", "each of them once", "some twice")
 
 
-class Store:
+class SearchStore:
     """A search on disk.
 
     Parameters
     ----------
     path : path
         The folder; it is created if it does not exist.
-    search : Search
+    search : BoxSearch
         One that has not begun; what the store holds is put into it.
 
     Raises
@@ -181,7 +180,7 @@ class Store:
         If it cannot be written.
     """
 
-    def __init__(self, path: str | os.PathLike[str], search: Search) -> None:
+    def __init__(self, path: str | os.PathLike[str], search: BoxSearch) -> None:
         if not isinstance(path, str | os.PathLike):
             checks.refuse("store", "the path of a folder", path, TypeError)
         self.path, self.search = Path(path), search
@@ -312,7 +311,7 @@ class Store:
         return one_sentence(lambda why: ValueError(f"{said} ({why})"))
 
 
-def _stated(search: Search) -> dict[str, Any]:
+def _stated(search: BoxSearch) -> dict[str, Any]:
     """Return what a search is about."""
     problem = posed(search)
     parts = ("functions", "domain", "symmetries")
@@ -325,7 +324,7 @@ def _stated(search: Search) -> dict[str, Any]:
     }
 
 
-def _progress(search: Search) -> dict[str, Any]:
+def _progress(search: BoxSearch) -> dict[str, Any]:
     """Return what is known; numbers are written with all their digits."""
     return {
         "tally": asdict(search.tally),

@@ -24,14 +24,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, between, dot, matrix, precision
+from polycorner.intervals.balls import ball, dot, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
-from polycorner.proofs.definite import pivots
-from polycorner.proofs.lists.acceptance import QUARTERINGS, WIDEST, Region
-from polycorner.proofs.lists.operators import BITS, outward
-from polycorner.proofs.lists.vertices import Vertices
+from polycorner.proofs.definite import is_definite, is_regular
+from polycorner.proofs.lists.faces import BITS, WIDEST, EnclosedFaces, Region, enclosing, outward
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.spaces.manifold import Array
 
@@ -67,12 +65,12 @@ class TipRegion(Region):
     critical: tuple[int, ...]
 
 
-def tips(vertices: Vertices, q: Array, open_: Sequence[int], reach: float) -> Iterator[TipRegion]:
+def tips(faces: EnclosedFaces, q: Array, open_: Sequence[int], reach: float) -> Iterator[TipRegion]:
     """Yield boxes about a singular corner near ``q``, for each set of functions that isolates it.
 
     Parameters
     ----------
-    vertices : Vertices
+    faces : EnclosedFaces
     q : (n,) array
     open_ : sequence of int
         Inequalities that may vanish there.
@@ -80,35 +78,35 @@ def tips(vertices: Vertices, q: Array, open_: Sequence[int], reach: float) -> It
         How far the corner may be, in scale units.
     """
     with precision(BITS):
-        near = _approximate(vertices, q, open_)
-        if near is None or (abs(near - q) > reach * vertices.scales).any():
+        near = _approximate(faces, q, open_)
+        if near is None or (abs(near - q) > reach * faces.scales).any():
             return
-        for point in _rational(vertices, near, reach):
-            found = list(_tips_at(vertices, point, open_))
+        for point in _rational(faces, near, reach):
+            found = list(_tips_at(faces, point, open_))
             yield from found
             if found:
                 return
 
 
-def _tips_at(vertices: Vertices, point: Exact, open_: Sequence[int]) -> Iterator[TipRegion]:
-    active, slopes = _vanishing(vertices, point, open_)
+def _tips_at(faces: EnclosedFaces, point: Exact, open_: Sequence[int]) -> Iterator[TipRegion]:
+    active, slopes = _vanishing(faces, point, open_)
     if active is None:
         return
-    rest = range(len(active), len(active) + vertices.equations)
-    for size in range(len(vertices.free) - vertices.equations + 1):
+    rest = range(len(active), len(active) + faces.equations)
+    for size in range(len(faces.free) - faces.equations + 1):
         for places in combinations(range(len(active)), size):
             chosen = [slopes[i] for i in (*places, *rest)]
-            found = _isolated(vertices, point, [active[i] for i in places], chosen)
+            found = _isolated(faces, point, [active[i] for i in places], chosen)
             if found is not None:
                 yield found
 
 
-def _approximate(vertices: Vertices, q: Array, open_: Sequence[int]) -> Array | None:
+def _approximate(faces: EnclosedFaces, q: Array, open_: Sequence[int]) -> Array | None:
     """Return a common zero of functions near ``q`` by the method of Gauss and Newton."""
-    free, rows = list(vertices.free), vertices.rows(open_)
+    free, rows = list(faces.free), faces.rows(open_)
     q = q.copy()
     for _ in range(MOST_STEPS):
-        forms = vertices.formulas.smooth(Box([ball(x) for x in q.tolist()]), rows)
+        forms = faces.formulas.smooth(Box([ball(x) for x in q.tolist()]), rows)
         if isinstance(forms, Undecided):
             return None
         values, gradients = forms.evaluate(Box([ball(x) for x in q.tolist()]), 1)
@@ -116,45 +114,45 @@ def _approximate(vertices: Vertices, q: Array, open_: Sequence[int]) -> Array | 
         missed = np.array([float(x.mid()) for x in values])
         if not (np.isfinite(slopes).all() and np.isfinite(missed).all()):
             return None
-        step = np.linalg.lstsq(slopes * vertices.scales[free], -missed, rcond=1e-9)[0]
-        q[free] += step * vertices.scales[free]
+        step = np.linalg.lstsq(slopes * faces.scales[free], -missed, rcond=1e-9)[0]
+        q[free] += step * faces.scales[free]
         if abs(step).max(initial=0.0) < 1e-14:
             break
     return q
 
 
-def _rational(vertices: Vertices, near: Array, reach: float) -> Iterator[Exact]:
+def _rational(faces: EnclosedFaces, near: Array, reach: float) -> Iterator[Exact]:
     """Yield points with small denominators near one, the smallest first."""
-    fixed = set(range(len(near))) - set(vertices.free)
+    fixed = set(range(len(near))) - set(faces.free)
     seen = set()
     for most in DENOMINATORS:
         numbers = [Fraction(x) for x in near.tolist()]
         point = tuple(
             [x if i in fixed else x.limit_denominator(most) for i, x in enumerate(numbers)]
         )
-        away = abs(np.array([float(x) for x in point]) - near) / vertices.scales
+        away = abs(np.array([float(x) for x in point]) - near) / faces.scales
         if point not in seen and (away <= reach).all():
             seen.add(point)
             yield point
 
 
 def _vanishing(
-    vertices: Vertices, point: Exact, open_: Sequence[int]
+    faces: EnclosedFaces, point: Exact, open_: Sequence[int]
 ) -> tuple[list[int] | None, list[list[Fraction]]]:
     """Return the functions that vanish exactly at a point, and their gradients, equations last.
 
     None unless all equations vanish and everything is a rational number.
     """
-    rows = vertices.rows(open_)
-    forms = vertices.formulas.smooth(Box([ball(x) for x in point]), rows)
+    rows = faces.rows(open_)
+    forms = faces.formulas.smooth(Box([ball(x) for x in point]), rows)
     if isinstance(forms, Undecided):
         return None, []
     d = forms.graph.derivative
-    slopes = [d(f, i) for f in forms.outputs for i in vertices.free]
+    slopes = [d(f, i) for f in forms.outputs for i in faces.free]
     inputs = [algebra.number(x) for x in point]
     found = evaluate(forms.graph, [*forms.outputs, *slopes], inputs, Symbols())
     numbers = [None if p is None else algebra.constant(p) for p in found]
-    values, n = numbers[: len(rows)], len(vertices.free)
+    values, n = numbers[: len(rows)], len(faces.free)
     if any(value != 0 for value in values[len(open_) :]):
         return None, []
     active, gradients = [], []
@@ -169,7 +167,7 @@ def _vanishing(
 
 
 def _isolated(
-    vertices: Vertices, point: Exact, active: list[int], slopes: list[list[Fraction]]
+    faces: EnclosedFaces, point: Exact, active: list[int], slopes: list[list[Fraction]]
 ) -> TipRegion | None:
     """Return the widest box tried in which the point is the only common zero."""
     import sympy
@@ -184,26 +182,22 @@ def _isolated(
     ]
     chosen = _relations(relations)
     q = np.array([float(x) for x in point])
-    free = list(vertices.free)
-    for power in range(QUARTERINGS if chosen else 0):
-        radii = np.zeros_like(q)
-        radii[free] = WIDEST / 4**power * vertices.scales[free]
+    for radii in faces.reaches(WIDEST) if chosen else ():
         lower, upper = q - radii, q + radii
-        sides = zip(lower.tolist(), upper.tolist(), strict=True)
-        box = Box([between(a, b) for a, b in sides])
-        forms = vertices.formulas.smooth(box, vertices.rows(active))
+        box = enclosing(lower, upper)
+        forms = faces.formulas.smooth(box, faces.rows(active))
         if isinstance(forms, Undecided):
             continue
-        hessians = _hessians(forms, box, vertices.free)
-        away = [box.hull[i] - ball(point[i]) for i in vertices.free]
+        hessians = _hessians(forms, box, faces.free)
+        away = [box.hull[i] - ball(point[i]) for i in faces.free]
         for relation in chosen:
             for weight in _weights(hessians, slopes, relation):
                 if isolates(hessians, slopes, away, relation, weight):
-                    ends = np.array([outward(ball(point[i])) for i in vertices.free])
+                    ends = np.array([outward(ball(point[i])) for i in faces.free])
                     critical = [
                         i
                         for i, g, h in zip(active, slopes, hessians, strict=False)
-                        if not any(g) and not vertices.equations and _regular(h)
+                        if not any(g) and not faces.equations and is_regular(h)
                     ]
                     return TipRegion(
                         lower, upper, tuple(active), ends[:, 0], ends[:, 1], None,
@@ -251,15 +245,4 @@ def isolates(
         ]
         for i in range(n)
     ]
-    symmetric = [[(form[i][j] + form[j][i]) / 2 for j in range(n)] for i in range(n)]
-    found = pivots(symmetric)
-    return len(found) == n and all(x > 0 for x in found)
-
-
-def _regular(rows: "list[list[Ball]]") -> bool:
-    """Whether every matrix in an enclosure is regular."""
-    try:
-        matrix(rows).inv()
-    except ZeroDivisionError:
-        return False
-    return True
+    return is_definite([[(form[i][j] + form[j][i]) / 2 for j in range(n)] for i in range(n)])

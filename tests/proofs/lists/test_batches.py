@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from polycorner.proofs.lists.batches import inverted, solved
+from polycorner.proofs.lists.attempts import inverted, solved
 
 RNG = np.random.default_rng(0)
 

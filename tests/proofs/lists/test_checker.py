@@ -25,7 +25,7 @@ from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs.lists import checker, records, search
 from polycorner.proofs.lists.checker import balls, problem
 from polycorner.proofs.lists.checker.__main__ import main
-from polycorner.proofs.lists.checker.proof import Proof
+from polycorner.proofs.lists.checker.proof import StoredProof
 from polycorner.proofs.lists.enumeration import stationary_points
 
 PLANE = Manifold.euclidean("x y")
@@ -533,7 +533,7 @@ def stated(nodes, outputs, **more):
     data = {"format": problem.FORMAT, "coordinates": ["x", "y"], "periods": [None, None]}
     data |= {"inequalities": 0, "equations": 0, "branches": [[]], "domain": sides}
     data |= {"minima_only": False, "functions": ["E"], "weights": [(0.0).hex()] * 2}
-    return Proof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
+    return StoredProof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
 
 
 @pytest.mark.parametrize("level", ["-1", "1/2"])
@@ -549,7 +549,7 @@ def test_a_locus_of_an_energy_that_selects_by_another_coordinate_is_refused(leve
     if level == "-1":  # which no point of the domain is below
         assert stated(nodes, [10], loci=[locus]).loci[0].index == 0
     else:
-        with pytest.raises(balls.RefusedError, match="locus"):
+        with pytest.raises(balls.NotShownError, match="locus"):
             stated(nodes, [10], loci=[locus])
 
 

@@ -10,12 +10,12 @@ from polycorner import AnyOf, Manifold, NonsmoothWarning, Polyhedron, SmoothFunc
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.proofs import corners, stationary_points
 from polycorner.proofs.lists import search
-from polycorner.proofs.lists.boxes import Boxes
 from polycorner.proofs.lists.branches import conjunctions
 from polycorner.proofs.lists.checker.balls import hull
-from polycorner.proofs.lists.checker.proof import Proof
+from polycorner.proofs.lists.checker.proof import StoredProof
 from polycorner.proofs.lists.checker.verdict import check, contents
 from polycorner.proofs.lists.contraction import narrowed
+from polycorner.proofs.lists.tree import Boxes
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
@@ -131,7 +131,7 @@ def test_slopes_in_the_checker_contain_those_of_points(tmp_path):
     d = Polyhedron(PLANE, {"disc": 9 - X**2 - Y**2})
     energy = sympy.sin(X * Y) + X**3 / (3 + Y)
     path = stationary_points(d, energy, box=SIDES, max_boxes=9).save(tmp_path / "list.zip")
-    proof = Proof(contents(str(path))[0])
+    proof = StoredProof(contents(str(path))[0])
     p = proof.p
     rng = np.random.default_rng(2)
     slope = sympy.lambdify((X, Y), [energy.diff(X), energy.diff(Y)])
@@ -156,7 +156,7 @@ def test_slopes_in_the_checker_contain_those_of_points(tmp_path):
 def test_the_checker_reads_no_sign_from_slopes_that_are_not_bounded(formula, tmp_path):
     d = Polyhedron(PLANE, {"f": formula, "right": X})
     proof = stationary_points(d, X + Y, box=[(0, 1), (0, 1)], max_boxes=5).save(tmp_path / "l.zip")
-    p = Proof(contents(str(proof))[0]).p
+    p = StoredProof(contents(str(proof))[0]).p
     lo, hi = [0.0, 0.0], [1.0, 1.0]
     assert p.sign(p.values(hull(lo, hi)), 0, {}, lo, hi) == 0
 

@@ -13,12 +13,12 @@ from polycorner import AnyOf, Manifold, NonsmoothWarning, Polyhedron, SmoothFunc
 from polycorner.minimisation.problem import pose
 from polycorner.proofs import stationary_points
 from polycorner.proofs.lists import search as searching
-from polycorner.proofs.lists.boxes import Boxes
-from polycorner.proofs.lists.checker.balls import RefusedError
+from polycorner.proofs.lists.checker.balls import NotShownError
 from polycorner.proofs.lists.checker.verdict import check
 from polycorner.proofs.lists.domains import domain
-from polycorner.proofs.lists.saddles import without_minima
-from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.examination import without_minima
+from polycorner.proofs.lists.search import StationarySearch
+from polycorner.proofs.lists.tree import Boxes
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
@@ -77,7 +77,7 @@ def test_a_minimum_that_is_left_out_is_missed(tmp_path):
     d, energy = PROBLEMS["Himmelblau's function in a disc"]
     path = stationary_points(d, energy, box=SIDES, minima_only=True).save(tmp_path / "list.zip")
     changed(path, lambda data: data["points"].pop(0))
-    with pytest.raises(RefusedError, match="is not listed"):
+    with pytest.raises(NotShownError, match="is not listed"):
         check(str(path), None, 1)
 
 
@@ -87,7 +87,7 @@ def test_a_list_of_minima_that_passes_for_a_whole_one_is_refused(tmp_path):
     d, energy = PROBLEMS["saddles on the boundary"]
     path = stationary_points(d, energy, box=SIDES, minima_only=True).save(tmp_path / "list.zip")
     changed(path, lambda data: data.update(minima_only=False))
-    with pytest.raises(RefusedError):
+    with pytest.raises(NotShownError):
         check(str(path), None, 1)
 
 
@@ -123,7 +123,7 @@ def test_boxes_that_are_closed_contain_no_minimum(energy, wall, active, seed):
     formula = sum((c * term for c, term in zip(energy, terms, strict=True)), U**2 / 7)
     bound = wall[0] * U + wall[1] * V + W + wall[2] * U**2 + wall[3] * V * W
     problem = pose(Polyhedron(SPACE, {"wall": bound}), formula)
-    search = Search(problem, domain(SPACE, [(-2, 2)] * 3), 1e-6)
+    search = StationarySearch(problem, domain(SPACE, [(-2, 2)] * 3), 1e-6)
     rng = np.random.default_rng(seed)
     for q, lam in kkt_points(problem, active, rng):
         half = 10.0 ** rng.uniform(-4, 0, (8, 1))
@@ -168,7 +168,7 @@ def test_a_saddle_on_a_wall_without_force_is_no_minimum(wall, tmp_path):
     path = found.save(tmp_path / "saddle.zip")
     assert check(str(path), None, 1).startswith("verified: 0 local minima")
     changed(path, lambda data: data["regions"][0].update(way=["0x0p0", "0x0p0"]))
-    with pytest.raises(RefusedError, match="is not listed"):
+    with pytest.raises(NotShownError, match="is not listed"):
         check(str(path), None, 1)
     upright = Polyhedron(PLANE, {"wall": wall.subs({X: Y, Y: X}, simultaneous=True)})
     found = stationary_points(

@@ -9,10 +9,9 @@ import sympy
 
 from polycorner import Manifold, Polyhedron
 from polycorner.proofs import stationary_points
-from polycorner.proofs.lists.attempts import Screen
-from polycorner.proofs.lists.candidates import newton
+from polycorner.proofs.lists.attempts import Screen, newton
 from polycorner.proofs.lists.enumeration import begun
-from polycorner.proofs.lists.search import CHUNKS, LEAST, Search
+from polycorner.proofs.lists.search import CHUNKS, LEAST, StationarySearch
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
@@ -91,7 +90,7 @@ def test_workers_are_counted(lattice):
 
 def test_boxes_that_pass_the_screen_have_one_point_by_ball_arithmetic(lattice):
     problem, found = lattice
-    setting = begun(Search, *problem.values(), None, 1e-6)
+    setting = begun(StationarySearch, *problem.values(), None, 1e-6)
     inside = np.array([p.point for p in found if not p.active])
     radii = Screen(setting, (), inside).radii(np.ones(len(inside)))
     assert np.isfinite(radii).mean() > 0.9
@@ -104,7 +103,7 @@ def test_boxes_that_pass_the_screen_have_one_point_by_ball_arithmetic(lattice):
 
 def test_newton_finds_kkt_points_of_the_face_of_each_start():
     d = Polyhedron(PLANE, {"low": Y, "left": X + 1})
-    setting = begun(Search, d, X**4 - X**2 + Y, [(-2, 2), (-1, 2)], None, 1e-6)
+    setting = begun(StationarySearch, d, X**4 - X**2 + Y, [(-2, 2), (-1, 2)], None, 1e-6)
     starts = np.array([[0.9, 0.4], [0.0, 0.1], [-0.9, 0.2], [0.4, 0.1], [-0.9, 0.1]])
     active = np.array([[1, 0]] * 3 + [[0, 0], [1, 1]], dtype=bool)
     q, found = newton(setting.problem, starts, active, (0, 1))

@@ -17,7 +17,7 @@ from polycorner.proofs import stationary_points
 from polycorner.proofs.lists.checker import __main__ as checker
 from polycorner.proofs.lists.domains import domain
 from polycorner.proofs.lists.members import OUT, judged
-from polycorner.proofs.lists.search import Search
+from polycorner.proofs.lists.search import StationarySearch
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols
@@ -271,7 +271,7 @@ def test_a_place_is_left_out_where_a_distance_is_zero():
     d = Polyhedron(PLANE, {"away": sympy.sqrt(across**2 + along**2) - sympy.Rational(1, 4)})
     energy, centre = across**2 + 2 * along**2, [math.asin(math.sin(1) / 3), math.sqrt(3) / 3]
     box = [(-1.5, 1.5), (-4, 4)]
-    search = Search(pose(d, energy), domain(PLANE, box), 1e-6)
+    search = StationarySearch(pose(d, energy), domain(PLANE, box), 1e-6)
     region = search.faces.region(np.array(centre), [])
     assert region is not None
     assert judged(search, region).place == OUT

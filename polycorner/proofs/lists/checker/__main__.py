@@ -4,7 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from .balls import RefusedError
+from .balls import NotShownError
 from .verdict import check
 
 
@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     try:
         print(check(given.file, given.sample, given.jobs))
-    except RefusedError as error:
+    except NotShownError as error:
         print(f"NOT VERIFIED: {error}")
         return 1
     except OSError as error:

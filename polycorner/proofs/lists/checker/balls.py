@@ -11,13 +11,13 @@ BESIDE = 2.0**-40  # to which points beyond a side are listed: wider than enclos
 ZERO, NAN = arb(0), arb("nan")
 
 
-class RefusedError(Exception):
+class NotShownError(Exception):
     """Something in the file could not be shown."""
 
 
 def need(condition: object, message: str) -> None:
     if not condition:
-        raise RefusedError(message)
+        raise NotShownError(message)
 
 
 def places(numbers: Any, count: int, message: str) -> list[int]:

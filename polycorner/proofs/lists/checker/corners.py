@@ -6,39 +6,39 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .balls import ZERO, different, dot, hull, need, nothing, number
-from .problem import Problem
-from .proof import Proof
+from .problem import StoredProblem
+from .proof import StoredProof
 from .symmetries import POINTS, symmetries
-from .vertices import Vertex
+from .vertices import StoredVertex
 
 SHIFT = 2.0**-30
 
 
-class CornerProof(Proof):
+class StoredCorners(StoredProof):
     """The problem of a file, with regions and symmetries."""
 
     kind = "corners"
 
     def __init__(self, data: dict[str, Any]) -> None:
-        self.p = p = Problem(data)
+        self.p = p = StoredProblem(data)
         different(data["regions"], "a region is stated")
-        self.regions = [Vertex(p, r) for r in data["regions"]]
+        self.regions = [StoredVertex(p, r) for r in data["regions"]]
         self.tested = sum(vertex.tested for vertex in self.regions)
-        self.related = [Relation(p, r).rows for r in data["relations"]]
+        self.related = [StoredRelation(p, r).rows for r in data["relations"]]
         self.symmetries = symmetries(p, data)
 
     def shown(self, lo: list[float], hi: list[float], _: list[list[arb]]) -> bool:
         """Whether a box is closed rightly."""
         if any(g.carries(lo, hi) for g in self.symmetries):
             return True
-        box = Box(self.p, lo, hi)
+        box = StoredBox(self.p, lo, hi)
         signs = self.p.signs(box.v)
         if self.known(box, signs):
             return True
         closer = [s or self.p.sign(box.v, row, box.memo, lo, hi) for row, s in enumerate(signs)]
         return closer != signs and self.known(box, closer)
 
-    def known(self, box: "Box", signs: list[int]) -> bool:
+    def known(self, box: "StoredBox", signs: list[int]) -> bool:
         """Whether all corners in a box are known, from the sets of functions that may vanish.
 
         Each set vanishes nowhere, or at a known point only, or has independent gradients and too
@@ -75,10 +75,10 @@ class CornerProof(Proof):
         need(active == point["active"], f"{vertex.name}: {active} are active")
 
 
-class Relation:
+class StoredRelation:
     """A linear relation between inequalities and equations, tested at random points."""
 
-    def __init__(self, p: Problem, record: dict[str, Any]) -> None:
+    def __init__(self, p: StoredProblem, record: dict[str, Any]) -> None:
         name, weights = f"relation {record}", [number(text) for text in record["weights"]]
         self.rows = frozenset(record["rows"])
         fine = (
@@ -94,10 +94,10 @@ class Relation:
             need(nothing(dot(weights, values)), f"{name}: is none")
 
 
-class Box:
+class StoredBox:
     """Enclosures of functions on a box."""
 
-    def __init__(self, p: Problem, lo: list[float], hi: list[float]) -> None:
+    def __init__(self, p: StoredProblem, lo: list[float], hi: list[float]) -> None:
         self.p, self.lo, self.hi = p, lo, hi
         self.hull, self.memo = hull(lo, hi), dict[int, Any]()
         self.v = p.values(self.hull)

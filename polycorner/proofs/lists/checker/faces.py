@@ -5,18 +5,22 @@ from typing import Any
 from flint import acb_mat, arb, arb_mat
 
 from .balls import BESIDE, ZERO, definite, dot, hull, moved, need, nothing, shown, sides, turn, zero
-from .problem import Problem
+from .problem import StoredProblem
 
 HALVINGS = 6  # of a region, in whose parts multipliers are enclosed
 
 
-class Face:
+class StoredRegion:
     """A region, or a locus: a box with one KKT point on a face, all multipliers positive.
 
     Of a locus the face is the whole space of the coordinates that the energy depends on.
     """
 
-    def __init__(self, p: Problem, record: dict[str, Any], places: list[int], active: Any) -> None:
+    tested = 0  # properties at the point that are not shown, but tested
+
+    def __init__(
+        self, p: StoredProblem, record: dict[str, Any], places: list[int], active: Any
+    ) -> None:
         self.p, self.places, self.active = p, places, frozenset(active or ())
         self.name = f"{'locus' if active is None else 'region'} {record}"
         fine = self.active <= set(range(p.m)) and set(places) <= set(p.free)
@@ -45,21 +49,9 @@ class Face:
         self, sharp: list[list[float]], record: dict[str, Any], index: Any, given: frozenset[int]
     ) -> None:
         """Decide whether the point is in the set; the ``given`` functions are shown to vanish."""
-        p = self.p
-        slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in self.unknowns]
-        near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
-        inside = all(x.contains(y) for x, y in zip(near, self.unknowns, strict=True))
-        need(inside, f"{self.name}: the solution is elsewhere")
+        p, signs = self.p, self.located(sharp, given)
         self.index = index
         need(record["index"] in {None, self.index}, f"{self.name}: the index is {self.index}")
-        self.point = self.at(self.unknowns)
-        self.outside = p.is_outside(self.point, self.places)
-        self.far = p.is_outside(self.point, self.places, BESIDE)
-        v = p.values(self.point)
-        signs = p.signs(v)
-        self.zeros = given | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
-        self.tested = sum(not shown(v[p.outputs[i]]) for i in self.zeros - given)
-        self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
         self.branches = branches = p.open_sets(signs, self.zeros)
         sure = any(u <= self.zeros for u in branches)
         self.stationary = sure and all(self.active <= u for u in branches)
@@ -67,6 +59,26 @@ class Face:
         self.listable = self.stationary and not (p.minima_only and self.index != 0)
         self.absent = not branches or any(u < self.active for u in branches)
         self.absent |= p.minima_only and bool(self.index) and self.free
+
+    def located(self, sharp: list[list[float]], given: frozenset[int]) -> list[int]:
+        """Place the point by its unknowns; return the signs of all functions there.
+
+        Functions that are not ``given`` count as zero where they vanish up to ``2**-80``.
+        """
+        p = self.p
+        slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in self.unknowns]
+        near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
+        inside = all(x.contains(y) for x, y in zip(near, self.unknowns, strict=True))
+        need(inside, f"{self.name}: the solution is elsewhere")
+        self.point = self.at(self.unknowns)
+        self.outside = p.is_outside(self.point, self.places)
+        self.far = p.is_outside(self.point, self.places, BESIDE)
+        v = p.values(self.point)
+        signs = p.signs(v)
+        self.zeros = given | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
+        self.tested += sum(not shown(v[p.outputs[i]]) for i in self.zeros - given)
+        self.unknown = {i for i in range(p.m) if signs[i] == 0} - self.zeros
+        return signs
 
     def at(self, unknowns: list[arb], middle: bool = False) -> list[arb]:
         """Return all coordinates; others may be anywhere in the domain, or are in its middle."""
@@ -88,6 +100,11 @@ class Face:
         pairs = [[(i, j) for j in self.places] for i in self.places]
         bends = [[[h.get(ij, ZERO) for ij in row] for row in pairs] for _, h in found]
         return [v[self.p.outputs[row]] for row in self.rows], slopes, bends
+
+    def vanishing(self, unknowns: list[arb]) -> Any:
+        """Return values and gradients of the functions alone."""
+        found = self.rows_at(unknowns)
+        return found[:2] if found else ([], [])
 
     def start(self, growth: int) -> list[arb] | None:
         """Return the box, and more than an enclosure of the multipliers at all of its points."""
@@ -180,16 +197,22 @@ class Face:
         signs = self.p.signs(self.p.values(q))
         return any(all(signs[i] > 0 for i in branch) for branch in self.p.branches)
 
-    def same(self, other: "Face") -> bool | None:
+    def same(self, other: "StoredRegion") -> bool | None:
         """Whether two regions have one point: whether this one's lies in the other region."""
         alike, full = self.active == other.active, len(other.rows) > len(self.p.free)
         for one, two in ((self, other), (other, self)):
             if not alike and one.active - two.zeros - two.unknown:
                 return False
+        inside = self.lies_in(other)
+        if inside is False:
+            return False
+        return True if inside and (alike or (full and other.active <= self.zeros)) else None
+
+    def lies_in(self, other: "StoredRegion") -> bool | None:
+        """Whether the point lies in the box of another region; None where it is not decided."""
         ends = zip(self.places, other.lower, other.upper, strict=True)
         places = ((self.point[i], a, b, self.p.periods[i]) for i, a, b in ends)
         known = [(x + turn(x, a, b, period), a, b) for x, a, b, period in places]
-        inside = all(a <= x <= b for x, a, b in known)
         if any(x < a or x > b for x, a, b in known):
             return False
-        return True if inside and (alike or (full and other.active <= self.zeros)) else None
+        return True if all(a <= x <= b for x, a, b in known) else None

@@ -5,13 +5,13 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .balls import ZERO, dot, hull, need, sides, zero
-from .faces import Face
-from .problem import Problem
+from .faces import StoredRegion
+from .problem import StoredProblem
 
 NEAR = 2.0**-30  # reach of the box in which the point is sought
 
 
-class Pinned(Face):
+class StoredPin(StoredRegion):
     """A box without stationary points but one, at which the active functions vanish.
 
     The set is one intersection without equations.  For ``i`` of the active functions, the energy
@@ -21,7 +21,7 @@ class Pinned(Face):
     ``t r_j > sum mu_i R_i + 2 R_E + max(R_i / df_i u) dE u`` leave no other stationary point.
     """
 
-    def __init__(self, p: Problem, record: dict[str, Any]) -> None:
+    def __init__(self, p: StoredProblem, record: dict[str, Any]) -> None:
         self.p, self.places, self.active = p, p.free, frozenset(record["active"])
         self.name, n, corner = f"region of {record['active']}", len(p.free), {*record["corner"]}
         plain = not p.k and not p.parameters
@@ -39,11 +39,6 @@ class Pinned(Face):
         self.unknowns = [*(point or []), *self.shown(record, point or [])]
         self.placed(sharp, record, 0, frozenset(corner))
         need(self.active <= self.zeros, f"{self.name}: not all functions vanish")
-
-    def vanishing(self, unknowns: list[arb]) -> Any:
-        """Return values and gradients of the functions of the corner."""
-        found = self.rows_at(unknowns)
-        return found[:2] if found else ([], [])
 
     def shown(self, record: dict[str, Any], point: list[arb]) -> list[arb]:
         """Check the inequality; return positive multipliers."""

@@ -11,7 +11,7 @@ from .operations import LOGICAL, SLOPES, VALUES, arity, chain, ordered, unite
 FORMAT, CORNERS = ["polycorner-stationary-list", 1], ["polycorner-corner-list", 1]
 
 
-class Problem:
+class StoredProblem:
     """The problem of a file: a program of the functions, the branches of the set, the domain."""
 
     def __init__(self, data: dict[str, Any]) -> None:

@@ -8,36 +8,36 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .balls import NAN, ZERO, different, dot, hull, moved, need, places, sides
-from .faces import Face
-from .pinned import Pinned
-from .problem import Problem
+from .faces import StoredRegion
+from .pinned import StoredPin
+from .problem import StoredProblem
 from .symmetries import symmetries
 
 PIECES = 4000  # into which a box is bisected at most
 MOST_SETS = 500  # of functions that are looked at in a box
 
 
-class Proof:
+class StoredProof:
     """The problem of a file, with regions, loci and symmetries."""
 
     kind = "stationary points"  # that are listed
     related: Sequence[frozenset[int]] = ()  # functions with linear relations, tested
-    loci: Sequence[Face] = ()
+    loci: Sequence[StoredRegion] = ()
     ways: Sequence[list[float]] = ()
     counted = open = beside = 0  # points; those that may be; those beyond a side by rounding
 
     def __init__(self, data: dict[str, Any]) -> None:
-        self.p = p = Problem(data)
+        self.p = p = StoredProblem(data)
         self.kind = "local minima" if p.minima_only else self.kind
         different(data["regions"], "a region is stated")
         self.regions: list[Any] = [
-            Pinned(p, r) if "corner" in r else Face(p, r, p.free, r["active"])
+            StoredPin(p, r) if "corner" in r else StoredRegion(p, r, p.free, r["active"])
             for r in data["regions"]
         ]
         self.ways = [
             sides(r, ("way", "way"), p.n)[0] if "way" in r else [] for r in data["regions"]
         ]
-        self.loci = [Face(p, r, r["z"], None) for r in data["loci"]]
+        self.loci = [StoredRegion(p, r, r["z"], None) for r in data["loci"]]
         self.symmetries = symmetries(p, data)
         self.tested = sum(region.tested for region in self.regions)
 
@@ -157,7 +157,7 @@ class Proof:
         ]
         return sum(bent, ZERO) < 0
 
-    def is_saddle(self, face: Face, way: list[float]) -> bool:
+    def is_saddle(self, face: StoredRegion, way: list[float]) -> bool:
         """Whether negative curvature along all that may vanish at a point makes it no minimum."""
         u = frozenset[int]().union(*face.branches)
         return self.bends_down(u, self.p.values(face.point), [arb(x) for x in way])
@@ -216,9 +216,9 @@ class Proof:
         self.counted, self.open = sure, len(named) - sure
         self.beside = sum(face.outside for face in claimed)
 
-    def distinct(self) -> list[Face]:
+    def distinct(self) -> list[StoredRegion]:
         """Return loci that are not beside the domain, of minima if only these are listed, once."""
-        found = list[Face]()
+        found = list[StoredRegion]()
         for place in self.loci:
             alike = [place.same(other) for other in found]
             need(None not in alike, f"{place.name}: may be another one")

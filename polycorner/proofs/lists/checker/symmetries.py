@@ -8,16 +8,16 @@ from typing import Any
 from flint import arb
 
 from .balls import different, dot, hull, need, number, turn
-from .problem import Problem
+from .problem import StoredProblem
 
 POINTS = 20
 
 
-class Symmetry:
+class StoredSymmetry:
     """A map ``q -> signs * q[order] + shifts * periods``."""
 
     def __init__(
-        self, p: Problem, record: dict[str, Any], weights: list[str], name: str = ""
+        self, p: StoredProblem, record: dict[str, Any], weights: list[str], name: str = ""
     ) -> None:
         self.p, self.name = p, name or f"symmetry {record}"
         self.order, self.signs = record["order"], record["signs"]
@@ -78,19 +78,19 @@ class Symmetry:
         need(kept and sets[0] == sets[1], f"{self.name}: changes the problem")
 
 
-def periodic(p: Problem, weights: list[str]) -> Iterator[Symmetry]:
+def periodic(p: StoredProblem, weights: list[str]) -> Iterator[StoredSymmetry]:
     """Yield the turns by whole periods, which have to preserve the problem."""
     for i, name in enumerate(p.names):
         if p.periods[i] is not None:
             shifts = ["1" if k == i else "0" for k in range(p.n)]
             turns = {"order": [*range(p.n)], "signs": [1] * p.n, "shifts": shifts}
-            yield Symmetry(p, turns, weights, f"period of {name}")
+            yield StoredSymmetry(p, turns, weights, f"period of {name}")
 
 
-def symmetries(p: Problem, data: dict[str, Any]) -> list[Symmetry]:
+def symmetries(p: StoredProblem, data: dict[str, Any]) -> list[StoredSymmetry]:
     """Return the symmetries of a file, each once; see that coordinates have their periods."""
     list(periodic(p, data["weights"]))
-    found = [Symmetry(p, record, data["weights"]) for record in data["symmetries"]]
+    found = [StoredSymmetry(p, record, data["weights"]) for record in data["symmetries"]]
     different([g.key for g in found], "a symmetry is stated")
     need(not any(g.is_identity for g in found), "the identity is listed as a symmetry")
     return found

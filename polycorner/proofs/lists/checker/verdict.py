@@ -17,9 +17,9 @@ from threading import Thread
 from typing import Any
 
 from .balls import moved, need
-from .corners import CornerProof
-from .problem import CORNERS, Problem
-from .proof import Proof
+from .corners import StoredCorners
+from .problem import CORNERS, StoredProblem
+from .proof import StoredProof
 
 CHUNK = 500  # leaves that a worker checks at a time
 MOST_UNPACKED = 200  # bytes for each of a file; deflate packs a thousand zeros into one
@@ -37,7 +37,9 @@ def contents(path: str) -> tuple[dict[str, Any], list[Any]]:
         return json.loads(archive.read("problem.json")), parts
 
 
-def leaves(p: Problem, codes: Any, positions: Any, counts: Any, directions: Any) -> Iterator[Any]:
+def leaves(
+    p: StoredProblem, codes: Any, positions: Any, counts: Any, directions: Any
+) -> Iterator[Any]:
     """Yield number, sides and directions of the closed boxes."""
     waiting, places, rows, closed = [(p.lower, p.upper)], iter(positions), 0, 0
     for code in codes:
@@ -58,7 +60,7 @@ def leaves(p: Problem, codes: Any, positions: Any, counts: Any, directions: Any)
     need(closed == len(counts) and rows * p.n == len(directions), "the number of directions")
 
 
-WORKER: list[Proof] = []
+WORKER: list[StoredProof] = []
 
 
 def follow() -> None:
@@ -71,7 +73,7 @@ def follow() -> None:
 
 def begin(data: dict[str, Any]) -> None:
     Thread(target=follow, daemon=True).start()
-    WORKER[:] = [(CornerProof if data["format"] == CORNERS else Proof)(data)]
+    WORKER[:] = [(StoredCorners if data["format"] == CORNERS else StoredProof)(data)]
 
 
 def failing(chunk: list[Any]) -> Any:
@@ -105,7 +107,7 @@ def check(path: str, sample: int | None, jobs: int) -> str:
     return f"verified: {', '.join([*said(proof), leaves_, boxes, proof.p.where()])}"
 
 
-def said(proof: Proof) -> Iterator[str]:
+def said(proof: StoredProof) -> Iterator[str]:
     """Yield what a proof shows of points and loci, once its list is checked."""
     images = f" and their images under {len(proof.symmetries)} symmetries (tested, not proved)"
     yield f"{proof.counted} {proof.kind}{images if proof.symmetries else ''}"

@@ -1,4 +1,4 @@
-"""Boxes in which exactly one point is stationary, by Krawczyk's operator on the KKT equations.
+"""Faces over balls: boxes in which the functions held have exactly one KKT point, or one zero.
 
 Let ``U`` be the inequalities that may vanish in a box ``X``, ``A`` some of them, and let all
 functions involved be smooth on ``X``.  The multipliers of a stationary point of the branch ``A``
@@ -11,9 +11,13 @@ therefore solves the KKT equations with multipliers in the enclosure ``L``.  Kra
 
 For a branch whose open functions in a part of ``X`` are a subset of ``A`` this is the only
 candidate, and none if the subset is proper.
+
+A *vertex* has, with the equations, as many functions as there are free coordinates.  The operator
+on ``X`` shows that their Jacobian is regular and that they have exactly one common zero there: a
+regular corner, if it lies in the set.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -22,27 +26,27 @@ import numpy as np
 from polycorner.intervals.balls import (
     ball,
     between,
-    dot,
+    column,
+    entries,
+    exact,
+    matrix,
     middle_inverse,
     narrower,
     precision,
 )
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
-from polycorner.proofs.lists.operators import (
-    BITS,
-    enclosed_multipliers,
-    inertia,
-    krawczyk,
-    outward,
-    wider,
-)
+from polycorner.proofs.kkt import bordered, krawczyk, lagrangian, strictly_inside
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
+    Equations = tuple[list[Ball], list[list[Ball]]]  # residual and Jacobian
+
+BITS = 128
+SLACK = 16  # last binary digits of a multiplier that its enclosure covers at least
 QUARTERINGS = 10
 SHARPENINGS = 6
 SMALL = 2.0**-30  # of the radii of a box of unknowns: those of a small one about the solution
@@ -81,8 +85,8 @@ class Region(Value):
 
 
 @dataclass(frozen=True, eq=False)
-class Faces:
-    """The KKT equations of the faces of a problem, in the coordinates that are free.
+class EnclosedFaces:
+    """The faces of a problem over balls, in the coordinates that are free.
 
     Attributes
     ----------
@@ -103,54 +107,91 @@ class Faces:
     scales: Array
     held: Mapping[int, tuple[float, float]] = field(default_factory=dict)
 
+    @property
+    def equations(self) -> int:
+        """The number of equations."""
+        return len(self.formulas.names) - 1 - self.inequalities
+
     def rows(self, active: Sequence[int]) -> tuple[int, ...]:
-        """Return the rows of a face: active inequalities, equations, energy."""
-        return (*active, *range(self.inequalities, len(self.formulas.names)))
+        """Return the rows of a face: active inequalities, equations."""
+        return (*active, *range(self.inequalities, len(self.formulas.names) - 1))
 
     def region(
         self, q: Array, active: Sequence[int], widest: float = 1.0, guess: Array | None = None
     ) -> Region | None:
-        """Return the widest box tried about ``q`` in which one solution is shown, or None.
+        """Return the widest box tried about ``q`` in which one KKT point is shown, or None.
 
         Boxes reach ``widest`` scale units from ``q``, a quarter of it, and so on; before these,
         shares of one with the radii ``guess`` are tried.
         """
-        rows = self.rows(active)
+        rows = (*self.rows(active), len(self.formulas.names) - 1)
         with precision(BITS):
             for reach in [share * guess for share in GUESSED] if guess is not None else ():
                 shown = self._shown(*self._sides(q, reach), rows, len(active))
                 if isinstance(shown, Region):
                     return shown
-            reaches = [min(widest, WIDEST) / 4**power for power in range(QUARTERINGS)]
-            narrowest = self._box(*self._sides(q, self._radii(reaches[-1])))
-            if self._multipliers(narrowest, rows, len(active)) is None:
+            *_, last = reaches = list(self.reaches(widest))
+            if self._multipliers(enclosing(*self._sides(q, last)), rows, len(active)) is None:
                 return None  # as wider boxes have wider enclosures
-            for reach in reaches:
-                found = self._within(q, rows, len(active), reach)
+            for radii in reaches:
+                found = self._within(q, rows, len(active), radii)
                 if found is not None:
                     return found
         return None
 
-    def _within(self, q: Array, rows: tuple[int, ...], count: int, reach: float) -> Region | None:
-        """Try boxes that reach ``reach`` scale units or more from ``q``.
+    def vertex(self, q: Array, active: Sequence[int], widest: float) -> Region | None:
+        """Return the widest box tried about ``q`` in which one common zero is shown, or None.
+
+        Its enclosure has no multipliers.
+        """
+        with precision(BITS):
+            for radii in self.reaches(widest):
+                lower, upper = q - radii, q + radii
+                zero = self.zero(lower, upper, self.rows(active))
+                if zero is not None:
+                    ends = np.array([outward(x) for x in zero])
+                    return Region(lower, upper, tuple(active), ends[:, 0], ends[:, 1], None)
+        return None
+
+    def zero(self, lower: Array, upper: Array, rows: Sequence[int]) -> "list[Ball] | None":
+        """Enclose the only common zero in a box, in the free coordinates; None if not shown."""
+        box = enclosing(lower, upper)
+        forms = self.formulas.smooth(box, rows)
+        if isinstance(forms, Undecided):
+            return None
+        unknowns = [box.hull[i] for i in self.free]
+        found = self._image(forms, box, unknowns, kkt=False)
+        if found is None or not strictly_inside(found[0], unknowns):
+            return None
+        for _ in range(SHARPENINGS):
+            unknowns = [narrower(x, y) for x, y in zip(unknowns, found[0], strict=True)]
+            found = self._image(forms, box, unknowns, kkt=False)
+            if found is None:
+                break
+        return unknowns
+
+    def reaches(self, widest: float) -> Iterator[Array]:
+        """Yield the radii of boxes to be tried, the widest first."""
+        free = list(self.free)
+        for power in range(QUARTERINGS):
+            radii = np.zeros_like(self.scales)
+            radii[free] = min(widest, WIDEST) / 4**power * self.scales[free]
+            yield radii
+
+    def _within(self, q: Array, rows: tuple[int, ...], count: int, radii: Array) -> Region | None:
+        """Try boxes with some radii or more about ``q``.
 
         Where the image of a box is wider than the box along a coordinate, the next is as wide.
         """
-        radii = self._radii(reach)
+        free = list(self.free)
         for _ in range(WIDENINGS):
             found = self._shown(*self._sides(q, radii), rows, count)
             if found is None or isinstance(found, Region):
                 return found
-            if (found > MOST_WIDENING * radii[list(self.free)]).any():
+            if (found > MOST_WIDENING * radii[free]).any():
                 break
-            radii[list(self.free)] = np.maximum(radii[list(self.free)], GROWTH * found)
+            radii[free] = np.maximum(radii[free], GROWTH * found)
         return None
-
-    def _radii(self, reach: float) -> Array:
-        """Return the radii of a box that reaches ``reach`` scale units from its middle."""
-        radii = np.zeros_like(self.scales)
-        radii[list(self.free)] = reach * self.scales[list(self.free)]
-        return radii
 
     def _sides(self, q: Array, radii: Array) -> tuple[Array, Array]:
         """Return the ends of a box about ``q``, those of the parameters being given."""
@@ -163,33 +204,25 @@ class Faces:
         self, lower: Array, upper: Array, rows: tuple[int, ...], count: int
     ) -> "Region | Array | None":
         """Return the region of a box; the reach of its image if that is too wide; or None."""
-        box = self._box(lower, upper)
+        box = enclosing(lower, upper)
         enclosed = self._multipliers(box, rows, count)
         if enclosed is None:
             return None
         forms, multipliers = enclosed
-        _, gradients, hessians = forms.evaluate(box, 2)
-        n = len(self.free)
         unknowns = [*(box.hull[i] for i in self.free), *(wider(lam) for lam in multipliers)]
-        residual, start, centre = self._at_centre(forms, box, unknowns)
-        _, jacobian = self._equations([], gradients, hessians, unknowns)
-        inverse = middle_inverse(start)
-        if inverse is None:
+        found = self._image(forms, box, unknowns)
+        if found is None:
             return None
-        image = krawczyk(residual, jacobian, inverse, unknowns, centre)
-        if not _inside(image, unknowns):
-            reach = [(y - c).abs_upper() for y, c in zip(image[:n], centre, strict=False)]
-            return np.array([float(x) for x in reach])
+        image, start = found
+        if not strictly_inside(image, unknowns):
+            pairs = zip(image[: len(self.free)], unknowns, strict=False)
+            return np.array([float((y - x.mid()).abs_upper()) for y, x in pairs])
         sharp = self._sharpened(forms, box, unknowns, image)
-        index = self._index(start, len(rows) - 1)
         ends = np.array([outward(x) for x in sharp])
         if self.held:  # so that others, who stop elsewhere, arrive within
             ends += LOOSENESS * (ends[:, 1:] - ends[:, :1]) * np.array([-1.0, 1.0])
+        index = self._index(start, len(rows) - 1)
         return Region(lower, upper, tuple(rows[:count]), ends[:, 0], ends[:, 1], index)
-
-    @staticmethod
-    def _box(lower: Array, upper: Array) -> Box:
-        return Box([between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)])
 
     def _multipliers(
         self, box: Box, rows: tuple[int, ...], count: int
@@ -204,36 +237,33 @@ class Faces:
             return None
         return forms, multipliers
 
-    def _at_centre(
-        self, forms: SmoothForms, box: Box, unknowns: "list[Ball]"
-    ) -> "tuple[list[Ball], list[list[Ball]], list[Ball]]":
-        """Return the equations and their Jacobian in the middle of the unknowns, and the middle."""
+    def _image(
+        self, forms: SmoothForms, box: Box, unknowns: "list[Ball]", *, kkt: bool = True
+    ) -> "tuple[list[Ball], list[list[Ball]]] | None":
+        """Return the image under Krawczyk's operator, and the Jacobian in the middle."""
         centre = [x.mid() for x in unknowns]
-        point = list(box.hull)
-        for i, x in zip(self.free, centre, strict=False):
-            point[i] = x
-        values, gradients, hessians = forms.evaluate(Box(point), 2)
-        return *self._equations(values, gradients, hessians, centre), centre
+        residual, start = self._equations(forms, box, centre, kkt)
+        inverse = middle_inverse(start)
+        if inverse is None:
+            return None
+        _, jacobian = self._equations(forms, box, unknowns, kkt)
+        return krawczyk(residual, jacobian, inverse, unknowns, centre), start
 
     def _equations(
-        self,
-        values: "list[Ball]",
-        gradients: "list[list[Ball]]",
-        hessians: "list[list[list[Ball]]]",
-        unknowns: "list[Ball]",
-    ) -> "tuple[list[Ball], list[list[Ball]]]":
-        """Return the residual of the KKT equations and their Jacobian."""
-        free, n = self.free, len(self.free)
+        self, forms: SmoothForms, box: Box, unknowns: "list[Ball]", kkt: bool
+    ) -> "Equations":
+        """Return the equations of a face and their Jacobian; KKT equations, or functions alone."""
+        n, hull = len(self.free), list(box.hull)
+        for i, x in zip(self.free, unknowns, strict=False):
+            hull[i] = x
+        if not kkt:
+            values, gradients = forms.evaluate(Box(hull), 1)
+            return values, [[g[i] for i in self.free] for g in gradients]
+        values, gradients, hessians = forms.evaluate(Box(hull), 2)
         weights = [*(-lam for lam in unknowns[n:]), ball(1)]
-        rows = [[g[i] for i in free] for g in gradients[:-1]]
-        slope = [dot(weights, [g[i] for g in gradients]) for i in free]
-        bent = [[dot(weights, [h[i][j] for h in hessians]) for j in free] for i in free]
-        nothing = [ball(0)] * len(rows)
-        jacobian = [
-            *([*bent[i], *(-row[i] for row in rows)] for i in range(n)),
-            *([*row, *nothing] for row in rows),
-        ]
-        return [*slope, *values[: len(rows)]], jacobian
+        slope, bent = lagrangian(weights, gradients, hessians, self.free, self.free)
+        rows = [[g[i] for i in self.free] for g in gradients[:-1]]
+        return [*slope, *values[:-1]], bordered(bent, rows)
 
     def _sharpened(
         self, forms: SmoothForms, box: Box, unknowns: "list[Ball]", image: "list[Ball]"
@@ -245,8 +275,8 @@ class Faces:
         """
         small = self._small(forms, box, unknowns)
         shown = small and self._image(forms, box, small)
-        if small and shown and _inside(shown, small) and _inside(small, unknowns):
-            image = shown
+        if small and shown and strictly_inside(shown[0], small):
+            image = shown[0] if strictly_inside(small, unknowns) else image
         for _ in range(SHARPENINGS):
             pairs = zip(image, unknowns, strict=True)
             if all(y.rad() <= x.abs_upper() * ball(2) ** (-TIGHT) for y, x in pairs):
@@ -254,7 +284,7 @@ class Faces:
             again = self._image(forms, box, image)
             if again is None:
                 break
-            image = [narrower(x, y) for x, y in zip(image, again, strict=True)]
+            image = [narrower(x, y) for x, y in zip(image, again[0], strict=True)]
         return image
 
     def _small(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball] | None":
@@ -272,19 +302,6 @@ class Faces:
         pairs = zip(middle, reach, strict=True)
         return [x.mid() + ball(0, SMALL * r + x.rad()) for x, r in pairs]
 
-    def _image(self, forms: SmoothForms, box: Box, unknowns: "list[Ball]") -> "list[Ball] | None":
-        """Return the image of unknowns under Krawczyk's operator."""
-        hull = list(box.hull)
-        for i, x in zip(self.free, unknowns, strict=False):
-            hull[i] = x
-        _, gradients, hessians = forms.evaluate(Box(hull), 2)
-        residual, start, centre = self._at_centre(forms, box, unknowns)
-        _, jacobian = self._equations([], gradients, hessians, unknowns)
-        inverse = middle_inverse(start)
-        if inverse is None:
-            return None
-        return krawczyk(residual, jacobian, inverse, unknowns, centre)
-
     def _index(self, jacobian: "list[list[Ball]]", rows: int) -> int | None:
         """Return the number of negative eigenvalues on the tangent space, from the inertia.
 
@@ -298,5 +315,69 @@ class Faces:
         return None if signs is None else signs[0] - rows
 
 
-def _inside(inner: "list[Ball]", outer: "list[Ball]") -> bool:
-    return all(x.contains_interior(y) for x, y in zip(outer, inner, strict=True))
+def enclosing(lower: Array, upper: Array) -> Box:
+    """Return a box of balls that contains one of doubles."""
+    return Box([between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True)])
+
+
+def wider(x: "Ball") -> "Ball":
+    """Return a ball twice as wide, and by a little more."""
+    return x + ball(0, x.rad() + abs(x) * ball(2) ** (SLACK - BITS))
+
+
+def inertia(rows: "list[list[Ball]]") -> tuple[int, int] | None:
+    """Return the numbers of negative and positive eigenvalues of a symmetric matrix of balls."""
+    if not rows:  # nothing may move
+        return 0, 0
+    middle = np.array([[float(x.mid()) for x in row] for row in rows])
+    if not np.isfinite(middle).all():
+        return None
+    unit = np.sqrt(np.maximum(abs(middle).max(axis=1), 1e-300))
+    vectors = np.linalg.eigh((middle + middle.T) / 2 / np.outer(unit, unit))[1] / unit[:, None]
+    turn = matrix(vectors.tolist())
+    form = (turn.transpose() * matrix(rows) * turn).tolist()
+    if (turn.det()) == 0 or turn.det().contains(0):
+        return None
+    negative = positive = 0
+    for i, row in enumerate(form):
+        radius = sum((abs(x) for j, x in enumerate(row) if j != i), ball(0))
+        if row[i] > radius:
+            positive += 1
+        elif row[i] < -radius:
+            negative += 1
+        else:
+            return None
+    return negative, positive
+
+
+def enclosed_multipliers(slopes: "list[list[Ball]]") -> "list[Ball] | None":
+    """Enclose the solutions of ``sum lam_i g_i = dE``; None if the ``g_i`` may be dependent.
+
+    ``slopes`` are the gradients ``g_i``, the energy's last.
+    """
+    count = len(slopes) - 1
+    if not count:
+        return []
+    middle = np.array([[float(x.mid()) for x in row] for row in slopes[:-1]])
+    if not np.isfinite(middle).all():
+        return None
+    try:
+        left = matrix(np.linalg.pinv(middle.T).tolist())
+        square = left * matrix(slopes[:-1]).transpose()
+        return entries(square.solve(left * column(slopes[-1])))
+    except (ZeroDivisionError, np.linalg.LinAlgError):
+        return None
+
+
+def outward(x: "Ball") -> tuple[float, float]:
+    """Return doubles below and above a ball."""
+    return _double(exact(x.lower()), -np.inf), _double(exact(x.upper()), np.inf)
+
+
+def _double(value: object, towards: float) -> float:
+    from fractions import Fraction
+
+    assert isinstance(value, Fraction)
+    near = value.numerator / value.denominator
+    off = Fraction(near) > value if towards < 0 else Fraction(near) < value
+    return float(np.nextafter(near, towards)) if off else near
