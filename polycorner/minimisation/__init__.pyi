@@ -1,8 +1,7 @@
 from .abundance import Richness, richness
-from .certificate import Certificate, certify
+from .certificate import Certificate, Condition, Residuals, certify
 from .crossings import Crossing, crossing
 from .immobility import Immobility, Mobility, immobility
-from .lemma import Condition, Residuals
 from .methods import minimise, stationary_on
 from .multistart import minima
 from .outcomes import Minima

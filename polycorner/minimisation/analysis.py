@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
 
 from polycorner.minimisation.conditions import (
     Curvature,
@@ -12,15 +13,29 @@ from polycorner.minimisation.conditions import (
     find_multipliers,
 )
 from polycorner.minimisation.constancy import symmetric_tangents, without
-from polycorner.minimisation.corner_degeneracy import decide
-from polycorner.minimisation.degeneracy import Decision, Situation, symmetric, undecided
+from polycorner.minimisation.degeneracy import Situation, decide, symmetric
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
-from polycorner.minimisation.evidence import steepest_descent
-from polycorner.minimisation.findings import OPEN, Analysis, Higher, Local
+from polycorner.minimisation.findings import (
+    OPEN,
+    Analysis,
+    Decision,
+    FaceSize,
+    Higher,
+    Local,
+    steepest_descent,
+    undecided,
+)
+from polycorner.minimisation.neighbourhood import (
+    falls_on_set,
+    is_steady,
+    obstacle,
+    steady,
+    unresolved,
+)
 from polycorner.minimisation.problem import Problem
-from polycorner.minimisation.smoothness import obstacle
-from polycorner.minimisation.steadiness import is_steady, steady
-from polycorner.minimisation.tangency import falls_on_set, unresolved
+from polycorner.minimisation.sparse.factorisation import rank as rank_of_sparse
+from polycorner.minimisation.sparse.factorisation import unit
+from polycorner.minimisation.sparse.optimality import first_order, leads_down, second_order
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.cones import (
     Rows,
@@ -30,13 +45,13 @@ from polycorner.polyhedra.cones import (
     rank,
     unit_rows,
 )
+from polycorner.polyhedra.faces import Face
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.polyhedra.strata import distances, local_pieces
+from polycorner.polyhedra.strata import local_pieces
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
-NEWTON = 4  # steps to a corner
-ROUNDING = 1e-14  # relative length of a step that is rounding
+NEWTON = 4  # steps to a corner, the last of which is rounding
 # Distances, in scale units, at which lower points are sought where a gradient vanishes: those that
 # are not lost in how far the point may be off.
 DISTANCES = 10.0 ** np.arange(-5, 0)
@@ -55,23 +70,20 @@ DECISIVE = (
 
 
 def corner(local: Local, active: tuple[int, ...]) -> Local | None:
-    """Return the derivatives where the active functions vanish exactly, by Newton's method.
+    """Return the derivatives where the active functions vanish exactly.
 
     A point is within its tolerance of them, which is more than rounding: higher orders would tell
     it from the corner.  None where it is the corner, or where none is found as near.
     """
-    numbers, scales = [*active, *local.sections], local.problem.scales
-    q, steps = local.point, []
-    for _ in range(NEWTON):
-        values, gradients = local.problem.evaluate(q, 1)
-        step = np.linalg.lstsq(gradients[numbers], values[numbers], rcond=local.tolerances.rank)[0]
-        q = q - step * scales
-        steps.append(float(abs(step).max()))
-    size = ROUNDING * (1.0 + float(abs(q / scales).max()))
-    if not (size < steps[0] <= OPEN * local.tolerances.zero and steps[-1] <= size):
+    held, problem, tolerances = [*active, *local.sections], local.problem, local.tolerances
+    face = Face(lambda q: problem.evaluate(q, 1), problem.scales, held, tolerances)
+    point, settled = face.project(local.point, steps=NEWTON)
+    moved, u = abs(point - local.point) / problem.scales, abs(point / problem.scales)
+    rounding = tolerances.rounding * (1.0 + float(u.max()))
+    if not (settled and rounding < moved.max() <= OPEN * tolerances.zero):
         return None
-    values, gradients, hessians = local.problem.evaluate(q, 2)
-    return replace(local, point=q, values=values, gradients=gradients, hessians=hessians)
+    exact = Local.at(problem, point, tolerances, local.higher)
+    return exact if abs(exact.away[held]).max() <= rounding else None
 
 
 def seen_from(a: Analysis, exact: Analysis) -> Analysis:
@@ -79,7 +91,7 @@ def seen_from(a: Analysis, exact: Analysis) -> Analysis:
     if exact.verdict in {Verdict.NOT_STATIONARY, Verdict.NO_MULTIPLIER}:
         reason = "the exact corner of the active functions beside it is not stationary"
         return replace(a, decision=undecided(len(a.local.point), reason))
-    return replace(a, verdict=exact.verdict, decision=exact.decision, curvature=exact.curvature)
+    return replace(a, verdict=exact.verdict, decision=exact.decision, second=exact.second)
 
 
 def beside_inflection(a: Analysis) -> Analysis:
@@ -109,8 +121,8 @@ def analyse(
     alone; or, ``"followed"``, an energy that is constant over a distance counts as constant, which
     is no evidence: it may change very slowly.
     """
-    values, gradients, hessians = problem.evaluate(q, 2)
-    local = Local(problem, q, values, gradients, hessians, tolerances, higher)
+    local = Local.at(problem, q, tolerances, higher)
+    values, gradients, hessians = local.values, local.gradients, local.hessians
     pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerances.zero)
     if not pieces:
         return _without_conditions(local, Verdict.OUTSIDE, "")
@@ -127,9 +139,11 @@ def analyse(
 
 def _without_conditions(local: Local, verdict: Verdict, reason: str) -> Analysis:
     """Return the analysis of a point at which the conditions cannot be applied."""
-    known = (np.where(np.isfinite(x), x, 0.0) for x in (local.gradients, local.hessians))
-    gradients, hessians = known
-    finite = replace(local, gradients=gradients, hessians=hessians, higher="none")
+    gradients, hessians = (
+        np.where(np.isfinite(x), x, 0.0) for x in (local.gradients, local.hessians)
+    )
+    known = {"gradients": gradients, "hessians": hessians, "slope": gradients[-1]}
+    finite = replace(local, **known, higher="none")
     found = _analyse_piece(finite, frozenset())
     return replace(found, verdict=verdict, obstacle=reason, local=local)
 
@@ -155,7 +169,7 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
         sizes = np.linalg.norm(gradients[seen], axis=1)
         gradients[seen] = rows.truncated(level) * sizes[:, None]
         rows = Rows(gradients[seen], local.tolerances.rank)
-    slope = local.gradients[-1]
+    slope = local.slope
     most = 0.1 * float(np.linalg.norm(slope)) / local.tolerances.rank + small
     multipliers = find_multipliers(rows, kept, slope, small, most, local.tolerances.dependent)
     left = slope - multipliers.values @ rows.units
@@ -173,26 +187,27 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
         curvature = steady(
             local, active, gradients, multipliers, curvature, NEARLY_FLAT * small_curvature
         )
-    away = distances(local.values[list(active)], gradients[:k])
-    verdict = _verdict(local, rows, away, multipliers, curvature, small_curvature)
+    verdict = _verdict(
+        local, rows, local.away[list(active)], multipliers, curvature, small_curvature
+    )
     independent = rows.independent and not blind
     positive = np.array([i for i in strong if i < k and values[i] > small], dtype=np.int64)
     result = Analysis(
         verdict=verdict,
         active=active,
         gradients=gradients,
+        rank=rows.rank,
         multipliers=multipliers,
         independent=independent,
         strong_positions=tuple(positive.tolist())
         if rows.independent
         else _independent_positions(gradients, seen, positive, k, local),
         weak=weak,
-        blind=blind,
-        curvature=curvature,
+        second=curvature,
         reference=local.reference,
         small_curvature=small_curvature,
-        decision=None,
         local=local,
+        blind=blind,
     )
     higher = local.higher != "none"
     if level and verdict not in {Verdict.NOT_STATIONARY, Verdict.NO_MULTIPLIER}:
@@ -275,7 +290,7 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
         hessian, exact = _hessian_with(local, numbers, a.gradients, values), False
         tangent = Rows(a.gradients[held], local.tolerances.rank).null_space
         curvature = find_curvature(hessian, tangent, local.gradients[[]], a.small_curvature)
-        left = abs(local.gradients[-1] - values @ unit_rows(a.gradients)).max()
+        left = abs(local.slope - values @ unit_rows(a.gradients)).max()
         if curvature.least < -a.small_curvature or a.weak or left > local.small:
             return undecided(len(hessian), "the multipliers are not unique")
         flat = curvature.flat
@@ -284,21 +299,13 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
     sizes = np.linalg.norm(a.gradients[held], axis=1)
     return decide(
         Situation(
-            problem=local.problem,
-            tolerances=local.tolerances,
-            point=local.point,
+            analysis=a,
             piece=piece,
             rows=tuple(numbers[i] for i in held),
             multipliers=values[held] / sizes,
             exact=exact,
-            weak=a.weak,
             hessian=hessian,
             flat=flat,
-            reference=local.reference,
-            small=local.small,
-            small_curvature=a.small_curvature,
-            nearly=NEARLY_FLAT * a.small_curvature,
-            brief=local.higher == "followed",
         )
     )
 
@@ -322,7 +329,7 @@ def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array
     """
     from scipy.optimize import nnls
 
-    k, units, slope = len(a.active), unit_rows(a.gradients), a.local.gradients[-1]
+    k, units, slope = len(a.active), unit_rows(a.gradients), a.local.slope
     equations = [i for i in strong if i >= k]
     chosen = independent_rows(units[equations], a.local.tolerances.rank)
     along = null_space(units[equations], a.local.tolerances.rank)
@@ -389,3 +396,63 @@ def _independent_positions(
             chosen.append(i)
             reached += 1
     return tuple(chosen)
+
+
+def analyse_sparse(problem: Problem, q: Array, tolerances: Tolerances) -> Analysis:
+    """Analyse a point of a polyhedron without unions, with sparse matrices throughout."""
+    local = Local.sparsely_at(problem, q, tolerances)
+    m, zero = problem.inequalities, tolerances.zero
+    active = np.flatnonzero(local.away[:m] <= zero)
+    k, held = len(active), np.concatenate([active, np.array(local.sections, dtype=np.int64)])
+    gradients = csr_array(local.gradients[held])
+    rows = unit(gradients)
+    first, level = first_order(rows, k, local.slope, local.small, tolerances)
+    least = tolerances.stationary * abs(first.values).max(initial=0.0)
+    strong = np.flatnonzero(first.values[:k] > least)
+    carrying = rows[np.concatenate([strong, np.arange(k, len(held))])]
+    read = problem.sparse_energy.used  # by the energy or a strongly active function
+    read[carrying.indices] = True
+    moved = np.flatnonzero(read)
+    carrying = csr_array(carrying[:, moved])
+    whole = level is not None and len(strong) == k
+    own = level if whole else rank_of_sparse(carrying, tolerances.rank)
+    result = Analysis(
+        verdict=Verdict.STRICT_MINIMUM,
+        active=tuple(active.tolist()),
+        gradients=gradients,
+        rank=level,
+        multipliers=first,
+        independent=first.unique,
+        strong_positions=tuple(strong.tolist()),
+        weak=tuple(np.delete(active, strong).tolist()),
+        second=FaceSize(len(moved) - (own or 0), np.flatnonzero(~read)),
+        reference=local.reference,
+        small_curvature=NEARLY_FLAT * local.small,
+        local=local,
+    )
+    if (local.away[:m] < -zero).any() or (abs(local.away[m:]) > zero).any():
+        return replace(result, verdict=Verdict.OUTSIDE)
+    if not first.exist:
+        down = first.unique or leads_down(rows, k, local.slope)
+        return replace(result, verdict=Verdict.NOT_STATIONARY if down else Verdict.NO_MULTIPLIER)
+    if own is None:
+        obstacle = "the rank of the active gradients is not decided"
+        return replace(result, verdict=Verdict.UNDECIDED, obstacle=obstacle)
+    if len(moved) == own:
+        return _as_minimum(result)
+    weights = np.zeros(m + len(local.sections))
+    weights[held] = first.values / result.sizes
+    scaling = diags_array(problem.scales)
+    bent = scaling @ problem.sparse_rows.curvature(q, weights) @ scaling
+    hessian = csr_array(local.hessians - bent)[moved][:, moved]
+    verdict = second_order(hessian, carrying, result.small_curvature)
+    if verdict is Verdict.STRICT_MINIMUM:
+        return _as_minimum(result)
+    return replace(result, verdict=Verdict.UNDECIDED if result.weak else verdict)
+
+
+def _as_minimum(a: Analysis) -> Analysis:
+    """Return an analysis whose face is a corner, or is curved upward in all that is read."""
+    if isinstance(a.second, FaceSize) and len(a.second.unmoved):
+        return replace(a, verdict=Verdict.MINIMUM_ALONG_LOCUS)
+    return replace(a, verdict=Verdict.WEAK_MINIMUM if a.weak else Verdict.STRICT_MINIMUM)

@@ -13,15 +13,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.kinds import check_fields, checked
-from polycorner.minimisation.analysis import analyse
-from polycorner.minimisation.explanation import explanation
-from polycorner.minimisation.findings import Analysis
-from polycorner.minimisation.lemma import Condition, Residuals, hypotheses, residuals_at
+from polycorner.minimisation.analysis import analyse, analyse_sparse
+from polycorner.minimisation.explanation import explanation, sparse_explanation
+from polycorner.minimisation.findings import Analysis, Local
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.minimisation.sparse_analysis import SparseAnalysis, analyse_sparse
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.strata import Stratum, stratum_at
 from polycorner.printing import (
@@ -37,7 +36,7 @@ from polycorner.printing import (
     units,
 )
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
+from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
@@ -50,46 +49,94 @@ SHOWN = 100  # coordinates that are shown in one line
 VAGUE = frozenset({Verdict.NOT_STATIONARY, Verdict.OUTSIDE, Verdict.MINIMUM_ALONG_LOCUS})
 
 
-def sparse_sheet(
-    a: SparseAnalysis, verdict: Verdict, energy: float, residuals: Residuals, note: str
-) -> Sheet:
-    """Return a table of the numbers of a certificate, and its explanation."""
-    problem = a.local.problem
-    rows = (
-        ("verdict", verdict.value),
-        ("energy", number(energy, 12)),
-        ("coordinates", str(problem.dimension)),
-        ("active", f"{len(a.active)} of {problem.inequalities} inequalities"),
-        ("equations", str(len(problem.polyhedron.equations))),
-        ("infeasibility", f"{residuals.infeasibility:.1e}"),
-        ("stationarity", f"{residuals.stationarity:.1e}"),
-        ("complementarity", f"{residuals.complementarity:.1e}"),
+@dataclass(frozen=True)
+class Residuals(Checked):
+    """Deviations from the first-order conditions at a point; all dimensionless.
+
+    Attributes
+    ----------
+    infeasibility : float
+        Scaled distance by which the polyhedron is missed.
+    stationarity : float
+        Largest component of ``dE - sum lam df`` in scaled coordinates, relative to the size of the
+        energy there: its largest first or second derivative.
+    complementarity : float
+        Largest ``|lam_i f_i|``, relative to the same size.
+    """
+
+    infeasibility: float
+    stationarity: float
+    complementarity: float
+
+    @property
+    def worst(self) -> float:
+        """The largest of the three."""
+        return max(self.infeasibility, self.stationarity, self.complementarity)
+
+
+@dataclass(frozen=True)
+class Condition(Checked):
+    """One hypothesis of the minimisation lemma ([GMBN] app. C), checked.
+
+    Attributes
+    ----------
+    statement : str
+        What is required.
+    holds : bool
+        Whether it does.
+    figure : float
+        The number that decides it.
+    """
+
+    statement: str
+    holds: bool
+    figure: float
+
+
+def residuals_at(problem: Problem, q: Array, multipliers: Mapping[str, float]) -> Residuals:
+    """Return the residuals of the first-order conditions with given multipliers ``dE/df``."""
+    d, m = problem.polyhedron, problem.inequalities
+    local = (Local.sparsely_at if problem.is_sparse else Local.at)(problem, q, DEFAULT)
+    weights = np.array([multipliers.get(name, 0.0) for name in (*d.names, *d.equation_names)])
+    held = np.flatnonzero(weights)
+    pull, product = local.without(weights), abs(weights[held] * local.values[held])
+    away, reference = local.away, local.reference
+    short = -d.implicit_of(away[:m]) if m else 0.0
+    pull, reference = (np.full(1, np.nan), 1.0) if not np.isfinite(reference) else (pull, reference)
+    return Residuals(
+        infeasibility=float(max(0.0, short, abs(away[m:]).max(initial=0.0))),
+        stationarity=float(abs(pull).max() / reference),
+        complementarity=float(product.max(initial=0.0) / reference),
     )
-    return Sheet("Certificate", (facts(rows), sparse_explanation(a, verdict, note)))
 
 
-def sparse_explanation(a: SparseAnalysis, verdict: Verdict, note: str) -> str:
-    """Explain a verdict in a few sentences of numbers."""
-    problem, first = a.local.problem, a.first
-    words = verdict.value
-    lines = [
-        f"{words[0].upper()}{words[1:]}.",
-        (
-            f"Of {problem.inequalities} inequalities {len(a.active)} are active; with "
-            f"{len(problem.polyhedron.equations)} equations their gradients have rank "
-            f"{first.rank}. {len(a.unmoved)} of {problem.dimension} coordinates are read by no "
-            "function with a positive multiplier."
+def hypotheses(a: Analysis) -> tuple[Condition, ...]:
+    """Return the four hypotheses of the minimisation lemma, each with its deciding number."""
+    held = a.multipliers.values[[*a.strong_positions]]
+    curved = a.curvature.values[abs(a.curvature.values) > a.small_curvature]
+    least = float(curved.min()) if len(curved) else float("inf")
+    return (
+        Condition(
+            "(1) the energy grows to first order as each of the p contacts opens",
+            bool((held > 0).all()) and a.multipliers.exist,
+            float(held.min(initial=np.inf)),
         ),
-    ]
-    if a.obstacle:
-        lines.append(f"{a.obstacle[0].upper()}{a.obstacle[1:]}.")
-    elif len(a.active):
-        values = first.values[: len(a.active)]
-        lines.append(
-            f"Multipliers of unit gradients lie between {values.min():.3g} and {values.max():.3g}; "
-            f"the gradient of the energy is met up to {first.residual:.1e}."
-        )
-    return "\n".join([*lines, note] if note else lines)
+        Condition(
+            "(2) its other first derivatives vanish (relative size)",
+            a.multipliers.exist,
+            a.multipliers.residual / a.reference,
+        ),
+        Condition(
+            "(3) its second derivatives in the q directions are positive definite",
+            least > 0,
+            least,
+        ),
+        Condition(
+            "(4) it does not depend on the remaining r coordinates",
+            a.flat_verified,
+            a.flat_change,
+        ),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,19 +188,18 @@ class Certificate(Checked, Printed):
         return Tolerances.of(self.tolerance, self.rank_tolerance)
 
     @cached_property
-    def found(self) -> Analysis | SparseAnalysis:
+    def found(self) -> Analysis:
         """First and second order at the point, with sparse matrices for a large polyhedron."""
-        if self.problem.is_sparse:
-            return analyse_sparse(self.problem, self.point, self.tolerances)
-        return self.analysis
+        some = analyse_sparse if self.problem.is_sparse else analyse
+        return some(self.problem, self.point, self.tolerances)
 
-    @cached_property
+    @property
     def analysis(self) -> Analysis:
         """First and second order at the point, in scaled coordinates, with full matrices."""
         if self.problem.is_sparse:
             msg = "analysis: expected a small polyhedron; full matrices of this one are too large"
             raise ValueError(msg)
-        return analyse(self.problem, self.point, self.tolerances)
+        return self.found
 
     @property
     def energy(self) -> float:
@@ -279,9 +325,9 @@ class Certificate(Checked, Printed):
         Opening wall, all other contacts kept closed, lowers the energy at the rate 3 per mm:
         its multiplier is negative.
         """
-        if isinstance(self.found, SparseAnalysis):
+        if self.problem.is_sparse:
             return sparse_explanation(self.found, self.verdict, self.note)
-        return explanation(self.analysis, self.stratum, self.verdict, self.search, unit, self.note)
+        return explanation(self.found, self.stratum, self.verdict, self.search, unit, self.note)
 
     def __repr__(self) -> str:
         """Return the verdict, the point, the energy and the active functions in one line."""
@@ -300,36 +346,33 @@ class Certificate(Checked, Printed):
 
     def _sheet(self) -> Sheet:
         """Return tables of the point, the active functions and the directions."""
-        manifold = self.problem.polyhedron.manifold
-        residuals = self.residuals
-        if isinstance(self.found, SparseAnalysis):
-            return sparse_sheet(self.found, self.verdict, self.energy, residuals, self.note)
-        return Sheet(
-            "Certificate",
-            (
-                facts(
-                    (
-                        ("verdict", self.verdict.value),
-                        ("energy", number(self.energy, 12)),
-                        ("active", names(self.active, LONGEST) or "none"),
-                        ("signature", "(p, q, r) = ({}, {}, {})".format(*self.signature)),
-                        ("infeasibility", f"{residuals.infeasibility:.1e}"),
-                        ("stationarity", f"{residuals.stationarity:.1e}"),
-                        ("complementarity", f"{residuals.complementarity:.1e}"),
-                    )
-                ),
-                coordinates(manifold.names, manifold.periods, self.point.tolist()),
-                self._multiplier_table(),
-                "" if self.multipliers_unique else "The multipliers are one choice of several.",
-                listed(
-                    "",
-                    ("direction", "entrapment"),
-                    ((name, kind.value) for name, kind in self.entrapment.items()),
-                    len(self.entrapment),
-                ),
-                units(manifold.periods),
-            ),
+        d, sparse, residuals = self.problem.polyhedron, self.problem.is_sparse, self.residuals
+        rows = [("verdict", self.verdict.value), ("energy", number(self.energy, 12))]
+        if sparse:
+            rows += [
+                ("coordinates", str(self.problem.dimension)),
+                ("active", f"{len(self.active)} of {self.problem.inequalities} inequalities"),
+                ("equations", str(len(d.equations))),
+            ]
+        else:
+            rows += [
+                ("active", names(self.active, LONGEST) or "none"),
+                ("signature", "(p, q, r) = ({}, {}, {})".format(*self.signature)),
+            ]
+        kinds = ("infeasibility", "stationarity", "complementarity")
+        rows += [(kind, f"{getattr(residuals, kind):.1e}") for kind in kinds]
+        if sparse:
+            return Sheet("Certificate", (facts(rows), self.explain()))
+        held = [(name, kind.value) for name, kind in self.entrapment.items()]
+        parts = (
+            facts(rows),
+            coordinates(d.manifold.names, d.manifold.periods, self.point.tolist()),
+            self._multiplier_table(),
+            "" if self.multipliers_unique else "The multipliers are one choice of several.",
+            listed("", ("direction", "entrapment"), held, len(held)),
+            units(d.manifold.periods),
         )
+        return Sheet("Certificate", parts)
 
     def _multiplier_table(self) -> Table:
         d, values = self.problem.polyhedron, self.found.local.values[:-1].tolist()

@@ -6,11 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from polycorner.minimisation.germs import Face, bordered_system
+from polycorner.minimisation.germs import DirectedFace, bordered_system
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
@@ -138,7 +137,7 @@ def constancy(
     problem: Problem,
     piece: Piece,
     q: Array,
-    face: Face,
+    face: DirectedFace,
     tolerances: Tolerances,
     *,
     one_sided: bool,
@@ -147,24 +146,10 @@ def constancy(
 ) -> Constancy:
     """Follow the directions of a face both ways, by steps that double, until it ends or bends.
 
-    Beyond a fold of the locus other stationary points would be followed.
-
-    Parameters
-    ----------
-    problem : Problem
-    piece : frozenset of int
-        Inequalities that must hold, beside all equations.
-    q : (n,) array
-    face : Face
-        Its ``moving`` directions are followed, and generic mixtures of them.
-    tolerances : Tolerances
-    one_sided : bool
-        Whether only the positive sides are followed.
-    reference : float
-        The size of the energy's derivatives.
-    least : float
-        If positive, the first side that ends at a shorter distance, or on which the energy changes,
-        is the last that is followed.
+    Beyond a fold of the locus other stationary points would be followed.  Followed are the
+    ``moving`` directions of the face and generic mixtures of them, one way only if ``one_sided``,
+    inside the piece and on all equations.  With a positive ``least`` the first side that ends at a
+    shorter distance, or on which the energy changes, is the last.
     """
     c = face.moving.shape[1]
     weights = np.eye(c)
@@ -188,7 +173,7 @@ def _followed(
     problem: Problem,
     piece: Piece,
     q: Array,
-    face: Face,
+    face: DirectedFace,
     w: Array,
     tolerances: Tolerances,
     reference: float,
@@ -210,7 +195,8 @@ def _followed(
         if found is None or abs((found - guess)[: len(q)]).max() > BENT * step:
             break
         values, gradients = problem.evaluate(found[: len(q)] * problem.scales, 1)
-        if not _is_inside(piece, problem.inequalities, values, gradients, tolerances.zero / 10):
+        inside = problem.holds(piece, values, gradients, tolerances.zero / 10)
+        if not (inside and np.isfinite(values).all()):
             break
         pull = gradients[-1] - found[len(q) :] @ gradients[list(face.rows)]
         slope = abs(face.moving.T @ pull).max()
@@ -228,7 +214,7 @@ def _followed(
 
 def _in_small_steps(
     problem: Problem,
-    face: Face,
+    face: DirectedFace,
     start: Array,
     w: Array,
     state: Array,
@@ -248,15 +234,9 @@ def _in_small_steps(
     return here
 
 
-def _is_inside(
-    piece: Piece, inequalities: int, values: Array, gradients: Array, miss: float
-) -> bool:
-    away = distances(values[:-1], gradients[:-1])
-    held = (away[sorted(piece)] >= -miss).all() and (abs(away[inequalities:]) <= miss).all()
-    return bool(np.isfinite(values).all() and held)
-
-
-def _corrected(problem: Problem, face: Face, start: Array, w: Array, state: Array) -> Array | None:
+def _corrected(
+    problem: Problem, face: DirectedFace, start: Array, w: Array, state: Array
+) -> Array | None:
     """Solve the stationarity conditions of the face at given values of its directions."""
     n, rows = len(start), list(face.rows)
     held = np.hstack([face.moving, face.still])

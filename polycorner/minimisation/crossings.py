@@ -87,14 +87,14 @@ def crossing(
 
 def _augmented_step(linear: Linear, free: Array, multipliers: Array, which: int) -> Array:
     """Return Newton's step ``(du, dlam, dnu, ds)``, NaN if the matrix is singular."""
-    rows, n, k = linear.gradients[:-1], len(linear.curvature), len(multipliers)
+    rows, n, k = linear.rows, len(linear.slope), len(multipliers)
     core = bordered(linear.curvature, np.vstack([rows, free.T]))
     matrix = np.zeros((len(core) + 1, len(core) + 1))
     matrix[:-1, :-1] = core
     matrix[:n, -1], matrix[n : n + k, -1] = linear.turning[:, 0], linear.drift[:-1, 0]
     matrix[-1, n + which] = 1.0
     residual = np.zeros(len(matrix))
-    residual[:n] = linear.gradients[-1] - multipliers @ rows
+    residual[:n] = linear.slope - multipliers @ rows
     residual[n : n + k] = linear.values
     residual[-1] = multipliers[which]
     try:

@@ -5,6 +5,13 @@ directions in which the second order vanishes (:mod:`~polycorner.minimisation.ge
 sign near 0 decides (:mod:`~polycorner.minimisation.signs`).  By metric regularity of the face, a
 point is a minimum on the polyhedron if it is one on the face: off it, the energy grows to first
 order, faster than anything changes on it.
+
+With weakly active functions the zeros of the form on the critical cone are followed:
+
+1. positive semidefinite on the face: a strict minimum without the weak functions is one with them;
+2. zeros that are isolated rays, the form growing to first order into the cone from each: along each
+   the energy is reduced on the face of the weak functions that stay closed, on one side;
+3. otherwise the weak functions are themselves variables that are not negative.
 """
 
 from dataclasses import dataclass, replace
@@ -18,24 +25,26 @@ from polycorner.minimisation.constancy import (
     symmetric_directions,
     without,
 )
+from polycorner.minimisation.copositivity import cone_rays
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
+from polycorner.minimisation.findings import Analysis, Decision, Local, undecided
 from polycorner.minimisation.germs import (
     CLEAR,
     MOVE,
     ROUNDING,
-    Face,
+    DirectedFace,
     Germ,
     missed,
     reduce_energy,
     vague,
 )
+from polycorner.minimisation.jets import NotAnalyticError
 from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.signs import Sign, Signed, sign_near_zero, signed
 from polycorner.minimisation.verdicts import Verdict
-from polycorner.polyhedra.cones import null_space
+from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import Tolerances
 from polycorner.values import Value
 
 ORDERS = {1: 16, 2: 10, 3: 8, 4: 6}  # degree of the series by its number of variables
@@ -49,8 +58,10 @@ class Situation(Value):
 
     Attributes
     ----------
-    problem, tolerances, point, piece
-        The problem, the tolerances, the point, and the inequalities that hold near it.
+    analysis : Analysis
+        First and second order there.
+    piece : frozenset of int
+        The inequalities that hold near it.
     rows : tuple of int
         Strongly active functions with independent gradients, and equations.
     multipliers : (p,) array
@@ -58,98 +69,83 @@ class Situation(Value):
     exact : bool
         Whether the face of ``rows`` lies in the polyhedron, as far as weak functions allow;
         otherwise it only contains the true face.
-    weak : tuple of int
-        Active functions with zero multipliers.
     hessian : (n, n) array
         Of the Lagrangian, in scaled coordinates.
     flat : (n, r) array
         Directions of the critical cone in which its form vanishes.
-    reference, small, small_curvature, nearly : float
-        The size of the energy, and of first and second derivatives that count as zero.
-    brief : bool
-        Whether constancy over a distance suffices, without a series.
     """
 
-    problem: Problem
-    tolerances: Tolerances
-    point: Array
+    analysis: Analysis
     piece: Piece
     rows: tuple[int, ...]
     multipliers: Array
     exact: bool
-    weak: tuple[int, ...]
     hessian: Array
     flat: Array
-    reference: float
-    small: float
-    small_curvature: float
-    nearly: float
-    brief: bool
+
+    @property
+    def local(self) -> Local:
+        """The derivatives at the point."""
+        return self.analysis.local
+
+    @property
+    def problem(self) -> Problem:
+        """The problem."""
+        return self.analysis.local.problem
+
+    @property
+    def weak(self) -> tuple[int, ...]:
+        """Active functions with zero multipliers."""
+        return self.analysis.weak
+
+    @property
+    def nearly(self) -> float:
+        """Curvature up to which a direction is treated as flat."""
+        return NEARLY_FLAT * self.analysis.small_curvature
+
+    def follow(self, face: DirectedFace, *, one_sided: bool) -> Constancy:
+        """Follow the directions of a face as far as the energy is constant."""
+        local, sided = self.local, one_sided
+        place = self.problem, self.piece, local.point, face, local.tolerances
+        return constancy(*place, one_sided=sided, reference=local.reference)
 
     def tangent(self, rows: tuple[int, ...]) -> Array:
         """Return an orthonormal basis of the directions tangent to functions."""
-        gradients = self.problem.evaluate(self.point, 1)[1]
-        if not rows:
-            return np.eye(len(self.point))
-        return null_space(gradients[list(rows)], self.tolerances.rank)
+        return null_space(self.local.gradients[list(rows)], self.local.tolerances.rank)
 
-    def near(self, face: Face) -> Array:
+    def near(self, face: DirectedFace) -> Array:
         """Return how much each variable of a face may differ within the tolerance of the point."""
-        opened = self.problem.evaluate(self.point, 1)[1][[face.rows[i] for i in face.opened]]
+        opened = self.local.gradients[[face.rows[i] for i in face.opened]]
         sizes = np.concatenate([np.linalg.norm(opened, axis=1), np.ones(face.moving.shape[1])])
-        return np.asarray(self.small / self.reference * sizes)
+        return np.asarray(self.local.small / self.local.reference * sizes)
 
-    def face(self, closed: tuple[int, ...], moving: Array, *, opened: bool = False) -> Face:
+    def face(self, closed: tuple[int, ...], moving: Array, *, opened: bool = False) -> DirectedFace:
         """Return the face on which further functions are closed, or opened as variables."""
         rows = self.rows + closed
         multipliers = np.concatenate([self.multipliers, np.zeros(len(closed))])
         still = symmetric_directions(self.problem, rows)
         still = without(still, moving) if moving.shape[1] else still
         positions = tuple(range(len(self.rows), len(rows))) if opened else ()
-        return Face(rows, multipliers, positions, moving, still)
-
-
-@dataclass(frozen=True, eq=False)
-class Decision(Value):
-    """What higher orders decide.
-
-    Attributes
-    ----------
-    verdict : Verdict
-        Minimum, minimum along a locus, saddle or undecided.
-    degree : int
-        Degree of the terms that decide, 0 where none does.
-    order : int
-        Degree to which the energy was expanded, 0 where it was not.
-    direction : (n,) array
-        Where they decide, tangent to the curve followed, in scaled coordinates.
-    reason : str
-        What stands in the way where nothing is decided; how constancy is known.
-    followed : Constancy or None
-        How far a locus was followed.
-    """
-
-    verdict: Verdict
-    degree: int
-    order: int
-    direction: Array
-    reason: str
-    followed: Constancy | None = None
-
-
-def undecided(n: int, reason: str, order: int = 0) -> Decision:
-    """Return that nothing is decided in ``n`` dimensions, and why."""
-    return Decision(Verdict.UNDECIDED, 0, order, np.zeros(n), reason)
+        return DirectedFace(rows, multipliers, positions, moving, still)
 
 
 def no_decision(s: Situation, reason: str, order: int = 0) -> Decision:
     """Return that nothing is decided, and why."""
-    return undecided(len(s.point), reason, order)
+    return undecided(len(s.local.point), reason, order)
 
 
 def order_for(variables: int) -> int:
     """Return the degree to which a series in so many variables is computed."""
     return ORDERS.get(variables, ORDER)
+
+
+def decide(s: Situation) -> Decision:
+    """Decide a point whose second order vanishes; undecided where mathematics here cannot."""
+    try:
+        return _decide_weak(s) if s.weak else decide_free(s, s.flat)
+    except NotAnalyticError as error:
+        reason = f"a formula is not analytic at the point: {error}"
+        return no_decision(s, reason) if s.weak else follow_only(s, reason)
 
 
 # --------------------------------------------------------------- without weak functions
@@ -164,23 +160,23 @@ def decide_free(s: Situation, flat: Array) -> Decision:
     if moving.shape[1] > MOST:
         return no_decision(s, f"the second order vanishes in more than {MOST} directions")
     face = s.face((), moving)
-    if s.brief:
+    if s.local.higher == "followed":
         seen = constancy(
             s.problem,
             s.piece.difference(s.weak),
-            s.point,
+            s.local.point,
             face,
-            s.tolerances,
+            s.local.tolerances,
             one_sided=False,
             reference=1e-300,  # where an energy decays, its own size tells that it changes
             least=FAR,
         )
         if seen.holds:
             return Decision(Verdict.MINIMUM_ALONG_LOCUS, 0, 0, moving[:, 0], "followed", seen)
-    germ = reduce_energy(s.problem, s.point, s.hessian, face, order_for(moving.shape[1]))
+    germ = reduce_energy(s.problem, s.local.point, s.hessian, face, order_for(moving.shape[1]))
     if germ is None:
         return no_decision(s, "the conditions across these directions are singular")
-    found = classify(germ, 0, s.small, s.near(face), s.tolerances.same)
+    found = classify(germ, 0, s.local.small, s.near(face), s.local.tolerances.same)
     return concluded(s, face, germ, found, locus=bool(still.shape[1]))
 
 
@@ -193,7 +189,7 @@ def symmetric(flat: Array) -> Decision:
 
 
 def concluded(
-    s: Situation, face: Face, germ: Germ, found: Signed, *, locus: bool = False
+    s: Situation, face: DirectedFace, germ: Germ, found: Signed, *, locus: bool = False
 ) -> Decision:
     """Return the decision that the sign of a reduced energy implies."""
     order = germ.domain.order
@@ -211,17 +207,12 @@ def concluded(
     return follow_zeros(face, s, germ, found)
 
 
-def follow_zeros(face: Face, s: Situation, germ: Germ, found: Signed) -> Decision:
+def follow_zeros(face: DirectedFace, s: Situation, germ: Germ, found: Signed) -> Decision:
     """Follow the zeros of a reduced energy that is not negative."""
     half, order = len(face.opened), germ.domain.order
     whole = found.degree == 0 and not half
     ways = [(face, False)] if whole else [(_arc(face, s, germ, z), True) for z in found.zeros]
-    seen = [
-        constancy(
-            s.problem, s.piece, s.point, arc, s.tolerances, one_sided=side, reference=s.reference
-        )
-        for arc, side in ways
-    ]
+    seen = [s.follow(arc, one_sided=side) for arc, side in ways]
     together = Constancy(
         min(c.reach for c in seen), max(c.change for c in seen), all(c.followed for c in seen)
     )
@@ -238,9 +229,7 @@ def follow_zeros(face: Face, s: Situation, germ: Germ, found: Signed) -> Decisio
 def follow_only(s: Situation, reason: str) -> Decision:
     """Decide without a series, by whether the energy is constant as far as it is followed."""
     face = s.face((), without(s.flat, symmetric_directions(s.problem, s.rows)))
-    seen = constancy(
-        s.problem, s.piece, s.point, face, s.tolerances, one_sided=False, reference=s.reference
-    )
+    seen = s.follow(face, one_sided=False)
     if not seen.holds:
         return no_decision(s, reason)
     reason = f"{reason}; constant to rounding as far as it was followed"
@@ -248,7 +237,7 @@ def follow_only(s: Situation, reason: str) -> Decision:
     return Decision(Verdict.MINIMUM_ALONG_LOCUS, 0, 0, direction, reason, seen)
 
 
-def _arc(face: Face, s: Situation, germ: Germ, zero: Array) -> Face:
+def _arc(face: DirectedFace, s: Situation, germ: Germ, zero: Array) -> DirectedFace:
     """Return the face that carries a zero, with its direction: opened functions at zero close."""
     half = len(face.opened)
     open_rows = [face.rows[i] for i, w in zip(face.opened, zero[:half], strict=True) if w > 0]
@@ -268,13 +257,14 @@ def falls(s: Situation, germ: Germ, found: Signed) -> bool:
     level = float(
         s.problem.energy.value(germ.point(np.zeros(len(found.direction))) * s.problem.scales)
     )
-    miss, fall = s.tolerances.zero / 10, 10 * s.tolerances.rounding * (abs(level) + s.reference)
+    miss, fall = (
+        s.local.tolerances.zero / 10,
+        10 * s.local.tolerances.rounding * (abs(level) + s.local.reference),
+    )
     for t in 0.5 ** np.arange(1, 20):
         u = germ.point(t ** np.array(found.weights) * found.direction)
         values, gradients = s.problem.evaluate(u * s.problem.scales, 1)
-        away = distances(values[:-1], gradients[:-1])
-        m = s.problem.inequalities
-        inside = (away[sorted(s.piece)] >= -miss).all() and (abs(away[m:]) <= miss).all()
+        inside = s.problem.holds(s.piece, values, gradients, miss)
         if inside and values[-1] < level - fall:
             return True
     return False
@@ -354,3 +344,125 @@ def _centred(germ: Germ, degree: int, same: float) -> tuple[Array, Array] | None
         noise = domain.shifted(noise, abs(move)) + blur
         coefficients = domain.shifted(coefficients, move)
     return coefficients, noise
+
+
+# --------------------------------------------------------------- with weak functions
+
+
+def _decide_weak(s: Situation) -> Decision:
+    basis = s.tangent(s.rows)
+    values, vectors = np.linalg.eigh(basis.T @ s.hessian @ basis)
+    relaxed = None
+    if not len(values) or values[0] >= -s.analysis.small_curvature:
+        relaxed = decide_free(s, basis @ vectors[:, values <= s.nearly])
+        if relaxed.verdict is Verdict.STRICT_MINIMUM:
+            return replace(relaxed, verdict=Verdict.WEAK_MINIMUM)
+        if relaxed.verdict is Verdict.MINIMUM_ALONG_LOCUS and _stays(s, relaxed):
+            return relaxed
+    by_rays = _decide_rays(s, basis)
+    if by_rays is not None:
+        return by_rays
+    return _decide_opened(s)
+
+
+def _stays(s: Situation, found: Decision) -> bool:
+    """Whether a locus found without the weak functions can be followed among them."""
+    gradients = unit_rows(s.local.gradients[list(s.weak)])
+    for way in (*s.flat.T, found.direction, -found.direction):
+        if (gradients @ way >= -1e-9).all():
+            face = s.face((), way[:, None])
+            if s.follow(face, one_sided=True).holds:
+                return True
+    return False
+
+
+def _decide_rays(s: Situation, basis: Array) -> Decision | None:
+    """Decide along zeros that are isolated rays; None where they are not."""
+    gradients = unit_rows(s.local.gradients[list(s.weak)])
+    lines, rays, simplicial = cone_rays(gradients @ basis, s.local.tolerances.rank)
+    if not simplicial or not s.flat.shape[1]:
+        return None
+    rays = basis @ rays
+    least = 100 * s.local.tolerances.curvature * max(1e-300, float(abs(s.hessian).max()))
+    parts = []
+    for way in s.flat.T:
+        shut = gradients @ way <= 1e-7
+        if shut.all():
+            return None  # a line of the cone
+        climbs = rays[:, shut].T @ s.hessian @ way
+        closed = tuple(row for row, tight in zip(s.weak, shut, strict=True) if tight)
+        inner = s.tangent(s.rows + closed)
+        levels = np.linalg.eigvalsh(inner.T @ s.hessian @ inner)
+        if (climbs <= least).any() or (levels <= s.nearly).sum() != 1:
+            return None
+        if lines.shape[1] and abs(way @ basis @ lines).max() > 1 - 1e-9:
+            return None
+        parts.append(_on_ray(s, closed, way))
+    return _least_favourable(parts)
+
+
+def _on_ray(s: Situation, closed: tuple[int, ...], way: Array) -> Decision:
+    """Decide along one ray, on the face of the weak functions that stay closed."""
+    face = s.face(closed, way[:, None])
+    everywhere = symmetric_directions(s.problem, face.rows)
+    if not without(way[:, None], everywhere).shape[1]:
+        return symmetric(way[:, None])
+    germ = reduce_energy(s.problem, s.local.point, s.hessian, face, order_for(1))
+    if germ is None:
+        return no_decision(s, "the conditions across a direction are singular")
+    coefficients = germ.coefficients.copy()
+    coefficients[1] = 0.0 if abs(coefficients[1]) <= s.local.small else coefficients[1]
+    order, direction = germ.domain.order, tangent_of(germ, np.ones(1))
+    passing = vague(germ, coefficients, missed(germ, 0, s.near(face)))
+    for degree in range(1, order + 1):
+        c, noise = coefficients[degree], germ.noise[degree]
+        if abs(c) <= ROUNDING * noise:
+            continue
+        if abs(c) <= CLEAR * noise or degree == 1:
+            return no_decision(s, "the first term cannot be told from rounding", order)
+        firm = coefficients[degree:][~passing[degree:] & (abs(coefficients[degree:]) > 0)]
+        if passing[degree] and len(firm) and firm[0] * c < 0:
+            return no_decision(s, "the first term would vanish a little further on", order)
+        verdict = Verdict.WEAK_MINIMUM if c > 0 else Verdict.SADDLE
+        if c < 0 and not (s.exact or falls(s, germ, signed(Sign.NEGATIVE, degree, np.ones(1)))):
+            return no_decision(s, "the energy decreases on a face that may leave the polyhedron")
+        return Decision(verdict, degree, order, direction, "")
+    zero = Signed(Sign.ZERO, 1, np.ones(1), (1,), np.ones((1, 1)))
+    return follow_zeros(face, s, germ, zero)
+
+
+def _least_favourable(parts: list[Decision]) -> Decision:
+    """Return the decision of several rays together."""
+    ranks = (
+        Verdict.SADDLE,
+        Verdict.UNDECIDED,
+        Verdict.MINIMUM_ALONG_LOCUS,
+        Verdict.WEAK_MINIMUM,
+    )
+    return min(parts, key=lambda part: ranks.index(part.verdict))
+
+
+def _decide_opened(s: Situation) -> Decision:
+    """Decide with the weak functions as variables that are not negative."""
+    rows = s.rows + s.weak
+    gradients = s.local.gradients[list(rows)]
+    if np.linalg.matrix_rank(unit_rows(gradients), tol=s.local.tolerances.rank) < len(rows):
+        return no_decision(s, "weakly active functions depend on each other")
+    inner = s.tangent(rows)
+    values, vectors = np.linalg.eigh(inner.T @ s.hessian @ inner)
+    flat = inner @ vectors[:, values <= s.nearly]
+    moving = without(flat, symmetric_directions(s.problem, rows)) if flat.size else flat
+    face = s.face(s.weak, moving, opened=True)
+    if face.variables > MOST:
+        return no_decision(s, f"more than {MOST} weak functions and degenerate directions")
+    germ = reduce_energy(s.problem, s.local.point, s.hessian, face, order_for(face.variables))
+    if germ is None:
+        return no_decision(s, "the conditions across these directions are singular")
+    found = classify(germ, len(s.weak), s.local.small, s.near(face), s.local.tolerances.same)
+    if found.sign is Sign.ZERO and not len(found.zeros):
+        unit = np.linalg.lstsq(germ.points[:, 1 : 1 + face.variables], s.flat, rcond=1e-9)[0].T
+        unit = np.where(abs(unit) <= 1e-7 * abs(unit).max(axis=1)[:, None], 0.0, unit)
+        found = replace(found, zeros=np.asarray(unit, dtype=np.float64))
+    decision = concluded(s, face, germ, found, locus=bool(face.still.shape[1]))
+    strict = decision.verdict is Verdict.STRICT_MINIMUM
+    return replace(decision, verdict=Verdict.WEAK_MINIMUM) if strict else decision

@@ -11,13 +11,14 @@ import numpy as np
 
 from polycorner.minimisation.copositivity import MAX_RAYS
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
-from polycorner.minimisation.evidence import (
+from polycorner.minimisation.findings import (
+    Analysis,
+    FaceSize,
     implied_functions,
     least_curvature,
     oriented,
     steepest_descent,
 )
-from polycorner.minimisation.findings import Analysis
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
 from polycorner.polyhedra.strata import Stratum, distances
@@ -39,18 +40,8 @@ def explanation(
 ) -> str:
     """Explain why a point is or is not a minimum, with one or two sentences a line.
 
-    Parameters
-    ----------
-    a : Analysis
-        The optimality conditions at the point.
-    stratum : Stratum
-        The face it lies on.
-    verdict, search : Verdict
-        The verdict, and how the search for the point failed, if it did.
-    unit : str or None
-        Unit of the inequalities.
-    note : str, optional
-        What the search saw.
+    ``search`` says how the search for the point failed, if it did, and ``note`` what it saw;
+    ``unit`` is that of the inequalities.
     """
     lines = [_headline(verdict, search), note, _position(a, stratum, unit)]
     if search in SEARCHES and a.verdict not in {Verdict.OUTSIDE, Verdict.NOT_STATIONARY}:
@@ -63,6 +54,31 @@ def explanation(
         if a.stationary:
             lines += [*_second_order(a), *_entrapment(a)]
     return "\n".join(line for line in lines if line)
+
+
+def sparse_explanation(a: Analysis, verdict: Verdict, note: str) -> str:
+    """Explain a verdict on a large polyhedron in a few sentences of numbers."""
+    assert isinstance(a.second, FaceSize)
+    problem, first, unmoved = a.local.problem, a.multipliers, a.second.unmoved
+    words = verdict.value
+    lines = [
+        f"{words[0].upper()}{words[1:]}.",
+        (
+            f"Of {problem.inequalities} inequalities {len(a.active)} are active; with "
+            f"{len(problem.polyhedron.equations)} equations their gradients have rank "
+            f"{a.rank}. {len(unmoved)} of {problem.dimension} coordinates are read by no "
+            "function with a positive multiplier."
+        ),
+    ]
+    if a.obstacle:
+        lines.append(f"{a.obstacle[0].upper()}{a.obstacle[1:]}.")
+    elif len(a.active):
+        values = first.values[: len(a.active)]
+        lines.append(
+            f"Multipliers of unit gradients lie between {values.min():.3g} and {values.max():.3g}; "
+            f"the gradient of the energy is met up to {first.residual:.1e}."
+        )
+    return "\n".join([*lines, note] if note else lines)
 
 
 def _headline(verdict: Verdict, search: Verdict | None) -> str:

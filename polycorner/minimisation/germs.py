@@ -28,7 +28,7 @@ REGULAR = 1e12  # condition of the linear system up to which it is regular
 
 
 @dataclass(frozen=True, eq=False)
-class Face(Value):
+class DirectedFace(Value):
     """Functions held on a face, with multipliers, and the directions in which it is followed.
 
     Attributes
@@ -103,25 +103,11 @@ def missed(germ: Germ, half: int, near: Array) -> Array:
 
 
 def reduce_energy(
-    problem: Problem, q: Array, hessian: Array, face: Face, order: int
+    problem: Problem, q: Array, hessian: Array, face: DirectedFace, order: int
 ) -> Germ | None:
-    """Return the energy on a face as a series in its degenerate directions.
+    """Return the energy on a face as a series of a degree in its degenerate directions.
 
-    Parameters
-    ----------
-    problem : Problem
-    q : (n,) array
-        The point.
-    hessian : (n, n) array
-        Of the Lagrangian there, in scaled coordinates.
-    face : Face
-    order : int
-        Degree of the series.
-
-    Returns
-    -------
-    Germ or None
-        None where the linear system is singular.
+    ``hessian`` is that of the Lagrangian at ``q``.  None where the linear system is singular.
 
     Raises
     ------
@@ -171,13 +157,13 @@ class _System(Value):
 
     problem: Problem
     q: Array
-    face: Face
+    face: DirectedFace
     across: Array
     inverse: Array
     size: float
 
     @classmethod
-    def of(cls, problem: Problem, q: Array, hessian: Array, face: Face) -> "_System | None":
+    def of(cls, problem: Problem, q: Array, hessian: Array, face: DirectedFace) -> "_System | None":
         held = np.hstack([face.moving, face.still])
         across = null_space(held.T, 1e-9) if held.size else np.eye(problem.dimension)
         gradients = problem.evaluate(q, 1)[1][list(face.rows)]

@@ -169,12 +169,11 @@ def _of_pieces(
         local = _Local(units[rows], units[held], hessians[rows + held], tolerances.rank)
         sizes, changes = np.maximum(1, abs(hessians[rows + held])), jumps[rows + held]
         smooth = bool((np.isfinite(sizes + changes) & (changes <= JUMP * sizes)).all())
-        answer = local.answer(slides, smooth=smooth)
-        forces = answer.weights / lengths[rows + held, 0] if len(answer.weights) else answer.weights
+        mobility, forces, motion = local.answer(slides, smooth=smooth)
+        forces = forces / lengths[rows + held, 0] if len(forces) else forces
         total = forces[: len(rows)].sum() or 1.0
         stress = dict(zip([*piece, *names[count:]], (forces / total).tolist(), strict=False))
-        motion = None if answer.motion is None else answer.motion * scales
-        yield Immobility(answer.mobility, stress, motion)
+        yield Immobility(mobility, stress, None if motion is None else motion * scales)
 
 
 def _jumps(polyhedron: Polyhedron, q: Array, beside: Array) -> Array:
@@ -183,13 +182,6 @@ def _jumps(polyhedron: Polyhedron, q: Array, beside: Array) -> Array:
     hessians = polyhedron.bundle.evaluate(q + beside * rng.uniform(-1, 1, (16, len(q))), 2)[2]
     with np.errstate(invalid="ignore"):  # of infinite ones
         return np.asarray(np.ptp(hessians, axis=0))
-
-
-@dataclass(frozen=True)
-class _Answer:
-    mobility: Mobility
-    weights: Array
-    motion: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -204,27 +196,29 @@ class _Local:
     bends: Array
     rank: float
 
-    def answer(self, slides: Callable[[Array], bool], *, smooth: bool) -> _Answer:
-        """Return the verdict; to first order only if second derivatives jump.
+    def answer(
+        self, slides: Callable[[Array], bool], *, smooth: bool
+    ) -> tuple[Mobility, Array, Array | None]:
+        """Return the verdict, to first order only if second derivatives jump, stress and motion.
 
         ``slides`` says whether no function falls along a line.
         """
         nothing = np.empty(0)
         tight, inner = self._tight()
         if not tight and inner.any():
-            return _Answer(Mobility.MOBILE, nothing, inner)
+            return Mobility.MOBILE, nothing, inner
         span = null_space(np.vstack([self.functions[tight], self.equations]), self.rank)
         if not span.shape[1]:
-            return _Answer(Mobility.FIRST_ORDER, nothing)
+            return Mobility.FIRST_ORDER, nothing, None
         if not smooth:
-            return _Answer(Mobility.UNDECIDED, nothing)
+            return Mobility.UNDECIDED, nothing, None
         weights, largest = self._stress(span)
         if largest < -self.rank:
-            return _Answer(Mobility.SECOND_ORDER, weights)
+            return Mobility.SECOND_ORDER, weights, None
         for v in self._candidates(span, inner, weights):
             if self._moves(v) or slides(v):
-                return _Answer(Mobility.MOBILE, nothing, v)
-        return _Answer(Mobility.UNDECIDED, nothing)
+                return Mobility.MOBILE, nothing, v
+        return Mobility.UNDECIDED, nothing, None
 
     def _tight(self) -> tuple[list[int], Array]:
         """Return the functions that vanish on the whole cone, and a vector inside the others."""

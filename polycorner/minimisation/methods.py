@@ -1,7 +1,5 @@
 """Local minimisation of an energy on a polyhedron by three methods that must agree.
 
-Scales of badly scaled problems, estimated from the data where a descent has stalled.
-
 A descent measures steps in the manifold's scales.  Where these are far from the sizes over which
 the functions vary, steps are short and curvatures drown in rounding errors.  A stalled descent goes
 on from where it is, in scales that are estimated there, until one converges:
@@ -9,11 +7,16 @@ on from where it is, in scales that are estimated there, until one converges:
 * ``sqrt(max_j |L_jj| / |L_ii|)`` with ``L`` the Hessian of the Lagrangian, which makes the diagonal
   of the scaled Hessian constant ([NW] sec. 2.2); where ``L`` is flat, the magnitude below;
 * ``|q_i|``, the magnitude of the coordinate, where it is larger than the manifold's scale.
+
+A wall that touches what the equations define, without cutting anything off, shortens every
+linearised step towards the point of contact: where ``f >= 0`` has the gap ``t^2 / 2`` at the
+distance ``t``, by half of it.  The steps converge to that point, whatever the energy does there,
+and the descent goes on from lower points beside it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,17 +24,18 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.minimisation.analysis import analyse
 from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.continuation import go_on
 from polycorner.minimisation.descent import statuses
-from polycorner.minimisation.domain_edges import domain_edge
-from polycorner.minimisation.escapes import escape
+from polycorner.minimisation.escapes import Escape, domain_edge, escape
 from polycorner.minimisation.feasibility import approach
-from polycorner.minimisation.polishing import Endpoint, polished
+from polycorner.minimisation.findings import steepest_descent
+from polycorner.minimisation.neighbourhood import STEPS
+from polycorner.minimisation.polishing import Endpoint, slsqp
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.sparse.descent import descend
 from polycorner.minimisation.sparse.faces import on_face
 from polycorner.minimisation.sparse.nonlinear import Nonlinear
 from polycorner.minimisation.verdicts import Verdict
+from polycorner.polyhedra.cones import Rows
 from polycorner.polyhedra.polyhedron import MAX_SELECTIONS, Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
 from polycorner.printing import number
@@ -41,7 +45,8 @@ from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
-STOPPED = (0, 8)  # SLSQP's exit codes for convergence, and for a line search without progress
+CONTACTS = 50  # from which a descent goes on
+NEARLY = 1e-3  # singular value of unit gradients, relative to the largest, to be looked at
 FARTHEST = 1e3  # longest step of Newton's method towards a chosen face, in scale units
 End = tuple[int, int, Array, Array]  # status, iterations, point, multipliers
 FLAT = 1e-14  # diagonal entry, relative to the largest, below which a coordinate is flat
@@ -55,52 +60,9 @@ DISTANT = 8.0  # scale units beyond which a flat end is doubted
 FADED = 1e-2  # size of derivatives, relative to those at the start, below which it is doubted
 
 
-def slsqp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
-    """Run SLSQP in scaled coordinates, the energy divided by its own size, and polish."""
-    from scipy.optimize import minimize
-
-    scales, m = problem.scales, problem.inequalities
-    values, gradients, hessians = problem.evaluate(q, 2)
-    size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
-    rows = sorted(piece)
-    sections = list(range(m, problem.rows - 1))
-    floor = float(values[-1])
-    options: Any = {"ftol": 1e-15, "maxiter": limit}
-
-    def constraint(kind: str, kept: list[int]) -> Any:
-        return {
-            "type": kind,
-            "fun": lambda u: problem.evaluate(u * scales, 0)[0][kept],
-            "jac": lambda u: problem.evaluate(u * scales, 1)[1][kept],
-        }
-
-    def energy(u: Array) -> float:
-        return float(problem.evaluate(u * scales, 0)[0][-1] - floor) / size
-
-    def slope(u: Array) -> Array:
-        return np.asarray(problem.evaluate(u * scales, 1)[1][-1] / size)
-
-    found = minimize(
-        energy,
-        q / scales,
-        jac=slope,
-        method="SLSQP",
-        constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
-        options=options,
-    )
-    point, stopped = found.x * scales, found.status in STOPPED
-    return polished(problem, piece, q, point, int(found.nit), tolerances, stopped=stopped)
-
-
-def nonlinear(problem: Problem, tolerances: Tolerances) -> Nonlinear:
-    """Return a problem as a sparse nonlinear programme."""
-    terms, constraints = problem.sparse_energy, problem.sparse_rows
-    return Nonlinear(terms, constraints, problem.inequalities, problem.scales, tolerances)
-
-
 def sparse_descent(problem: Problem, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
     """Descend from ``q`` in a sparse polyhedron; see :mod:`.sparse.descent`."""
-    end = descend(nonlinear(problem, tolerances), q / problem.scales, limit)
+    end = descend(Nonlinear(problem, tolerances), q / problem.scales, limit)
     return Endpoint(end.point * problem.scales, end.iterations, end.failure)
 
 
@@ -108,7 +70,7 @@ def sparse_on_face(
     problem: Problem, active: Piece, q: Array, tolerances: Tolerances
 ) -> tuple[Array, float]:
     """Apply Newton's method on a face; return the point and the length of the last step."""
-    programme = nonlinear(problem, tolerances)
+    programme = Nonlinear(problem, tolerances)
     held = np.concatenate([np.array(sorted(active), dtype=np.int64), programme.equations])
     found = on_face(programme, held, q / problem.scales, far=FARTHEST)
     if found is None:
@@ -119,11 +81,8 @@ def sparse_on_face(
 def rescaled(problem: Problem, piece: Piece, limit: int, end: End) -> tuple[int, int, Array]:
     """Let a descent go on in estimated scales that stalled, or where it is flat and uneven.
 
-    Returns
-    -------
-    status, iterations, point
-        Of the first descent that converges to a point as low, otherwise those given; iterations
-        are those of all.
+    Returned are status, iterations of all and the point of the first descent that converges to a
+    point as low, otherwise those given.
     """
     status, spent, q, multipliers = end
     if status == statuses.STALLED and spent >= limit and limit < PATIENCE:
@@ -440,7 +399,8 @@ def _without_dependent(
     if len(smaller.polyhedron.equations) == len(problem.polyhedron.equations):
         return end
     found = plain(smaller, frozenset(range(len(piece))), q, limit)
-    return found if problem.equations_hold(found.point, tolerances.zero) else end
+    values, gradients = problem.evaluate(found.point, 1)
+    return found if problem.holds(frozenset(), values, gradients, tolerances.zero) else end
 
 
 def _is_doubtful(problem: Problem, start: Array, end: Endpoint, tolerances: Tolerances) -> bool:
@@ -469,7 +429,7 @@ def _diagnosed(
     """Return the end of a failed descent with what is seen of where it leads."""
     edge = domain_edge(problem, piece, end.point, tolerances)
     if edge is not None:
-        return Endpoint(edge.point, end.iterations, Verdict.DOMAIN_EDGE, edge.note)
+        return _ended(end, edge)
     if end.failure is Verdict.NOT_CONVERGED and limit < PATIENCE:
         return replace(end, note=f"It was stopped after {end.iterations} steps.")
     found = escape(problem, piece, q, tolerances)
@@ -480,5 +440,55 @@ def _diagnosed(
     if not np.isfinite(problem.energy.value(point)):
         edge = domain_edge(problem, piece, point, tolerances)
         if edge is not None:
-            return Endpoint(edge.point, end.iterations, Verdict.DOMAIN_EDGE, edge.note)
-    return Endpoint(point, end.iterations, found.verdict, found.note)
+            return _ended(end, edge)
+    return _ended(end, replace(found, point=point))
+
+
+def _ended(end: Endpoint, found: Escape) -> Endpoint:
+    return Endpoint(found.point, end.iterations, found.verdict, found.note)
+
+
+def go_on(
+    problem: Problem,
+    piece: Piece,
+    end: Endpoint,
+    descent: Descent,
+    limit: int,
+    tolerances: Tolerances,
+) -> Endpoint:
+    """Repeat a descent from lower points beside its end, as long as there are any."""
+    for _ in range(CONTACTS):
+        lower = _lower_point(problem, piece, end, tolerances)
+        if lower is None:
+            break
+        further = descent(problem, piece, lower, limit)
+        if not problem.energy.value(further.point) < problem.energy.value(end.point):
+            break
+        end = replace(further, iterations=end.iterations + further.iterations)
+    return end
+
+
+def _lower_point(
+    problem: Problem, piece: Piece, end: Endpoint, tolerances: Tolerances
+) -> Array | None:
+    """Return a point of the piece that is lower than the end of a descent at a contact."""
+    if end.failure not in {None, Verdict.NOT_CONVERGED}:
+        return None
+    values, gradients = problem.evaluate(end.point, 1)
+    away, m = distances(values[:-1], gradients[:-1]), problem.inequalities
+    near = [i for i in piece if away[i] <= tolerances.zero]
+    numbers = [*near, *range(m, problem.rows - 1)]
+    if not near or len(numbers) < 2 or not np.isfinite(gradients[numbers]).all():
+        return None
+    if Rows(gradients[numbers], NEARLY).independent:
+        return None
+    with np.errstate(all="ignore"):
+        found = analyse(problem, end.point, tolerances, higher="followed")
+    if found.verdict is not Verdict.NOT_STATIONARY or found.independent:
+        return None
+    rate, way = steepest_descent(found)
+    for step in STEPS:
+        reached, point = problem.restore(piece, end.point + step * way * problem.scales)
+        if reached and problem.energy.value(point) < values[-1] - rate * step / 4:
+            return point
+    return None

@@ -12,17 +12,25 @@ of compiled kernels whose variables are coordinates and parameters alike, so the
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, eye_array
 
 from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.formulas.rows import SparseRows
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
+from polycorner.minimisation.findings import Analysis, FaceSize
+from polycorner.minimisation.sparse.factorisation import Saddle, lengths
+from polycorner.minimisation.sparse.optimality import nondegenerate
 from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import cached_property
 
 # The derivatives of the formulas' parameters, by name, by each parameter.
 Rates = Mapping[str, Mapping[str, float]]
@@ -32,60 +40,100 @@ SINGULAR = 1e-13  # reciprocal condition number of a matrix that counts as singu
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The KKT equations to first order; rows are the active functions, and last the energy.
+    """The KKT equations of a face to first order, in scaled coordinates.
 
     Attributes
     ----------
     values : (k,) array
         The active functions and equations.
-    gradients : (k + 1, n) array
-        Derivatives by scaled coordinates.
+    rows : (k, n) array, full or sparse
+        Their gradients.
+    slope : (n,) array
+        The energy's.
     drift : (k + 1, p) array
-        Derivatives by the parameters.
-    curvature : (n, n) array
+        Derivatives by the parameters of the functions, and last of the energy.
+    curvature : (n, n) array, full or sparse
         The Lagrangian's Hessian.
     turning : (n, p) array
         Derivatives of the Lagrangian's gradient by the parameters.
     """
 
     values: Array
-    gradients: Array
+    rows: Any
+    slope: Array
     drift: Array
-    curvature: Array
+    curvature: Any
     turning: Array
 
     def free_directions(self, certificate: Certificate) -> Array:
-        """Return the directions along the face in which the second order vanishes, ``(n, r)``."""
+        """Return the directions along the face in which the second order vanishes, ``(n, r)``.
+
+        With sparse matrices, the coordinates that nothing reads.
+        """
+        second = certificate.found.second
+        if isinstance(second, FaceSize):
+            return csr_array(eye_array(len(self.slope)))[:, second.unmoved].toarray()
         flat = NEARLY_FLAT * certificate.analysis.small_curvature
-        basis = null_space(self.gradients[:-1], certificate.rank_tolerance)
+        basis = null_space(self.rows, certificate.rank_tolerance)
         values, vectors = np.linalg.eigh(basis.T @ self.curvature @ basis)
         return np.asarray(basis @ vectors[:, abs(values) <= flat])
 
-    def solve(self, free: Array, reference: float) -> tuple[Array, Array, Array] | None:
-        """Return derivatives of scaled coordinates and multipliers, and slopes along ``free``.
+    def solve(self, a: Analysis, free: Array) -> tuple[Array, Array, NDArray[np.bool_]] | None:
+        """Return derivatives of scaled coordinates and multipliers, and which are no solution.
 
-        The slopes, ``(r, p)``, are relative to the summands they are differences of.  Gradients are
-        scaled to unit length and energies by ``reference``, so that the condition number of the
-        matrix is meaningful; None if it is singular.
+        Those are of parameters along whose change the energy slopes along ``free``.  Gradients
+        are scaled to unit length and energies by their size; None if the matrix is singular.
         """
-        rows, (n, p) = self.gradients[:-1], self.turning.shape
-        sizes, k = np.linalg.norm(rows, axis=1), len(rows)
-        matrix = bordered(self.curvature / reference, np.vstack([unit_rows(rows), free.T]))
+        if isinstance(a.second, FaceSize):
+            return self._solve_sparsely(a, a.second)
+        (k, n), p, reference = self.rows.shape, self.turning.shape[1], a.reference
+        sizes = np.linalg.norm(self.rows, axis=1)
+        matrix = bordered(self.curvature / reference, np.vstack([unit_rows(self.rows), free.T]))
         if not np.linalg.cond(matrix) < 1 / SINGULAR:
             return None
         right = np.zeros((len(matrix), p))
         right[:n] = -self.turning / reference
         right[n : n + k] = -self.drift[:-1] / sizes[:, None]
         found = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+        # The slopes along free directions, relative to the summands they are differences of.
         summands = abs(matrix[:n]) @ abs(found) + abs(right[:n])
         slopes = abs(found[n + k :]) / np.maximum(summands.max(axis=0), np.finfo(float).tiny)
-        return found[:n], reference * found[n : n + k] / sizes[:, None], slopes
+        sloping = (slopes > a.local.tolerances.stationary).any(axis=0)
+        return found[:n], reference * found[n : n + k] / sizes[:, None], sloping
+
+    def _solve_sparsely(
+        self, a: Analysis, face: FaceSize
+    ) -> tuple[Array, Array, NDArray[np.bool_]] | None:
+        n, reference, sizes = len(self.slope), a.reference, lengths(self.rows)
+        units = csr_array(diags_array(1 / sizes) @ self.rows)
+        hessian = csr_array(self.curvature / reference)
+        moved = np.setdiff1d(np.arange(n), face.unmoved)
+        small = a.small_curvature / reference
+        if not nondegenerate(hessian[moved][:, moved], csr_array(units[:, moved]), small):
+            return None
+        right = np.vstack([-self.turning / reference, -self.drift[:-1] / sizes[:, None]])
+        system = Saddle(hessian, units)
+        found = system.solve(right, np.zeros_like(right))
+        left = abs(right - system.matrix @ found).max(axis=0, initial=0.0)
+        size = np.maximum(abs(right).max(axis=0, initial=0.0), np.finfo(float).tiny)
+        sloping = left > a.local.tolerances.stationary * size
+        return found[:n], -reference * found[n:] / sizes[:, None], sloping
 
 
 def bordered(hessian: Array, rows: Array) -> Array:
     """Return the matrix ``[[H, -A^T], [A, 0]]``."""
     corner = np.zeros((len(rows), len(rows)))
     return np.block([[hessian, -rows.T], [rows, corner]])
+
+
+@dataclass(frozen=True)
+class _Raised:
+    """A function whose parameters are variables, after the coordinates."""
+
+    family: Family
+    member_name: str
+    reads: tuple[int, ...]
+    parameters: tuple[float, ...] = ()
 
 
 class Lifted:
@@ -101,27 +149,31 @@ class Lifted:
 
     def __init__(self, certificate: Certificate) -> None:
         problem = certificate.problem
-        d = problem.polyhedron
-        held = (*(d.functions[i] for i in certificate.analysis.active), *d.equations)
+        d, self._sparse = problem.polyhedron, problem.is_sparse
+        held = (*(d.functions[i] for i in certificate.found.active), *d.equations)
+        terms = problem.energy.terms if self._sparse else (problem.energy,)
         self.names = tuple(f.name for f in held)
-        self.slots = slots_of((*held, problem.energy))
+        self.slots = slots_of((*held, *terms))
         self._scales = problem.scales
         self._values = np.array([value for _, value in self.slots])
-        self._bundle = self._bind((*held, problem.energy))
+        self._functions = self._raise((*held, *terms))
 
-    def _bind(self, functions: Sequence[SmoothFunction]) -> Bundle:
-        places = tuple(f"q{i}" for i in range(len(self._scales)))
-        manifold = Manifold((*places, *(f"p{j}" for j in range(len(self.slots)))))
+    def _raise(self, functions: Sequence[SmoothFunction]) -> list[_Raised]:
         used: dict[Family, set[str]] = {}
         for f in functions:
             used.setdefault(f.family, set()).add(f.member_name)
-        lifted = []
+        families = {family: lifted_family(family, frozenset(used[family])) for family in used}
+        n, raised = len(self._scales), []
         for f in functions:
-            family = lifted_family(f.family, frozenset(used[f.family]))
-            own = [self.slots[s] for s in zip(f.family.parameters, f.parameters, strict=True)]
-            reads = [*(places[i] for i in f.reads), *(f"p{j}" for j in own)]
-            lifted.append(SmoothFunction.member(family, f.member_name, manifold, reads=reads))
-        return Bundle(manifold, lifted)
+            slots = zip(f.family.parameters, f.parameters, strict=True)
+            own = [n + self.slots[slot] for slot in slots]
+            raised.append(_Raised(families[f.family], f.member_name, (*f.reads, *own)))
+        return raised
+
+    @cached_property
+    def _bundle(self) -> Bundle:
+        variables = len(self._scales) + len(self.slots)
+        return Bundle(Manifold(tuple(f"q{i}" for i in range(variables))), self._functions)
 
     def directions(self, rates: Rates) -> Array:
         """Return the derivatives of the slots by the parameters, ``(s, p)``."""
@@ -142,18 +194,39 @@ class Lifted:
         directions : (s, p) array
             Derivatives of the slots by the parameters.
         """
-        n, scales = len(self._scales), self._scales
         at = np.concatenate([q, self._values + changes])
+        if self._sparse:
+            return self._linearise_sparsely(at, multipliers, directions)
+        n, scales = len(self._scales), self._scales
         values, gradients, hessians = self._bundle.evaluate(at, 2)
         weights = np.append(-multipliers, 1.0)
         curved = np.einsum("i,ijk->jk", weights, hessians[:, :n, :n])
         mixed = (hessians[:, :n, n:] * scales[:, None]) @ directions
+        scaled = gradients[:, :n] * scales
         return Linear(
             values=values[:-1],
-            gradients=gradients[:, :n] * scales,
+            rows=scaled[:-1],
+            slope=scaled[-1],
             drift=gradients[:, n:] @ directions,
             curvature=curved * np.outer(scales, scales),
             turning=np.einsum("i,ijp->jp", weights, mixed),
+        )
+
+    def _linearise_sparsely(self, at: Array, multipliers: Array, directions: Array) -> Linear:
+        n, k, scaling = len(self._scales), len(self.names), diags_array(self._scales)
+        faces, terms = (
+            SparseRows.of(some, len(at)) for some in (self._functions[:k], self._functions[k:])
+        )
+        values, jacobian = faces.evaluate(at)
+        slope = np.asarray(terms.evaluate(at)[1].sum(axis=0))
+        bent = terms.curvature(at, np.ones(terms.count)) - faces.curvature(at, multipliers)
+        return Linear(
+            values=values,
+            rows=csr_array(jacobian[:, :n] @ scaling),
+            slope=slope[:n] * self._scales,
+            drift=np.vstack([jacobian[:, n:] @ directions, slope[n:] @ directions]),
+            curvature=csr_array(scaling @ bent[:n, :n] @ scaling),
+            turning=scaling @ (bent[:n, n:] @ directions),
         )
 
 

@@ -1,6 +1,7 @@
-"""Refinement of approximate minima to solutions of the KKT equations of a face."""
+"""Refinement of approximate minima to solutions of the KKT equations of a face; SLSQP with it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
+
+STOPPED = (0, 8)  # SLSQP's exit codes for convergence, and for a line search without progress
 
 
 @dataclass(frozen=True)
@@ -39,18 +42,7 @@ def polished(
 ) -> Endpoint:
     """Solve the KKT equations of the face that carries an approximate minimum ``q``.
 
-    Parameters
-    ----------
-    problem : Problem
-    piece : frozenset of int
-        The piece of the polyhedron in which the method ran.
-    start, q : (n,) array
-        Where the method started, and where it ended.
-    iterations : int
-        Number of its steps.
-    tolerances : Tolerances
-    stopped : bool
-        Whether it ended by its own stopping test.
+    It was found in a piece from ``start``; ``stopped`` says whether by the method's own test.
     """
     if not np.isfinite(q).all():
         q = start
@@ -69,6 +61,43 @@ def polished(
         if reached and np.isfinite(problem.energy.value(point)):
             return Endpoint(point, iterations, Verdict.NOT_CONVERGED)
     return Endpoint(q, iterations, Verdict.INFEASIBLE)
+
+
+def slsqp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tolerances) -> Endpoint:
+    """Run SLSQP in scaled coordinates, the energy divided by its own size, and polish."""
+    from scipy.optimize import minimize
+
+    scales, m = problem.scales, problem.inequalities
+    values, gradients, hessians = problem.evaluate(q, 2)
+    size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
+    rows = sorted(piece)
+    sections = list(range(m, problem.rows - 1))
+    floor = float(values[-1])
+    options: Any = {"ftol": 1e-15, "maxiter": limit}
+
+    def constraint(kind: str, kept: list[int]) -> Any:
+        return {
+            "type": kind,
+            "fun": lambda u: problem.evaluate(u * scales, 0)[0][kept],
+            "jac": lambda u: problem.evaluate(u * scales, 1)[1][kept],
+        }
+
+    def energy(u: Array) -> float:
+        return float(problem.evaluate(u * scales, 0)[0][-1] - floor) / size
+
+    def slope(u: Array) -> Array:
+        return np.asarray(problem.evaluate(u * scales, 1)[1][-1] / size)
+
+    found = minimize(
+        energy,
+        q / scales,
+        jac=slope,
+        method="SLSQP",
+        constraints=[constraint(k, kept) for k, kept in (("ineq", rows), ("eq", sections)) if kept],
+        options=options,
+    )
+    point, stopped = found.x * scales, found.status in STOPPED
+    return polished(problem, piece, q, point, int(found.nit), tolerances, stopped=stopped)
 
 
 def _on_face(

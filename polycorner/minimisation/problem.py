@@ -225,15 +225,6 @@ class Problem(Checked):
         u, step = descent.on_face(self._laid, self.mask(active), q / self.scales)
         return u * self.scales, step
 
-    def probe(
-        self, strong: Piece, piece: Piece, q: Array, directions: Array, held: Array, steps: Array
-    ) -> float:
-        """Return the change of the energy along directions on the face of ``strong``."""
-        from polycorner.minimisation.descent import intermediate as descent
-
-        masks = self.mask(strong), self.mask(piece)
-        return descent.probe(self._laid, masks, q / self.scales, directions, held, steps)
-
     def with_independent_equations(
         self, piece: Piece, points: Iterable[Array], tolerances: Tolerances
     ) -> "Problem":
@@ -247,10 +238,11 @@ class Problem(Checked):
         stated = [d.equations[i - m] for i in chosen if i - m < len(d.stated)]
         return pose(Polyhedron(d.manifold, parts, stated), self.energy)
 
-    def equations_hold(self, q: Array, tolerance: float) -> bool:
-        """Whether ``q`` lies on all equations, to first order within a distance."""
-        values, gradients = (part[self.inequalities : -1] for part in self.evaluate(q, 1))
-        return bool((abs(distances(values, gradients)) <= tolerance).all())
+    def holds(self, piece: Piece, values: Array, gradients: Array, miss: float) -> bool:
+        """Whether a point lies in a piece and on all equations, to first order within ``miss``."""
+        away = distances(values[:-1], gradients[:-1])
+        inside = (away[sorted(piece)] >= -miss).all()
+        return bool(inside and (abs(away[self.inequalities :]) <= miss).all())
 
 
 def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:

@@ -12,39 +12,23 @@ While no multiplier vanishes, the active set stays the same and the implicit fun
 the derivatives of both by the parameters ([Fi] ch. 3).  Where one vanishes the contact may open:
 generically, the minimum ends there or continues without the contact ([JJT], type 2).
 
-Derivatives of stationary points by parameters, with sparse matrices throughout.
-
-The equations are those of :mod:`~polycorner.minimisation.parametric`; coordinates that nothing
-reads are the free directions.
+In a large sparse polyhedron the coordinates that nothing reads are the free directions.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NoReturn, TypeAlias
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, eye_array
 
 from polycorner import checks
-from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.formulas.rows import SparseRows
 from polycorner.kinds import checked
-from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.parametric import (
-    Lifted,
-    Rates,
-    check_rates,
-    lifted_family,
-    partial_derivatives,
-    slots_of,
-)
-from polycorner.minimisation.sparse.factorisation import Saddle, lengths
-from polycorner.minimisation.sparse.optimality import nondegenerate
-from polycorner.minimisation.sparse_analysis import SparseAnalysis
+from polycorner.minimisation.certificate import LONGEST, Certificate
+from polycorner.minimisation.parametric import Lifted, Rates, check_rates, partial_derivatives
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.strata import local_pieces
-from polycorner.printing import Printed, Sheet, Table, number, titled, units
+from polycorner.printing import Printed, Sheet, Table, names, number, titled, units
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked
 
@@ -52,118 +36,6 @@ if TYPE_CHECKING:
     import sympy
 
     Quantity: TypeAlias = SmoothFunction | sympy.Expr | str
-
-
-@dataclass(frozen=True, eq=False)
-class Derivatives:
-    """Derivatives of a point by ``p`` parameters.
-
-    Attributes
-    ----------
-    names : tuple of str
-        The active functions and the equations.
-    point, multipliers : (n, p), (k, p) array
-    energy, envelope : (p,) array
-    free : (n, r) array
-        The coordinates that nothing reads.
-    """
-
-    names: tuple[str, ...]
-    point: Array
-    multipliers: Array
-    energy: Array
-    envelope: Array
-    free: Array
-
-
-@dataclass(frozen=True)
-class _Lifted:
-    """A function whose parameters are variables, after the coordinates."""
-
-    family: Family
-    member_name: str
-    reads: tuple[int, ...]
-    parameters: tuple[float, ...] = ()
-
-
-def lifted_rows(
-    functions: Sequence[SmoothFunction], slots: dict[tuple[str, float], int], n: int
-) -> SparseRows:
-    """Return functions of ``n`` coordinates, and after them of the parameters in their slots."""
-    lifted: list[SmoothFunction | _Lifted] = []
-    for f in functions:
-        if not f.family.parameters:
-            lifted.append(f)
-            continue
-        own = [n + slots[slot] for slot in zip(f.family.parameters, f.parameters, strict=True)]
-        family = lifted_family(f.family, frozenset({f.member_name}))
-        lifted.append(_Lifted(family, f.member_name, (*f.reads, *own)))
-    return SparseRows.of(lifted, n + len(slots))
-
-
-def sparse_obstacle(analysis: SparseAnalysis) -> str:
-    """Return why the implicit function theorem does not apply, or an empty string."""
-    if analysis.verdict in {Verdict.OUTSIDE, Verdict.DOMAIN_EDGE}:
-        return str(analysis.verdict.value)
-    if not analysis.independent:
-        return "the gradients of the active functions are dependent"
-    if analysis.first.residual > analysis.local.small:
-        return "the energy is not stationary on the face of its active functions"
-    weak = np.setdiff1d(np.arange(len(analysis.active)), analysis.strong_positions)
-    if len(weak):
-        first = analysis.names[int(weak[0])]
-        return f"the multiplier of {first} is zero, so that derivatives are one-sided"
-    return ""
-
-
-def sparse_derivatives(certificate: Certificate, rates: Rates) -> Derivatives | str:
-    """Solve the linearised KKT equations; return a sentence instead where that is impossible."""
-    problem, analysis = certificate.problem, certificate.found
-    assert isinstance(analysis, SparseAnalysis)
-    d, n, scales = problem.polyhedron, problem.dimension, problem.scales
-    held = (*(d.functions[i] for i in analysis.active), *d.equations)
-    slots = slots_of((*held, *problem.energy.terms))
-    directions = csr_array(
-        np.array(
-            [[moved.get(name, 0.0) for moved in rates.values()] for name, _ in slots], dtype=float
-        ).reshape(len(slots), len(rates))
-    )
-    at = np.concatenate([certificate.point, [value for _, value in slots]])
-    faces, terms = lifted_rows(held, slots, n), lifted_rows(problem.energy.terms, slots, n)
-    weights = np.array(list(analysis.named_multipliers.values()))
-    jacobian, slopes = faces.evaluate(at)[1], terms.evaluate(at)[1]
-    slope = np.asarray(slopes.sum(axis=0))
-    bent = terms.curvature(at, np.ones(terms.count)) - faces.curvature(at, weights)
-    scaling = diags_array(scales)
-    rows = csr_array(jacobian[:, :n] @ scaling)
-    sizes, reference = lengths(rows), analysis.reference
-    units = csr_array(diags_array(1 / sizes) @ rows)
-    hessian = csr_array(scaling @ bent[:n, :n] @ scaling / reference)
-    drift = (jacobian[:, n:] @ directions).toarray()
-    turning = (scaling @ (bent[:n, n:] @ directions)).toarray()
-    moved = np.setdiff1d(np.arange(n), analysis.unmoved)
-    small = analysis.small_curvature / reference
-    if not nondegenerate(hessian[moved][:, moved], csr_array(units[:, moved]), small):
-        return "the second order vanishes in a direction that is not free"
-    right = np.vstack([-turning / reference, -drift / sizes[:, None]])
-    system = Saddle(hessian, units)
-    found = system.solve(right, np.zeros_like(right))
-    left = abs(right - system.matrix @ found).max(axis=0, initial=0.0)
-    size = np.maximum(abs(right).max(axis=0, initial=0.0), np.finfo(float).tiny)
-    sloping = left > certificate.tolerances.stationary * size  # there is no solution
-    if sloping.any():
-        name = list(rates)[int(np.flatnonzero(sloping)[0])]
-        return f"the energy does not stay constant along the free coordinates as {name} changes"
-    still = slope[n:] @ directions
-    point = found[:n] * scales[:, None]
-    return Derivatives(
-        names=(*analysis.names, *d.equation_names),
-        point=point,
-        multipliers=-reference * found[n:] / sizes[:, None],
-        energy=still + slope[:n] @ point,
-        envelope=still - weights @ drift,
-        free=csr_array(eye_array(n))[:, analysis.unmoved].toarray(),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,22 +188,20 @@ def sensitivity(
     >>> s.point[:, 0].round(9).tolist(), s.energy.round(9).tolist(), s.of(x * y).round(9).tolist()
     ([0.5, -0.25], [0.25], [0.25])
     """
+    checks.instance("certificate", certificate, Certificate)
     _check_point(certificate)
     rates = check_rates(certificate, parameters)
-    if certificate.problem.is_sparse:
-        return _sparse(certificate, rates)
-    lifted, reference = Lifted(certificate), certificate.analysis.reference
-    multipliers = np.array(list(certificate.analysis.named_multipliers.values()))
+    lifted, found = Lifted(certificate), certificate.found
+    multipliers = np.array(list(found.named_multipliers.values()))
     still, directions = np.zeros(len(lifted.slots)), lifted.directions(rates)
     linear = lifted.linearise(certificate.point, still, multipliers, directions)
     free = linear.free_directions(certificate)
-    solved = linear.solve(free, reference)
+    solved = linear.solve(found, free)
     if solved is None:
-        raise ValueError(_refusal("the second order vanishes in a direction that is not free"))
-    moved, changed, slopes = solved
-    loose = (slopes > certificate.tolerances.stationary).any(axis=0)
-    if loose.any():
-        name = list(rates)[int(np.flatnonzero(loose)[0])]
+        _refuse("the second order vanishes in a direction that is not free")
+    moved, changed, sloping = solved
+    if sloping.any():
+        name = list(rates)[int(np.flatnonzero(sloping)[0])]
         msg = (
             "parameters: expected ones that keep the energy constant along the free directions; "
             f"got {name}, whose change makes the energy slope along one"
@@ -341,59 +211,32 @@ def sensitivity(
         certificate=certificate,
         rates=rates,
         point=moved * certificate.problem.scales[:, None],
-        multipliers=certificate.analysis.stated(dict(zip(lifted.names, changed, strict=True))),
-        energy=linear.drift[-1] + linear.gradients[-1] @ moved,
+        multipliers=found.stated(dict(zip(lifted.names, changed, strict=True))),
+        energy=linear.drift[-1] + linear.slope @ moved,
         envelope=linear.drift[-1] - multipliers @ linear.drift[:-1],
         free=free,
     )
 
 
-def _sparse(certificate: Certificate, rates: Rates) -> Sensitivity:
-    found = sparse_derivatives(certificate, rates)
-    if isinstance(found, str):
-        raise ValueError(_refusal(found))
-    changed = dict(zip(found.names, found.multipliers, strict=True))
-    return Sensitivity(
-        certificate=certificate,
-        rates=rates,
-        point=found.point,
-        multipliers=certificate.problem.stated(changed),
-        energy=found.energy,
-        envelope=found.envelope,
-        free=found.free,
-    )
+def _refuse(reason: str) -> NoReturn:
+    msg = f"certificate: expected a point that depends smoothly on the parameters; {reason}"
+    raise ValueError(msg)
 
 
 def _check_point(certificate: Certificate) -> None:
-    """Raise for a certificate whose point need not depend smoothly on the parameters."""
-    checks.instance("certificate", certificate, Certificate)
-    reason = _reason(certificate)
-    if reason:
-        raise ValueError(_refusal(reason))
-
-
-def _refusal(reason: str) -> str:
-    return f"certificate: expected a point that depends smoothly on the parameters; {reason}"
-
-
-def _reason(certificate: Certificate) -> str:
-    """Return the reason why the implicit function theorem does not apply, or an empty string."""
-    if isinstance(certificate.found, SparseAnalysis):
-        return sparse_obstacle(certificate.found)
-    analysis, d = certificate.analysis, certificate.problem.polyhedron
-    values, gradients = analysis.local.values, analysis.local.gradients
-    if analysis.verdict in {Verdict.OUTSIDE, Verdict.DOMAIN_EDGE}:
-        return str(analysis.verdict.value)
-    if len(local_pieces(d, values[:-1], gradients[:-1], certificate.tolerance)) > 1:
-        return "several pieces of the polyhedron meet there"
-    if not analysis.independent:
-        return f"the gradients of {', '.join(certificate.active)} are dependent"
-    if analysis.multipliers.residual > analysis.local.small:
-        return "the energy is not stationary on the face of its active functions"
-    if analysis.weak:
-        names = ", ".join(d.names[i] for i in analysis.weak)
-        return f"the multiplier of {names} is zero, so that derivatives are one-sided"
-    higher = analysis.decision is not None and analysis.decision.degree > 2
-    if higher or analysis.verdict is Verdict.UNDECIDED:
-        return "the second order vanishes in a direction that is not free"
-    return ""
+    """Raise where the implicit function theorem does not apply."""
+    a, d = certificate.found, certificate.problem.polyhedron
+    values, gradients = a.local.values[:-1], a.local.gradients
+    if a.verdict in {Verdict.OUTSIDE, Verdict.DOMAIN_EDGE}:
+        _refuse(str(a.verdict.value))
+    if d.is_union and len(local_pieces(d, values, gradients[:-1], certificate.tolerance)) > 1:
+        _refuse("several pieces of the polyhedron meet there")
+    if not a.independent:
+        _refuse(f"the gradients of {names(certificate.active, LONGEST)} are dependent")
+    if a.multipliers.residual > a.local.small:
+        _refuse("the energy is not stationary on the face of its active functions")
+    if a.weak:
+        weak = names([d.names[i] for i in a.weak], LONGEST)
+        _refuse(f"the multiplier of {weak} is zero, so that derivatives are one-sided")
+    if a.verdict is Verdict.UNDECIDED or (a.decision is not None and a.decision.degree > 2):
+        _refuse("the second order vanishes in a direction that is not free")

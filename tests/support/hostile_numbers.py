@@ -77,9 +77,6 @@ def descents(seed, count):
         assert 0 <= iterations <= limit
         descent.restore(problem, masks[0], u)
         descent.on_face(problem, masks[1], u)
-        held = np.eye(n)[: rng.randint(1, n)]
-        change = descent.probe(problem, masks, u, held, held, np.array([0.1, -0.1]))
-        assert np.isnan(change) or change >= 0
 
 
 def boxes(seed, count):

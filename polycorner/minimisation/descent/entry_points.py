@@ -4,15 +4,15 @@ import numpy as np
 
 from polycorner.formulas.intermediate import intermediate_code
 from polycorner.formulas.records import RecordType, reader
-from polycorner.minimisation.descent import flat_directions, newton, records, sqp
+from polycorner.minimisation.descent import newton, records, sqp
 from polycorner.minimisation.descent.feasibility import project
 from polycorner.minimisation.descent.jit import compiled
 
 RESTORATIONS = np.int64(100)  # linearisations with which a point is restored
 
-problem_at, descend_at, restore_at, face_at, probe_at = (
+problem_at, descend_at, restore_at, face_at = (
     reader(RecordType(f"descent.{name}", getattr(records, name).declared))
-    for name in ("PROBLEM", "DESCEND", "RESTORE", "ON_FACE", "PROBE")
+    for name in ("PROBLEM", "DESCEND", "RESTORE", "ON_FACE")
 )
 
 
@@ -57,17 +57,7 @@ def on_face(problem, call):
     return step, 0.0
 
 
-@compiled
-def probe(problem, call):
-    """Follow directions along a face; see ``flat_directions.probe``."""
-    p, c = problem_at(problem), probe_at(call)
-    change = flat_directions.probe(
-        arrays(p), c.on, c.use, p.inequalities, p.rows, c.u, c.directions, c.held, c.steps, p.size
-    )
-    return change, 0.0
-
-
 def made() -> str:
     """Return the entry points as intermediate code."""
-    functions = {"descend": descend, "restore": restore, "on_face": on_face, "probe": probe}
+    functions = {"descend": descend, "restore": restore, "on_face": on_face}
     return intermediate_code(functions, arguments=2)

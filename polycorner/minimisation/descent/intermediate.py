@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from polycorner.formulas.shipped import Shipped
 from polycorner.formulas.tables import Layout
-from polycorner.minimisation.descent.records import DESCEND, ON_FACE, PROBE, PROBLEM, RESTORE
+from polycorner.minimisation.descent.records import DESCEND, ON_FACE, PROBLEM, RESTORE
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,7 +28,7 @@ SHIPPED = Shipped(
     package="polycorner.minimisation.descent",
     file="descent.ll.xz",
     make=_make,
-    names=("descend", "restore", "on_face", "probe"),
+    names=("descend", "restore", "on_face"),
     arguments=2,
     results=2,
     number=ctypes.c_double,
@@ -76,17 +76,6 @@ def on_face(problem: Laid, on: Mask, u: Array) -> tuple[Array, float]:
     v = u.copy()
     step, _ = _call(2, problem, ON_FACE, on, v)
     return v, step
-
-
-def probe(
-    problem: Laid, masks: tuple[Mask, Mask], u: Array, directions: Array, held: Array, steps: Array
-) -> float:
-    """Follow directions along the face of the first mask, in the piece of the second.
-
-    See ``flat_directions.probe``.
-    """
-    change, _ = _call(3, problem, PROBE, *masks, u, directions, held, steps)
-    return change
 
 
 if __name__ == "__main__":

@@ -16,11 +16,3 @@ PROBLEM = Layout.of(
 DESCEND = Layout.of(use="flag m", u="real n", multipliers="real M", limit="whole")
 RESTORE = Layout.of(use="flag m", u="real n")
 ON_FACE = Layout.of(on="flag m", u="real n")
-PROBE = Layout.of(
-    on="flag m",
-    use="flag m",
-    u="real n",
-    directions="real * n",
-    held="real * n",
-    steps="real *",
-)

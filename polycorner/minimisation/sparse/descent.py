@@ -29,7 +29,7 @@ from polycorner.minimisation.sparse.optimality import (
     first_order,
     second_order,
 )
-from polycorner.minimisation.sparse.quadratic_programmes import quadratic_step
+from polycorner.minimisation.sparse.programmes import quadratic_step
 from polycorner.minimisation.sparse.restoration import (
     inside,
     linearised,
@@ -67,13 +67,8 @@ class DescentEnd:
 def descend(problem: Nonlinear, start: Array, limit: int) -> DescentEnd:
     """Descend from ``start``, never through a wall, until a face carries a minimum.
 
-    Parameters
-    ----------
-    problem : Nonlinear
-    start : (n,) array
-        In scaled coordinates; if it is not feasible, the violation is lowered first.
-    limit : int
-        Number of quadratic programmes.
+    From a start that is not feasible the violation is lowered first.  The limit is that of the
+    number of quadratic programmes.
     """
     at = problem.at(start)
     found = projected(problem, at, 30) if at.is_finite else None
@@ -269,8 +264,8 @@ def signed_multipliers(
     if not lam[:inequalities].min(initial=0.0) < 0:
         return lam
     small = tolerances.multiplier * float(abs(at.gradient).max())
-    found = first_order(csr_array(at.rows[held]), inequalities, at.gradient, small, tolerances)
-    return lam if found.independent or not found.exist else found.values
+    found, _ = first_order(csr_array(at.rows[held]), inequalities, at.gradient, small, tolerances)
+    return lam if found.unique or not found.exist else found.values
 
 
 def downward(hessian: csr_array, rows: csr_array) -> Array | None:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from polycorner.formulas.rows import Indices, SparseRows
+from polycorner.minimisation.problem import Problem
 from polycorner.minimisation.sparse.factorisation import lengths
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
@@ -47,26 +48,34 @@ class Point(Value):
 
 @dataclass(frozen=True, eq=False)
 class Nonlinear(Value):
-    """Minimise ``sum_t e_t(u)`` over ``f_i(u) >= 0`` and ``h_j(u) = 0``; ``u = q / scales``.
+    """A problem as the sparse programme ``min sum_t e_t(u)``, ``f_i(u) >= 0``, ``h_j(u) = 0``.
 
-    Attributes
-    ----------
-    terms : SparseRows
-        The ``e_t``.
-    constraints : SparseRows
-        The ``f_i``, then the ``h_j``.
-    inequalities : int
-        The number ``m`` of the ``f_i``.
-    scales : (n,) array
-    tolerances : Tolerances
-        Those in force.
+    ``u = q / scales``; the terms of the energy, and the constraints one after the other, are rows
+    of few coordinates each.
     """
 
-    terms: SparseRows
-    constraints: SparseRows
-    inequalities: int
-    scales: Array
+    problem: Problem
     tolerances: Tolerances
+
+    @cached_property
+    def terms(self) -> SparseRows:
+        """The ``e_t``."""
+        return self.problem.sparse_energy
+
+    @cached_property
+    def constraints(self) -> SparseRows:
+        """The ``f_i``, then the ``h_j``."""
+        return self.problem.sparse_rows
+
+    @property
+    def inequalities(self) -> int:
+        """The number ``m`` of the ``f_i``."""
+        return self.problem.inequalities
+
+    @property
+    def scales(self) -> Array:
+        """The scales of the coordinates."""
+        return self.problem.scales
 
     @property
     def equations(self) -> Indices:

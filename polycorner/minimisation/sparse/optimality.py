@@ -1,12 +1,12 @@
 """Optimality conditions of first and second order with sparse matrices."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import block_array, csr_array, eye_array, hstack
 
+from polycorner.minimisation.conditions import Multipliers
 from polycorner.minimisation.sparse.factorisation import (
     Saddle,
     least_squares,
@@ -22,39 +22,13 @@ INWARD = 1e-3  # rate, per step of a scale unit, at which a direction leads inwa
 PENALTY = 1e4  # of directions that leave the face, in units of the largest curvature
 
 
-@dataclass(frozen=True)
-class FirstOrder:
-    """Multipliers of unit gradients ``g = A^T lam``.
-
-    Attributes
-    ----------
-    values : (k,) array
-        Those of inequalities first.
-    residual : float
-        Largest component of ``g - A^T lam``.
-    rank : int or None
-        Of ``A``; None where it cannot be decided.
-    exist : bool
-        Whether the conditions hold with these values.
-    """
-
-    values: Array
-    residual: float
-    rank: int | None
-    exist: bool
-
-    @property
-    def independent(self) -> bool:
-        """Whether the gradients are independent, and the multipliers unique."""
-        return self.rank == len(self.values)
-
-
 def first_order(
     rows: csr_array, inequalities: int, gradient: Array, small: float, tolerances: Tolerances
-) -> FirstOrder:
-    """Return the multipliers of unit gradients.
+) -> tuple[Multipliers, int | None]:
+    """Return the multipliers of unit gradients ``g = A^T lam``, and the rank of ``A``.
 
-    Where they are not unique, those whose least is the largest.
+    Where they are not unique, those whose least is the largest, without their ranges.  The rank is
+    None where it cannot be decided.
     """
     found = rank(rows, tolerances.rank)
     k = rows.shape[0]
@@ -62,12 +36,12 @@ def first_order(
         lam = least_squares(rows, gradient) if k else np.empty(0)
     else:
         lam = _central(rows, inequalities, gradient)
-    if lam is None:
-        return FirstOrder(np.zeros(k), np.inf, found, exist=False)
-    residual = float(abs(gradient - rows.T @ lam).max(initial=0.0))
+    solved, lam = lam is not None, np.zeros(k) if lam is None else lam
+    residual = float(abs(gradient - rows.T @ lam).max(initial=0.0)) if solved else np.inf
     least = float(lam[:inequalities].min(initial=0.0))
     negative = -tolerances.stationary * abs(lam).max(initial=0.0)
-    return FirstOrder(lam, residual, found, exist=residual <= small and least >= negative)
+    exist, ends = residual <= small and least >= negative, lam if found == k else lam + np.nan
+    return Multipliers(lam, ends, ends, exist, residual, unique=found == k), found
 
 
 def _central(rows: csr_array, inequalities: int, gradient: Array) -> Array | None:

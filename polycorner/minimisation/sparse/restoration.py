@@ -8,8 +8,7 @@ from scipy.sparse import csr_array, eye_array
 from polycorner.formulas.rows import Indices
 from polycorner.minimisation.sparse.factorisation import Saddle
 from polycorner.minimisation.sparse.nonlinear import Nonlinear, Point
-from polycorner.minimisation.sparse.programmes import Linearised
-from polycorner.minimisation.sparse.quadratic_programmes import elastic_step, quadratic_step
+from polycorner.minimisation.sparse.programmes import Linearised, elastic_step, quadratic_step
 from polycorner.spaces.manifold import Array
 
 FIRST, LEAST = 0.5, 1e-9  # box of a step, in scale units

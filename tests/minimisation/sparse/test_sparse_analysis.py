@@ -8,9 +8,9 @@ import pytest
 from scipy.sparse import csr_array
 
 from polycorner import Manifold, Polyhedron, Verdict, certify, minimise
+from polycorner.minimisation.analysis import analyse_sparse
 from polycorner.minimisation.problem import pose
 from polycorner.minimisation.sparse.factorisation import negative_eigenvalues, rank
-from polycorner.minimisation.sparse_analysis import analyse_sparse
 from polycorner.tolerances import DEFAULT
 
 # Largest least distance of N points in a unit square, as published: packomania.com.
@@ -93,7 +93,7 @@ def test_twelve_spheres_around_one():
     found = analyse_sparse(problem, q, DEFAULT)
     assert len(found.active) == 30
     assert found.verdict is certify(D, -t, q).verdict is Verdict.STRICT_MINIMUM
-    assert found.first.rank == 37  # a corner
+    assert found.rank == 37  # a corner
     assert len(found.active) + 15 - 37 == 8  # states of self-stress beside the normalised one
     assert not found.independent
     values = found.named_multipliers
@@ -130,7 +130,7 @@ def test_second_order_by_inertia(sign, verdict):
     q = np.zeros(12)
     found = analyse_sparse(pose(D, E), q, DEFAULT)
     assert found.verdict is certify(D, E, q).verdict is Verdict[verdict]
-    assert found.face_dimension == 6
+    assert found.second.dimension == 6
 
 
 def test_first_order_verdicts():

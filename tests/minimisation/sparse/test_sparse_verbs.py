@@ -21,8 +21,8 @@ from polycorner import (
 )
 from polycorner.formulas.families import Family
 from polycorner.minimisation import problem as problems
+from polycorner.minimisation.analysis import analyse_sparse
 from polycorner.minimisation.problem import pose
-from polycorner.minimisation.sparse_analysis import analyse_sparse
 from polycorner.tolerances import DEFAULT
 
 SIDES = (("floor", "low", "y"), ("left", "low", "x"), ("right", "high", "x"))
