@@ -19,6 +19,7 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
+from tests.support.arrangements import anywhere
 from tests.support.hulls import margin
 
 seeds = st.integers(0, 2**32 - 1)
@@ -40,21 +41,6 @@ def some_body(rng, d, kind):
         return capsule(at, at + rng.standard_normal(d), radius)
     hull = polygon if d == 2 else polytope
     return hull(convex(rng, d, 6), 0.0 if kind == "sharp" else radius)
-
-
-def anywhere(rng, a, reach=1.7):
-    """A random point of an arrangement."""
-    placed = {}
-    for name in a.named:
-        turn = (
-            None
-            if a.orientations == "none"
-            else rng.uniform(-7, 7)
-            if a.dimension == 2
-            else Rotation.random(random_state=np.random.RandomState(rng.integers(2**31)))
-        )
-        placed[name] = (reach * rng.uniform(-1, 1, a.dimension), turn)
-    return a.point(placed)
 
 
 def least(a, q):
@@ -79,7 +65,7 @@ def test_a_placement_is_free_if_no_point_is_in_both(d, first, second, orientatio
     a = Arrangement(bodies, orientations=orientations)
     free = []
     for _ in range(75):
-        q = anywhere(rng, a)
+        q = anywhere(a, rng, 1.7)
         expected = least(a, q)
         if abs(expected) > NEAR:
             assert a.polyhedron.contains(q) == (expected > 0)
@@ -96,7 +82,7 @@ def test_the_least_gap_is_the_distance(d, kinds):
     gaps = Polyhedron(a.manifold, AllOf(*a.contacts(excluded=False)))
     apart = 0
     for _ in range(60):
-        q = anywhere(rng, a, 3.0)
+        q = anywhere(a, rng, 3.0)
         one, two = (next(iter(body.parts.values())) for body in a.placed(q).values())
         expected, radius = margin(one, two), one.radius + two.radius
         if expected > NEAR - radius:
@@ -121,7 +107,7 @@ def test_compounds_fixed_bodies_and_walls(seed, d):
         fixed={"C": hull},
     )
     for _ in range(20):
-        q = anywhere(rng, a)
+        q = anywhere(a, rng, 1.7)
         bodies = a.placed(q)
         expected = min(least(a, q), *(inner(bodies[name], walls) for name in "AB"))
         if abs(expected) > NEAR:

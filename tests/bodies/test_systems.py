@@ -285,6 +285,17 @@ def test_weight_that_follows_the_time_acts_at_the_centre_of_mass(body):
     assert end == pytest.approx(expected, abs=1e-4)
 
 
+UPRIGHT, TURNED = capsule([0, 0, -1], [0, 0, 1], 1), Mass(1, [0, 0, 0.2], [1, 1.2, 1])
+
+
+def system(body=disc(1), **options):  # noqa: B008 - a value that does not change
+    return lambda: Arrangement([body] * 2).system(**options)
+
+
+def on_the_ground(**options):
+    return lambda: Arrangement({"A": disc(1)}, GROUND).system(**options)
+
+
 def masses(mass, centre, inertia):
     return lambda: Mass(mass, centre, inertia)
 
@@ -292,42 +303,22 @@ def masses(mass, centre, inertia):
 @pytest.mark.parametrize(
     ("make", "kind", "said"),
     [
-        (lambda: Arrangement([polygon(TRIANGLE)] * 2).system(), NotImplementedError, "rounded"),
-        (lambda: Arrangement([disc(1)] * 2).system(friction=0.1), ValueError, "orientations"),
-        (lambda: Arrangement([disc(1)] * 2).system(friction=-1), ValueError, "friction"),
-        (lambda: Arrangement([disc(1)] * 2).system(gravity=[1, 2, 3]), ValueError, "gravity"),
-        (lambda: Arrangement([disc(1)] * 2).system(gravity=3), TypeError, "gravity: expected 2"),
-        (lambda: Arrangement([disc(1)] * 2).system(gravity=[True, 1]), TypeError, "gravity: exp"),
-        (
-            lambda: Arrangement([disc(1)] * 2).system(gravity=[0, sympy.Symbol("t")]),
-            ValueError,
-            "gravity: expected 2 finite numbers, or expressions of time_symbol",
-        ),
-        (
-            lambda: Arrangement([disc(1)] * 2).system(gravity=[0, sympy.I * time_symbol()]),
-            ValueError,
-            "gravity: expected a formula of real values",
-        ),
-        (lambda: Arrangement([disc(1)] * 2).system(density=0), ValueError, "density"),
-        (lambda: Arrangement([disc(1)] * 2).system(masses={"3": 1}), ValueError, "masses"),
-        (lambda: Arrangement([disc(1)] * 2).system(masses={"1": 1}), TypeError, "masses"),
-        (
-            lambda: Arrangement({"A": disc(1)}, GROUND).system(friction=-1, count=2),
-            ValueError,
-            "friction",
-        ),
-        (
-            lambda: Arrangement([disc(1)] * 2).system(masses={"1": Mass(1, [0.1, 0], 1)}),
-            ValueError,
-            "masses: .* '1' that looks the same",
-        ),
-        (
-            lambda: Arrangement([capsule([0, 0, -1], [0, 0, 1], 1)] * 2).system(
-                masses={"2": Mass(1, [0, 0, 0.2], [1, 1.2, 1])}
-            ),
-            ValueError,
-            "masses: .* '2' that looks the same",
-        ),
+        (system(polygon(TRIANGLE)), NotImplementedError, "rounded"),
+        (system(friction=0.1), ValueError, "orientations"),
+        (system(friction=-1), ValueError, "friction"),
+        (system(gravity=[1, 2, 3]), ValueError, "gravity"),
+        (system(gravity=3), TypeError, "gravity: expected 2"),
+        (system(gravity=[True, 1]), TypeError, "gravity: exp"),
+        (system(gravity=[0, sympy.Symbol("t")]), ValueError, "gravity: .* of time_symbol"),
+        (system(gravity=[0, sympy.I * time_symbol()]), ValueError, "gravity: .* of real values"),
+        (system(density=0), ValueError, "density"),
+        (system(masses={"3": 1}), ValueError, "masses"),
+        (system(masses={"1": 1}), TypeError, "masses"),
+        (system(masses={"1": Mass(1, [0.1, 0], 1)}), ValueError, "masses: .* '1' that looks"),
+        (system(UPRIGHT, masses={"2": TURNED}), ValueError, "masses: .* '2' that looks the same"),
+        (on_the_ground(friction=-1, count=2), ValueError, "friction"),
+        (on_the_ground(count=0), ValueError, "count"),
+        (system(count=2), ValueError, "count: expected 1 for several bodies"),
         (masses(0, [0, 0], 1), ValueError, "mass"),
         (masses(1, [0, 0], 0), ValueError, "inertia"),
         (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),
@@ -362,13 +353,6 @@ def test_repeated_bodies_move_as_if_they_were_listed(d, friction):
     second = simulate(repeated, repeated.state(np.array(starts)), 0.25, 5e-4)
     assert any(len(bodies) == 2 for bodies, *_ in second.touching[-1])
     np.testing.assert_allclose(first.q[-1].reshape(3, -1), second.q[-1], atol=2e-3)
-
-
-def test_only_one_body_can_be_repeated():
-    with pytest.raises(ValueError, match="count: expected 1 for several bodies"):
-        Arrangement([disc(1), disc(1)]).system(count=2)
-    with pytest.raises(ValueError, match="count"):
-        Arrangement({"A": disc(1)}, GROUND).system(count=0)
 
 
 def test_coefficients_by_name():

@@ -27,6 +27,13 @@ def first_slip(drum, azimuth, heading, duration):
     return path, began[0].time
 
 
+def assert_motion_begins_on_the_boundary(theta):
+    boundary = float(exact_eastern_boundary(theta, KEEL.onset, SLENDERNESS))
+    start = boundary - math.radians(0.1)
+    _, time = first_slip(DRUM, start, theta, 0.4)
+    assert start + DRUM.spin * time == pytest.approx(boundary, abs=STEP)
+
+
 @given(st.floats(-30, 30))
 @settings(max_examples=6)
 def test_motion_begins_on_the_eastern_boundary_of_the_region_of_rest(degrees):
@@ -34,22 +41,14 @@ def test_motion_begins_on_the_eastern_boundary_of_the_region_of_rest(degrees):
 
     Steps begin half-way between those at which forces are evaluated, hence within one step.
     """
-    theta = math.radians(degrees)
-    boundary = exact_eastern_boundary(theta, KEEL.onset, SLENDERNESS)
-    start = boundary - math.radians(0.1)
-    _, time = first_slip(DRUM, start, theta, 0.4)
-    assert start + DRUM.spin * time == pytest.approx(boundary, abs=STEP)
+    assert_motion_begins_on_the_boundary(math.radians(degrees))
 
 
 @pytest.mark.parametrize("degrees", [50, 60, 70])
 def test_motion_begins_on_the_boundary_where_it_slides_first(degrees):
     """At these headings the disc bounds the region, not the strip; length matters most there."""
-    theta = math.radians(degrees)
-    boundary = float(exact_eastern_boundary(theta, KEEL.onset, SLENDERNESS))
-    assert not KEEL.onset.rolls_back(theta)
-    start = boundary - math.radians(0.1)
-    _, time = first_slip(DRUM, start, theta, 0.4)
-    assert start + DRUM.spin * time == pytest.approx(boundary, abs=STEP)
+    assert not KEEL.onset.rolls_back(math.radians(degrees))
+    assert_motion_begins_on_the_boundary(math.radians(degrees))
 
 
 @pytest.mark.parametrize("degrees", [-25, 10])

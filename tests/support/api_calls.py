@@ -4,8 +4,6 @@ The arguments of a dataclass are the fields of the value in ``VALUES``, on which
 class are called as well.
 """
 
-from pathlib import Path
-
 import api_samples as of
 import numpy as np
 
@@ -23,10 +21,6 @@ from polycorner import (
 )
 from polycorner.dumbbells import pictures as drum_pictures
 
-PACKAGES = sorted(
-    ".".join(file.parent.relative_to(Path(polycorner.__file__).parent.parent).parts)
-    for file in Path(polycorner.__file__).parent.rglob("__init__.pyi")
-)
 ORIGIN = [0.0, 0.0]
 
 # One value of every public class.
@@ -138,13 +132,26 @@ ON = {"manifold": of.M}
 FORCE = {"p": [0.1, 0.1]}
 SLIP = {"s": [0.1, 0.1]}
 SETS = ("ConvexPolygon", "CutDisc", "Disc", "Ellipse", "Interval")
-
-
-def placed():
-    return of.pair().nested("R")
-
+ALIKE = (  # arguments, and what takes them
+    (
+        Q,
+        """Manifold.frame Manifold.point Manifold.points Manifold.wrap Polyhedron.contains
+        Polyhedron.equation_values Polyhedron.evaluate Polyhedron.gradients Polyhedron.hessians
+        Polyhedron.implicit Polyhedron.values SmoothFunction.gradient SmoothFunction.hessian
+        SmoothFunction.value System.state""",
+    ),
+    (PQ, "Manifold.chord Manifold.difference Manifold.distance"),
+    (
+        {},
+        """Arrangement.system Body.moved Certificate.explain Certificate.holds CornerList.skeleton
+        JammedPacking.near_gaps Manifold.matrix Manifold.vector Nerve.betti
+        Nerve.euler_characteristic PeriodicPacking.scattered StationaryList.certificates
+        TorusDisks.critical_search Tutorial.sides""",
+    ),
+)
 
 CALLS = {
+    **{name: given.copy for given, names in ALIKE for name in names.split()},
     # minimisation
     "certify": lambda: {"polyhedron": of.square(), "energy": of.energy(), "q": ORIGIN},
     "minima": lambda: {
@@ -169,8 +176,6 @@ CALLS = {
     },
     "minimisation.immobility": lambda: {"polyhedron": of.square(), "q": ORIGIN},
     "minimisation.richness": lambda: {"counts": [1, 2, 2]},
-    "Certificate.explain": dict,
-    "Certificate.holds": dict,
     "Sensitivity.function": lambda: {"quantity": of.energy()},
     "Sensitivity.of": lambda: {"quantity": of.energy()},
     "Sensitivity.predict": lambda: {"changes": {"a": 0.1}},
@@ -178,17 +183,8 @@ CALLS = {
     "AllOf": lambda: {"parts": of.X},
     "AnyOf": lambda: {"parts": of.X},
     "Polyhedron": lambda: {"manifold": of.M, "parts": {"left": of.X}},
-    "Polyhedron.contains": lambda: Q,
-    "Polyhedron.equation_values": lambda: Q,
-    "Polyhedron.evaluate": lambda: Q,
-    "Polyhedron.gradients": lambda: Q,
-    "Polyhedron.hessians": lambda: Q,
-    "Polyhedron.implicit": lambda: Q,
-    "Polyhedron.values": lambda: Q,
     "stratum_at": lambda: {"polyhedron": of.square(), "q": ORIGIN},
     "polyhedra.nerve": lambda: {"polyhedron": of.square(), "height": of.Y},
-    "Nerve.betti": dict,
-    "Nerve.euler_characteristic": dict,
     # functions and spaces
     "SmoothFunction": lambda: {
         "name": "f",
@@ -196,9 +192,6 @@ CALLS = {
         "manifold": of.M,
         "parameters": {"a": 1.0},
     },
-    "SmoothFunction.gradient": lambda: Q,
-    "SmoothFunction.hessian": lambda: Q,
-    "SmoothFunction.value": lambda: Q,
     "SmoothFunction.renamed": lambda: {"name": "g"},
     "SmoothFunction.member": lambda: {
         "family": of.energy().family,
@@ -217,19 +210,10 @@ CALLS = {
     "Symmetry.relabellings": lambda: ON | BETWEEN | {"tolerance": 1e-6},
     "Symmetry.separation": lambda: ON | BETWEEN,
     "Symmetry.separations": lambda: ON | {"p": SQUARE, "points": SQUARE[None]},
-    "Manifold.matrix": dict,
-    "Manifold.vector": dict,
-    "Manifold.chord": lambda: PQ,
-    "Manifold.difference": lambda: PQ,
-    "Manifold.distance": lambda: PQ,
     "Manifold.euclidean": lambda: {"names": "x y"},
     "Manifold.sphere": lambda: {"names": "u"},
     "Manifold.rotation": lambda: {"names": "a"},
-    "Manifold.frame": lambda: Q,
-    "Manifold.point": lambda: Q,
-    "Manifold.points": lambda: Q,
     "Manifold.shift": lambda: Q | {"v": [0.1, 0.1]},
-    "Manifold.wrap": lambda: Q,
     # proofs
     "prove": lambda: {"certificate": of.certificate(), "digits": 8},
     "proofs.corners": lambda: {"polyhedron": of.square(), "box": of.UNIT},
@@ -240,8 +224,6 @@ CALLS = {
     },
     "Proof.enclose": lambda: {"expression": of.X + of.Y},
     "CornerList.save": lambda: {"path": of.new("corners.zip")},
-    "CornerList.skeleton": dict,
-    "StationaryList.certificates": dict,
     "StationaryList.save": lambda: {"path": of.new("points.zip")},
     # skeletons
     "skeleton": lambda: {"polyhedron": of.square(), "starts": [[0.5, 0.5]]},
@@ -289,7 +271,6 @@ CALLS = {
     "System.check_placement": lambda: {"q": np.array([[0.25, 0.5]])},
     "System.energies": lambda: {"state": of.state()},
     "System.largest_step": lambda: {"state": of.state()},
-    "System.state": lambda: Q,
     "System.sticks": lambda: {"q": of.state().q, "v": of.state().v},
     "Trajectory.at": lambda: {"time": 0.005},
     "Trajectory.of_kind": lambda: {"kind": motion.EventKind.IMPACT},
@@ -307,24 +288,19 @@ CALLS = {
     "bodies.thinned": lambda: {"arrangement": of.arrangement()},
     "Arrangement.placed": lambda: {"q": [0.0, 0.0, 3.0, 0.0]},
     "Arrangement.point": lambda: {"placed": {"a": [0.0, 0.0], "b": [3.0, 0.0]}},
-    "Arrangement.system": dict,
     "Arrangement.velocity": lambda: {"q": [0.0, 0.0, 3.0, 0.0], "moving": {"a": [1.0, 0.0]}},
-    "Body.moved": dict,
     "Body.same": lambda: {"other": of.hexagon()},
     # models
-    "JammedPacking.near_gaps": dict,
     "PeriodicPacking.bidisperse": lambda: {"count": 24},
     "PeriodicPacking.monodisperse": lambda: {"count": 64},
     "PeriodicPacking.density": lambda: {"inflation": 1.0},
     "PeriodicPacking.jam": lambda: {"start": 0, "max_programmes": 2},
-    "PeriodicPacking.scattered": dict,
     "PeriodicPacking.soft_start": lambda: {"iterations": 5},
     "Pinball.starts": lambda: {"rng": 0, "count": 2},
     "SphereCluster.contacts": lambda: {"q": of.tetrahedron()},
     "SphereCluster.distances": lambda: {"q": of.tetrahedron()},
     "TorusDisks.centres": lambda: {"q": of.critical()[0].point},
     "TorusDisks.critical": lambda: {"starts": 2},
-    "TorusDisks.critical_search": dict,
     "TorusDisks.fewer": lambda: {"count": 1},
     "TorusDisks.radius": lambda: {"q": of.critical()[0].point},
     "TorusDisks.same": lambda: {"first": of.critical()[0], "second": of.critical()[0]},
@@ -333,7 +309,6 @@ CALLS = {
         "contact": of.critical()[0].contacts[0],
     },
     "TorusDisks.starts": lambda: {"rng": np.random.default_rng(0), "count": 2},
-    "Tutorial.sides": dict,
     "Tutorial.starts": lambda: {"rng": 0, "count": 2},
     # files
     "files.load_certificate": lambda: {"path": of.kept("certificate")},

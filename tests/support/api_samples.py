@@ -20,31 +20,11 @@ M = pc.Manifold.euclidean("x y")
 X, Y = M.symbols
 UNIT = [(0.0, 1.0)] * 2
 STRETCH = sympy.Symbol("a")
-
-
-@cache
-def square():
-    return pc.Polyhedron(M, {"left": X, "bottom": Y, "right": 1 - X, "top": 1 - Y})
-
-
-@cache
-def energy():
-    return pc.SmoothFunction("energy", STRETCH * X + Y, M, parameters={"a": 2.0})
-
-
-@cache
-def certificate():
-    return pc.certify(square(), energy(), [0.0, 0.0])
-
-
-@cache
-def minima():
-    return pc.minima(square(), energy(), starts=3, box=UNIT)
-
-
-@cache
-def skeleton():
-    return pc.skeleton(square(), [[0.5, 0.5]])
+square = cache(lambda: pc.Polyhedron(M, {"left": X, "bottom": Y, "right": 1 - X, "top": 1 - Y}))
+energy = cache(lambda: pc.SmoothFunction("energy", STRETCH * X + Y, M, parameters={"a": 2.0}))
+certificate = cache(lambda: pc.certify(square(), energy(), [0.0, 0.0]))
+minima = cache(lambda: pc.minima(square(), energy(), starts=3, box=UNIT))
+skeleton = cache(lambda: pc.skeleton(square(), [[0.5, 0.5]]))
 
 
 @cache
@@ -53,19 +33,11 @@ def system():
     return pc.System(square(), (vx**2 + vy**2) / 2, 9.81 * Y, friction=(friction(),))
 
 
-@cache
-def friction():
-    return pc.Friction("floor", (pc.velocities(M)[0],), motion.Interval(0.3), "bottom")
-
-
-@cache
-def state():
-    return system().state([0.5, 0.5])
-
-
-@cache
-def trajectory():
-    return pc.simulate(system(), state(), 0.01, 0.001)
+friction = cache(
+    lambda: pc.Friction("floor", (pc.velocities(M)[0],), motion.Interval(0.3), "bottom")
+)
+state = cache(lambda: system().state([0.5, 0.5]))
+trajectory = cache(lambda: pc.simulate(system(), state(), 0.01, 0.001))
 
 
 @cache
@@ -81,116 +53,38 @@ def contact_family():
     return motion.ContactFamily({"touch": gap}, 1.0, friction=(pair_friction(),))
 
 
-@cache
-def proof():
-    return pc.prove(certificate(), digits=8)
-
-
-@cache
-def corner_list():
-    return proofs.corners(square(), box=UNIT)
-
-
-@cache
-def stationary_list():
-    return proofs.stationary_points(square(), energy(), box=UNIT)
-
-
-@cache
-def cell():
-    return pc.prove(certificate(), digits=8, parameters={"a": (1.9, 2.1)})
-
-
-@cache
-def nerve():
-    return polyhedra.nerve(square(), Y)
-
-
-@cache
-def locus():
-    return proofs.StationaryLocus({"x": 0.0}, {"x": 1.0}, 0, np.array([0.5, 0.0]))
+proof = cache(lambda: pc.prove(certificate(), digits=8))
+corner_list = cache(lambda: proofs.corners(square(), box=UNIT))
+stationary_list = cache(lambda: proofs.stationary_points(square(), energy(), box=UNIT))
+cell = cache(lambda: pc.prove(certificate(), digits=8, parameters={"a": (1.9, 2.1)}))
+nerve = cache(lambda: polyhedra.nerve(square(), Y))
+locus = cache(lambda: proofs.StationaryLocus({"x": 0.0}, {"x": 1.0}, 0, np.array([0.5, 0.0])))
 
 
 def mirrored(q):
     return np.stack([1 - q[..., 0], q[..., 1]], axis=-1)
 
 
-@cache
-def element():
-    return polyhedra.Element(mirrored, {"left": "right", "right": "left"})
-
-
-@cache
-def symmetry():
-    return pc.Symmetry(elements=(element(),))
-
-
-@cache
-def pair():
-    return dumbbells.DumbbellPair(16.0, 3.0, 1.5, 125.0)
-
-
-@cache
-def atlas():
-    return dumbbells.pair_atlas(pair(), rng=0)
-
-
-@cache
-def drum():
-    return dumbbells.DumbbellDrum(count=2)
+element = cache(lambda: polyhedra.Element(mirrored, {"left": "right", "right": "left"}))
+symmetry = cache(lambda: pc.Symmetry(elements=(element(),)))
+pair = cache(lambda: dumbbells.DumbbellPair(16.0, 3.0, 1.5, 125.0))
+atlas = cache(lambda: dumbbells.pair_atlas(pair(), rng=0))
+drum = cache(lambda: dumbbells.DumbbellDrum(count=2))
 
 
 PLACED = [[0.0, 0.0, 0.0], [0.0, 40.0, 0.0]]
-
-
-@cache
-def run():
-    return pc.simulate(drum(), drum().state(PLACED), 0.01, 0.001)
-
-
-@cache
-def film():
-    return drum_pictures.pair_film(pair(), [pair().nested("R")] * 2)
-
-
-@cache
-def scene():
-    return drum_pictures.pair_scene(pair(), pair().nested("R"))
-
-
-@cache
-def minima_map():
-    return dumbbells.minima_map(curvatures=[0.5], rods=[0.5], lengths=[4.0, 6.0], starts=3)
-
-
-@cache
-def pair_map():
-    return dumbbells.pair_map([4.0], [0.5])
-
-
-@cache
-def spheres():
-    return models.SphereCluster(4)
-
-
-@cache
-def tetrahedron():
-    return [0.5, 0.5, 0.5, 0.5, -0.5, -0.5, -0.5, 0.5, -0.5, -0.5, -0.5, 0.5]
-
-
-@cache
-def disks():
-    return models.TorusDisks(2)
-
-
-@cache
-def critical():
-    return disks().critical(0, starts=3)
-
-
-@cache
-def packing():
-    return models.PeriodicPacking.bidisperse(24).jam(0)
+run = cache(lambda: pc.simulate(drum(), drum().state(PLACED), 0.01, 0.001))
+film = cache(lambda: drum_pictures.pair_film(pair(), [pair().nested("R")] * 2))
+scene = cache(lambda: drum_pictures.pair_scene(pair(), pair().nested("R")))
+minima_map = cache(
+    lambda: dumbbells.minima_map(curvatures=[0.5], rods=[0.5], lengths=[4.0, 6.0], starts=3)
+)
+pair_map = cache(lambda: dumbbells.pair_map([4.0], [0.5]))
+spheres = cache(lambda: models.SphereCluster(4))
+tetrahedron = cache(lambda: [0.5, 0.5, 0.5, 0.5, -0.5, -0.5, -0.5, 0.5, -0.5, -0.5, -0.5, 0.5])
+disks = cache(lambda: models.TorusDisks(2))
+critical = cache(lambda: disks().critical(0, starts=3))
+packing = cache(lambda: models.PeriodicPacking.bidisperse(24).jam(0))
 
 
 def ball(grid):
@@ -256,9 +150,7 @@ def study(size, *, noise=0.0):
     return {"area": size**2 + noise}
 
 
-@cache
-def folder():
-    return Path(tempfile.mkdtemp(prefix="polycorner-calls-"))
+folder = cache(lambda: Path(tempfile.mkdtemp(prefix="polycorner-calls-")))
 
 
 def new(name):
@@ -272,9 +164,7 @@ def study_file():
     return path
 
 
-@cache
-def study_results():
-    return sweeps.sweep(study, {"size": [1.0, 2.0]})
+study_results = cache(lambda: sweeps.sweep(study, {"size": [1.0, 2.0]}))
 
 
 @cache
@@ -293,38 +183,16 @@ def kept(kind):
     return getattr(files, f"save_{kind}")(value[kind](), new(f"kept-{kind}.nc"))
 
 
-@cache
-def hexagon():
-    return bodies.polygon([[math.cos(t), math.sin(t)] for t in np.arange(6) * math.pi / 3])
-
-
-@cache
-def arrangement():
-    return bodies.Arrangement(
+hexagon = cache(
+    lambda: bodies.polygon([[math.cos(t), math.sin(t)] for t in np.arange(6) * math.pi / 3])
+)
+arrangement = cache(
+    lambda: bodies.Arrangement(
         {"a": bodies.disc(1.0), "b": bodies.disc(0.5)}, walls=bodies.box([-5, -5], [5, 5])
     )
-
-
-@cache
-def lying():
-    return dumbbells.RigidDumbbells(drum()).state(PLACED)
-
-
-@cache
-def keel():
-    return dumbbells.Keel(0.12, 0.1, 0.3, 0.06, 0.2)
-
-
-@cache
-def dyad():
-    return dumbbells.dyad_minima(pair())[0]
-
-
-@cache
-def solid():
-    return drum_pictures.forbidden_solid(plane_pair(), 16)
-
-
-@cache
-def plane_pair():
-    return dumbbells.DumbbellPair(16.0, 3.0, 1.5)
+)
+lying = cache(lambda: dumbbells.RigidDumbbells(drum()).state(PLACED))
+keel = cache(lambda: dumbbells.Keel(0.12, 0.1, 0.3, 0.06, 0.2))
+dyad = cache(lambda: dumbbells.dyad_minima(pair())[0])
+solid = cache(lambda: drum_pictures.forbidden_solid(plane_pair(), 16))
+plane_pair = cache(lambda: dumbbells.DumbbellPair(16.0, 3.0, 1.5))

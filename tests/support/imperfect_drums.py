@@ -1,6 +1,7 @@
 """A dumbbell in an imperfect drum, from the definition: two balls in space, in NumPy."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from reference_step import solve_step
@@ -152,7 +153,6 @@ def _turned(drum, problem, after):
     for block, static in zip(problem.blocks, _sets(drum, static=True), strict=True):
         slips = [block.matrix @ x + block.drift for x in (problem.v, after)]
         reverses = block.shape != static and float(slips[0] @ slips[1]) < 0
-        parts = (block.matrix, block.drift, static, block.load, block.owner)
-        blocks.append(FrictionBlock(*parts) if reverses else block)
+        blocks.append(replace(block, shape=static) if reverses else block)
         found = found or reverses
-    return StepProblem(*list(vars(problem).values())[:-1], tuple(blocks)), found
+    return replace(problem, blocks=tuple(blocks)), found

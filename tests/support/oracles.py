@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import mpmath
 import numpy as np
+from exact_algebra import reduced
 
 CONTACTS = ("A1B1", "A1B2", "A2B1", "A2B2", "A1b", "A2b", "aB1", "aB2", "ab")
 
@@ -143,18 +144,7 @@ def truth_table(signs):
 
 def exact_rank(rows):
     """Return the rank of an integer matrix by elimination in fractions."""
-    rows = [[Fraction(int(x)) for x in row] for row in rows]
-    found = 0
-    for column in range(len(rows[0]) if rows else 0):
-        pivot = next((i for i in range(found, len(rows)) if rows[i][column]), None)
-        if pivot is None:
-            continue
-        rows[found], rows[pivot] = rows[pivot], rows[found]
-        for i in range(found + 1, len(rows)):
-            factor = rows[i][column] / rows[found][column]
-            rows[i] = [x - factor * y for x, y in zip(rows[i], rows[found], strict=True)]
-        found += 1
-    return found
+    return len(reduced([[Fraction(int(x)) for x in row] for row in rows])[1])
 
 
 def fastest_rate(a, e):

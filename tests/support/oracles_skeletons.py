@@ -13,6 +13,7 @@ from fractions import Fraction
 import networkx as nx
 import numpy as np
 import sympy as sp
+from exact_algebra import solved
 from oracles import exact_rank
 from scipy.integrate import quad
 
@@ -29,22 +30,6 @@ class ExactPolytope:
     facets: int
 
 
-def solve_exactly(rows, right):
-    """Return the solution of a square system in the fractions; None where it is singular."""
-    n = len(rows)
-    table = [[Fraction(x) for x in (*row, b)] for row, b in zip(rows, right, strict=True)]
-    for k in range(n):
-        pivot = next((i for i in range(k, n) if table[i][k]), None)
-        if pivot is None:
-            return None
-        table[k], table[pivot] = table[pivot], table[k]
-        table[k] = [x / table[k][k] for x in table[k]]
-        for i in range(n):
-            if i != k and table[i][k]:
-                table[i] = [x - table[i][k] * y for x, y in zip(table[i], table[k], strict=True)]
-    return tuple(row[n] for row in table)
-
-
 def exact_polytope(rows, limits):
     """Return the faces of ``{q : rows q <= limits}``, integers in, by trying every n rows."""
     rows = [[int(x) for x in row] for row in rows]
@@ -52,9 +37,10 @@ def exact_polytope(rows, limits):
     n = len(rows[0])
     vertices = {}
     for chosen in itertools.combinations(range(len(rows)), n):
-        q = solve_exactly([rows[i] for i in chosen], [limits[i] for i in chosen])
-        if q is None or q in vertices:
+        found = solved([[*map(Fraction, rows[i])] for i in chosen], [limits[i] for i in chosen])
+        if found is None or not found[1] or tuple(found[0]) in vertices:
             continue
+        q = tuple(found[0])
         room = [
             b - sum(a * x for a, x in zip(row, q, strict=True))
             for row, b in zip(rows, limits, strict=True)

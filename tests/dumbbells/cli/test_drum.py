@@ -355,13 +355,6 @@ def test_without_anything_to_resume_a_run_starts(capsys):
     assert "nothing to resume" in err
 
 
-def test_help_names_every_option(capsys):
-    code, out, err = run(capsys, "--help")
-    assert (code, err) == (0, "")
-    for option in ("--pair", "--heading", "--mu-slide", "--movie", "--resume", "--json", "--out"):
-        assert option in out
-
-
 def test_options_in_degrees_have_keys_that_say_so():
     values = {"tilt": 7.0, "heading": (5.0,), "start": ((0.0, 10.0, 5.0),), "spin": 0.01}
     told = _parameters(values)

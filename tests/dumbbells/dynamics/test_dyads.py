@@ -43,11 +43,6 @@ def test_nested_pairs_are_dyads_and_mirror_images_have_the_other_hand(degrees, h
     assert handedness(DRUM, q * [-1, 1, -1]) == -handedness(DRUM, q)
 
 
-@pytest.mark.parametrize("q", [PAIR.end_to_end(), PAIR.side_by_side(clearance=4.0)])
-def test_pairs_that_are_not_nested_are_no_dyads(q):
-    assert not is_dyad(DRUM, q.reshape(2, 3))
-
-
 def test_right_pairs_climb_and_left_pairs_descend_with_opposite_headings():
     angle = math.radians(12)
     paths = follow_dyads(DRUM, [("R", angle), ("L", -angle)], 25.0)

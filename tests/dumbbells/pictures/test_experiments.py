@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from drawn_curves import bars
 from drum_motions import recorded
 from matplotlib.colors import same_color
 
@@ -72,16 +73,6 @@ def curve(axes, colour, style=None):
         and style in (None, line.get_linestyle())
     ]
     return line.get_xydata()
-
-
-def bars(axes):
-    """Return the points with error bars: places, and half the heights of the bars."""
-    shown = []
-    for bar in axes.containers:
-        places = bar.lines[0].get_xydata()
-        segments = np.array(bar.lines[2][-1].get_segments())
-        shown.append((places, (segments[:, 1, 1] - segments[:, 0, 1]) / 2, bar.lines[0]))
-    return shown
 
 
 def least(length, shift):

@@ -107,10 +107,6 @@ def test_where_headings_grow_it_is_hatched(figure, pixels):
     assert False in tried
 
 
-def test_saved_as_an_image(figure, tmp_path):
-    assert save(figure, tmp_path / "keel.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_region_alone_has_its_boundary_and_the_curve():
     axes = Figure().add_subplot()
     place_region(axes, KEEL.onset)

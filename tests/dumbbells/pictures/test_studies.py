@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from drawn_curves import bars
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from polycorner.dumbbells.pictures.studies import draw_study
@@ -48,13 +49,11 @@ def test_climb_rates_have_bars_of_two_standard_errors():
     found = xr.Dataset(data, coordinates)
     figure = draw_study("climbing", found)
     FigureCanvasAgg(figure).draw()
-    first = figure.axes[0].containers
-    assert [one.get_label() for one in first] == ["tilt 0°", "tilt 7°"]
-    for k, one in enumerate(first):
-        points, _, (bars,) = one
-        np.testing.assert_array_equal(points.get_ydata(), found["climb_rate"].values[:, k])
-        spans = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
-        np.testing.assert_allclose(spans, 4 * found["climb_rate_error"].values[:, k])
+    labels = [one.get_label() for one in figure.axes[0].containers]
+    assert labels == ["tilt 0°", "tilt 7°"]
+    for k, (places, halves, _) in enumerate(bars(figure.axes[0])):
+        np.testing.assert_array_equal(places[:, 1], found["climb_rate"].values[:, k])
+        np.testing.assert_allclose(halves, 2 * found["climb_rate_error"].values[:, k])
 
 
 def test_pairs_of_either_hand_under_noise_are_drawn_with_bars():
@@ -66,13 +65,11 @@ def test_pairs_of_either_hand_under_noise_are_drawn_with_bars():
     data["status"] = (names, np.ones(shape, dtype=np.int8))
     found = xr.Dataset(data, {"strength": [10.0, 20.0, 30.0], "scale": [0.01, 0.03]})
     for axes, name in zip(draw_study("driven", found).axes, ("heading", "climb_rate"), strict=True):
-        for k, one in enumerate(axes.containers):
-            points, _, (bars,) = one
+        for k, (places, halves, _) in enumerate(bars(axes)):
             column = f"{name}_{('right', 'left')[k % 2]}"
             values = [found[n].values[:, k // 2] for n in (column, f"{column}_error")]
-            np.testing.assert_array_equal(points.get_ydata(), values[0])
-            spans = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
-            np.testing.assert_allclose(spans, 4 * values[1])
+            np.testing.assert_array_equal(places[:, 1], values[0])
+            np.testing.assert_allclose(halves, 2 * values[1])
 
 
 def test_lengths_of_driven_pairs_come_with_the_bounds_of_their_headings():
@@ -112,15 +109,13 @@ def test_members_of_an_ensemble_are_averaged():
     found = xr.Dataset(data, {"rubbing": [0.1, 0.3], "start": range(5), "top": [50, 60, 70]})
     figure = draw_study("bunch", found)
     FigureCanvasAgg(figure).draw()
-    first, second = (axes.containers for axes in figure.axes)
-    assert [one.get_label() for one in first] == ["rubbing 0.1", "rubbing 0.3"]
-    for k, one in enumerate(first):
-        points, _, (bars,) = one
-        left = found["left"].values[k]
-        np.testing.assert_allclose(points.get_ydata(), left.mean(axis=0))
-        spans = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
-        np.testing.assert_allclose(spans, 4 * left.std(axis=0, ddof=1) / np.sqrt(5))
-    np.testing.assert_allclose(second[0][0].get_ydata(), 3.0)  # of those that were computed
+    labels = [one.get_label() for one in figure.axes[0].containers]
+    assert labels == ["rubbing 0.1", "rubbing 0.3"]
+    first, second = map(bars, figure.axes)
+    for left, (places, halves, _) in zip(found["left"].values, first, strict=True):
+        np.testing.assert_allclose(places[:, 1], left.mean(axis=0))
+        np.testing.assert_allclose(halves, 2 * left.std(axis=0, ddof=1) / np.sqrt(5))
+    np.testing.assert_allclose(second[0][0][:, 1], 3.0)  # of those that were computed
 
 
 def test_one_member_has_no_bar():

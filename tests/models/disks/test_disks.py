@@ -28,16 +28,9 @@ def test_radius_is_half_the_least_distance_over_all_images(placed):
     assert model.radius(q) == pytest.approx(least_distance(q[:-1], model.lattice) / 2, abs=1e-12)
 
 
-@given(placements())
-def test_polyhedron_is_where_no_disks_overlap(placed):
-    """In the chart the least of all functions is the least distance minus the diameter."""
-    model, q = placed
-    room = least_distance(q[:-1], model.lattice) - 2 * q[-1]
-    assert model.polyhedron.implicit(q) == pytest.approx(room, abs=1e-12)
-
-
 @given(placements(reach=0.6))
-def test_functions_reach_over_the_cut(placed):
+def test_polyhedron_is_where_no_disks_overlap(placed):
+    """In the chart, and a little over its cut, the least function is what distances leave."""
     model, q = placed
     room = least_distance(q[:-1], model.lattice) - 2 * q[-1]
     assert model.polyhedron.implicit(q) == pytest.approx(room, abs=1e-12)

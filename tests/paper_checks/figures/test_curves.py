@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import oracles
 import pytest
 from drawn_curves import lines
 from matplotlib.colors import to_rgb
@@ -97,26 +98,11 @@ def test_what_was_observed_is_marked(drawn):
 # ------------------------------------------------------------------------------------------ pairs
 
 
-def touching(q, length=16.0, r=3.0, t=1.5):
+def touching(q):
     """Return which balls touch balls or rods, from distances of points and segments."""
-    balls = {}
-    for name, (x, y, theta) in zip("AB", np.reshape(q, (2, 3)), strict=True):
-        for k, e in ((1, -1), (2, 1)):
-            balls[f"{name}{k}"] = np.array(
-                [x + e * length / 2 * math.sin(theta), y + e * length / 2 * math.cos(theta)]
-            )
-
-    def to_rod(ball, rod):
-        ends = np.linspace(balls[f"{rod}1"], balls[f"{rod}2"], 200_001)
-        return np.hypot(*(ends - balls[ball]).T).min()
-
-    found = {
-        a + b: np.hypot(*(balls[a] - balls[b])) - 2 * r for a in ("A1", "A2") for b in ("B1", "B2")
-    }
-    found |= {f"{a}b": to_rod(a, "B") - r - t for a in ("A1", "A2")}
-    found |= {f"a{b}": to_rod(b, "A") - r - t for b in ("B1", "B2")}
-    assert min(found.values()) > -1e-6
-    return {name for name, gap in found.items() if gap < 1e-6}
+    found = oracles.gaps(look.PLANE, q)[:8]
+    assert min(found) > -1e-6
+    return {name for name, gap in zip(oracles.CONTACTS, found, strict=False) if gap < 1e-6}
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,15 @@
-"""Full symmetries of arrangements: symmetries of the box, and mirror images of equal bodies.
+"""Symmetries of arrangements: motions keep gaps, invariants tell orbits apart, boxes and mirrors.
 
-The oracle knows no walls, frames or names: an isometry that is written out carries the bodies of a
-placement, and it is looked up which element of the group gives the same bodies.
+The oracle of full symmetries knows no walls, frames or names: an isometry that is written out
+carries the bodies of a placement, and it is looked up which element gives the same bodies.
 """
 
+import math
 from itertools import combinations, permutations, product
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from polycorner import minima, minimise, prove, skeleton
 from polycorner.bodies import (
@@ -22,20 +24,109 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
-from tests.support.arrangements import anywhere
+from tests.support.arrangements import anywhere, assert_renamed, rank_of_invariants
 
 SQUARE = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 WEDGE = polygon([[0, 0], [2, 0], [0, 1]], 0.1)  # has no mirror image among its rotations
-KITE = polygon([[-1, 0], [0, -1], [2, 0], [0, 1]])
 ROD = capsule([-1, 0, 0], [1, 0, 0], 0.3)
 CUBE = polytope(np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T)
+TETRAHEDRON = polytope([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+PEAR = compound([sphere(0.5), sphere(0.3, at=[0, 0, 1])])
 BENT = compound([sphere(0.5), sphere(0.5, at=[1, 0, 0]), sphere(0.5, at=[0, 1, 0])])
+FLOOR = HalfSpace([0, 0, 1], [0, 0, -5])
+PIPE = Cylinder(5.0, axis=[1, 2, 2], point=[0.5, 0, 0])
+BALL = Cylinder(5.0, point=[0.5, 0, 0])
+
+# Arrangement, dimension of the motions, number of exchanges and rotations with the identity.
+CASES = {
+    "squares": (Arrangement([SQUARE, SQUARE]), 3, 4 * 4 * 2),
+    "squares in a box": (Arrangement([SQUARE, SQUARE], box([-3, -3], [3, 3])), 0, 32),
+    "wedges and discs": (Arrangement([WEDGE, WEDGE, disc(1), disc(1), disc(2)]), 3, 4),
+    "on a line": (Arrangement([SQUARE, WEDGE], {"floor": HalfSpace([1, 2], [0, 0])}), 1, 4),
+    "in a circle": (Arrangement([disc(1), disc(1)], {"ring": Cylinder(5, point=[1, 0])}), 1, 2),
+    "around a disc": (Arrangement([SQUARE], fixed={"peg": disc(1, at=[3, 1])}), 1, 4),
+    "around a square": (Arrangement([SQUARE], fixed={"peg": SQUARE}), 0, 4),
+    "spinning disc": (Arrangement([disc(1), SQUARE], orientations="all"), 4, 4),
+    "shifted squares": (Arrangement([SQUARE, SQUARE], orientations="none"), 2, 2),
+    "shifted discs": (Arrangement([disc(1), disc(1)], orientations="none"), 3, 2),
+    "shifted cubes": (Arrangement([CUBE, CUBE, sphere(1)], orientations="none"), 3, 2),
+    "balls": (Arrangement([sphere(1)] * 4), 6, 24),
+    "rods": (Arrangement([ROD, ROD]), 6, 8),
+    "pears": (Arrangement([PEAR, PEAR, sphere(1)]), 6, 2),
+    "spinning rod": (Arrangement([ROD, CUBE], orientations="all"), 7, 48),
+    "spinning ball": (Arrangement([sphere(1), CUBE], orientations="all"), 9, 24),
+    "tetrahedra": (Arrangement([TETRAHEDRON, TETRAHEDRON]), 6, 12 * 12 * 2),
+    "bent": (Arrangement([BENT, BENT]), 6, 2 * 2 * 2),
+    "rods on a floor": (Arrangement([ROD, ROD], {"floor": FLOOR}), 3, 8),
+    "rods in a pipe": (Arrangement([ROD, BENT], {"pipe": PIPE}), 2, 4),
+    "rods in a ball": (Arrangement([ROD, BENT], {"shell": BALL}), 3, 4),
+    "pipe and floor": (Arrangement([ROD, ROD], {"pipe": PIPE, "floor": FLOOR}), 0, 8),
+    "around a ball": (Arrangement([BENT], fixed={"B": sphere(1, at=[1, 2, 3])}), 3, 2),
+    "around a rod": (Arrangement([BENT], fixed={"B": ROD}), 1, 2),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_motions_keep_gaps_and_invariants(case):
+    a, count, _ = CASES[case]
+    rng = np.random.default_rng(len(case))
+    for _ in range(3):
+        q = anywhere(a, rng)
+        tangents = a.symmetry.directions(a.manifold, q) * a.manifold.scale_array
+        assert len(tangents) == count
+        if not count:
+            continue
+        assert np.linalg.matrix_rank(tangents) == count
+        step = rng.standard_normal(count) @ tangents
+        assert np.abs(a.polyhedron.gradients(q) @ step).max() < 1e-9
+        h = 1e-5
+        moved = [a.symmetry.invariants(a.manifold.canonical(q + s * h * step)) for s in (1, -1)]
+        np.testing.assert_allclose(moved[0], moved[1], atol=1e-7)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_invariants_change_along_everything_else(case):
+    a, count, _ = CASES[case]
+    if not count:
+        assert a.symmetry.invariants is None
+        return
+    q = anywhere(a, np.random.default_rng(len(case)))
+    assert rank_of_invariants(a, q) == a.manifold.dimension - count
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_exchanges_rename_gaps_and_form_a_group(case):
+    a, _, count = CASES[case]
+    assert len(a.symmetry.elements) + 1 == count
+    assert_renamed(a, a.symmetry.elements, anywhere(a, np.random.default_rng(len(case))))
+
+
+def test_mirror_images_are_different_orbits():
+    """Four balls: the mirror image has the same distances."""
+    a = Arrangement([sphere(0.5), sphere(0.6), sphere(0.7), sphere(0.8)])
+    q = np.array([0, 0, 0, 2, 0, 0, 0, 2, 0, 0.3, 0.4, 2], dtype=float)
+    mirrored = q * np.tile([1, 1, -1], 4)
+    turned = Rotation.from_rotvec([1, 2, 3]).apply(q.reshape(4, 3)).ravel()
+    assert a.symmetry.separation(a.manifold, q, turned) < 1e-12
+    assert a.symmetry.separation(a.manifold, q, mirrored) > 0.1
+
+
+def test_too_many_exchanges_are_left_out():
+    a = Arrangement([disc(1)] * 8)
+    assert math.factorial(8) > 10_000
+    assert len(a.symmetry.elements) == 0
+    assert a.symmetry.directions(a.manifold, np.arange(16.0)).shape == (3, 16)
+
+
+# ---------------------------------------------------------------------------------- full symmetries
+
+KITE = polygon([[-1, 0], [0, -1], [2, 0], [0, 1]])
 SCREW = compound([sphere(0.5, at=p) for p in ([0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1])])
 CHANNEL = {"floor": HalfSpace([0, 1], [0, 0]), "roof": HalfSpace([0, -1], [0, 3])}
 RING = Cylinder(5, point=[1, 0])
 
 # Arrangement and the order of its full finite group: isometries x exchanges x congruences.
-CASES = {
+FULL_CASES = {
     "discs in a square": (Arrangement([disc(1)] * 2, box([0, 0], [6, 6])), 8 * 2),
     "discs in a rectangle": (Arrangement([disc(1)] * 2, box([0, 0], [6, 7])), 4 * 2),
     "squares in a square": (Arrangement([SQUARE] * 2, box([-3, -3], [3, 3])), 8 * 2 * 16),
@@ -64,24 +155,16 @@ CASES = {
 IN_A_BOX = ["discs in a square", "discs in a rectangle", "squares in a square", "rods in a cube"]
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", FULL_CASES)
 def test_elements_rename_gaps_and_are_as_many_as_isometries_allow(case):
-    a, count = CASES[case]
-    elements = a.full_symmetry.elements
-    assert len(elements) + 1 == count
-    q = anywhere(a, np.random.default_rng(len(case)))
-    before = a.polyhedron.values(q)
-    places = {name: k for k, name in enumerate(a.polyhedron.names)}
-    for element in elements[:: max(1, len(elements) // 12)]:
-        after = a.polyhedron.values(element.apply(q))
-        images = [places[element.names.get(name, name)] for name in places]
-        assert sorted(images) == sorted(places.values())
-        assert after[images] == pytest.approx(before, abs=1e-9)
+    a, count = FULL_CASES[case]
+    assert len(a.full_symmetry.elements) + 1 == count
+    assert_renamed(a, a.full_symmetry.elements, anywhere(a, np.random.default_rng(len(case))))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", FULL_CASES)
 def test_symmetry_is_contained_in_the_full_one(case):
-    a, _ = CASES[case]
+    a, _ = FULL_CASES[case]
     assert len(a.symmetry.elements) <= len(a.full_symmetry.elements)
     assert len(a.symmetry.fields) == len(a.full_symmetry.fields)
 
@@ -98,7 +181,7 @@ def figure(bodies):
 @pytest.mark.parametrize("case", IN_A_BOX)
 def test_elements_are_the_isometries_of_the_box(case):
     """Every symmetry of the box, written out, is an element, and every element is one."""
-    a, _ = CASES[case]
+    a, _ = FULL_CASES[case]
     d, q = a.dimension, anywhere(a, np.random.default_rng(3))
     low, high = a.walls["left"].point, a.walls["right"].point
     middle, sizes = (low + high) / 2, high - low
