@@ -186,10 +186,12 @@ def project(
         moved += size
         if moved > reach:
             return Arrival(point, settled=False)
-        if size <= tolerances.rounding or (size < tolerances.settled and size > last / 2):
+        still = size <= tolerances.rounding or (size < tolerances.settled and size > last / 2)
+        if still and not dependent:
             return Arrival(point if last == math.inf else HeldPoint(quotient, q, kept), True)
         q, last = q + scales * (step if size <= stride else step * (stride / size)), size
-        if size < tolerances.settled * min(1.0, point.condition):
+        # Where gradients are independent the step after one as short is rounding.
+        if still or (not dependent and size < tolerances.settled * min(1.0, point.condition)):
             point = HeldPoint(quotient, q, kept)
             return Arrival(point, point.finite)
     still = size <= tolerances.settled / 10  # a step so short need not be taken

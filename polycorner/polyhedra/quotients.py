@@ -90,6 +90,11 @@ class Quotient:
         """Return values and scaled gradients of all functions."""
         return evaluated(self.polyhedron, q)
 
+    def bent(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return values and scaled first and second derivatives of all functions."""
+        values, gradients, hessians = self.polyhedron.bundle.evaluate(q, 2)
+        return values, gradients * self.scales, hessians * np.outer(self.scales, self.scales)
+
     def orbit(self, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit through a point, ``(g, n)``."""
         return self.symmetry.directions(self.manifold, q)

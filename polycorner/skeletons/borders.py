@@ -66,11 +66,6 @@ class Border(Value):
     curves: int
     tips: tuple[Tip, ...] = ()
 
-    @property
-    def balls(self) -> list[tuple[Array, Array]]:
-        """Centres of balls about the tips, and points outside them."""
-        return balls_about(self.tips)
-
 
 def balls_about(tips: Sequence[Tip]) -> list[tuple[Array, Array]]:
     """Return centres of balls about tips, and points outside them."""

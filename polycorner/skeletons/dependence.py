@@ -90,14 +90,11 @@ def unit_hessians(point: EvaluatedPoint, rows: list[int]) -> Array:
 
     Equations count with the multipliers that cancel what is left of sums of gradients.
     """
-    quotient = point.quotient
-    polyhedron, solved = quotient.polyhedron, list(quotient.equations)
-    scales = polyhedron.manifold.scale_array
+    solved, hessians = list(point.quotient.equations), point.quotient.bent(point.q)[2]
     sizes = np.linalg.norm(point.gradients[rows], axis=1)
     sizes[sizes == 0] = 1.0  # a vanishing gradient is a relation by itself
     units = point.gradients[rows] / sizes[:, None]
     multipliers = np.linalg.lstsq(point.gradients[solved].T, -units.T, rcond=None)[0]
-    hessians = polyhedron.bundle.evaluate(point.q, 2)[2] * np.outer(scales, scales)
     own = hessians[rows] / sizes[:, None, None]
     return np.asarray(own + np.tensordot(multipliers.T, hessians[solved], 1))
 

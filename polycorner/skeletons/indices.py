@@ -25,7 +25,7 @@ import numpy as np
 
 from polycorner.polyhedra.faces import HeldPoint
 from polycorner.polyhedra.symmetry import Element
-from polycorner.skeletons.borders import Border, Tip, seeds_of
+from polycorner.skeletons.borders import Border, Tip, balls_about, seeds_of
 from polycorner.skeletons.nets import LEVELS, Net
 from polycorner.skeletons.spheres_about import link_about
 from polycorner.skeletons.surfaces import Height, Surface
@@ -156,7 +156,7 @@ def face_euler_characteristic(border: Border) -> int | None:
     if whole is None:
         return None
     border = whole
-    surface = Surface(border.quotient, border.active, border.seeds[0], border.balls)
+    surface = Surface(border.quotient, border.active, border.seeds[0], balls_about(border.tips))
     found = _agreed(border, surface, np.random.default_rng(0))
     handles = None if found is None else 2 - border.curves - found
     if surface.is_plane:

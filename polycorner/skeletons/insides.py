@@ -186,7 +186,7 @@ def _located(quotient: Quotient, q: Array, held: Positions) -> _Points:
     rows = np.concatenate(
         [held, np.tile(np.array(quotient.equations, held.dtype), (len(q), 1))], axis=1
     )
-    values, slopes = _evaluated(quotient, q)
+    values, slopes = quotient.evaluated(q)
     sizes = np.maximum(np.linalg.norm(slopes, axis=2), 1e-300)
     units, away = slopes / sizes[..., None], values / sizes
     normals = np.take_along_axis(units, rows[..., None], 1)
@@ -198,7 +198,7 @@ def _located(quotient: Quotient, q: Array, held: Positions) -> _Points:
     weights = np.linalg.solve(factor, (units @ span).transpose(0, 2, 1))[:, : rows.shape[1]]
     h = quotient.tolerances.difference
     nearby = (q + h * scales * frame[:, :, i] for i in range(2))
-    turned = [(_evaluated(quotient, p)[1] - slopes) @ frame for p in nearby]
+    turned = [(quotient.evaluated(p)[1] - slopes) @ frame for p in nearby]
     bends = np.stack(turned, axis=3) / (h * sizes[..., None, None])
     of_held = np.take_along_axis(bends, rows[..., None, None], 1)
     flat = (len(q), rows.shape[1], 4)
@@ -212,12 +212,6 @@ def _located(quotient: Quotient, q: Array, held: Positions) -> _Points:
         forms[:, :count],
         fits,
     )
-
-
-def _evaluated(quotient: Quotient, q: Array) -> tuple[Array, Array]:
-    """Return values and scaled gradients at several points."""
-    values, slopes = quotient.polyhedron.bundle.evaluate(q, 1)
-    return values, slopes * quotient.scales
 
 
 def _split(quotient: Quotient, q: Array, normals: Array) -> tuple[Array, Array, Array, Mask]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
 from polycorner.polyhedra.symmetry import Element, renamed
+from polycorner.skeletons.curves import lies_on
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.spaces.manifold import Array
@@ -93,7 +94,9 @@ class _Images:
             alike = [c for c in self.explorer.curves if c.start is None]
             moved = g.apply(curve.middle)
             for other in alike:
-                if self.names(other.active) == active and self.explorer.lies_on(moved, other):
+                if self.names(other.active) == active and lies_on(
+                    self.explorer.quotient, moved, other
+                ):
                     return self.explorer.curves.index(other)
             return None
         corner = self.corner(curve.start[0], g)

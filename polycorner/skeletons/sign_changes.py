@@ -41,6 +41,8 @@ def dips(f0: float, f1: float, slope0: float, slope1: float, h: float) -> bool:
         return False
     a, b = 3 * (2 * (f0 - f1) + c + last), 6 * (f1 - f0) - 4 * c - 2 * last
     root = math.hypot(b, 2 * math.sqrt(-a * c)) if a >= 0 else math.sqrt(max(b * b - 4 * a * c, 0))
+    if b + root == 0:  # slopes so small that their product vanishes: it is constant
+        return bool(f0 < 0.25 * min(f0, f1) + 1e-9)
     t = (root - b) / (2 * a) if b < 0 else -2 * c / (b + root)
     lowest = f0 + t * (c + t * (b / 2 + t * a / 3))
     return bool(lowest < 0.25 * min(f0, f1) + 1e-9)

@@ -45,7 +45,7 @@ class SingularPoint(HeldPoint):
         self.values = self.values.copy()
         self.values[held] = 0.0
         sizes = np.linalg.norm(self.gradients, axis=1)
-        bends = _second(quotient, q)[2]
+        bends = quotient.bent(q)[2]
         limit = quotient.tolerances.rank
         flat = [i for i in held if not sizes[i] > limit * np.linalg.norm(bends[i])]
         self.gradients = self.gradients.copy()
@@ -58,13 +58,6 @@ class SingularPoint(HeldPoint):
     def orientation(self, t: Array) -> float:
         """Return zero: held gradients and any direction are dependent."""
         return 0.0 * float(t[0])
-
-
-def _second(quotient: Quotient, q: Array) -> tuple[Array, Array, Array]:
-    """Return values and scaled first and second derivatives of all functions and equations."""
-    scales = quotient.scales
-    values, gradients, hessians = quotient.polyhedron.bundle.evaluate(q, 2)
-    return values, gradients * scales, hessians * np.outer(scales, scales)
 
 
 def singular_point(
@@ -109,7 +102,7 @@ def _solved(
     sizes: Array = np.zeros(0)
     limit = np.inf
     for k in range(STEPS):
-        values, gradients, hessians = (part[held] for part in _second(quotient, q))
+        values, gradients, hessians = (part[held] for part in quotient.bent(q))
         if not (np.isfinite(gradients).all() and np.isfinite(hessians).all()):
             return None
         if not len(mu):

@@ -275,7 +275,7 @@ class EdgeTracer:
         """
         here = HeldPoint(self.quotient, point.q, point.basis(active))
         for k, curve in enumerate(self.curves):
-            if curve.active == active and self.lies_on(here.q, curve):
+            if curve.active == active and lies_on(self.quotient, here.q, curve):
                 return ("curve", k) if curve.start is None else ("half", curve.start)
         t = self._along(here)
         walks = []
@@ -325,13 +325,9 @@ class EdgeTracer:
         """Whether a symmetry carries a point with given active functions to a curve."""
         names, there = self.registry.names(active), self.registry.names(curve.active)
         return any(
-            renamed(names, g.names) == there and self.lies_on(g.apply(q), curve)
+            renamed(names, g.names) == there and lies_on(self.quotient, g.apply(q), curve)
             for g in self.symmetry.group
         )
-
-    def lies_on(self, q: Array, curve: Curve) -> bool:
-        """Whether a point lies on a curve."""
-        return lies_on(self.quotient, q, curve)
 
     def _undirected(self, point: EvaluatedPoint, active: frozenset[int]) -> list[int]:
         """Return the active functions and equations whose gradients have no direction."""

@@ -9,7 +9,6 @@ Every candidate is tested: a point a little way along it must lie in the polyhed
 and the functions that vanish there are the edge's active set.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, islice
@@ -19,6 +18,7 @@ import numpy as np
 from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank, unit_rows
 from polycorner.polyhedra.faces import HeldPoint, projected
 from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient, Sample
+from polycorner.skeletons.branches import common_zeros
 from polycorner.skeletons.dependence import curvature, held_at
 from polycorner.skeletons.sectors import Sector, active_along, sectors_between
 from polycorner.spaces.manifold import Array
@@ -194,9 +194,10 @@ def singular_rays(
             yield plane[:, 0], tight
             yield -plane[:, 0], tight
         elif plane.shape[1] == 2 and held.relations.shape[1] == 1:
-            for d in _null_lines(point, [rows[i] for i in rest], held.relations[:, 0], plane):
-                yield d, tight
-                yield -d, tight
+            form = curvature(point, [rows[i] for i in rest], held.relations[:, 0], plane)
+            for zero in common_zeros(form[None], 0.0) or ():
+                yield plane @ zero, tight
+                yield -(plane @ zero), tight
         else:
             notes.append(
                 f"breaking {point.quotient.polyhedron.names[rows[k]]} leaves "
@@ -219,18 +220,6 @@ def _isolated(point: EvaluatedPoint, rows: list[int], slopes: Array) -> bool:
         if values[0] > limit or values[-1] < -limit:
             return True
     return False
-
-
-def _null_lines(
-    point: EvaluatedPoint, rows: list[int], weights: Array, plane: Array
-) -> list[Array]:
-    """Return the directions in a plane along which a weighted sum of Hessians vanishes."""
-    values, axes = np.linalg.eigh(curvature(point, rows, weights, plane))
-    if values[0] * values[1] >= 0:
-        return []
-    low, high = math.sqrt(-values[0]), math.sqrt(values[1])
-    lines = [high * axes[:, 0] + sign * low * axes[:, 1] for sign in (1, -1)]
-    return [plane @ (line / np.linalg.norm(line)) for line in lines]
 
 
 def _bases(

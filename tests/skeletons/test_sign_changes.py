@@ -1,7 +1,7 @@
 """Dips of a function along a step, against the cubic itself."""
 
 import numpy as np
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
@@ -26,6 +26,7 @@ def test_a_dip_is_where_the_cubic_is_lowest(f0, f1, fall, rise, h):
     st.floats(0, 1e3),
     st.sampled_from([0.0, 1e-320, 1e-200, 1e-17, 1.0, 1e150]),
 )
+@example(1.0, 1e-3, 1e-3, 1e3, 1e-200)  # the product of the slopes vanishes
 def test_every_cubic_has_an_answer_without_a_warning(f0, fall, turn, bend, size):
     """The slope is ``(t - turn) (bend t + fall / turn)``; sizes from 0 to overflow follow."""
     p, q, r = bend, fall / turn - bend * turn, -fall
