@@ -2,11 +2,15 @@
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from polycorner.checks import refuse
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 PART = ".part"  # in the name of a file that is still being written
 
@@ -80,6 +84,31 @@ def write_atomically(
     with replace_atomically(target) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
     return target
+
+
+def is_store(path: Path, root: str, what: str, is_own: Callable[[Path], bool] = is_part) -> bool:
+    """Return whether a folder has the root of a store; refuse a file, and a folder of others."""
+    if path.exists() and not path.is_dir():
+        msg = f"store: expected a folder; {path} is a file"
+        raise ValueError(msg)
+    found = (path / root).exists()
+    if not found and path.is_dir() and not all(map(is_own, path.iterdir())):
+        msg = f"store: expected a new or empty folder, or {what}; {path} is neither"
+        raise ValueError(msg)
+    return found
+
+
+def lock_store(path: Path) -> "FileLock":
+    """Return the lock of a store, which this process alone writes until it is released."""
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(f"{path}.lock", thread_local=False)
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        msg = f"store: expected one that nothing else is writing; {path} is in use"
+        raise ValueError(msg) from None
+    return lock
 
 
 def _synchronise(path: Path) -> None:

@@ -1,8 +1,10 @@
 """Forms of what files hold: what each number may be, checked before it is used.
 
 A form is a function of a place and of what stands there, like the guards of
-:mod:`polycorner.checks`, and raises an error that names the place.  Whoever forges a file can give
-it a digest that fits; numbers that become an index, a size or a state are not taken on trust.
+:mod:`polycorner.checks`: it returns what was read, or raises an error that names the place.
+
+Whoever forges a file can give it a digest that fits; numbers that become an index, a size or a
+state are not taken on trust.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,11 +16,17 @@ import numpy as np
 from polycorner import checks
 from polycorner.container import read_number
 
-Form = Callable[[str, Any], object]
+Form = Callable[[str, Any], Any]
 
 
-def anything(place: str, value: Any) -> None:
+def anything(_place: str, value: Any) -> Any:
     """Check nothing: what stands there is checked elsewhere."""
+    return value
+
+
+def made(form: Form, convert: Callable[[Any], Any]) -> Form:
+    """Return the form of something of which a value is made."""
+    return lambda place, value: convert(form(place, value))
 
 
 def count(place: str, value: Any) -> int:
@@ -64,12 +72,11 @@ def optional(form: Form) -> Form:
 def many(form: Form, *, exactly: int | None = None) -> Form:
     """Return the form of a list."""
 
-    def check(place: str, value: Any) -> None:
+    def check(place: str, value: Any) -> list[Any]:
         checks.instance(place, value, list)
         if exactly is not None and len(value) != exactly:
             checks.refuse(place, f"a list of {exactly}", len(value))
-        for k, item in enumerate(value):
-            form(f"{place}[{k}]", item)
+        return [form(f"{place}[{k}]", item) for k, item in enumerate(value)]
 
     return check
 
@@ -77,10 +84,9 @@ def many(form: Form, *, exactly: int | None = None) -> Form:
 def row(*forms: Form) -> Form:
     """Return the form of a list with an entry of each form."""
 
-    def check(place: str, value: Any) -> None:
-        many(anything, exactly=len(forms))(place, value)
-        for k, (form, item) in enumerate(zip(forms, value, strict=True)):
-            form(f"{place}[{k}]", item)
+    def check(place: str, value: Any) -> tuple[Any, ...]:
+        parts = zip(forms, many(anything, exactly=len(forms))(place, value), strict=True)
+        return tuple(form(f"{place}[{k}]", item) for k, (form, item) in enumerate(parts))
 
     return check
 
@@ -88,14 +94,15 @@ def row(*forms: Form) -> Form:
 def entries(required: Mapping[str, Form], maybe: Mapping[str, Form] | None = None) -> Form:
     """Return the form of entries by name; others may be there and do not count."""
 
-    def check(place: str, value: Any) -> None:
+    def check(place: str, value: Any) -> dict[str, Any]:
         checks.instance(place or "content", value, dict)
-        within = f"{place}." if place else ""
+        within, read = f"{place}." if place else "", {}
         for name, form in (*required.items(), *(maybe or {}).items()):
             if name in value:
-                form(f"{within}{name}", value[name])
+                read[name] = form(f"{within}{name}", value[name])
             elif name in required:
                 checks.refuse(f"{within}{name}", "an entry", None)
+        return read
 
     return check
 
@@ -103,10 +110,11 @@ def entries(required: Mapping[str, Form], maybe: Mapping[str, Form] | None = Non
 def mapped(names: Form, form: Form) -> Form:
     """Return the form of a mapping from names."""
 
-    def check(place: str, value: Any) -> None:
-        for name, item in checks.instance(place, value, dict).items():
-            names(f"a name in {place}", name)
-            form(f"{place}.{name}", item)
+    def check(place: str, value: Any) -> dict[Any, Any]:
+        return {
+            names(f"a name in {place}", name): form(f"{place}.{name}", item)
+            for name, item in checks.instance(place, value, dict).items()
+        }
 
     return check
 
@@ -122,17 +130,8 @@ def array(
 ) -> Any:
     """Return an array after a check of its type, its shape and the range of its numbers.
 
-    Parameters
-    ----------
-    place : str
-    value : array
-    kinds : str
-        Letters of NumPy's kinds: ``f`` for real numbers, which have to be finite, ``iu`` for whole
-        ones, ``b`` for truth values.
-    shape : tuple of int
-        -1 stands for any length.
-    least, most : optional
-        Ends of the range.
+    The kinds are letters of NumPy's: ``f`` for real numbers, which have to be finite, ``iu`` for
+    whole ones, ``b`` for truth values.  In the shape -1 stands for any length.
     """
     found = np.asarray(value)
     fits = found.ndim == len(shape) and all(

@@ -25,22 +25,9 @@ class Ending(Enum):
 
 
 class Clock:
-    """When work in progress is saved: every few seconds, for a small share of the time at most.
+    """When work in progress is saved: every few seconds, for a small share of the time at most."""
 
-    Parameters
-    ----------
-    save : callable
-        Saves the work.
-    every : float, optional
-        Least time between two times of saving, in s; default 5.
-
-    Attributes
-    ----------
-    share : float
-        Largest part of the time that saving takes.
-    """
-
-    every, share = 5.0, 0.05
+    every, share = 5.0, 0.05  # s between two times of saving at least; of the time at most
 
     def __init__(self, save: Callable[[], object], every: float | None = None) -> None:
         self._save, self._saved, self._took = save, monotonic(), 0.0
@@ -69,19 +56,8 @@ def work_through(
 ) -> Ending:
     """Do the tasks of a search until none is left, budget or time is used up, or Ctrl-C.
 
-    At least one task is done, however short the time, if the budget allows it.
-
-    Parameters
-    ----------
-    tasks : iterable of (bool, callable)
-        The next task depends on what the search is when it is asked for.
-    told : callable
-        Returns what is reported after every task.
-    progress : callable, optional
-    seconds : float, optional
-        Time after which no further task begins.
-    clock : Clock, optional
-        Saves the search between two tasks.
+    At least one task is done, however short the time, if the budget allows it.  What is ``told``
+    is reported after every task; the clock saves between two of them.
     """
     deadline, begun = monotonic() + seconds, False
     try:

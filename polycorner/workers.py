@@ -70,15 +70,9 @@ class Inline(Executor):
 class Workers:
     """An executor, and how much it is given at a time.
 
-    Parameters
-    ----------
-    executor : Executor
-    count : callable
-        Returns the number of workers.
-    largest, ahead : int, optional
-        Points in a batch, and batches in flight for each worker, at most.
-    state : callable, optional
-        Returns "running", or in another word why nothing that is submitted is computed.
+    ``count`` returns the number of workers, ``state`` "running", or in another word why nothing
+    that is submitted is computed.  At most ``largest`` points are in a batch, and ``ahead`` batches
+    in flight for each worker.
     """
 
     def __init__(

@@ -79,13 +79,7 @@ cli.add_command(completion)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and end the process with its exit code.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Arguments after the command's name; default those of the process.
-    """
+    """Run the command line, with the process's arguments by default, and end with its exit code."""
     given = None if arguments is None else list(arguments)
     chosen, start = Verbosity(), perf_counter()
     closed = _occupied()

@@ -43,14 +43,7 @@ PARTICIPANTS = ("body_1", "body_2", "contact")
 
 
 def check_structure(content: bytes, stream: Any) -> None:
-    """Raise ValueError if an HDF5 file has more than arrays of numbers and texts in its root.
-
-    Parameters
-    ----------
-    content : bytes
-    stream : file
-        Of the content.
-    """
+    """Raise ValueError if an HDF5 file has more than arrays of numbers and texts in its root."""
     import h5py
 
     with h5py.File(stream, "r") as file:

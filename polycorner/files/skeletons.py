@@ -4,6 +4,7 @@ import operator
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from polycorner.forms import (
     anything,
     entries,
     generator_entry,
+    made,
     many,
     mapped,
     number,
@@ -40,7 +42,7 @@ from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.parts import Completeness
-from polycorner.skeletons.probing import ISLAND, Anchor, Patch
+from polycorner.skeletons.probing import ISLAND, Patch
 from polycorner.skeletons.registry import FoundCorner
 from polycorner.skeletons.search import UNFINISHED
 from polycorner.skeletons.states import SearchState
@@ -165,45 +167,41 @@ def load_skeleton(
 
 def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> "Explorer | str":
     """Return the search, or which function differs at a corner."""
-    extent, n = read_number(content["extent"]), polyhedron.manifold.size
-    _check_sizes(content, n, len(polyhedron.functions))
-    starts = [_points(q, n, 1) for _, q in content["starts"]]
-    edges = [_points(entry["points"], n, 2)[0] for entry in content["edges"]]
-    corners = [_points(corner["point"], n, 1) for corner in content["corners"]]
+    sized = _read_sizes(content, polyhedron.manifold.size, len(polyhedron.functions))
+    starts = [q for _, q in sized["starts"]]
+    edges = [entry["points"][0] for entry in sized["edges"]]
+    corners = [corner["point"] for corner in sized["corners"]]
     written, here = content["symmetry"], _symmetry(polyhedron, symmetry, corners + edges)
     if written != here:
         words = [", ".join(f"{k} {v}" for k, v in entry.items()) for entry in (written, here)]
         return f"symmetry: written {words[0]}, found {words[1]}"
-    given = float(content["tolerance"]), float(content.get("rank tolerance", RANK_TOLERANCE))
-    points, tolerances = starts + edges + corners, Tolerances.of(*given)
-    quotient = Quotient.near(polyhedron, symmetry, tolerances, extent, points)
+    tolerances = Tolerances.of(sized["tolerance"], sized.get("rank tolerance", RANK_TOLERANCE))
+    points = starts + edges + corners
+    quotient = Quotient.near(polyhedron, symmetry, tolerances, sized["extent"], points)
     explorer = Explorer(quotient, [], read_generator("random", content["random"]))
-    for k, (corner, q) in enumerate(zip(content["corners"], corners, strict=True)):
+    for k, (corner, q) in enumerate(zip(sized["corners"], corners, strict=True)):
         active = frozenset(map(polyhedron.names.index, corner["active"]))
         differs = _unlike(quotient, q[None], active)
         if differs:
             return differs.replace(":", f" at corner {k}:", 1)
         _check_active(f"corners[{k}].active", quotient, q, active)
         explorer.registry.restore(q, active)
-    _check_rays(content, explorer)
-    for record, corner in zip(explorer.records, content["corners"], strict=True):
+    joined = _read_joints(content, sized, explorer)
+    for record, corner in zip(explorer.records, sized["corners"], strict=True):
         record.edges.update(dict(corner["edges"]))
-    explorer.curves += [_read_curve(entry, n) for entry in content["edges"]]
-    explorer.crossings += [
-        FaceCrossing(_read_flag(start), _read_flag(stop)) for start, stop in content["crossings"]
-    ]
-    explorer.starts.extend((count, _points(start, n, 1)) for count, start in content["starts"])
-    explorer.pending.extend((corner, ray) for corner, ray in content["pending"])
-    explorer.tried.update(map(_read_flag, content["tried"]))
-    for active, point in content.get("patches", ()):
-        explorer.patches.append(Patch(frozenset(active), _points(point, n, 1)))
-    explorer.links += [frozenset(map(_anchor, link)) for link in content.get("links", ())]
-    explorer.origins += [_points(q, n, 1) for q in content.get("origins", ())]
-    explorer.least.update({k: read_number(x) for k, x in content.get("least", {}).items()})
-    explorer.sought = _pair(content.get("sought")) or explorer.sought
-    for sentence in content["notes"]:
+    explorer.curves += joined["curves"]
+    explorer.crossings += starmap(FaceCrossing, joined["crossings"])
+    explorer.starts.extend(sized["starts"])
+    explorer.pending.extend(joined["pending"])
+    explorer.tried.update(joined["tried"])
+    explorer.patches += starmap(Patch, sized.get("patches", ()))
+    explorer.links += joined.get("links", ())
+    explorer.origins += sized.get("origins", ())
+    explorer.least.update(joined.get("least", {}))
+    explorer.sought = joined.get("sought", explorer.sought)
+    for sentence in sized["notes"]:
         explorer.registry.note(sentence)
-    explorer.registry.lost = bool(content["lost"])
+    explorer.registry.lost = sized["lost"]
     return explorer
 
 
@@ -237,14 +235,6 @@ def _corner(explorer: Explorer, record: FoundCorner) -> Entries:
     }
 
 
-def _points(written: Any, n: int, dimensions: int) -> Any:
-    found = np.array(written, dtype=np.float64)
-    if found.ndim != dimensions or found.shape[-1] != n or not np.isfinite(found).all():
-        msg = f"{n} finite numbers make a point, not an array of shape {found.shape}"
-        raise ValueError(msg)
-    return found
-
-
 def _curve(curve: Curve) -> dict[str, Any]:
     changed = {name: image for name, image in curve.relabelled.items() if name != image}
     return {
@@ -257,34 +247,8 @@ def _curve(curve: Curve) -> dict[str, Any]:
     }
 
 
-def _read_curve(entry: dict[str, Any], n: int) -> Curve:
-    first, last = (End[name] for name in entry["kinds"])
-    return Curve(
-        points=_points(entry["points"], n, 2),
-        active=frozenset(entry["active"]),
-        kinds=(first, last),
-        start=_pair(entry["start"]),
-        stop=_pair(entry["stop"]),
-        relabelled=entry["relabelled"],
-    )
-
-
-def _pair(half: list[int] | None) -> tuple[int, int] | None:
-    return None if half is None else (half[0], half[1])
-
-
-def _anchor(written: list[Any]) -> Anchor:
-    kind, where = written
-    return kind, _pair(where) or (0, 0) if isinstance(where, list) else int(where)
-
-
 def _flag(flag: Flag) -> list[Any]:
     return [flag[0], flag[1], sorted(flag[2])]
-
-
-def _read_flag(written: list[Any]) -> Flag:
-    kind, record, names = written
-    return kind, tuple(record) if isinstance(record, list) else record, frozenset(names)
 
 
 # ------------------------------------------------------------------------------------------- forms
@@ -293,10 +257,11 @@ def _read_flag(written: list[Any]) -> Flag:
 # sizes, then corners, which have to lie where their functions vanish, then all that has rays.
 
 
-def _check_sizes(content: Mapping[str, Any], n: int, m: int) -> None:
-    """Check what depends on ``n`` coordinates and ``m`` functions alone."""
-    point, active = many(number(), exactly=n), many(position(m))
-    kind = word(*End.__members__)
+def _read_sizes(content: Entries, n: int, m: int) -> Entries:
+    """Return what depends on ``n`` coordinates and ``m`` functions alone."""
+    point = made(many(number(), exactly=n), np.array)
+    active = made(many(position(m)), frozenset)
+    kind = made(word(*End.__members__), lambda name: End[name])
     corner = entries(
         {
             "point": point,
@@ -305,13 +270,13 @@ def _check_sizes(content: Mapping[str, Any], n: int, m: int) -> None:
             "edges": many(row(forms.count, position(len(content["edges"])))),
         }
     )
-    edge = entries({"points": many(point), "active": active, "kinds": row(kind, kind)})
+    edge = {"points": made(many(point), np.array), "active": active, "kinds": row(kind, kind)}
     header = {
         "complete": word(*Completeness.__members__),
         "tolerance": number(above=0, below=1),
         "extent": number(above=0, infinite=True),
         "corners": many(corner),
-        "edges": many(edge),
+        "edges": many(entries(edge)),
         "starts": many(row(partial(checks.whole, least=ISLAND), point)),
         "notes": many(text),
         "lost": forms.flag,
@@ -321,7 +286,8 @@ def _check_sizes(content: Mapping[str, Any], n: int, m: int) -> None:
         "patches": many(row(active, point)),
         "origins": many(point),
     }
-    entries(header, later)("", content)
+    read: Entries = entries(header, later)("", content)
+    return read
 
 
 def _unlike(quotient: Quotient, points: Array, active: frozenset[int]) -> str:
@@ -356,24 +322,23 @@ def _check_active(place: str, quotient: Quotient, q: Array, active: frozenset[in
         checks.refuse(place, f"the functions {names} that vanish there", len(active))
 
 
-def _check_rays(content: Mapping[str, Any], explorer: Explorer) -> None:
-    """Check the rest against the corners, their rays and their sectors."""
+def _read_joints(content: Entries, sized: Entries, explorer: Explorer) -> Entries:
+    """Return the rest, which depends on the corners, their rays and their sectors."""
     names = explorer.polyhedron.names
     rays = [len(record.figure.rays) for record in explorer.records]
     sectors = [len(record.figure.sectors) for record in explorer.records]
-    edges = position(len(content["edges"]))
-    patches = position(len(content.get("patches", ())))
+    edges, patches = (position(len(sized.get(name, ()))) for name in ("edges", "patches"))
 
     def at(counts: list[int], least: int = 0) -> Form:
-        def check(place: str, value: Any) -> None:
-            row(position(len(counts)), anything)(place, value)
-            position(counts[value[0]], least=least)(f"{place}[1]", value[1])
+        def check(place: str, value: Any) -> tuple[int, int]:
+            k, i = row(position(len(counts)), anything)(place, value)
+            return k, position(counts[k], least=least)(f"{place}[1]", i)
 
         return check
 
     name = word(*names)
     kinds: Mapping[str, Form] = {"half": at(rays), "curve": edges, "apex": at(sectors)}
-    flag = _by_kind(kinds, many(name))
+    flag = _by_kind(kinds, made(many(name), frozenset))
     anchors: Mapping[str, Form] = {
         "half": at(rays), "curve": edges, "patch": patches, "corner": position(len(rays)),
     }  # fmt: skip
@@ -392,51 +357,47 @@ def _check_rays(content: Mapping[str, Any], explorer: Explorer) -> None:
         "tried": many(flag),
     }
     later = {
-        "links": many(many(_by_kind(anchors))),
+        "links": many(made(many(_by_kind(anchors)), frozenset)),
         "least": mapped(name, number(infinite=True)),
         "sought": row(forms.count, partial(checks.whole, least=-1)),
     }
-    entries(required, later)("", content)
-    for k, (record, corner) in enumerate(zip(explorer.records, content["corners"], strict=True)):
+    read: Entries = entries(required, later)("", content)
+    curves = [Curve(**one, **two) for one, two in zip(sized["edges"], read["edges"], strict=True)]
+    for k, (record, corner) in enumerate(zip(explorer.records, sized["corners"], strict=True)):
         for j, (ray, kept) in enumerate(corner["edges"]):
-            ends = content["edges"][kept]
-            here = {record.orbit[i] for c, i in _ends(ends) if c == k}
-            if ray not in here:
+            ends = filter(None, (curves[kept].start, curves[kept].stop))
+            if ray not in {record.orbit[i] for c, i in ends if c == k}:
                 checks.refuse(f"corners[{k}].edges[{j}]", "an edge that ends there", kept)
-    for k, written in enumerate(content["edges"]):
-        _check_curve(f"edges[{k}]", written, explorer)
+    for k, curve in enumerate(curves):
+        _check_curve(f"edges[{k}]", curve, explorer)
     finished = Completeness[content["complete"]] not in UNFINISHED
     if finished and (content["pending"] or content["starts"]):
         checks.refuse(
             "complete", "an unfinished search, with work that is left", content["complete"]
         )
+    return read | {"curves": curves}
 
 
 def _by_kind(kinds: Mapping[str, Form], *more: Form) -> Form:
     """Return the form of a list: a kind, what has the form of this kind, and more."""
 
-    def check(place: str, value: Any) -> None:
-        row(word(*kinds), anything, *more)(place, value)
-        kinds[value[0]](f"{place}[1]", value[1])
+    def check(place: str, value: Any) -> tuple[Any, ...]:
+        kind, where, *rest = row(word(*kinds), anything, *more)(place, value)
+        return kind, kinds[kind](f"{place}[1]", where), *rest
 
     return check
 
 
-def _ends(edge: Mapping[str, Any]) -> list[list[int]]:
-    return [end for end in (edge["start"], edge["stop"]) if end is not None]
-
-
-def _check_curve(place: str, edge: Mapping[str, Any], explorer: Explorer) -> None:
+def _check_curve(place: str, curve: Curve, explorer: Explorer) -> None:
     """Check that an edge lies where its functions vanish, is no longer than a walk, and begins."""
-    quotient, points = explorer.quotient, np.array(edge["points"], dtype=np.float64)
-    differs = _unlike(quotient, points, frozenset(edge["active"]))
+    quotient, points, active = explorer.quotient, curve.points, curve.active
+    differs = _unlike(quotient, points, active)
     if differs:
         msg = f"{place}.points: expected an edge; got {differs}"
         raise ValueError(msg)
-    active = frozenset(edge["active"])
     inner = (quotient.at(q).active() for q in points[1:-1])
     if len(points) > 2 and all(found is not None and found > active for found in inner):
-        checks.refuse(f"{place}.active", "all that vanish along the edge", edge["active"])
+        checks.refuse(f"{place}.active", "all that vanish along the edge", sorted(active))
     chords = np.diff(points, axis=0) / explorer.scales
     # Two walks at most, whose last step is at most half as long as the extent.
     longest = 3 * (quotient.extent + LONGEST_STEP)
@@ -444,10 +405,9 @@ def _check_curve(place: str, edge: Mapping[str, Any], explorer: Explorer) -> Non
         checks.refuse(
             f"{place}.points", f"an edge of a length of at most {longest:g}", "a longer one"
         )
-    start, corner = edge["start"], End.CORNER.name
-    begins = edge["kinds"][0] == corner
-    at = None if start is None else explorer.records[start[0]].point.q
+    begins = curve.kinds[0] is End.CORNER
+    at = None if curve.start is None else explorer.records[curve.start[0]].point.q
     if begins != (at is not None) or (at is not None and (at != points[0]).any()):
-        checks.refuse(f"{place}.start", "the corner where the edge begins", start)
-    if edge["stop"] is not None and edge["kinds"][1] != corner:
-        checks.refuse(f"{place}.stop", "None for an edge that ends at no corner", edge["stop"])
+        checks.refuse(f"{place}.start", "the corner where the edge begins", curve.start)
+    if curve.stop is not None and curve.kinds[1] is not End.CORNER:
+        checks.refuse(f"{place}.stop", "None for an edge that ends at no corner", curve.stop)

@@ -21,9 +21,9 @@ from polycorner.kinds import checked
 from polycorner.progress import Progress, silent
 from polycorner.sweeps.grid import Grid
 from polycorner.sweeps.points import Job, Outcome, evaluate, one_line
-from polycorner.sweeps.store import StoredResults
+from polycorner.sweeps.store import Store
 from polycorner.sweeps.study import Study, SweepError, canonical
-from polycorner.sweeps.tables import Results
+from polycorner.sweeps.tables import StudyTable
 from polycorner.workers import LARGEST, Shared, Workers, is_broken, killed_workers, workers_of
 
 if TYPE_CHECKING:
@@ -258,7 +258,7 @@ def sweep(
     axes, constants = Grid.of(grid), dict(fixed or {})
     random = check_arguments(function, axes, constants)
     study = Study(axes, _name(function), canonical(constants), _seed(rng, wanted=random))
-    table = Results(study) if store is None else StoredResults(Path(store), study)
+    table = StudyTable(study) if store is None else Store(Path(store), study)
     try:
         finished = _compute(table, Job(function, constants, study.seed), executor, retry, progress)
         table.close(complete="finished" if finished else "interrupted")
@@ -272,7 +272,7 @@ def sweep(
     return table.dataset()
 
 
-def _compute(table: Results, job: Job, executor: Any, retry: bool, progress: Progress) -> bool:
+def _compute(table: StudyTable, job: Job, executor: Any, retry: bool, progress: Progress) -> bool:
     """Compute the missing points, until Ctrl-C; return whether all are finished."""
     grid, stop = table.study.grid, threading.Event()
     reported = (-1, -1)
@@ -302,7 +302,7 @@ def _compute(table: Results, job: Job, executor: Any, retry: bool, progress: Pro
     return table.done + table.failed == grid.size and not (retry and stop.is_set())
 
 
-def _close(table: Results) -> None:
+def _close(table: StudyTable) -> None:
     """Keep what is finished as far as that is possible."""
     try:
         table.close(complete="interrupted")
@@ -310,9 +310,9 @@ def _close(table: Results) -> None:
         return  # a full disk has been reported already
 
 
-def _kept(table: Results) -> str:
+def _kept(table: StudyTable) -> str:
     finished = f"{table.done + table.failed} of {table.study.grid.size} points are finished"
-    if isinstance(table, StoredResults):
+    if isinstance(table, Store):
         return f"{finished} and kept in {table.path}; the same call computes the others"
     return f"{finished}, the `results` of this exception; with a store the study could be resumed"
 

@@ -42,7 +42,7 @@ _COLUMN = {
     "name": forms.text,
     "unit": forms.text,
     "text": forms.flag,
-    "shape": forms.many(forms.count),
+    "shape": forms.made(forms.many(forms.count), tuple),
 }
 
 
@@ -83,16 +83,14 @@ def check_root(document: Any) -> None:
 
 def stored_grid(about: Mapping[str, Any]) -> Grid:
     """Return the grid of the study in a store."""
-    study = json.loads(about["study"])
-    forms.entries(_STUDY)("study", study)
+    study = forms.entries(_STUDY)("study", json.loads(about["study"]))
     return Grid({axis["name"]: Axis(axis["values"], axis["unit"]) for axis in study["axes"]})
 
 
 def stored_columns(about: Mapping[str, Any]) -> tuple[Column, ...]:
     """Return the columns of the results from the attributes of a store."""
-    entries = json.loads(about.get("columns", "[]"))
-    forms.many(forms.entries(_COLUMN))("columns", entries)
-    return tuple(Column(e["name"], e["unit"], e["text"], tuple(e["shape"])) for e in entries)
+    column = forms.made(forms.entries(_COLUMN), lambda entry: Column(**entry))
+    return tuple(forms.many(column)("columns", json.loads(about.get("columns", "[]"))))
 
 
 def _array(new: Variable) -> forms.Form:

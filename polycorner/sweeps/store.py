@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner import forms
-from polycorner.atomic import is_part
+from polycorner.atomic import is_part, is_store, lock_store
 from polycorner.checks import missing_extra
 from polycorner.kinds import checked
 from polycorner.sweeps.metadata import (
@@ -41,7 +41,7 @@ from polycorner.sweeps.study import Study, SweepError, difference, versions
 from polycorner.sweeps.tables import (
     FAILED,
     PENDING,
-    Results,
+    StudyTable,
     Variable,
     coordinate_arrays,
     coordinates,
@@ -55,7 +55,7 @@ POINTS = 4096  # in a chunk, at most
 BYTES = 4 << 20  # in a chunk, at most, unless one point has more
 
 
-class StoredResults(Results):
+class Store(StudyTable):
     """Results on disk, in a folder that is created if it does not exist.
 
     Raises
@@ -70,20 +70,13 @@ class StoredResults(Results):
 
     def __init__(self, path: Path, study: Study) -> None:
         need_zarr()
-        from filelock import FileLock, Timeout
-
         super().__init__(study)
         self.path = path
         self.present: list[str] = []  # names of the arrays on disk
         check_study(path, study)
         with self._writing():
             path.mkdir(parents=True, exist_ok=True)
-            self.lock = FileLock(f"{path}.lock", thread_local=False)
-            try:
-                self.lock.acquire(blocking=False)
-            except Timeout:
-                msg = f"store: expected one that nothing else is writing; {path} is in use"
-                raise ValueError(msg) from None
+            self.lock = lock_store(path)
         try:
             with self._writing():
                 self._open()
@@ -218,27 +211,13 @@ def need_zarr() -> None:
 
 def check_study(path: Path, study: Study) -> None:
     """Refuse a folder with anything but this study, in a sentence that names the difference."""
-    if path.exists() and not path.is_dir():
-        msg = f"store: expected a folder; {path} is a file"
-        raise ValueError(msg)
-    found = stored_study(path)
-    if found is None:
-        if path.is_dir() and not all(map(is_part, path.iterdir())):
-            msg = f"store: expected a new or empty folder, or a store of a sweep; {path} is neither"
-            raise ValueError(msg)
+    if not is_store(path, ROOT, "a store of a sweep"):
         return
+    found = json.loads(checked_root(path)[0]["study"])
     differs = difference(json.loads(study.attributes()["study"]), found)
     if differs:
         msg = f"store: expected {differs}; {path} is of another study"
         raise ValueError(msg)
-
-
-def stored_study(path: Path) -> dict[str, Any] | None:
-    """Return the identity of the study in a store, or None where there is none."""
-    if not (path / ROOT).exists():
-        return None
-    found: dict[str, Any] = json.loads(checked_root(path)[0]["study"])
-    return found
 
 
 def stored_state(path: Path) -> str:

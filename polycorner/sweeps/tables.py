@@ -76,7 +76,7 @@ def units(unit: str) -> dict[str, Any]:
     return {"units": unit} if unit else {}
 
 
-class Results:
+class StudyTable:
     """The results of a study in memory."""
 
     def __init__(self, study: Study) -> None:

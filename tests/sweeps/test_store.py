@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from polycorner.sweeps import SweepError, metadata, open_results, sweep
 from polycorner.sweeps.metadata import write_root
-from polycorner.sweeps.store import StoredResults, _chunk_shape
+from polycorner.sweeps.store import Store, _chunk_shape
 from polycorner.sweeps.tables import Variable
 
 GRID = {"a": ([0, 1, 2], "mm"), "b": [1, 2, 3, 4]}
@@ -180,7 +180,7 @@ def test_stopped_anywhere_the_same_call_comes_to_the_same(tmp_path, monkeypatch,
     log, whole, reported = tmp_path / "log", drawn(None, tmp_path / "other"), [0]
     with monkeypatch.context() as patch:
         patch.setattr("polycorner.searches.Clock.share", 1e9)  # rows are written after every point
-        stopping(at, patch, StoredResults, name, after=after)
+        stopping(at, patch, Store, name, after=after)
         unsettled(patch)
         with pytest.raises(Stop):
             drawn(tmp_path / "s", log, progress=lambda done, *_: reported.append(done))
@@ -245,7 +245,7 @@ def test_a_full_disk_is_said_and_room_lets_the_study_go_on(tmp_path, monkeypatch
     def full(*_arguments):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    log, real, calls = tmp_path / "log", StoredResults._write_points, []
+    log, real, calls = tmp_path / "log", Store._write_points, []
 
     def method(*arguments):
         calls.append(1)
@@ -253,7 +253,7 @@ def test_a_full_disk_is_said_and_room_lets_the_study_go_on(tmp_path, monkeypatch
 
     with monkeypatch.context() as patch:
         patch.setattr("polycorner.searches.Clock.share", 1e9)  # rows are written after every point
-        patch.setattr(StoredResults, "_write_points", method)
+        patch.setattr(Store, "_write_points", method)
         with pytest.raises(
             SweepError, match=r"No space left on device; \d+ of 42 points are"
         ) as stop:
@@ -417,7 +417,7 @@ def test_another_version_resumes_and_is_noted(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("polycorner.sweeps.study.versions", lambda: {"polycorner": "0.0.1"})
         patch.setattr("polycorner.sweeps.store.versions", lambda: {"polycorner": "0.0.1"})
-        stopping(3, patch, StoredResults, "add", after=True)
+        stopping(3, patch, Store, "add", after=True)
         with pytest.raises(Stop):
             drawn(tmp_path / "s")
     found = json.loads(drawn(tmp_path / "s").attrs["versions"])

@@ -330,14 +330,14 @@ class Limits:
 
         def report() -> None:
             if kept:
-                kept.clock.tick()
+                kept.save_by_the_clock()
             note = f"{len(search.waiting)} boxes wait, {len(search.regions)} points"
             self.progress(float(search.tally.boxes), None, note)
 
         limits = self.max_boxes, self.max_seconds
         search.run(*limits, report, workers=self.workers, stopped=stop.is_set)
         if kept:
-            kept.clock.save()
+            kept.save()
 
 
 @dataclass(frozen=True)

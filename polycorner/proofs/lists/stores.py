@@ -29,11 +29,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from polycorner import __version__, checks, forms
-from polycorner.atomic import is_part, write_atomically
+from polycorner import __version__, checks, forms, searches
+from polycorner.atomic import is_part, is_store, lock_store, write_atomically
 from polycorner.checks import choice, refuse, whole
 from polycorner.container import one_sentence, read_arrays
 from polycorner.formulas.cache import sources_digest
@@ -46,7 +45,6 @@ from polycorner.proofs.lists.records import (
 )
 from polycorner.proofs.lists.search import BoxSearch, Tally
 from polycorner.proofs.lists.tree import DIRECTED, SPLIT, Boxes, Tree, joined
-from polycorner.searches import Clock
 
 FORMAT = ["polycorner-search-of-stationary-points", 1]
 ROOT = "search.json"
@@ -186,17 +184,12 @@ class SearchStore:
         self.path, self.search = Path(path), search
         self._files: dict[str, str] = {}  # digests by name
         self._marks, self._count = (0, 0), 0
-        self.clock = Clock(self._save)
+        self._clock = searches.Clock(self._save)
         self._stated = json.loads(json.dumps(_stated(search)))
         found = self._found()
         with _writing(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            self._lock = FileLock(f"{self.path}.lock", thread_local=False)
-            try:
-                self._lock.acquire(blocking=False)
-            except Timeout:
-                msg = f"store: expected one that nothing else is writing; {self.path} is in use"
-                raise ValueError(msg) from None
+            self._lock = lock_store(self.path)
         try:
             found = self._found()
             if found is not None:
@@ -205,10 +198,18 @@ class SearchStore:
                 for file in self.path.iterdir():  # of a process that was killed as it saved
                     if _is_own(file) and file.name not in self._files:
                         file.unlink()
-            self.clock.save()
+            self.save()
         except BaseException:
             self._lock.release()
             raise
+
+    def save_by_the_clock(self) -> None:
+        """Save the search if the last time is long enough ago."""
+        self._clock.tick()
+
+    def save(self) -> None:
+        """Save the search now."""
+        self._clock.save()
 
     def _save(self) -> None:
         """Save the search as it is between two rounds."""
@@ -243,14 +244,7 @@ class SearchStore:
 
     def _found(self) -> dict[str, Any] | None:
         """Return what the folder holds of this search, or None for nothing."""
-        if self.path.exists() and not self.path.is_dir():
-            msg = f"store: expected a folder; {self.path} is a file"
-            raise ValueError(msg)
-        if not (self.path / ROOT).exists():
-            if self.path.is_dir() and not all(map(_is_own, self.path.iterdir())):
-                kinds = "a new or empty folder, or the store of a search"
-                msg = f"store: expected {kinds}; {self.path} is neither"
-                raise ValueError(msg)
+        if not is_store(self.path, ROOT, "the store of a search", _is_own):
             return None
         root = self._parsed((self.path / ROOT).read_bytes())
         for name, words in DIFFERENCES.items():
