@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_times
+from polycorner.dumbbells.statics.wells import Agitation, Hold, dyad_holds, hold_times
 from polycorner.models.wells import (
     Escapes,
     Well,
@@ -39,7 +39,7 @@ from polycorner.models.wells import (
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 DEPTH, DRAG = 1.5, 0.8  # units of the temperature, of sqrt(m T) / a
-SHAKING = Shaking(energy=1e-3, drag_rate=5.0)  # weight of a ball times mm, 1/s
+SHAKING = Agitation(energy=1e-3, drag_rate=5.0)  # weight of a ball times mm, 1/s
 NEAR = 0.2  # mm
 
 

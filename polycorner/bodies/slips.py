@@ -15,24 +15,39 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from polycorner.bodies import frames, gaps, normals, waves
-from polycorner.bodies.frames import Frame, symbols
-from polycorner.bodies.gaps import FIRST, SECOND, given, numbers
-from polycorner.bodies.normals import Definitions, Features, inward, nearest, off_hull
+from polycorner.bodies import frames, gaps
+from polycorner.bodies.frames import AXES, Frame, symbols
+from polycorner.bodies.gaps import FIRST, SECOND, beside, given, harmonics, numbers
 from polycorner.bodies.pairs import PlacedPart, Touch, function_of
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
+from polycorner.bodies.waves import waves
 from polycorner.formulas import cache
+from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion import rotations
 from polycorner.motion.contacts import velocities
 from polycorner.motion.formulation import dotted
 from polycorner.spaces import distances
-from polycorner.spaces.distances import cross, dot, minus, norm, plus, scaled, zero
+from polycorner.spaces.distances import (
+    PARALLEL,
+    beyond,
+    clamped,
+    cross,
+    dot,
+    foot,
+    minus,
+    norm,
+    plus,
+    scaled,
+    zero,
+)
 from polycorner.spaces.manifold import Array, Manifold
 
 if TYPE_CHECKING:
-    from polycorner.bodies.gaps import Formulas
+    import sympy
+
+    from polycorner.bodies.gaps import Expressions, Formulas
     from polycorner.spaces.distances import Point
 
 SLIDING, ROLLING = "sliding", "rolling"
@@ -40,6 +55,122 @@ COMPONENTS = ("s0", "s1")
 SPIN = ("spin0", "spin1", "spin2")  # angular velocity of a wall
 
 AtWall = tuple[str, Wall, PlacedPart, Array]  # name of the contact, wall, part, point
+
+
+# Nearest points of two parts that touch, and the normal there.  Quantities in between are
+# *defined*: to SymPy they are symbols, so that formulas stay short however many faces there are.
+
+
+class Features(NamedTuple):
+    """What touches: a point or the two of an edge, of each part; or a point and a hull.
+
+    Attributes
+    ----------
+    first, second : int
+        How many points.
+    faces, edges : tuple of tuple of int
+        The points of each face of a polyhedron in order, and of each edge of a hull.
+    """
+
+    first: int
+    second: int
+    faces: tuple[tuple[int, ...], ...] = ()
+    edges: tuple[tuple[int, ...], ...] = ()
+
+
+class Definitions:
+    """Intermediate quantities, which are symbols to SymPy once they are defined."""
+
+    def __init__(self) -> None:
+        self.written: Expressions = {}
+
+    def number(self, name: str, expression: "sympy.Expr") -> "sympy.Expr":
+        """Define a number, and return its symbol; itself if it is known."""
+        expression = as_expression(name, expression)
+        if expression.is_Number:
+            return expression
+        self.written[name] = expression
+        return symbols([name])[0]
+
+    def point(self, name: str, point: "Point") -> "Point":
+        """Define a point or vector."""
+        x, y, z = (self.number(f"{name}{axis}", c) for axis, c in zip(AXES, point, strict=True))
+        return (x, y, z)
+
+
+def nearest(w: Definitions, first: "list[Point]", second: "list[Point]") -> "tuple[Point, Point]":
+    """Return the nearest points of two points or segments ([Er] sec. 5.1.9)."""
+    (p, *p_end), (q, *q_end) = first, second
+    if not q_end:
+        return p, q
+    v = w.point("v", minus(q_end[0], q))
+    if not p_end:
+        at = w.number("t", clamped(w.number("free_t", foot(p, q, q_end[0], 1 / dot(v, v)))))
+        return p, beyond(q, v, at)
+    u, apart = w.point("u", minus(p_end[0], p)), w.point("w", minus(p, q))
+    pairs = {"uu": (u, u), "vv": (v, v), "uv": (u, v), "uw": (u, apart), "vw": (v, apart)}
+    a, e, b, c, f = (w.number(name, dot(*pair)) for name, pair in pairs.items())
+    normal = w.point("m", cross(u, v))
+
+    def held(name: str, at: "sympy.Expr") -> "sympy.Expr":
+        return w.number(name, clamped(w.number(f"free_{name}", at)))
+
+    s = held("s", (b * f - c * e) / (dot(normal, normal) + PARALLEL**2 * a * e))
+    t = held("t", (b * s + f) / e)
+    return beyond(p, u, held("back", (b * t - c) / a)), beyond(q, v, t)
+
+
+def off_hull(w: Definitions, point: "Point", d: int, features: Features) -> "Point":
+    """Return the normal of a hull at the point of it that is nearest, in its own coordinates.
+
+    Over a face it is that of the face; elsewhere it comes from the nearest edge.
+    """
+    import sympy
+
+    p = w.point("inner", point)
+    least: sympy.Expr = sympy.oo
+    away = zero()
+    for k, (i, j) in enumerate(features.edges):
+        a, b = given(f"v{i}_", d), given(f"v{j}_", d)
+        along = minus(b, a)
+        at = w.number(f"at{k}", clamped(w.number(f"foot{k}", foot(p, a, b, 1 / dot(along, along)))))
+        here = w.point(f"from{k}", minus(p, beyond(a, along, at)))
+        square = w.number(f"square{k}", dot(here, here))
+        nearer = square < least
+        away = w.point(f"away{k}", _chosen(nearer, here, away))
+        least = w.number(f"least{k}", sympy.Piecewise((square, nearer), (least, True)))
+    normal = scaled(away, 1 / sympy.sqrt(least))
+    for f, face in enumerate(features.faces):
+        outward, corners = given(f"n{f}_", d), [given(f"v{i}_", d) for i in face]
+        height = dot(outward, minus(p, corners[0]))
+        over = sympy.And(height >= 0, *(x <= 0 for x in beside(p, corners, outward)))
+        normal = w.point(f"normal{f}", _chosen(over, outward, normal))
+    return normal
+
+
+def _chosen(holds: "sympy.Basic", one: "Point", other: "Point") -> "Point":
+    import sympy
+
+    x, y, z = (sympy.Piecewise((a, holds), (b, True)) for a, b in zip(one, other, strict=True))
+    return (x, y, z)
+
+
+def inward(w: Definitions, away: "Point", d: int, waviness: int) -> "Point":
+    """Return the normal of a cylinder, circle or sphere around a point that is off its centre."""
+    import sympy
+
+    axis = given("w", d)
+    away = w.point("away", minus(away, scaled(axis, dot(away, axis))))
+    if waviness:
+        e, f = given("e", d), given("f", d)
+        x, y = w.number("along_e", dot(away, e)), w.number("along_f", dot(away, f))
+        _, slope = waves(sympy.atan2(y, x), harmonics(waviness))
+        uphill = scaled(minus(scaled(f, x), scaled(e, y)), slope / norm(away))
+        away = w.point("across", minus(away, uphill))
+    return scaled(away, -1 / norm(away))
+
+
+# -------------------------------------------------------------------------------------------- slips
 
 
 class RigidVelocity(NamedTuple):
@@ -147,8 +278,8 @@ def _family(
     formulas: "Callable[[], Formulas]",
     written: object,
 ) -> Family:
-    rooms = (distances, frames, waves, gaps, normals, rotations)
-    sources = cache.source_key(*(room.__name__ for room in rooms), __name__)
+    rooms = (distances, frames, gaps, rotations)
+    sources = cache.source_key(*(room.__name__ for room in rooms), waves.__module__, __name__)
     key = repr((sources, written, one.value, two.value, d))
     places = one.variables(FIRST, d) + two.variables(SECOND, d)
     variables = (*places, *map(dotted, places))

@@ -1,5 +1,6 @@
 """Commands of applications: found by their entry points, and what is said where one is missing."""
 
+from importlib import metadata
 from importlib.metadata import EntryPoint
 
 import commands
@@ -9,6 +10,8 @@ from polycorner.cli import lazy
 from polycorner.cli.atlas import atlas
 from polycorner.cli.main import cli
 
+COMMANDS = "polycorner.commands"
+
 
 @pytest.fixture
 def registering(monkeypatch):
@@ -16,13 +19,15 @@ def registering(monkeypatch):
     monkeypatch.setattr(cli, "commands", {})  # those that were loaded before
     monkeypatch.delitem(atlas.commands, "dyad", raising=False)
 
-    def register(**values):
-        points = {
-            name: EntryPoint(name, value, "polycorner.commands") for name, value in values.items()
-        }
-        monkeypatch.setattr(lazy, "registered", lambda kind: points if kind == "commands" else {})
+    lazy.registered.cache_clear()
 
-    return register
+    def register(**values):
+        points = [EntryPoint(name, value, COMMANDS) for name, value in values.items()]
+        found = {COMMANDS: points}
+        monkeypatch.setattr(metadata, "entry_points", lambda group: found.get(group, []))
+
+    yield register
+    lazy.registered.cache_clear()
 
 
 def test_commands_are_registered(capsys, registering):

@@ -40,7 +40,7 @@ def _epilog(*names: str) -> str:
     return examples(*(EXAMPLES[name] for name in names)) + "Ctrl-C ends the server (exit code 0)."
 
 
-class _Group(click.Group):
+class _DyadByDefault(click.Group):
     """A group whose subcommand is ``dyad`` unless one is named."""
 
     command_class = GroupedCommand
@@ -51,7 +51,7 @@ class _Group(click.Group):
         return super().parse_args(ctx, args)
 
 
-@click.group(cls=_Group, epilog=_epilog(*EXAMPLES))
+@click.group(cls=_DyadByDefault, epilog=_epilog(*EXAMPLES))
 def view() -> None:
     """Show a pair, its atlas or a recorded motion in the browser; dyad by default."""
 

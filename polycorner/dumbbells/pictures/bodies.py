@@ -16,7 +16,7 @@ AXIS = 10.0  # mm, the length at which axes are drawn
 
 
 @dataclass(frozen=True)
-class Wall:
+class WallPatch:
     """A part of the drum's wall, or of the plane.
 
     Attributes
@@ -84,7 +84,7 @@ def dumbbell_centres(pair: DumbbellPair, q: ArrayLike) -> Array:
     return pair.ball_centres(np.concatenate([places, places], axis=-1))[..., :2, :]
 
 
-def wall_around(pair: DumbbellPair, centres: Array) -> Wall:
+def wall_around(pair: DumbbellPair, centres: Array) -> WallPatch:
     """Return the part of the wall below ball centres ``(..., 3)``; rows of NaN do not count.
 
     It reaches beyond them by half a dumbbell, and not further than once around.
@@ -95,7 +95,7 @@ def wall_around(pair: DumbbellPair, centres: Array) -> Wall:
     along = (float(here[:, 1].min()) - room, float(here[:, 1].max()) + room)
     if pair.is_plane:
         across = (float(here[:, 0].min()) - room, float(here[:, 0].max()) + room)
-        return Wall(math.inf, pair.ball_radius, across, along)
+        return WallPatch(math.inf, pair.ball_radius, across, along)
     mean = np.angle(np.exp(1j * np.arctan2(here[:, 0], -here[:, 2])).sum())
     turned = np.arctan2(here[:, 0], -here[:, 2]) - mean
     azimuths = mean + np.angle(np.exp(1j * turned))
@@ -103,7 +103,7 @@ def wall_around(pair: DumbbellPair, centres: Array) -> Wall:
     low, high = float(azimuths.min()) - turn, float(azimuths.max()) + turn
     if high - low > math.tau:
         low, high = -math.pi, math.pi
-    return Wall(pair.drum_radius, pair.ball_radius, (low, high), along)
+    return WallPatch(pair.drum_radius, pair.ball_radius, (low, high), along)
 
 
 def relative_stretch(pair: DumbbellPair) -> Array:

@@ -12,7 +12,12 @@ from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, Handed, dyads_among
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.dumbbells.pictures.bodies import Wall, contact_point, dumbbell_centres, wall_around
+from polycorner.dumbbells.pictures.bodies import (
+    WallPatch,
+    contact_point,
+    dumbbell_centres,
+    wall_around,
+)
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.symbols import energy_unit
 from polycorner.motion import Trajectory
@@ -65,7 +70,7 @@ class Film(Checked):
     contacts : tuple of T mappings from str to (3,) array
         Closed contacts and their points, in mm.
     words : tuple of T Words
-    wall : Wall
+    wall : WallPatch
     spin : float
         Of the drum, rad/s.
     """
@@ -80,7 +85,7 @@ class Film(Checked):
     energies: Mapping[str, Array]
     contacts: tuple[Mapping[str, Array], ...]
     words: tuple[Words, ...]
-    wall: Wall
+    wall: WallPatch
     spin: float = 0.0
 
     def __len__(self) -> int:

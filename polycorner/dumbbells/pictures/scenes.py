@@ -17,7 +17,7 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import (
     AXIS,
-    Wall,
+    WallPatch,
     contact_point,
     dumbbell_centres,
     relative_stretch,
@@ -286,7 +286,7 @@ def _add_corner(scene: "trimesh.Scene", k: int, point: Array, hand: str, radius:
          _moved(point))  # fmt: skip
 
 
-def _add_surroundings(scene: "trimesh.Scene", wall: Wall) -> None:
+def _add_surroundings(scene: "trimesh.Scene", wall: WallPatch) -> None:
     scene.add_geometry(wall_mesh(wall), node_name="wall", geom_name="wall")
     _add_axes(scene, wall.points(wall.across[0], wall.along[0]))
 
@@ -297,7 +297,7 @@ def _add_axes(scene: "trimesh.Scene", origin: Array) -> None:
         scene.add_geometry(line, node_name=name, geom_name=f"axis {name}")
 
 
-def wall_mesh(wall: Wall) -> "trimesh.Trimesh":
+def wall_mesh(wall: WallPatch) -> "trimesh.Trimesh":
     """Return a part of the wall as an open surface, its normals towards the dumbbells."""
     u = np.linspace(*wall.across, 2 if wall.is_plane else 49)
     y = np.array(wall.along)

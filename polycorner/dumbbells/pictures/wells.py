@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.dumbbells.statics.wells import Hold, Shaking, dyad_holds, hold_escapes, hold_times
+from polycorner.dumbbells.statics.wells import Agitation, Hold, dyad_holds, hold_escapes, hold_times
 from polycorner.minimisation import Entrapment
 from polycorner.models.wells import (
     KINDS,
@@ -28,7 +28,7 @@ from polycorner.toolkit import checked
 COLOURS = dict(zip(KINDS, ("#0072B2", "#E69F00", "#D55E00"), strict=True))
 SHAKEN = 120.0  # duration of sample paths, in a sqrt(m / D)
 RIMS = tuple(np.geomspace(0.1, 1.0, 8).tolist())  # mm
-SHAKING = Shaking(energy=2e-3, drag_rate=5.0)  # of the dyad, in weights of a ball times mm; 1/s
+SHAKING = Agitation(energy=2e-3, drag_rate=5.0)  # of the dyad, in weights of a ball times mm; 1/s
 MEASURED = 0.25  # mm, simulated
 LONGEST = 30.0  # s, longest mean time that is simulated
 TITLE = 11

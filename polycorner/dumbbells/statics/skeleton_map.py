@@ -161,7 +161,7 @@ def pair_map(
     across = checks.increasing("lengths", lengths, least=2, below=LONGEST)
     up = checks.increasing("rods", rods, above=0, below=1)
     checks.real("tolerance", tolerance, above=0)
-    survey = _Survey(float(tolerance), progress, len(across) * len(up) + len(up))
+    survey = _Signatures(float(tolerance), progress, len(across) * len(up) + len(up))
     table = np.array([[survey.at(x, t) for x in across.tolist()] for t in up.tolist()])
     exact = [(long_rod_length(1.0, t), t) for t in up.tolist()]
     critical = [survey.at(x, t) if x >= 2 else -1 for x, t in exact]
@@ -227,7 +227,7 @@ def pattern_at(length: float, rod_radius: float, *, seed: int = 0) -> Pattern:
     return _pattern(PairAtlas(pair, found, None), _single(found))
 
 
-class _Survey:
+class _Signatures:
     """Signatures found so far, and the progress of the work."""
 
     def __init__(self, tolerance: float, progress: Progress, expected: int) -> None:

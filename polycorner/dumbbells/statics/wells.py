@@ -148,7 +148,7 @@ def _derivatives(pair: DumbbellPair, corner: Certificate) -> tuple[Array, Array]
 
 
 @dataclass(frozen=True)
-class Shaking(Value):
+class Agitation(Value):
     """Noise and drag that are the same in every direction.
 
     Attributes
@@ -176,7 +176,7 @@ class Shaking(Value):
 
 
 def hold_times(
-    holds: Iterable[Hold], rims: Sequence[float], shaking: Shaking, *, cells: int = 40
+    holds: Iterable[Hold], rims: Sequence[float], shaking: Agitation, *, cells: int = 40
 ) -> Array:
     """Return mean times in s until noise moves the balls by ``rims`` mm, ``(holds, rims)``.
 
@@ -195,7 +195,7 @@ def _time(well: Well, kick: float, cells: int) -> float:
 
 
 def hold_escapes(
-    hold: Hold, rim: float, shaking: Shaking, *, duration: float, count: int = 300, seed: int = 0
+    hold: Hold, rim: float, shaking: Agitation, *, duration: float, count: int = 300, seed: int = 0
 ) -> Escapes:
     """Simulate escapes whose mean times :func:`hold_times` computes."""
     well = shaking.well(hold, rim)

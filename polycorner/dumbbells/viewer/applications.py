@@ -20,7 +20,7 @@ from polycorner.dumbbells.pictures.scenes import solid_bytes
 from polycorner.dumbbells.viewer.board import Board
 from polycorner.dumbbells.viewer.page import page_file, three_script
 from polycorner.dumbbells.viewer.server import allowed, names_of
-from polycorner.dumbbells.viewer.sliders import MESSAGE, RefusedError, hello, parsed
+from polycorner.dumbbells.viewer.sliders import MESSAGE, UnknownMessageError, hello, parsed
 from polycorner.toolkit import checked
 
 RATE = 300  # most messages of a page in a second
@@ -128,7 +128,7 @@ class _Live(WebSocketHandler):
             return
         try:
             asked = self._understood(message)
-        except RefusedError as error:
+        except UnknownMessageError as error:
             self._refuse(str(error))
             return
         if isinstance(asked, str):
@@ -144,10 +144,10 @@ class _Live(WebSocketHandler):
         self.second = second
         if self.counted > RATE:
             msg = f"expected at most {RATE} messages in a second"
-            raise RefusedError(msg)
+            raise UnknownMessageError(msg)
         if isinstance(message, bytes) or len(message) > MESSAGE:
             msg = f"expected a text of at most {MESSAGE} characters"
-            raise RefusedError(msg)
+            raise UnknownMessageError(msg)
         return parsed(message, self.board.sliders)
 
     def _refuse(self, words: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.dumbbells.pictures.bodies import (
-    Wall,
+    WallPatch,
     box_of,
     contact_point,
     relative_stretch,
@@ -168,14 +168,14 @@ class Board(Value):
         }
 
     @property
-    def _wall(self) -> Wall:
+    def _wall(self) -> WallPatch:
         """The part of the wall that the sliders can reach."""
         pair, room = self.pair, self.pair.length / 2 + self.pair.ball_radius
         along, across = (self.sliders[f"{name}_A"].high + room for name in ("axial", "lateral"))
         if pair.is_plane:
-            return Wall(math.inf, pair.ball_radius, (-across, across), (-along, along))
+            return WallPatch(math.inf, pair.ball_radius, (-across, across), (-along, along))
         turn = min(across / pair.centre_radius, math.pi)
-        return Wall(pair.drum_radius, pair.ball_radius, (-turn, turn), (-along, along))
+        return WallPatch(pair.drum_radius, pair.ball_radius, (-turn, turn), (-along, along))
 
     def fall(self) -> "tuple[Board, dict[str, Any]]":
         """Return the board after a descent, and the descent for the page."""

@@ -29,7 +29,7 @@ BUTTONS = (
 MESSAGE = 512  # most bytes of a message; all sliders together need fewer
 
 
-class RefusedError(ValueError):
+class UnknownMessageError(ValueError):
     """A message that the page never sends."""
 
 
@@ -102,19 +102,19 @@ def parsed(message: str, sliders: Mapping[str, Slider]) -> dict[str, float] | st
 
     Raises
     ------
-    RefusedError
+    UnknownMessageError
         For all other messages, names and numbers.
     """
     try:
         content = json.loads(message)
     except (ValueError, RecursionError) as error:
         msg = "expected JSON: slider names with numbers, or the name of a button"
-        raise RefusedError(msg) from error
+        raise UnknownMessageError(msg) from error
     if isinstance(content, str) and content in dict(BUTTONS):
         return content
     if not isinstance(content, dict) or not content:
         msg = "expected slider names with numbers, or the name of a button"
-        raise RefusedError(msg)
+        raise UnknownMessageError(msg)
     return {name: _checked(name, value, sliders) for name, value in content.items()}
 
 
@@ -122,10 +122,10 @@ def _checked(name: str, value: object, sliders: Mapping[str, Slider]) -> float:
     slider = sliders.get(name)
     if slider is None:
         msg = "expected the name of a slider; got another one"
-        raise RefusedError(msg)
+        raise UnknownMessageError(msg)
     # Integers of any size compare, but may not convert to float; nan is in no range.
     real = value if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
     if slider.low <= real <= slider.high:
         return float(real)
     msg = f"{name}: expected a number from {slider.low:g} to {slider.high:g}"
-    raise RefusedError(msg)
+    raise UnknownMessageError(msg)

@@ -30,7 +30,7 @@ _KEY_LIGHT, _FILL_LIGHT = (-0.7, 0.8, 0.9), (0.9, 0.1, 0.6)
 CURVES = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
-class Faces(Protocol):
+class Triangles(Protocol):
     """A triangulated surface: vertices ``(V, 3)`` and outward faces ``(F, 3)``."""
 
     vertices: Any
@@ -60,7 +60,7 @@ class View(Checked):
 
 @checked
 def draw_solid(
-    mesh: Faces,
+    mesh: Triangles,
     curves: Sequence[tuple[str, ArrayLike]] = (),
     points: ArrayLike = (),
     labels: Sequence[str] = (),
@@ -117,7 +117,7 @@ def draw_solid(
 @checked
 def place_solid(
     axes: Any,
-    mesh: Faces,
+    mesh: Triangles,
     curves: Sequence[tuple[str, ArrayLike]],
     marks: Sequence[tuple[str, ArrayLike]],
     *,
@@ -158,7 +158,7 @@ def place_solid(
 
 
 @checked
-def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
+def visible(mesh: Triangles, points: ArrayLike, view: View) -> Mask:
     """Return a mask of the points ``(m, 3)``, on or outside a solid, that it does not hide.
 
     Points may lie behind the mesh by 2.5 times the median side of a face (at most 0.05 of the
@@ -171,7 +171,7 @@ def visible(mesh: Faces, points: ArrayLike, view: View) -> Mask:
 class _Box:
     """The bounding box of a mesh in a view: from coordinates to places on the page."""
 
-    def __init__(self, mesh: Faces, view: View) -> None:
+    def __init__(self, mesh: Triangles, view: View) -> None:
         vertices = np.asarray(mesh.vertices)
         self.view, self.low, self.high = view, vertices.min(axis=0), vertices.max(axis=0)
         self.factors = np.array(view.factors)
@@ -195,7 +195,7 @@ class _Box:
 class _Depth:
     """A depth buffer of a mesh, with pixels finer than its faces."""
 
-    def __init__(self, mesh: Faces, box: _Box) -> None:
+    def __init__(self, mesh: Triangles, box: _Box) -> None:
         self.box = box
         corners = box.seen(np.asarray(mesh.vertices))[np.asarray(mesh.faces)]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
@@ -251,7 +251,7 @@ def _frame(axes: Any, box: _Box, names: Sequence[str]) -> None:
     axes.grid(visible=False)
 
 
-def _draw_faces(axes: Any, mesh: Faces, cut: Mask, box: _Box) -> None:
+def _draw_faces(axes: Any, mesh: Triangles, cut: Mask, box: _Box) -> None:
     faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
     # A cap shares no vertex with what it cuts, nor a part with another: rims and edges are sharp.
     smooth = np.zeros(len(cut)) if (parts := _parts(mesh)) is None else parts
@@ -271,7 +271,7 @@ def _draw_faces(axes: Any, mesh: Faces, cut: Mask, box: _Box) -> None:
     axes.add_collection3d(surface)
 
 
-def _parts(mesh: Faces) -> Indices | None:
+def _parts(mesh: Triangles) -> Indices | None:
     found: Indices | None = getattr(mesh, "face_attributes", {}).get("part")
     return found
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from polycorner.dumbbells import OutOfRound, Shaking, UnevenFriction, Wobble
-from polycorner.dumbbells.cli.drum_report import _parameters
+from polycorner.dumbbells.cli.drum import _parameters
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.files import load_run
 from polycorner.dumbbells.pictures import movies

@@ -16,7 +16,7 @@ from polycorner.dumbbells.statics.keel import Keel
 from polycorner.dumbbells.statics.minima import dyad_minima
 from polycorner.dumbbells.statics.skeleton import PairAtlas, pair_atlas
 from polycorner.dumbbells.statics.skeleton_map import PairMap, signature_of
-from polycorner.dumbbells.statics.wells import Shaking, dyad_holds
+from polycorner.dumbbells.statics.wells import Agitation, dyad_holds
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 KEEL = Keel(math.radians(7), 0.1, 0.3, 0.05, 0.2)
@@ -55,7 +55,7 @@ def values():
         "keel": KEEL,
         "turning": KEEL.turning(HEADINGS),
         "hold": dyad_holds(PAIR)[0],
-        "shaking": Shaking(1e-3, 5.0),
+        "shaking": Agitation(1e-3, 5.0),
     }
 
 

@@ -13,7 +13,7 @@ from polycorner.dumbbells.statics.critical import critical_rod_radius
 from polycorner.dumbbells.statics.minima import CORNER, dyad_minima
 from polycorner.dumbbells.statics.wells import (
     GRAVITY,
-    Shaking,
+    Agitation,
     dyad_holds,
     hold_escapes,
     hold_times,
@@ -159,7 +159,7 @@ def test_wells_have_the_kind_and_the_energy_of_their_hold():
 
 def test_the_mass_of_a_ball_does_not_matter():
     """Three times the mass, the drag and the energy of the noise: the same time."""
-    shaking = Shaking(2e-3, 5.0)
+    shaking = Agitation(2e-3, 5.0)
     assert shaking.well(HALF_V[0], 0.2).temperature(shaking.kick) == pytest.approx(2e-3 * GRAVITY)
     heavy = HALF_V[0].well(0.2, ball_mass=3.0, drag=4 * 3 * 5.0)
     ((light,),) = hold_times(HALF_V[:1], [0.2], shaking, cells=20)
@@ -168,17 +168,19 @@ def test_the_mass_of_a_ball_does_not_matter():
 
 def test_half_v_holds_longer_than_u_near_the_corner_but_not_far_from_it():
     """Below the way where the slope's energy is the modes' the contacts are the stronger holds."""
-    near, far = hold_times(BOUND, [0.2, 0.8], Shaking(2e-3, 5.0), cells=30).T
+    near, far = hold_times(BOUND, [0.2, 0.8], Agitation(2e-3, 5.0), cells=30).T
     assert near[:3].min() > 2 * near[3:].max()
     assert far[0] < far[3:].min()
-    bare = hold_times([hold.without_slope for hold in HALF_V], [0.2], Shaking(2e-3, 5.0), cells=30)
+    bare = hold_times(
+        [hold.without_slope for hold in HALF_V], [0.2], Agitation(2e-3, 5.0), cells=30
+    )
     assert (near[:3] > 2 * bare[:, 0]).all()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hold", [HOLDS[0], HOLDS[1], HOLDS[3]], ids=lambda hold: hold.direction)
 def test_simulated_times(hold):
-    shaking = Shaking(2e-3, 5.0)
+    shaking = Agitation(2e-3, 5.0)
     ((exact,),) = hold_times([hold], [0.2], shaking, cells=60)
     run = hold_escapes(hold, 0.2, shaking, duration=12 * exact, count=300, seed=4)
     assert run.escaped.mean() > 0.99
@@ -186,4 +188,4 @@ def test_simulated_times(hold):
 
 
 def test_times_out_of_reach_are_not_numbers():
-    assert math.isnan(hold_times(HALF_V[:1], [2.0], Shaking(1e-5, 5.0))[0, 0])
+    assert math.isnan(hold_times(HALF_V[:1], [2.0], Agitation(1e-5, 5.0))[0, 0])
