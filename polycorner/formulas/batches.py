@@ -172,12 +172,9 @@ def _emit_rows(
     strides = [*sizes, 0, 0][:3]
 
     def one(b: ir.IRBuilder, i: ir.Value) -> None:
-        def moved(pointer: ir.Value, k: ir.Value, stride: int) -> ir.Value:
-            return b.gep(pointer, [b.mul(k, ir.Constant(emit.I64, stride))]) if stride else pointer
-
-        parameters = moved(p, b.urem(i, period), program.parameters)
-        places = [moved(r, i, stride) for r, stride in zip(results, strides, strict=True)]
-        b.call(point, [moved(q, i, program.variables), parameters, *places])
+        numbers = row(b, p, b.urem(i, period), program.parameters)
+        places = [row(b, r, i, stride) for r, stride in zip(results, strides, strict=True)]
+        b.call(point, [row(b, q, i, program.variables), numbers, *places])
 
     builder = ir.IRBuilder(rows.append_basic_block())
     builder = loop(builder, ir.Constant(emit.I64, 0), count, 1, one)
@@ -194,10 +191,7 @@ def _emit_batch(
     count, *pointers = batch.args
 
     def moved(b: ir.IRBuilder, i: ir.Value) -> list[ir.Value]:
-        return [
-            b.gep(p, [b.mul(i, ir.Constant(emit.I64, s))]) if s else p
-            for p, s in zip(pointers, strides, strict=True)
-        ]
+        return [row(b, p, i, stride) for p, stride in zip(pointers, strides, strict=True)]
 
     builder = ir.IRBuilder(batch.append_basic_block("entry"))
     lanes = ir.Constant(emit.I64, emit.LANES)
@@ -292,6 +286,11 @@ def _clear(b: ir.IRBuilder, pointer: ir.Value, count: int) -> None:
 def at_offset(b: ir.IRBuilder, pointer: ir.Value, position: int) -> ir.Value:
     """Return the address of a number after the one at an address."""
     return b.gep(pointer, [ir.Constant(emit.I64, position)])
+
+
+def row(b: ir.IRBuilder, pointer: ir.Value, i: ir.Value, stride: int) -> ir.Value:
+    """Return the address of row ``i`` of ``stride`` numbers each; all share it for none."""
+    return b.gep(pointer, [b.mul(i, ir.Constant(emit.I64, stride))]) if stride else pointer
 
 
 def gather(b: ir.IRBuilder, pointer: ir.Value, position: int, stride: int, lanes: int) -> ir.Value:

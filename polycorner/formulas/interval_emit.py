@@ -68,7 +68,7 @@ class IntervalEmitter:
     def _operate(self, op: str, node: int) -> Sides:
         if op == "select":
             return self._select(node)
-        children = [int(a) for a in self.graph.nodes[node][1]]
+        children = self.graph.children(node)
         if op in {"sin", "cos"}:
             return self._sine(children[0])[op == "cos"]
         values = [self._done[a] for a in children]
@@ -77,9 +77,9 @@ class IntervalEmitter:
         if op in rules:
             return rules[op](children, x, y)
         if op == "add":
-            return self.r.add(x[0], y[0], up=False), self.r.add(x[1], y[1], up=True)
+            return self.r.sides("add", (x[0], y[0]), (x[1], y[1]))
         if op == "sub":
-            return self.r.sub(x[0], y[1], up=False), self.r.sub(x[1], y[0], up=True)
+            return self.r.sides("sub", (x[0], y[1]), (x[1], y[0]))
         if op == "neg":
             return self._neg(x)
         if op == "sqrt":
@@ -102,9 +102,9 @@ class IntervalEmitter:
         """Square roots of intervals that reach below zero are given up, as in ball arithmetic."""
         if not known.nonnegative:
             x = bounded(self.r, self.b.fcmp_ordered(">=", x[0], self.r.splat(0.0)), x)
-        return self.r.sqrt(x[0], up=False), self.r.sqrt(x[1], up=True)
+        return self.r.sides("sqrt", x[:1], x[1:])
 
-    def _mul(self, children: list[int], x: Sides, y: Sides) -> Sides:
+    def _mul(self, children: tuple[int, ...], x: Sides, y: Sides) -> Sides:
         first, second = (self.facts[a] for a in children)
         if children[0] == children[1]:
             return self._square(first, x)
@@ -139,7 +139,7 @@ class IntervalEmitter:
         pairs = [(p, q) for p in x for q in y]
         return self.r.mul(pairs, up=False), self.r.mul(pairs, up=True)
 
-    def _div(self, children: list[int], x: Sides, y: Sides) -> Sides:
+    def _div(self, children: tuple[int, ...], x: Sides, y: Sides) -> Sides:
         above, below = (self.facts[a] for a in children)
         b, r = self.b, self.r
         if below.nonpositive:
@@ -159,16 +159,16 @@ class IntervalEmitter:
         """Return the range of ``x / y`` for positive ``y``."""
         b, r, zero = self.b, self.r, self.r.splat(0.0)
         if above.nonnegative:
-            low, high = r.div(x[0], y[1], up=False), r.div(x[1], y[0], up=True)
+            low, high = r.sides("div", (x[0], y[1]), (x[1], y[0]))
             return greatest(b, zero, low), high
         if above.nonpositive:
-            low, high = r.div(x[0], y[0], up=False), r.div(x[1], y[1], up=True)
+            low, high = r.sides("div", (x[0], y[0]), (x[1], y[1]))
             return low, least(b, zero, high)
         smaller = b.select(b.fcmp_ordered(">=", x[0], zero), y[1], y[0])
         larger = b.select(b.fcmp_ordered(">=", x[1], zero), y[0], y[1])
-        return r.div(x[0], smaller, up=False), r.div(x[1], larger, up=True)
+        return r.sides("div", (x[0], smaller), (x[1], larger))
 
-    def _pow(self, children: list[int], x: Sides, y: Sides) -> Sides:
+    def _pow(self, children: tuple[int, ...], x: Sides, y: Sides) -> Sides:
         exponent = self.facts[children[1]]
         constant = self.graph.nodes[children[1]][0] == "const"
         return functions.power(self.r, x, y, positive=constant and exponent.nonnegative)

@@ -21,7 +21,7 @@ from polycorner.formulas import (
     rounding,
     translate,
 )
-from polycorner.formulas.batches import POINTER, VOID, gather, loop, store
+from polycorner.formulas.batches import POINTER, VOID, gather, loop, row, store
 from polycorner.formulas.interval_emit import IntervalEmitter
 from polycorner.formulas.interval_library import Sides
 from polycorner.formulas.machine_code import code_name, kept_code, machine_code
@@ -73,13 +73,8 @@ class IntervalKernel:
         form: str = "natural",
         kind: str = "",
     ) -> None:
-        self.inputs, self.sizes, self.continuity = (
-            inputs,
-            [len(level) for level in levels],
-            continuity,
-        )
-        self.kind = kind or best_rounding()
-        self.form = form
+        self.inputs, self.sizes = inputs, [len(level) for level in levels]
+        self.continuity, self.form, self.kind = continuity, form, kind or best_rounding()
         used, kept = compact(graph, levels)
         content = (used.nodes, inputs, kept, continuity, form, self.kind)
         name = code_name("polycorner_boxes", content, *GENERATORS)
@@ -107,10 +102,7 @@ class IntervalKernel:
         strides = [self.inputs, self.inputs, *widths]
 
         def block(b: ir.IRBuilder, i: ir.Value) -> None:
-            places = [
-                b.gep(pointer, [b.mul(i, ir.Constant(emit.I64, stride))])
-                for pointer, stride in zip(pointers, strides, strict=True)
-            ]
+            places = [row(b, p, i, stride) for p, stride in zip(pointers, strides, strict=True)]
             self._body(b, graph, levels, places)
 
         start = ir.IRBuilder(function.append_basic_block("entry"))
@@ -250,8 +242,7 @@ class Sharper:
         low, high = self._middle.value(self.values[j])
         for i, slope in self._row(j).items():
             part = self.emitter.product(NOTHING, slope, NOTHING, self._offsets[i])
-            low = self.r.add(low, part[0], up=False)
-            high = self.r.add(high, part[1], up=True)
+            low, high = self.r.sides("add", (low, part[0]), (high, part[1]))
         return self._intersected(j, (low, high))
 
     def monotone(self, j: int) -> Sides:
@@ -280,7 +271,7 @@ class Sharper:
             half = self.r.splat(0.5)
             near = self.b.fadd(self.b.fmul(half, low), self.b.fmul(half, high))
             c = centre[i] = greatest(self.b, least(self.b, near, high), low)
-            self._offsets[i] = self.r.sub(low, c, up=False), self.r.sub(high, c, up=True)
+            self._offsets[i] = self.r.sides("sub", (low, c), (high, c))
         return centre
 
     def _intersected(self, j: int, form: Sides) -> Sides:

@@ -34,7 +34,6 @@ LIBRARY = 8
 QUARTERS = 2 / 3.141592653589793  # quarter turns a radian, to nearest
 
 Sides = tuple[ir.Value, ir.Value]
-Known = dict[int, tuple[ir.Value, ir.Value]]
 
 
 def blend(b: ir.IRBuilder, mask: ir.Value, yes: Sides, no: Sides) -> Sides:

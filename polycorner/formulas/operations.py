@@ -9,35 +9,13 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
-SMALLEST = 5e-324  # the number from which on a double is positive
+# Numbers of some kind with the operations ``const``, ``add``, ``sub``, ``mul``, ``div``, ``neg``
+# and ``unary``, as a ``Graph`` has them for its nodes; balls and power series are others.
+Algebra = Any
+
 LARGEST_EXPONENT = 600.0  # arguments beyond this of exp, sinh and cosh are given up
-
-
-class Algebra(Protocol):
-    """Numbers of some kind, such as nodes of a graph, balls or power series, and operations."""
-
-    def const(self, value: Fraction | int | str) -> Any:
-        """Return a constant: a fraction, ``"pi"`` or ``"e"``."""
-
-    def add(self, a: Any, b: Any) -> Any:
-        """Return ``a + b``."""
-
-    def sub(self, a: Any, b: Any) -> Any:
-        """Return ``a - b``."""
-
-    def mul(self, a: Any, b: Any) -> Any:
-        """Return ``a * b``."""
-
-    def div(self, a: Any, b: Any) -> Any:
-        """Return ``a / b``."""
-
-    def neg(self, a: Any) -> Any:
-        """Return ``-a``."""
-
-    def unary(self, op: str, a: Any) -> Any:
-        """Return an elementary function of ``a``."""
 
 
 @dataclass(frozen=True)
@@ -132,10 +110,7 @@ OPERATIONS: dict[str, Operation] = {
         size=2.0,
         analytic=("the argument of an arccosine may reach 1 or -1", lambda x: -1 < x < 1),
     ),
-    "atan": Operation(
-        lambda g, u, _, d: g.div(d, g.add(g.const(1), g.mul(u, u))),
-        size=2.0,
-    ),
+    "atan": Operation(lambda g, u, _, d: g.div(d, g.add(g.const(1), g.mul(u, u))), size=2.0),
     "sinh": Operation(
         lambda g, u, _, d: g.mul(g.unary("cosh", u), d),
         limits=(-LARGEST_EXPONENT, LARGEST_EXPONENT),
@@ -152,9 +127,7 @@ OPERATIONS: dict[str, Operation] = {
         cycle=(math.cosh, math.sinh),
     ),
     "tanh": Operation(
-        lambda g, _, y, d: g.mul(g.sub(g.const(1), g.mul(y, y)), d),
-        values=(-1.0, 1.0),
-        size=0.0,
+        lambda g, _, y, d: g.mul(g.sub(g.const(1), g.mul(y, y)), d), values=(-1.0, 1.0), size=0.0
     ),
     "exp": Operation(
         lambda g, _, y, d: g.mul(y, d),
@@ -167,7 +140,7 @@ OPERATIONS: dict[str, Operation] = {
     "log": Operation(
         lambda g, u, _, d: g.div(d, u),
         known={1: 0},
-        limits=(SMALLEST, math.inf),
+        limits=(math.ulp(0.0), math.inf),  # positive doubles
         size=11.0,
         analytic=("the argument of a logarithm may reach 0", lambda x: x > 0),
     ),
@@ -178,9 +151,5 @@ OPERATIONS: dict[str, Operation] = {
         values=(0.0, None),
         analytic=("the argument of a square root may reach 0", lambda x: x > 0),
     ),
-    "erf": Operation(
-        lambda g, u, _, d: g.mul(_bell(g, u), d),
-        values=(-1.0, 1.0),
-        size=0.0,
-    ),
+    "erf": Operation(lambda g, u, _, d: g.mul(_bell(g, u), d), values=(-1.0, 1.0), size=0.0),
 }

@@ -59,26 +59,23 @@ class Stepped:
         """Return one constant in every lane."""
         return emit.splat(value, self.lanes)
 
-    def add(self, x: ir.Value, y: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of ``x + y``."""
-        return self.step(self.b.fadd(x, y), up=up)
+    def rounded(self, op: str, *values: ir.Value, up: bool) -> ir.Value:
+        """Return a bound of a result of ``add``, ``sub``, ``div`` or ``sqrt``."""
+        if op == "sqrt":
+            return self.step(self.call(op, *values), up=up)
+        r = self.step(getattr(self.b, f"f{op}")(*values), up=up)
+        return self._beyond(r, up=up) if op == "div" else r
 
-    def sub(self, x: ir.Value, y: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of ``x - y``."""
-        return self.step(self.b.fsub(x, y), up=up)
+    def sides(
+        self, op: str, lower: Sequence[ir.Value], upper: Sequence[ir.Value]
+    ) -> tuple[ir.Value, ir.Value]:
+        """Return a lower bound of one result and an upper bound of another."""
+        return self.rounded(op, *lower, up=False), self.rounded(op, *upper, up=True)
 
     def mul(self, pairs: Pairs, *, up: bool) -> ir.Value:
         """Return a lower bound of the least of some products, or an upper one of the greatest."""
         products = [self.b.fmul(x, y) for x, y in pairs]
         return self._beyond(self.step(self.fold(products, up=up), up=up), up=up)
-
-    def div(self, x: ir.Value, y: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of ``x / y``."""
-        return self._beyond(self.step(self.b.fdiv(x, y), up=up), up=up)
-
-    def sqrt(self, x: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of the square root of a number that is not negative."""
-        return self.step(self.call("sqrt", x), up=up)
 
     def fold(self, values: Sequence[ir.Value], *, up: bool) -> ir.Value:
         """Return the least or the greatest of some numbers."""
@@ -108,33 +105,18 @@ class Embedded(Stepped):
 
     name = "embedded"
 
-    def add(self, x: ir.Value, y: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of ``x + y``."""
-        return self._directed("add", [x, y], up=up)
-
-    def sub(self, x: ir.Value, y: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of ``x - y``."""
-        return self._directed("sub", [x, y], up=up)
-
-    def mul(self, pairs: Pairs, *, up: bool) -> ir.Value:
-        """Return a lower bound of the least of some products, or an upper one of the greatest."""
-        return self.fold([self._directed("mul", list(pair), up=up) for pair in pairs], up=up)
-
-    def div(self, x: ir.Value, y: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of ``x / y``."""
-        return self._directed("div", [x, y], up=up)
-
-    def sqrt(self, x: ir.Value, *, up: bool) -> ir.Value:
-        """Return a bound of the square root of a number that is not negative."""
-        return self._directed("sqrt", [x], up=up)
-
-    def _directed(self, op: str, values: list[ir.Value], *, up: bool) -> ir.Value:
+    def rounded(self, op: str, *values: ir.Value, up: bool) -> ir.Value:
+        """Return a bound of the result of an operation."""
         name, kind, mode = f"llvm.x86.avx512.{op}.pd.512", emit.lane_type(8), ir.IntType(32)
         known: dict[str, Any] = self.b.module.globals
         if name not in known:
             ir.Function(self.b.module, ir.FunctionType(kind, [kind] * len(values) + [mode]), name)
         direction = ir.Constant(mode, UPWARDS if up else DOWNWARDS)
         return self.b.call(known[name], [*values, direction])
+
+    def mul(self, pairs: Pairs, *, up: bool) -> ir.Value:
+        """Return a lower bound of the least of some products, or an upper one of the greatest."""
+        return self.fold([self.rounded("mul", *pair, up=up) for pair in pairs], up=up)
 
 
 ROUNDINGS: dict[str, type[Stepped]] = {kind.name: kind for kind in (Stepped, Embedded)}

@@ -301,7 +301,8 @@ class _Balls:
     @staticmethod
     def unary(op: str, a: Ball) -> Ball:
         """Return an elementary function."""
-        return operations()[op](a)
+        value: Ball = operations()[op](a)
+        return value
 
 
 def _slope(known: Operation) -> Callable[..., Any]:

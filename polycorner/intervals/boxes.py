@@ -8,6 +8,7 @@ searches that look at millions of boxes.
 from collections.abc import Sequence
 from functools import lru_cache
 from threading import RLock
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,6 @@ from polycorner.formulas.interval_kernels import IntervalKernel
 from polycorner.formulas.programs import Graph, Program
 from polycorner.intervals.enclosures import exact_program, written
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import cached_property
 
 
 class BoxFunctions:
@@ -63,8 +63,7 @@ class BoxFunctions:
         self.names, self.dimension = tuple(f.name for f in self.functions), manifold.size
         self.rounding = rounding
         self.graph = Graph()
-        self._kernels: dict[tuple[int, str], IntervalKernel] = {}
-        self._continuities: dict[int, tuple[IntervalKernel, list[int]]] = {}
+        self._kernels: dict[tuple[int, str], tuple[IntervalKernel, list[int]]] = {}
         self._making = RLock()  # of kernels, for which threads write into the one graph
 
     def values(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
@@ -112,7 +111,7 @@ class BoxFunctions:
         ``hessians`` the bounds of second derivatives ``(B, m, n, n)`` follow.
         """
         low, high = self._boxes(lo, hi)
-        kernel, entries = self._mean_value
+        kernel, entries = self._kernel(2, "slopes")
         count, n, m = len(entries), self.dimension, len(self.functions)
         parts = tuple(
             [np.zeros((len(low), count, *shape)) for shape in ((), (n,)) for _ in range(2)]
@@ -140,7 +139,7 @@ class BoxFunctions:
 
     def _are_continuous(self, lo: ArrayLike, hi: ArrayLike, order: int) -> NDArray[np.bool_]:
         low, high = self._boxes(lo, hi)
-        kernel, entries = self._continuity(order)
+        kernel, entries = self._kernel(order, "continuity")
         found = np.zeros((len(low), len(entries)))
         kernel.fill(low, high, [found])
         result = np.ones((len(low), len(self.functions) * self.dimension**order), dtype=np.bool_)
@@ -154,7 +153,7 @@ class BoxFunctions:
         m, n = len(self.functions), self.dimension
         shapes = ((m,), (m, n), (m, n, n))[: order + 1]
         results = tuple([np.zeros((len(low), *shape)) for shape in shapes for _ in range(2)])
-        self._kernel(order, form).fill(low, high, results)
+        self._kernel(order, form)[0].fill(low, high, results)
         return results
 
     def _boxes(self, lo: ArrayLike, hi: ArrayLike) -> tuple[Array, Array]:
@@ -165,37 +164,29 @@ class BoxFunctions:
             checks.refuse("lo, hi", expected, (low.shape, high.shape))
         return low, high
 
-    def _kernel(self, order: int, form: str = "natural") -> IntervalKernel:
+    def _kernel(self, order: int, form: str = "natural") -> tuple[IntervalKernel, list[int]]:
+        """Return the kernel of derivatives up to an order, and which of those are not zero.
+
+        ``form`` is one of ``FORMS``; ``"continuity"``, for flags of the highest derivatives that
+        are not zero (orders 0 and 1); or ``"slopes"``, for first derivatives in mean value form.
+        """
         with self._making:
             if (order, form) not in self._kernels:
-                known = self.graph, self.dimension, self._levels(order)
-                self._kernels[order, form] = IntervalKernel(*known, form=form, kind=self.rounding)
+                levels, n = self._levels(order), self.dimension
+                entries = [e for e, a in enumerate(levels[min(order, 1)]) if a is not None]
+                options: dict[str, Any] = {"kind": self.rounding}
+                if form == "continuity":
+                    levels = [[levels[order][e] for e in entries]]
+                    options["continuity"] = True
+                elif form == "slopes":
+                    bends = [a for e in entries for a in levels[2][e * n :][:n]]
+                    levels = [[levels[1][e] for e in entries], bends]
+                    options["form"] = "mean value"
+                else:
+                    options["form"] = form
+                kernel = IntervalKernel(self.graph, n, levels, **options)
+                self._kernels[order, form] = kernel, entries
             return self._kernels[order, form]
-
-    def _continuity(self, order: int) -> tuple[IntervalKernel, list[int]]:
-        """Return the kernel for derivatives of an order, and which are not zero."""
-        with self._making:
-            if order not in self._continuities:
-                level = self._levels(order)[order]
-                entries = [e for e, a in enumerate(level) if a is not None]
-                known = self.graph, self.dimension, [[level[e] for e in entries]]
-                kernel = IntervalKernel(*known, continuity=True, kind=self.rounding)
-                self._continuities[order] = kernel, entries
-            return self._continuities[order]
-
-    @property
-    def _mean_value(self) -> tuple[IntervalKernel, list[int]]:
-        with self._making:
-            return self._mean_value_kernel
-
-    @cached_property
-    def _mean_value_kernel(self) -> tuple[IntervalKernel, list[int]]:
-        """The kernel of first derivatives in mean value form, and which are not zero."""
-        _, slopes, bends = self._levels(2)
-        entries, n = [e for e, a in enumerate(slopes) if a is not None], self.dimension
-        levels = [[slopes[e] for e in entries], [a for e in entries for a in bends[e * n :][:n]]]
-        known = self.graph, n, levels
-        return IntervalKernel(*known, form="mean value", kind=self.rounding), entries
 
     def _levels(self, order: int) -> list[list[int | None]]:
         """Return the nodes of values, first and second derivatives, None for structural zeros."""
